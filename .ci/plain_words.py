@@ -3,8 +3,10 @@
 Run ``python .ci/plain_words.py`` at the root of the repository.
 """
 
+import io
 import re
 import sys
+import tokenize
 from pathlib import Path
 
 LIST = Path(__file__).with_suffix(".txt")
@@ -12,6 +14,7 @@ FOLDERS = (
     ".ci", "assembly", "benchmarks", "docs", "examples", "forcefit", "meshes",
     "stiffness", "tests", "validation",
 )  # fmt: skip
+LIBRARY = {"assembly", "examples", "forcefit", "meshes", "stiffness", "validation"}
 SOURCES = {".py", ".h", ".cpp", ".md"}
 SKIPPED = {"CHANGELOG.md"}  # history keeps the words of its time
 
@@ -40,6 +43,20 @@ def find_words(text, words, names=()):
         yield text.count("\n", 0, match.start()) + 1, found, words[found]
 
 
+def comments(text, python=True):
+    """Return the comments and docstrings of a source, on the same lines."""
+    if not python:  # C++
+        return "\n".join(line.partition("//")[2] for line in text.splitlines())
+    found, before = "", tokenize.NEWLINE
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        begins = before in {tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT}
+        if token.type == tokenize.COMMENT or (token.type == tokenize.STRING and begins):
+            found += "\n" * (token.start[0] - 1 - found.count("\n")) + token.string
+        if token.type not in {tokenize.NL, tokenize.COMMENT}:
+            before = token.type
+    return found
+
+
 def main():
     """Print every word that is found, with its file, line and replacement."""
     sections = read_list(LIST.read_text("utf-8"))
@@ -49,13 +66,19 @@ def main():
     for path in sorted(paths):
         if path.suffix not in SOURCES or path.name in SKIPPED:
             continue
-        words = dict(sections["everywhere"])
-        if path.suffix == ".md":
-            words |= sections["pages"]
         text = path.read_text("utf-8")
-        for line, found, plain in find_words(text, words, sections["names"]):
-            print(f"{path}:{line}: {found!r}; write: {plain}")
-            status = 1
+        searched = [(text, sections["everywhere"])]
+        if path.suffix == ".md":
+            searched.append((text, sections["pages"]))
+        elif path.parts[0] in LIBRARY:
+            searched.append((
+                comments(text, path.suffix == ".py"),
+                sections["comments"],
+            ))
+        for part, words in searched:
+            for line, found, plain in find_words(part, words, sections["names"]):
+                print(f"{path}:{line}: {found!r}; write: {plain}")
+                status = 1
     return status
 
 

@@ -1,6 +1,6 @@
-"""What pose, what energy, what error?  The virtual-joint model of the manipulator.
+"""Virtual-joint model of a manipulator: its pose, elastic energy and errors.
 
-Begin at ``model/robot.py``, then ``kinematics/posture.py`` and ``linear/energy.py``.
+Begin with ``model/robot.py``, then ``kinematics/posture.py``, ``linear/energy.py``.
 """
 
-DISTRIBUTION = "forcefit"  # which `import forcefit` looks for
+DISTRIBUTION = "forcefit"  # text by which ``import forcefit`` recognises the package

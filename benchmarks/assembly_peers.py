@@ -21,10 +21,13 @@ GRAVITY = np.array([0.0, 0.0, -9.81])  # [m/s^2]
 
 
 def closure_matrices(
-    posture: Posture, compliant: str = "elastic"
+    posture: Posture, springs: bool = True, own_axes_free: bool = False
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Columns of free motions, clearances, springs, and the misfit, scaled to 1."""
-    lin, joints = linearise(posture), virtual_joints(posture.robot, compliant)
+    lin, joints = (
+        linearise(posture),
+        virtual_joints(posture.robot, springs, own_axes_free),
+    )
     small = np.abs(lin.rows @ joints.cones).max()
     elastic = lin.rows @ joints.elastic
     soft = np.abs(elastic).max(initial=0.0) or 1.0
@@ -57,9 +60,9 @@ class Dpp:
     """
 
     def __init__(
-        self, robot: Robot, compliant: str, margin: bool, data: list[tuple]
+        self, robot: Robot, own_axes_free: bool, margin: bool, data: list[tuple]
     ) -> None:
-        joints = virtual_joints(robot, compliant)
+        joints = virtual_joints(robot, not margin, own_axes_free)
         self.entries = [
             np.nonzero(sum(map(np.abs, parts))) for parts in zip(*data, strict=True)
         ]

@@ -127,7 +127,7 @@ def print_energies(robot: Robot, postures: list[Posture], kappa: float) -> None:
     data = [closure_matrices(p) for p in few]
     rows = {
         "cvxpy rebuilt, SI": timed(cvxpy_rebuilt, few[::3]),
-        "cvxpy DPP, scaled": timed(Dpp(robot, "elastic", False, data), data),
+        "cvxpy DPP, scaled": timed(Dpp(robot, False, False, data), data),
         "Clarabel, full problem, scaled": timed(clarabel_full, few),
         "Clarabel, our reduction (numpy)": timed(clarabel_reduced, few),
         "moreau, batched, full problem": moreau_batched(own),
@@ -150,7 +150,7 @@ def print_loaded(robot: Robot, postures: list[Posture], kappa: float) -> None:
     for posture in own:
         solve_assembly(posture, **loaded)
     data = [loaded_matrices(p) for p in few]
-    dpp = Dpp(robot, "elastic", False, data)
+    dpp = Dpp(robot, False, False, data)
     rows = {
         "cvxpy DPP, scaled": timed(dpp, data),
         "ours, reference in numpy": timed(
@@ -173,9 +173,11 @@ def print_margins(postures: list[Posture]) -> None:
         ours = partial(zone_margin, compliant=reading)
         ours(few[0])
         reference = partial(zone_margin, compliant=reading, method="reference")
-        data = [closure_matrices(p, reading) for p in few]
+        data = [closure_matrices(p, False, reading == "free") for p in few]
         rows = {
-            "cvxpy DPP, scaled": timed(Dpp(few[0].robot, reading, True, data), data),
+            "cvxpy DPP, scaled": timed(
+                Dpp(few[0].robot, reading == "free", True, data), data
+            ),
             "ours, reference in numpy": timed(reference, few),
             "ours, one at a time": timed(ours, postures),
             "ours, batched": batched(ours, postures),

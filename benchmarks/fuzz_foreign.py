@@ -107,7 +107,7 @@ FOREIGN = [
     (6, "convert tied.sdf -o new.toml"),
     (8, "convert tied.xml -o new.toml"),
     (6, "convert tied.urdf -o new.toml"),
-    (3, "assembly zone tied.urdf --json -"),
+    (3, "assembly solve tied.urdf --quantities margin --json -"),
     (4, "stiffness import long.dmig --json -"),
     (2, "convert five.toml -o new.urdf"),
     (2, "convert five.toml -o new.xml"),

@@ -27,15 +27,15 @@ picture = false
 VECTORS = {"A": (0, 0, 0.1), "B": (0.1, 0.02, 0), "C": (0, 0.07, 0.03)}
 
 MACHINES = [
-    (5, "assembly zone delta.toml --json -"),
+    (5, "assembly solve delta.toml --quantities margin --json -"),
     (3, "assembly solve delta.toml --load fz=-100 --gravity z=-9.81"),
     (3, "assembly stiffness delta.toml --along tz=1 --json -"),
     (2, "assembly deflection delta.toml --along fz=0:-100:50 --figure new.svg"),
     (2, "assembly frequencies delta.toml --count 3 --json new.json"),
     (3, "assembly sweep delta.toml --grid tx=0:0.01:0.01 -o new.nc --state nominal "
         "--csv new.csv"),
-    (4, "assembly zone rounded.toml --rest coupler --json -"),
-    (2, "assembly table swept.nc -o new.csv"),
+    (4, "assembly solve rounded.toml --quantities margin --rest coupler --json -"),
+    (2, "assembly plot swept.nc --csv new.csv"),
     (2, "convert delta.toml -o new.urdf"),
     (3, "study service.toml -o newstudy"),
     (6, "validation predict saved.toml learnt -o new.csv --json -"),
@@ -44,7 +44,7 @@ MACHINES = [
         "diagnosed.json"),
     (4, "validation carry saved.toml learnt --setup 4 -o new.toml"),
     (3, "validation explain curved.toml --figure new.svg"),
-    (4, "validation iso learnt --json -"),
+    (4, "validation inspect learnt --iso --json -"),
     (2, "validation plan saved.toml -o newfolder --rows 8 --configurations 8"),
     (3, "validation inspect learnt"),
     (4, "validation import leica.csv --targets smr.toml --commands commands.csv "
@@ -63,7 +63,7 @@ MACHINES = [
 
 # gmsh, which reads STEP, is an extra; without it these are left out
 STEP = [
-    (4, "stiffness solids two.step --json -"),
+    (4, "stiffness fea two.step --part list --json -"),
     (3, "stiffness fea two.step#solid1 --base z=0 --tip z=7 --young 7e10 --poisson "
         "0.3"),
 ] if find_spec("gmsh") else []  # fmt: skip

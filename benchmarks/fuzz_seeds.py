@@ -147,11 +147,11 @@ f 1 4 3
 
 # share of the inputs, then the command; what a command writes is called new...
 COMMANDS = [
-    (9, "assembly zone bar.toml"),
+    (9, "assembly solve bar.toml --quantities margin"),
     (9, "assembly solve bar.toml --load fx=10,mz=1 --gravity y=-9.81 --json -"),
     (6, "assembly solve arm.toml --joint one=0.2,two=0.4 --under time=60 --json "
         "new.json"),
-    (3, "assembly exact bar.toml --joint crank=1.1"),
+    (3, "assembly solve bar.toml --state exact --joint crank=1.1"),
     (3, "assembly error bar.toml --assumption frozen --at x=0.1 --along tx=1"),
     (1, "assembly show bar.toml --figure new.png --exaggeration 20"),
     (5, "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o new.nc --near 0.1"),
@@ -168,14 +168,14 @@ COMMANDS = [
     (2, "assembly statistics bar.toml --errors errors.toml --draws 40 -o drawn.nc"),
     (3, "assembly tolerances bar.toml --grid tx=0.65 --plan plan.toml --fresh 20 "
         "-o new.nc --json -"),
-    (2, "assembly tolerances bar.toml --grid tx=0.65:0.66:0.01 --compliant rigid"),
+    (2, "assembly tolerances bar.toml --grid tx=0.65:0.66:0.01 --quantities margin"),
     (2, "assembly plot swept.nc --figure new.svg"),
     (1, "assembly plot draws.nc --figure new.png --kind histogram"),
     (5, "stiffness beam --length 0.4 --young 2.1e11 --poisson 0.3 --radius 0.02 "
         "--along 1,0,2 --theory timoshenko --json -"),
     (4, "stiffness beam --length 0.4 --young 2.1e11 --poisson 0.3 --section "
         "width=0.06,height=0.04,wall=0.003 --up z"),
-    (7, "stiffness curve curve.toml --young 7e10 --poisson 0.3 --json new.json"),
+    (7, "stiffness beam curve.toml --young 7e10 --poisson 0.3 --json new.json"),
     (3, "stiffness fea solid.obj --base z=0 --tip z=7 --young 7e10 --poisson 0.3 "
         "--unit mm --part z=0.2..0.4/young=2e11,poisson=0.3,density=7800 --mass "
         "1/0,0,1"),
@@ -185,12 +185,12 @@ COMMANDS = [
         "--radius 0.02 --figure new.pdf"),
     (2, "stiffness stress solid.obj --base z=0 --tip z=7 --young 7e10 --poisson 0.3 "
         "--wrench fx=10,mz=1 --away 0.01"),
-    (1, "stiffness slenderness --young 7e10 --poisson 0.3 --radius 0.02 --ratios 5,x"),
+    (1, "stiffness compare --young 7e10 --poisson 0.3 --radius 0.02 --ratios 5,x"),
     (6, "stiffness library build spec.toml --workers 1"),
-    (5, "stiffness library list links"),
-    (4, "stiffness library look-up links --at length=0.3 --json -"),
-    (4, "stiffness library export links --to csv"),
-    (3, "stiffness library export links --to mapdl --key "
+    (5, "stiffness library read links"),
+    (4, "stiffness library read links --at length=0.3 --json -"),
+    (4, "stiffness library read links --to csv"),
+    (3, "stiffness library read links --to mapdl --key "
         "round-beam-length0.3-radius0.02-young7e+10-poisson0.3"),
     (6, "validation inspect campaign --json -"),
     (1, "validation diagnose campaign --json new.json --save new.toml --report "

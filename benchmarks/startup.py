@@ -18,7 +18,7 @@ WANTED = {  # largest ratio
     "--help": 2.5,
     "--version": 2.5,
     "assembly solve": 5.0,
-    "assembly zone": 5.0,
+    "assembly solve --quantities margin": 5.0,
     "assembly error": 5.0,
 }
 

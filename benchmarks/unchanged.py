@@ -4,10 +4,10 @@
     python benchmarks/unchanged.py compare FOLDER   # after it
 
 For all built-in robots with errors drawn once (and stored as robot files): ``solve``,
-``zone``, ``exact``, ``error``; and one sweep, one statistics run, one diagnosis, one
-cross-check, one K_E by finite elements and one by beams.  Numbers are equal to the last
-bit or the largest relative difference is printed; times, versions and certificates,
-which are rounding, are left out.
+its margins alone, its exact state, ``error``; and one sweep, one statistics run, one
+diagnosis, one cross-check, one K_E by finite elements and one by beams.  Numbers are
+equal to the last bit or the largest relative difference is printed; times, versions and
+certificates, which are rounding, are left out.
 """
 
 import json
@@ -31,9 +31,14 @@ SMALLEST = 1e-9  # in SI: an array without a larger number is rounding of zero
 def questions(folder: Path) -> dict[str, list[str]]:
     """The words after ``forcefit`` for each answer; NetCDF goes to ``{out}``."""
     asked = {
-        f"{command} {robot}": ["assembly", command, str(folder / f"{robot}.toml")]
+        f"{question} {robot}": ["assembly", *words, str(folder / f"{robot}.toml")]
         for robot in (*ROBOTS, "arm6")
-        for command in ("solve", "zone", "exact", "error")
+        for question, words in {
+            "solve": ["solve"],
+            "error": ["error"],
+            "zone": ["solve", "--quantities", "margin"],
+            "exact": ["solve", "--state", "exact"],
+        }.items()
     }
     irsbot2 = str(folder / "irsbot2.toml")
     asked["loaded"] = [

@@ -1,4 +1,4 @@
-"""Campaign folders written from other people's data, and where those data lie."""
+"""Functions that write campaign folders from published data, and find that data."""
 
 import argparse
 import os
@@ -22,18 +22,18 @@ SOURCES = Path(__file__).parent / "data.toml"
 
 
 def data_folder(name: str, data: Path | None = None) -> Path:
-    """Folder of a set of measured data, fetched from its source where it is nowhere.
+    """Return the folder of a set of measured data; download the data if it is absent.
 
     Args:
-        name: of the set.
-        data: where all sets lie; the variable ``FORCEFIT_DATA`` if absent, else
-            ``../shared/data`` beside the repository, else the cache of ``pooch``.
+        name: name of the set.
+        data: folder of all sets; by default the variable ``FORCEFIT_DATA``, else
+            ``../shared/data`` next to the repository, else the cache of ``pooch``.
 
     Returns:
         The folder.
 
     Raises:
-        BadInput: there is none, and it cannot be fetched.
+        BadInput: there is no such folder, and the data cannot be downloaded.
     """
     given = data or os.environ.get("FORCEFIT_DATA")
     folder = Path(given or DATA) / name
@@ -55,7 +55,7 @@ def data_folder(name: str, data: Path | None = None) -> Path:
 
 
 def _fetched(name: str, source: dict[str, Any]) -> Path:
-    """Folder of a set in the cache, all of its files there with their checksums."""
+    """Return folder of a set in the cache, with all files and correct checksums."""
     import pooch
 
     folder = Path(pooch.os_cache("forcefit")) / name
@@ -70,7 +70,7 @@ def _fetched(name: str, source: dict[str, Any]) -> Path:
 def from_command_line(
     convert: Callable[[Path, Path | None], object], about: str | None
 ) -> None:
-    """A converter as a program: folders written are printed, bad input is one line."""
+    """Run a converter as a program: print the written folders, or an error."""
     parser = argparse.ArgumentParser(description=(about or "").split("\n")[0])
     parser.add_argument("-o", "--out", type=Path, required=True)
     parser.add_argument("--data", type=Path, help="folder that holds the data sets")
@@ -91,13 +91,14 @@ def write_campaign(
     sigma: tuple[float, float],
     registration: str = "unknown",
 ) -> Path:
-    """Write a campaign folder in the public format, the robot file beside it.
+    """Write a campaign folder in the public format, with the robot file in it.
 
     Args:
-        folder: made if absent.
-        robot: its platform is the point that was measured.
-        columns: (k,) by the names of ``measurements.csv``; ``id`` is added if absent.
-        sigma: [rad], [m] of a reading.
+        folder: folder, created if it is absent.
+        robot: robot whose platform is the point that was measured.
+        columns: (k,) values by column of ``measurements.csv``; ``id`` is added if
+            absent.
+        sigma: [rad], [m] standard deviations of a reading.
         registration: ``"known"`` or ``"unknown"``.
 
     Returns:
@@ -121,22 +122,22 @@ def write_campaign(
 
 
 def _cell(value: float | str) -> str:
-    """Text of a cell; NaN is an empty one."""
+    """Return the text of a cell; NaN gives an empty text."""
     if isinstance(value, str):
         return value
     return "" if np.isnan(value) else f"{value:.12g}"
 
 
 def deviation_columns(nominal: NDArray, measured: NDArray, turn: bool) -> dict:
-    """``meas.*`` of poses measured in one frame, brought onto the nominal ones.
+    """Return columns ``meas.*`` of poses measured in the device's frame.
 
-    The device's frame is laid on the base by least squares over positions (Kabsch,
-    1976), so that deviations are small; its exact place stays to be fitted.
+    The device's frame is fitted to the base by least squares over the positions
+    (Kabsch, 1976), so that deviations are small; its exact pose is still to be fitted.
 
     Args:
-        nominal: (k, 4, 4) platform seen from the base.
-        measured: (k, 4, 4) seen from the device.
-        turn: whether rotations were measured too.
+        nominal: (k, 4, 4) platform poses in base axes.
+        measured: (k, 4, 4) poses in the device's axes.
+        turn: whether rotations were also measured.
 
     Returns:
         Columns (k,).
@@ -151,7 +152,7 @@ def deviation_columns(nominal: NDArray, measured: NDArray, turn: bool) -> dict:
 
 
 def base_pose(nominal: NDArray, measured: NDArray) -> NDArray:
-    """(4, 4) base seen from the device, from positions (k, 4, 4): Kabsch (1976)."""
+    """Return (4, 4) pose of the base in the device's frame: Kabsch (1976)."""
     a, b = nominal[:, :3, 3], measured[:, :3, 3]
     U, _, Vt = np.linalg.svd((b - b.mean(0)).T @ (a - a.mean(0)))
     T = np.eye(4)

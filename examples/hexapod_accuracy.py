@@ -1,14 +1,14 @@
-"""How accurate a hexapod is, and what better ball joints would gain: one sweep.
+"""Accuracy of a hexapod, and the gain from better ball joints, by one sweep.
 
 Run ``python examples/hexapod_accuracy.py``; it takes some minutes.  Over a square of
 100 mm at working height the sweep draws the errors of ``hexapod_errors.toml`` at every
 posture, for ball joints with 8 and with 4 micrometres of clearance.  It bounds the pose
-error (27) that errors and clearances can add up to.  Printed is, for each clearance,
-the error that 90 % of the machines stay below, at the middle of the square and at its
-worst posture, beside the error by clearances alone; and how near the square is to a
-singularity.
+error (27) by errors and clearances together.  For each clearance it prints the error
+that 90 % of the machines do not exceed, at the middle of the square and at its worst
+posture.  It also prints the error by clearances alone, and the distance of the square
+from a singularity.
 
-The same sweep on the command line, on two processes:
+The same sweep on the command line, with two processes:
 
     forcefit assembly sweep hexapod --errors examples/hexapod_errors.toml --draws 10 \\
         --grid "tx=-0.05:0.05:0.025,ty=-0.05:0.05:0.025,tz=0.53,rx=0,ry=0,rz=0" \\
@@ -27,7 +27,7 @@ CLEARANCE = "ball_3.clearance.axial"
 
 
 def main():
-    """Solve, draw and print."""
+    """Run the sweep, draw the figure and print the errors."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--draws", type=int, default=10, help="machines")
     parser.add_argument("--step", type=float, default=0.025, help="of the grid [m]")
@@ -57,7 +57,7 @@ def main():
 
 
 def print_errors(clearance, data):
-    """Errors of the middle and of the worst posture, at one clearance."""
+    """Print the errors at the middle and at the worst posture, for one clearance."""
     upper = data.sel(bound="upper")
     print(
         f"ball joints with {clearance * 1e6:.0f} um of clearance, "

@@ -1,11 +1,11 @@
-"""The paper's figure 5 from one sweep, in both sign conventions of its errors.
+"""The paper's figure 5 by one sweep, in both sign conventions of its errors.
 
 Run ``python examples/paper_figure5.py``; with ``--step 0.05`` it takes a quarter of the
 time.  For each convention it writes a robot file with the errors of one draw, the data
-set of its maps and the figure, and prints least, median and largest values beside those
-of a reference made by another program (same draw for the positive errors, other signs).
-The figure alone is drawn again, without solving, by
-``forcefit assembly plot figure5_literal.nc --figure figure5_literal.png``.
+set of its maps and the figure.  It prints least, median and largest values, and those
+of a reference by another program.  The reference has the same draw for the positive
+errors and other signs.  To draw the figure again without solving: ``forcefit assembly
+plot figure5_literal.nc --figure figure5_literal.png``.
 """
 
 import argparse
@@ -41,7 +41,7 @@ ROWS = (
 
 
 def main():
-    """Solve, draw and print."""
+    """Run the sweep, draw the figures and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--step", type=float, default=0.025, help="of the grid [m]")
     parser.add_argument("-o", "--output", type=Path, default=Path("."))
@@ -67,7 +67,7 @@ def main():
 
 
 def print_table(signs, data, column):
-    """Least, median and largest of each map, and the reference's."""
+    """Print least, median and largest value of each map, and of the reference."""
     reached = data["status"] == "ok"
     inside = (data["margin_free"] <= ASSEMBLABLE).sum() / reached.sum()
     print(f"{signs}: {int(reached.sum())} postures, {100 * float(inside):.1f} % go "

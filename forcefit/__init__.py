@@ -1,29 +1,29 @@
-"""forcefit: forced assembly of parallel manipulators, and the proof of each number.
+"""forcefit: assembly of parallel manipulators by force, with independent checks.
 
-``import forcefit as ff; ff.load_robot("irsbot2")``: every public name, each imported
-when it is first asked for.  Files come in through :mod:`forcefit.inputs`; the commands
-are :mod:`forcefit.commands`.
+``import forcefit as ff; ff.load_robot("irsbot2")`` loads a robot.  Each public name is
+imported at its first use.  Files are read by :mod:`forcefit.inputs`; the commands are
+in :mod:`forcefit.commands`.
 """
 
 import os.path
 import sys
 
-TYPE_CHECKING = False  # importing typing takes longer than all that is done here
+TYPE_CHECKING = False  # importing typing takes longer than the rest of this module
 if TYPE_CHECKING:
     __version__: str
 
-_MARK = 'DISTRIBUTION = "forcefit"'  # in each package's __init__.py
+_MARK = 'DISTRIBUTION = "forcefit"'  # text in each package's __init__.py
 _BESIDE = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
 
 
 def _refuse_namesakes() -> None:
-    """Refuse to begin where one of the packages is another distribution's.
+    """Raise an error if one of the packages belongs to another distribution.
 
-    Their names are words that others use too: what is first on the path is imported,
-    and in one folder the last one installed has written over the first.
+    Other distributions use the same names of packages.  Python imports the first one on
+    the path; in one folder the last installation overwrites the first.
 
     Raises:
-        ImportError: it says where the other one is.
+        ImportError: names the file of the other distribution.
     """
     for name in ("stiffness", "assembly", "validation"):
         found = _place_of(name)
@@ -37,13 +37,14 @@ def _refuse_namesakes() -> None:
 
 
 def _place_of(name: str) -> str:
-    """First file of the package that would be imported, or ``"nothing"``.
+    """Return first file of the package that Python would import, or ``"nothing"``.
 
     Args:
-        name: of the package.
+        name: name of the package.
 
     Returns:
-        The path; ``importlib.util``, which could say it, takes long to import.
+        The path; the import of ``importlib.util``, which has such a function, takes
+        long.
     """
     for finder in sys.meta_path:
         spec = finder.find_spec(name, None)
@@ -53,44 +54,36 @@ def _place_of(name: str) -> str:
 
 
 def _is_ours(file: str) -> bool:
-    """Whether a package's first file is of forcefit."""
+    """Return whether a package's first file is of forcefit."""
     with open(file, encoding="utf-8", errors="replace") as text:
         return _MARK in text.read()
 
 
 _refuse_namesakes()
 
-# where each public name is defined: the whole of the interface
+# module and public names that it defines: the whole interface
 _OWNERS = {
     "forcefit.inputs.errors": ("BadInput",),
     "stiffness.beam.beam": ("beam_compliance",),
-    "stiffness.beam.sections": ("Section", "rectangular_section", "round_section"),
-    "stiffness.fem.fea": ("FemOptions", "mesh_link"),
+    "stiffness.beam.sections": ("rectangular_section", "round_section"),
+    "stiffness.fem.fea": ("mesh_link",),
     "stiffness.fem.material": ("Material",),
-    "stiffness.link": ("LinkStiffness", "turn_link"),
-    "stiffness.report.library": ("look_up", "read_library"),
-    "stiffness.report.library_build": ("build_library",),
-    "stiffness.surface.interface": ("Interface", "parse_interface"),
+    "stiffness.surface.interface": ("parse_interface",),
     "assembly.exact.exact": ("solve_exact",),
     "assembly.exchange.convert": ("convert",),
     "assembly.exchange.robot_files": ("load_robot", "write_robot"),
-    "assembly.kinematics.closing": ("preloaded", "rest_in"),
-    "assembly.kinematics.posture": ("Posture", "home_posture", "place_robot"),
-    "assembly.kinematics.singular_posture": ("is_singular",),
-    "assembly.linear.energy": ("Assembly", "CannotAssemble", "solve_assembly"),
+    "assembly.kinematics.posture": ("place_robot",),
+    "assembly.linear.energy": ("CannotAssemble", "solve_assembly"),
     "assembly.kinematics.mobility": ("mobility",),
-    "assembly.linear.pose_error": ("PoseError", "bound_pose_error"),
+    "assembly.linear.pose_error": ("bound_pose_error",),
     "assembly.linear.zone": ("zone_margin",),
     "assembly.model.error_distributions": ("read_sources",),
-    "assembly.model.random_errors": ("draw_errors",),
     "assembly.platform_stiffness.deflection": ("deflection_curve",),
-    "assembly.platform_stiffness.matrices": ("PlatformStiffness",),
     "assembly.platform_stiffness.platform_stiffness": ("platform_stiffness",),
     "assembly.platform_stiffness.vibration": ("natural_modes",),
     "assembly.model.robot": (
         "BeamLink", "Clearance", "Frame", "MatrixLink", "Robot",
     ),
-    "assembly.statistics.allocation": ("allocate",),
     "assembly.statistics.experiment": ("Experiment",),
     "assembly.statistics.monte_carlo": ("run_draws",),
     "assembly.statistics.summary": ("summarise",),
@@ -109,25 +102,44 @@ _OWNERS = {
     "validation.study.study": ("run_study",),
     "validation.study.study_file": ("read_study",),
 }  # fmt: skip
-# public names of the last release, which work in this one: the new public name; and
-# module and name of the object, where that is another
+# old public names of the last release, still valid: the new public name, or the module
+# and the name of the object in it
 _RENAMED = {
     "foretell": ("predict",), "load_deflection": ("deflection_curve",),
     "read_robot": ("load_robot",),
+    "home_posture": ("place_robot", "assembly.kinematics.posture", "home_posture"),
     "SweepOptions": ("sweep", "assembly.sweeps.robot_sweep", "options_by_old_names"),
     "ask_sweep": ("sweep", "assembly.sweeps.request", "ask_sweep"),
     "run_sweep": ("sweep", "assembly.sweeps.sweep", "run_sweep"),
     "sweep_in_memory": ("sweep", "assembly.sweeps.sweep", "sweep_in_memory"),
 }  # fmt: skip
+# public names of the last release that are imported from their module now
+_MOVED = {
+    "stiffness.beam.sections": ("Section",),
+    "stiffness.fem.fea": ("FemOptions",),
+    "stiffness.link": ("LinkStiffness", "turn_link"),
+    "stiffness.report.library": ("look_up", "read_library"),
+    "stiffness.report.library_build": ("build_library",),
+    "stiffness.surface.interface": ("Interface",),
+    "assembly.kinematics.closing": ("preloaded", "rest_in"),
+    "assembly.kinematics.posture": ("Posture",),
+    "assembly.kinematics.singular_posture": ("is_singular",),
+    "assembly.linear.energy": ("Assembly",),
+    "assembly.linear.pose_error": ("PoseError",),
+    "assembly.model.random_errors": ("draw_errors",),
+    "assembly.platform_stiffness.matrices": ("PlatformStiffness",),
+    "assembly.statistics.allocation": ("allocate",),
+}
 _OWNER_OF = {name: owner for owner, names in _OWNERS.items() for name in names}
+_MOVED_TO = {name: owner for owner, names in _MOVED.items() for name in names}
 __all__ = [*sorted(_OWNER_OF), "__version__"]
 
 
 def __getattr__(name: str) -> object:
-    """Import a public name when it is first needed; an old one with a warning."""
+    """Import a public name at its first use; give a warning for an old name."""
     if name == "__version__":
         return _version()
-    if name not in _OWNER_OF and name not in _RENAMED:
+    if name not in _OWNER_OF and name not in _RENAMED and name not in _MOVED_TO:
         raise AttributeError(f"module 'forcefit' has no attribute {name!r}")
     from importlib import import_module
 
@@ -135,6 +147,10 @@ def __getattr__(name: str) -> object:
         return getattr(import_module(_OWNER_OF[name]), name)
     from warnings import warn
 
+    if name in _MOVED_TO:
+        owner = _MOVED_TO[name]
+        warn(f"forcefit.{name} is now {owner}.{name}", FutureWarning, stacklevel=2)
+        return getattr(import_module(owner), name)
     new, *place = _RENAMED[name]
     warn(f"forcefit.{name} is now forcefit.{new}", FutureWarning, stacklevel=2)
     owner, attribute = place or (_OWNER_OF[new], new)
@@ -142,12 +158,12 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    """The public names and nothing else."""
+    """Return the public names and nothing else."""
     return __all__
 
 
 def _version() -> str:
-    """Of the installed package: the last tag and the commits since, when installed."""
+    """Return version of the installed package: last tag and the commits since."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:

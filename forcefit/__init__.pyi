@@ -3,21 +3,16 @@
 from assembly.exact.exact import solve_exact
 from assembly.exchange.convert import convert
 from assembly.exchange.robot_files import load_robot, write_robot
-from assembly.kinematics.closing import preloaded, rest_in
 from assembly.kinematics.mobility import mobility
-from assembly.kinematics.posture import Posture, home_posture, place_robot
-from assembly.kinematics.singular_posture import is_singular
-from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
-from assembly.linear.pose_error import PoseError, bound_pose_error
+from assembly.kinematics.posture import place_robot
+from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.zone import zone_margin
 from assembly.model.error_distributions import read_sources
-from assembly.model.random_errors import draw_errors
 from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from assembly.platform_stiffness.deflection import deflection_curve
-from assembly.platform_stiffness.matrices import PlatformStiffness
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.platform_stiffness.vibration import natural_modes
-from assembly.statistics.allocation import allocate
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.summary import summarise
@@ -27,13 +22,10 @@ from assembly.sweeps.point_table import point_table
 from assembly.sweeps.robot_sweep import sweep
 from forcefit.inputs.errors import BadInput
 from stiffness.beam.beam import beam_compliance
-from stiffness.beam.sections import Section, rectangular_section, round_section
-from stiffness.fem.fea import FemOptions, mesh_link
+from stiffness.beam.sections import rectangular_section, round_section
+from stiffness.fem.fea import mesh_link
 from stiffness.fem.material import Material
-from stiffness.link import LinkStiffness, turn_link
-from stiffness.report.library import look_up, read_library
-from stiffness.report.library_build import build_library
-from stiffness.surface.interface import Interface, parse_interface
+from stiffness.surface.interface import parse_interface
 from validation.assumptions.assumptions import assumption_costs
 from validation.campaign.campaign_file import read_campaign, read_commands
 from validation.correction.compensation import compensate
@@ -46,40 +38,26 @@ from validation.study.study import run_study
 from validation.study.study_file import read_study
 
 __all__ = [
-    "Assembly",
     "BadInput",
     "BeamLink",
     "CannotAssemble",
     "Clearance",
     "Experiment",
-    "FemOptions",
     "Frame",
-    "Interface",
-    "LinkStiffness",
     "Material",
     "MatrixLink",
-    "PlatformStiffness",
-    "PoseError",
-    "Posture",
     "Robot",
-    "Section",
-    "allocate",
     "assumption_costs",
     "beam_compliance",
     "bound_pose_error",
-    "build_library",
     "compensate",
     "convert",
     "crosscheck",
     "deflection_curve",
     "diagnose",
-    "draw_errors",
     "figure_of",
-    "home_posture",
     "inspect_campaign",
-    "is_singular",
     "load_robot",
-    "look_up",
     "mesh_link",
     "mobility",
     "natural_modes",
@@ -89,14 +67,11 @@ __all__ = [
     "platform_stiffness",
     "point_table",
     "predict",
-    "preloaded",
     "read_campaign",
     "read_commands",
-    "read_library",
     "read_sources",
     "read_study",
     "rectangular_section",
-    "rest_in",
     "round_section",
     "run_draws",
     "run_study",
@@ -104,7 +79,6 @@ __all__ = [
     "solve_exact",
     "summarise",
     "sweep",
-    "turn_link",
     "write_robot",
     "write_study",
     "zone_margin",

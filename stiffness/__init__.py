@@ -1,7 +1,7 @@
-"""How stiff is a link?  Its 6 x 6 stiffness K_E, from beams and from finite elements.
+"""Stiffness of a link: its 6 x 6 matrix K_E, from beams and from finite elements.
 
-Begin at ``link.py``, what a link's stiffness is; then ``beam/beam.py`` and
-``fem/fea.py``, the two ways to it.
+Begin with ``link.py``, which defines a link's stiffness; then ``beam/beam.py`` and
+``fem/fea.py``, the two methods that compute it.
 """
 
-DISTRIBUTION = "forcefit"  # which `import forcefit` looks for
+DISTRIBUTION = "forcefit"  # text by which ``import forcefit`` recognises the package

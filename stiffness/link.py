@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from forcefit.inputs.display import Figures, html_table, numbers, short_repr
 from forcefit.inputs.table import BadInput
+from forcefit.results.display import Figures, html_table, numbers, short_repr
 
-# eigenvalues of a scaled 6 by 6 matrix are known to its size times this
+# rounding error of a scaled 6 by 6 matrix's eigenvalues, relative to its size
 _ROUNDING = 6 * np.finfo(float).eps
 
 
@@ -23,7 +23,7 @@ class LinkStiffness:
     read at ``tip``, in the axes in which ``tip`` and ``base`` are given.
 
     Attributes:
-        method: by which it was computed, such as ``"Timoshenko beam"``.
+        method: method by which it was computed, such as ``"Timoshenko beam"``.
         compliance: (6, 6) [rad/(N m) .. m/N] symmetric positive definite.
         tip: (3,) [m] the point where screws and wrenches are read.
         base: (3,) [m] the centre of the held interface.
@@ -50,7 +50,7 @@ class LinkStiffness:
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
     def _figures(self) -> Figures:
-        """How stiff, and how well that is known."""
+        """Return how stiff, and how well that is known."""
         K = np.diag(self.stiffness)
         error = self.relative_error_estimate
         figures = {
@@ -103,7 +103,7 @@ class LinkStiffness:
 
 
 def scaled(matrix: ArrayLike, stiffness: ArrayLike) -> NDArray:
-    """Entries divided by sqrt(K_ii K_jj), so that rotations and translations compare.
+    """Return entries over sqrt(K_ii K_jj), to compare rotations with translations.
 
     Args:
         matrix: (6, 6) a stiffness, or a difference of two.
@@ -117,15 +117,15 @@ def scaled(matrix: ArrayLike, stiffness: ArrayLike) -> NDArray:
 
 
 def check_definite(who: str, matrix: NDArray) -> None:
-    """Refuse what is not a stiffness or a compliance.
+    """Reject a matrix that is neither a stiffness nor a compliance.
 
     Args:
-        who: whose matrix it is, for the message.
+        who: owner of the matrix, for the error message.
         matrix: (6, 6).
 
     Raises:
-        BadInput: it is not symmetric to 1e-6 of its scale, or not positive definite by
-            more than rounding.
+        BadInput: the matrix is not symmetric to 1e-6 of its scale, or not positive
+            definite by more than rounding.
     """
     if not np.all(np.diag(matrix) > 0):
         raise BadInput(f"{who} is not positive definite: its diagonal has a value <= 0")
@@ -145,7 +145,7 @@ def check_definite(who: str, matrix: NDArray) -> None:
 
 
 def inverted(matrix: NDArray) -> NDArray:
-    """Inverse of a symmetric positive definite matrix of mixed units.
+    """Return the inverse of a symmetric positive definite matrix of mixed units.
 
     Args:
         matrix: (6, 6) a stiffness or a compliance.
@@ -159,7 +159,7 @@ def inverted(matrix: NDArray) -> NDArray:
 
 
 def turn_link(link: LinkStiffness, rotation: ArrayLike) -> LinkStiffness:
-    """The same link, described in other axes with the same origin.
+    """Return the same link, described in other axes with the same origin.
 
     Args:
         link: the link.

@@ -1,6 +1,6 @@
 """Screws and wrenches: small motions and loads, read at a point in some axes.
 
-One convention, written once:
+All packages use one convention:
 
 ======  =====================  ==============================  ================
 symbol  code                   order                           unit
@@ -24,7 +24,7 @@ UNIT_VECTORS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)
 
 
 def skew(vector: ArrayLike) -> NDArray:
-    """Matrix of the cross product, ``skew(a) @ b == cross(a, b)``.
+    """Return the matrix of the cross product, ``skew(a) @ b == cross(a, b)``.
 
     Args:
         vector: (..., 3) any unit.
@@ -34,12 +34,12 @@ def skew(vector: ArrayLike) -> NDArray:
     """
     v = np.asarray(vector, dtype=float)
     S = np.zeros((*v.shape[:-1], 3, 3))
-    S[..., (2, 0, 1), (1, 2, 0)] = v  # of three components, no less and no more
+    S[..., (2, 0, 1), (1, 2, 0)] = v  # exactly three components
     return S - np.swapaxes(S, -1, -2)
 
 
 def screw_map(offset: ArrayLike, rotation: ArrayLike | None = None) -> NDArray:
-    """Matrix that re-reads a screw at another point, in other axes.
+    """Return the matrix that transforms a screw to another point and other axes.
 
     A body moves by the small screw ``s``, read at point ``q`` in the axes of a frame
     there.  The same motion, read at point ``p``, is ``screw_map(q - p, R) @ s``: the
@@ -64,7 +64,7 @@ def screw_map(offset: ArrayLike, rotation: ArrayLike | None = None) -> NDArray:
 
 
 def rotation_matrix(rotation_vector: ArrayLike) -> NDArray:
-    """Rotation matrices of rotation vectors.
+    """Return the rotation matrices of rotation vectors.
 
     Args:
         rotation_vector: (..., 3) [rad] axis times angle.
@@ -81,7 +81,7 @@ def rotation_matrix(rotation_vector: ArrayLike) -> NDArray:
 
 
 def rotation_vector(rotation: ArrayLike) -> NDArray:
-    """Rotation vectors, of length at most pi, of rotation matrices.
+    """Return the rotation vectors, of length at most pi, of rotation matrices.
 
     Args:
         rotation: (..., 3, 3) proper orthogonal matrices.
@@ -110,7 +110,7 @@ def rotation_vector(rotation: ArrayLike) -> NDArray:
 
 
 def transform(translation: ArrayLike, rotation: ArrayLike) -> NDArray:
-    """Homogeneous matrices ``T_a_b`` from where frame b stands in frame a.
+    """Return the homogeneous matrices ``T_a_b`` of frame b's pose in frame a.
 
     Args:
         translation: (..., 3) [m] origin of b in the axes of a.

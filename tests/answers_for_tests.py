@@ -172,14 +172,14 @@ def loaded(name: str, nudge: float) -> Any:
     }
 
 
-def drawn(clearance_model: str, nudge: float) -> Any:
+def drawn(clearance: str, nudge: float) -> Any:
     """A few draws of the paper's errors."""
     posture = place_robot(load_robot("irsbot2"))
     experiment = Experiment(
-        posture, sources_of(nudge), 3, clearance_model, stiffness="contact",
-        load=None if clearance_model == "worst" else (0.1, 0, 0, 5, 0, -9),
+        posture, sources_of(nudge), 3, clearance, stiffness="contact",
+        load=None if clearance == "worst" else (0.1, 0, 0, 5, 0, -9),
     )  # fmt: skip
-    options = ImportanceOptions(16, "frame") if clearance_model == "least" else None
+    options = ImportanceOptions(16, "frame") if clearance == "least" else None
     data = run_draws(experiment, 3, importance=options)
     limits = {"energy": 5.0, "translation": 1e-3}
     arrays = {
@@ -187,7 +187,7 @@ def drawn(clearance_model: str, nudge: float) -> Any:
         for name, array in data.data_vars.items()
         if array.dtype.kind in "bif"
     }
-    if clearance_model == "least":
+    if clearance == "least":
         arrays["summary"] = summarise(data, limits, 2e8, 0.9)
     return arrays
 

@@ -4,12 +4,16 @@ import numpy as np
 
 from assembly.effects.effect import Unknown
 from assembly.kinematics.posture import place_robot
+from assembly.measurement.predict import with_second_order
 from assembly.model.robot import BeamLink, Frame, Robot
 from tests.planar_arm_for_tests import SIGMA
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.claims import parameters_of
+from validation.diagnosis.columns import Columns
+from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.fit import fit_machine
 from validation.diagnosis.hypotheses import Hypothesis, Slot
+from validation.diagnosis.signatures import conditions_of
 from validation.diagnosis.unknowns import Acting, Unknowns
 
 LENGTH = 0.8
@@ -76,6 +80,11 @@ def machine(campaign, *hypotheses, start=0.0):
     parts = [Acting(h, np.full(len(h.slots), start)) for h in hypotheses]
     unknowns = Unknowns(campaign.robot, tuple(parts))
     return fit_machine(campaign, unknowns, np.ones(len(campaign), bool))
+
+
+def columns_of(campaign):
+    """Columns of all effects and functions about the declared robot."""
+    return Columns(campaign, Derivatives(with_second_order(conditions_of(campaign))))
 
 
 def numbers(fit):

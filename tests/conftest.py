@@ -17,6 +17,7 @@ import typer
 from hypothesis import settings
 
 from forcefit.commands import app as command
+from tests.schemas_for_tests import check_schema
 
 # a command is the same whenever it is called: its options are read from the signatures
 # once, not in each of a thousand tests
@@ -58,6 +59,8 @@ def run(capsys, monkeypatch):
         with pytest.raises(SystemExit) as done:
             command.main()
         out, err = capsys.readouterr()
+        if done.value.code in {0, 1}:
+            check_schema(tuple(sys.argv[1:]), out)  # under the present names
         return done.value.code, out, err
 
     return call

@@ -14,16 +14,22 @@ TUBE = BeamLink({"radius": 0.03, "inner_radius": 0.025}, 70e9, 0.33, density=270
 DRIVES = ("j1", "j2", "j3")
 
 
-def arm(**effects):
+def arm(link=TUBE, **effects):
     """No drive is parallel to the next; effects of its file."""
     turning = {"joint": "revolute", "actuated": True, "joint_stiffness": SPRING}
     robot = Robot("arm", "tool", (
         Frame("j1", **turning),
-        Frame("j2", "j1", [0.1, 0, 0.3], [np.pi / 2, 0, 0.3], link=TUBE, **turning),
-        Frame("j3", "j2", [0.35, 0.1, 0], [0, np.pi / 3, 0], link=TUBE, **turning),
-        Frame("tool", "j3", [0.3, 0.05, 0.1], link=TUBE, mass=0.8),
+        Frame("j2", "j1", [0.1, 0, 0.3], [np.pi / 2, 0, 0.3], link=link, **turning),
+        Frame("j3", "j2", [0.35, 0.1, 0], [0, np.pi / 3, 0], link=link, **turning),
+        Frame("tool", "j3", [0.3, 0.05, 0.1], link=link, mass=0.8),
     ))  # fmt: skip
     return replace(robot, effects=effects)
+
+
+def with_errors(robot, wider=1.0):
+    """The robot with errors of every frame, of up to 0.1 mrad and 50 um."""
+    drawn = np.random.default_rng(1).uniform(-1, 1, (len(robot.frames), 6))
+    return robot.with_errors(drawn * np.repeat([1e-4, 5e-5], 3) * wider)
 
 
 def commanded(robot, rows=12, seed=2, reach=1.5):

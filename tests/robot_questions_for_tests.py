@@ -147,7 +147,7 @@ def by_play(model: str, nudge: float) -> Any:
     plan = plan_for(
         robot, [("one", 3), ("two", 4), ("two", 1)], [1, 2, 0.5],
         {"translation": 2.5e-4, "force": 400.0, "moment": 1.0},
-        asked_yield=0.9, draws=30, clearance_model=model,
+        asked_yield=0.9, draws=30, clearance=model,
     )  # fmt: skip
     told: list[tuple[str, int, int]] = []
     found = allocate([place_robot(robot)], plan, 20, lambda *words: told.append(words))

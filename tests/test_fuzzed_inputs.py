@@ -16,8 +16,8 @@ from benchmarks.fuzz_seeds import COMMANDS, write_seeds
 
 # quick ones, that read no file which another command makes
 QUICK = (
-    "assembly zone bar", "assembly zone rounded", "convert bar.sdf", "convert tied",
-    "stiffness beam", "stiffness curve", "stiffness import long",
+    "assembly solve bar.toml --quantities", "assembly solve rounded", "convert bar.sdf",
+    "convert tied", "stiffness beam", "stiffness import long",
     "validation import", "validation inspect campaign",
 )  # fmt: skip
 

@@ -162,7 +162,7 @@ def test_nothing_heavy_is_imported_with_all_files_at_once():
         ("validation diagnose --help", ("numpy", "scipy", "rich")),
         ("stiffness beam --length 1 --radius 0.1 --young 1e9 --poisson 0.3",
          ("scipy",)),
-        ("assembly zone irsbot2; assembly error irsbot2; "
+        ("assembly solve irsbot2 --quantities margin; assembly error irsbot2; "
          "assembly solve irsbot2 --pose tx=0.1,tz=-0.5", FOR_MANY),
     ],
 )  # fmt: skip

@@ -30,3 +30,13 @@ def test_names_of_public_formats_are_not_found():
 def test_sections_of_a_word_list_are_read_without_comments():
     text = "# a\n[one]  # b\nx -> y\n\n[two]\nu v -> w\n"
     assert CHECK["read_list"](text) == {"one": {"x": "y"}, "two": {"u v": "w"}}
+
+
+def test_comments_and_docstrings_are_found_on_their_lines():
+    source = '"""Title."""\n\nx = "text"  # note\n\n\ndef f():\n    """Do."""\n'
+    expected = '"""Title."""\n\n# note\n\n\n\n"""Do."""'
+    assert CHECK["comments"](source) == expected
+
+
+def test_comments_of_cpp_are_found_on_their_lines():
+    assert CHECK["comments"]("int x;  // note\nint y;", python=False) == " note\n"

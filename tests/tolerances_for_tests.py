@@ -1,11 +1,58 @@
-"""Plans of tolerances that several tests use."""
+"""Small robots with errors, and plans of their tolerances."""
 
 import numpy as np
 
 from assembly.model.error_distributions import tolerance_sources
+from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.statistics.requirement import Plan
 
-PLAY = 1e-4
+PLAY = 1e-4  # [m] radial clearance
+ARM = 0.4  # [m] from the pin of the arm to its tip
+
+
+def arm(passive=False, joint="revolute", link=None, **clearance):
+    """A joint at the base, driven unless it is passive, and a tip across its axis."""
+    frames = (
+        Frame("pin", joint=joint, actuated=not passive,
+              clearance=Clearance(**clearance) if clearance else None),
+        Frame("tip", "pin", [ARM, 0, 0], link=link),
+    )  # fmt: skip
+    return Robot("arm", "tip", frames)
+
+
+def rigid_pair(**clearance):
+    """Two rigid parts that must meet at (0.5, 0, 0), within a clearance if given."""
+    frames = (
+        Frame("one", translation=[0.5, 0, 0]),
+        Frame("two", "base", [0.5, 0, 0]),
+        Frame("end", "one", clearance=Clearance(**clearance) if clearance else None),
+    )
+    return Robot("rigid", "end", frames, (("end", "two"),))
+
+
+def pairs_of_bars(stiffnesses, radial=None):
+    """Pairs of elastic bars that meet at (0.5, 0, 0), each by itself."""
+    frames, closures = [], []
+    for i, k in enumerate(stiffnesses):
+        link = MatrixLink(np.eye(6) * k)
+        clearance = None if radial is None else Clearance(radial=radial)
+        frames += [
+            Frame(f"one{i}", translation=[0.5, 0, 0], link=link),
+            Frame(f"two{i}", translation=[0.5, 0, 0], link=link),
+            Frame(f"joint{i}", f"one{i}", clearance=clearance),
+        ]
+        closures.append((f"joint{i}", f"two{i}"))
+    return Robot("pairs", "joint0", tuple(frames), tuple(closures))
+
+
+def silent(*_):
+    """Show no progress."""
+
+
+def drawn_errors(robot, scale=1.0, count=6):
+    """(count, frames, 6) errors within 1e-3 rad and 1e-4 m times a scale."""
+    sources = tolerance_sources(robot, scale * np.array([1e-3] * 3 + [1e-4] * 3))
+    return sources.errors(sources.draw(0, count, seed=4))
 
 
 def plan_for(robot, places, costs, limits, **options):

@@ -1,6 +1,6 @@
-"""Is it true?  Against a multibody simulation, and against measured data.
+"""Checks of the model: by a multibody simulation and by measured data.
 
-Begin at ``crosscheck/crosscheck.py`` and at ``diagnosis/diagnose.py``.
+Begin with ``crosscheck/crosscheck.py`` and ``diagnosis/diagnose.py``.
 """
 
-DISTRIBUTION = "forcefit"  # which `import forcefit` looks for
+DISTRIBUTION = "forcefit"  # text by which ``import forcefit`` recognises the package

@@ -1,6 +1,6 @@
-"""Effects that a declared model may lack; each in a file of its own.
+"""Effects that a declared model may lack; each in its own file.
 
-Begin at ``effect.py``, what an effect is.  They are applied in the order of
+Begin at ``effect.py``, which defines an effect.  Effects are applied in the order of
 :data:`LIBRARY`.  Friction acts on a joint's spring, so drive compliance comes before
 it; the foundation adds a frame, so it comes last.
 """
@@ -56,10 +56,10 @@ LIBRARY: dict[str, Effect] = {
 
 
 def apply_effects(conditions: Conditions, effects: Mapping[str, Values]) -> Conditions:
-    """Conditions with effects added.
+    """Return the conditions with effects added.
 
     Args:
-        conditions: without them.
+        conditions: conditions without them.
         effects: parameters by their public names, by effect.
 
     Returns:
@@ -78,14 +78,14 @@ def apply_effects(conditions: Conditions, effects: Mapping[str, Values]) -> Cond
 
 
 def apply_known(conditions: Conditions, robot: Robot) -> Conditions:
-    """Conditions with everything that a robot's file says the machine has.
+    """Return the conditions with all effects that a robot's file declares.
 
     Args:
-        conditions: of the robot without effects, R rows.
-        robot: with them.
+        conditions: conditions of the robot without effects, R rows.
+        robot: robot with these effects.
 
     Returns:
-        Conditions with its effects, those of each session and its functions.
+        Conditions with its effects, those of each session, and its functions.
     """
     recorded = conditions
     conditions = apply_effects(conditions, robot.effects)

@@ -1,4 +1,4 @@
-"""The foundation is elastic: at the base's origin, diagonal in the base's axes."""
+"""Elastic foundation: springs at the base's origin along and about the base's axes."""
 
 from dataclasses import replace
 
@@ -18,13 +18,13 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 
 def on_foundation(conditions: Conditions) -> Conditions:
-    """Conditions of a robot with a frame at the base that carries all the others.
+    """Add a frame at the base that carries all others, if there is none yet.
 
     Args:
         conditions: R rows.
 
     Returns:
-        The conditions, changed only if there is no such frame yet; it is the first.
+        The conditions; the new frame is the first.
     """
     feet = [f for f in conditions.robot.frames if f.parent == BASE]
     foot = feet[0]
@@ -35,7 +35,7 @@ def on_foundation(conditions: Conditions) -> Conditions:
 
 
 def _standing(conditions: Conditions, robot: Robot) -> Conditions:
-    """The rows with a frame before all others that does not move them."""
+    """Return the rows with an additional first frame, which does not move them."""
     still = np.broadcast_to(np.eye(4), (len(conditions), 1, 4, 4))
     zero = np.zeros((len(conditions), 1, 6))
     rest = (
@@ -52,10 +52,10 @@ def _standing(conditions: Conditions, robot: Robot) -> Conditions:
 
 
 def with_foundation(robot: Robot, values: Values) -> Robot:
-    """A robot on an elastic foundation: one more frame between base and ground.
+    """Return a robot on an elastic foundation: one more frame between base and ground.
 
     Args:
-        robot: any.
+        robot: any robot.
         values: ``stiffness.rx`` .. ``stiffness.tz`` [N m/rad, N/m]; rigid if absent.
 
     Returns:
@@ -72,7 +72,7 @@ def with_foundation(robot: Robot, values: Values) -> Robot:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Stiffnesses from compliances; below 0 of what is declared too soft."""
+    """Return stiffnesses from compliances; those below 0 mean a stiffer foundation."""
     return {
         f"stiffness.{name.removeprefix('compliance.')}": 1 / c
         for name, c in values.items()

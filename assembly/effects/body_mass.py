@@ -1,7 +1,7 @@
-"""A body is heavier than declared, and its centre of mass is elsewhere.
+"""Mass and centre of mass of a body that differ from the declared ones.
 
-With mass m and centre c declared and M, C true, ``mass`` is M - m and ``moment`` is
-M C - m c, both linear in what the body weighs on; its centre is (m c + moment)/M.
+With declared mass m and centre c, and true M and C, ``mass`` is M - m and ``moment`` is
+M C - m c.  The weight is linear in both; the true centre is (m c + moment)/M.
 """
 
 from dataclasses import replace
@@ -16,11 +16,11 @@ from assembly.measurement.conditions import Conditions
 from assembly.model.robot import BeamLink, Frame, Robot
 
 _MOMENT = ("moment.x", "moment.y", "moment.z")
-_LEAST = 1e-9  # [kg] a mass that has a centre
+_LEAST = 1e-9  # [kg] smallest mass that has a centre
 
 
 def heavy_bodies(robot: Robot) -> tuple[str, ...]:
-    """Frames whose bodies are declared to weigh something, beams among them."""
+    """Return the frames whose bodies are declared to have a mass, including beams."""
     return tuple(
         f.name
         for f in robot.frames

@@ -1,8 +1,8 @@
-"""An effect that a robot's file declares, together with the difference found for it.
+"""A declared effect of a robot's file combined with the difference found for it.
 
-Effects act one after the other: the declared one first, then what a diagnosis found.
-Both together are one effect again, with other numbers: offsets and compliances add,
-factors multiply, eccentricities add as vectors, turned frames are multiplied.
+Effects act in sequence: first the declared one, then the one that a diagnosis found.
+Both together are again one effect with other numbers: offsets and compliances add,
+factors multiply, eccentricities add as vectors, rotated frames are multiplied.
 """
 
 import math
@@ -18,18 +18,18 @@ Effects = Mapping[str, Values]
 
 
 def combined(declared: Effects, found: Effects) -> dict[str, dict[str, float]]:
-    """Effects of a robot's file with what was found in addition to them.
+    """Combine the effects of a robot's file with effects found in addition.
 
     Args:
         declared: parameters by their public names, by effect.
-        found: of effects that act after the declared ones, in the same form.
+        found: parameters of effects that act after the declared ones, likewise.
 
     Returns:
-        Parameters of every effect, which do the same as both in turn.
+        Parameters of every effect that are equivalent to both in sequence.
 
     Raises:
-        ValueError: no numbers of the effect do the same: two contact laws in one
-            joint, or two drifts of different time constants.
+        ValueError: no single effect is equivalent: two contact laws in one joint, or
+            two drifts of different time constants.
     """
     both = {name: dict(values) for name, values in declared.items()}
     for name, values in found.items():
@@ -42,12 +42,12 @@ def combined(declared: Effects, found: Effects) -> dict[str, dict[str, float]]:
 
 
 def _sum(declared: Values, found: Values) -> dict[str, float]:
-    """Parameters that add."""
+    """Return the sums of parameters."""
     return dict(declared) | {k: declared.get(k, 0.0) + v for k, v in found.items()}
 
 
 def _in_series(declared: Values, found: Values) -> dict[str, float]:
-    """Stiffnesses of springs in series; absent means rigid."""
+    """Return the stiffnesses of springs in series; an absent one is rigid."""
     both = {k: 1 / v for k, v in declared.items()}
     for k, v in found.items():
         both[k] = both.get(k, 0.0) + 1 / v
@@ -55,12 +55,12 @@ def _in_series(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _product(declared: Values, found: Values) -> dict[str, float]:
-    """Factors, one after the other."""
+    """Return the products of factors."""
     return dict(declared) | {k: declared.get(k, 1.0) * v for k, v in found.items()}
 
 
 def _load(declared: Values, found: Values) -> dict[str, float]:
-    """Gains of the load, the found one of what the declared one gives."""
+    """Return the load's gains: the found gain applied to the declared one's result."""
     factor = found.get("factor", 1.0)
     offsets = {k: factor * v for k, v in declared.items() if k != "factor"}
     more = {k: v for k, v in found.items() if k != "factor"}
@@ -68,7 +68,7 @@ def _load(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _eccentricity(declared: Values, found: Values) -> dict[str, float]:
-    """Amplitude and phase of two sines of one angle."""
+    """Return the amplitude and phase of two sines of one angle."""
     both = dict(declared)
     for key, amplitude in found.items():
         name, _, kind = key.rpartition(".")
@@ -82,7 +82,7 @@ def _eccentricity(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _registration(declared: Values, found: Values) -> dict[str, float]:
-    """The found turn and shift of the frame that the declared one gives."""
+    """Return the found rotation and shift applied after the declared ones."""
     first, second = (np.array([v.get(k, 0.0) for k in BASE]) for v in (declared, found))
     R = rotation_matrix(second[:3])
     turn = rotation_vector(R @ rotation_matrix(first[:3]))
@@ -92,7 +92,7 @@ def _registration(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _drift(declared: Values, found: Values) -> dict[str, float]:
-    """Amplitudes of one time constant."""
+    """Return the amplitudes of one time constant."""
     constant = declared["time_constant"]
     if not math.isclose(found["time_constant"], constant, rel_tol=1e-9):
         raise ValueError("drifts of different time constants are no single drift")
@@ -100,14 +100,14 @@ def _drift(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _contact(declared: Values, found: Values) -> dict[str, float]:
-    """Contact laws of different joints."""
+    """Return the contact laws of different joints."""
     if set(declared) & set(found):
         raise ValueError("two contact laws in series are no single contact law")
     return {**declared, **found}
 
 
 def _delayed(declared: Values, found: Values) -> dict[str, float]:
-    """Expansions of different bodies, or of one time constant."""
+    """Return the expansions of different bodies, or of one time constant."""
     both = _sum(declared, found)
     for key in set(declared) & set(found):
         if key.endswith(".time_constant"):

@@ -25,7 +25,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Coefficient from the deflection under a unit load, coefficient^(-1/exponent)."""
+    """Return coefficients from deflections under a unit load, d^(-exponent)."""
     parameters: dict[str, float] = {}
     for key, deflection in values.items():
         name, _, kind = key.rpartition(".")

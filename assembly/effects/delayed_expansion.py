@@ -1,7 +1,8 @@
-"""A body lengthens behind the temperature recorded, with a time constant.
+"""Thermal expansion of a body that lags behind the recorded temperature.
 
-Along its beam, or the line between its joints, by coefficient x length x temperature of
-the body.  That is the sensor's in the first row of a session, and follows it.
+The body lengthens along its beam, or along the line between its joints, by coefficient
+x length x its temperature.  In the first row of a session this is the sensor's
+temperature; later it follows the sensor with a time constant.
 """
 
 import numpy as np
@@ -24,7 +25,7 @@ _SCAN = (0.03, 0.1, 0.3)  # time constants, in durations of the campaign
 
 
 def _warmth(conditions: Conditions, time_constant: float) -> NDArray:
-    """(R,) [K] of a body behind the sensor."""
+    """Return the (R,) [K] temperature of a body that lags behind the sensor."""
     history, row = past(conditions, [_SENSOR])
     first = np.where(history.first, np.arange(len(history.first)), 0)
     began = history.values[_SENSOR][np.maximum.accumulate(first)]

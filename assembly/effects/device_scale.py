@@ -1,6 +1,6 @@
-"""All lengths that the measuring device measures are a multiple of the true ones.
+"""Scale of the measuring device: all measured lengths are a multiple of the true.
 
-Positions count from the device's origin: that of the registration, else the base's.
+Positions count from the device's origin: that of the registration, or else the base's.
 """
 
 from dataclasses import replace

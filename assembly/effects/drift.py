@@ -1,4 +1,4 @@
-"""The reading drifts: amplitude (1 - exp(-time / time constant))."""
+"""Drift of the reading: amplitude (1 - exp(-time / time constant))."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Actuated joints are elastic, in series with any stiffness declared."""
+"""Elastic actuated joints, in series with any declared stiffness."""
 
 from dataclasses import replace
 from functools import partial
@@ -26,7 +26,7 @@ def _unit(robot: Robot, name: str) -> str:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Stiffnesses from compliances; below 0 of a drive that is declared too soft."""
+    """Return stiffnesses from compliances; below 0 for drives stiffer than declared."""
     ends = len(".compliance")
     return {name[:-ends]: 1 / c for name, c in values.items() if abs(c) > RIGID}
 

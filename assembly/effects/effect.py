@@ -1,4 +1,4 @@
-"""What an effect is: something a declared model lacks, a change to conditions."""
+"""Effect: a property that a declared model lacks, as a change to conditions."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from assembly.measurement.conditions import Conditions
 from assembly.model.robot import Robot
 
 Values = Mapping[str, float]
-RIGID = 1e-12  # [rad/(N m), m/N] a fitted compliance below it counts as rigid
+RIGID = 1e-12  # [rad/(N m), m/N] smaller fitted compliances count as rigid
 
 
 @dataclass(frozen=True)
@@ -15,8 +15,9 @@ class Unknown:
     """An unknown of the fit, in a form in which the model is nearly linear.
 
     Attributes:
-        name: of a parameter, or of a part of one: below a frame's name where an effect
-            acts at frames (``""`` if the frame's name suffices).
+        name: name of a parameter, or of a part of one.  For an effect that acts at
+            frames it is appended to a frame's name (``""`` if the frame's name
+            suffices).
         scale: plausible size, in the unit of the parameter or of the part.
         lower: physical lower bound.
         upper: physical upper bound.
@@ -35,7 +36,7 @@ class Unknown:
 
 
 def _as_they_are(robot: Robot, values: Values) -> dict[str, float]:
-    """Unknowns that are the parameters themselves."""
+    """Return the unknowns unchanged: they are the parameters."""
     return dict(values)
 
 
@@ -44,27 +45,28 @@ class Effect:
     """One effect of the library.
 
     Attributes:
-        name: as in the public format.
+        name: name in the public format.
         apply: from conditions without the effect and parameters by their public names
             (``<frame>``, ``<frame>.<component>`` or plain) to conditions with it.
-        unit: of a parameter, from the robot and the parameter's public name.
-        frames: frames of a robot at which it can act; None if it acts at none.
-        device_alone: whether it is an error of the measuring device; a function that
-            does the same is the machine's, and likelier.
+        unit: unit of a parameter, from the robot and the parameter's public name.
+        frames: function of a robot that returns the frames at which it can act; None if
+            it acts at none.
+        device_alone: whether it is an error of the measuring device.  A function with
+            the same effect belongs to the machine, and is more likely.
         refines: the effect that it becomes in a limit, ``""`` for none.
-        tried: frames at which it is looked for; all of those if absent.
-        components: public parameters below a frame's name (``""``: the name itself), or
-            in all.
-        unknowns: of the fit: at each frame, or in all.
+        tried: frames at which it is searched; all possible ones if absent.
+        components: public parameters at each frame (``""``: the frame's name itself),
+            or of the effect as a whole.
+        unknowns: unknowns of the fit: at each frame, or of the effect as a whole.
         public: from unknowns by name (a frame's name, a dot, the unknown's name) to
             parameters by their public names.
         needs: covariates without which it can be neither applied nor identified.
         linear: whether the platform's deviation is linear in the unknowns, to first
             order in all small motions.
-        by_row: whether it changes rows one by one, so that it can act in some of
-            them alone; otherwise it changes the robot.
-        finite: whether it asks for finite motions.
-        clearance: whether it gives joints clearance.
+        by_row: whether it changes rows one by one, so that it can act in some of them
+            alone; otherwise it changes the robot.
+        finite: whether it needs finite motions.
+        clearance: whether it adds clearance to joints.
         device: unknowns that move the measuring frame as a whole.
         splits: whether each of its unknowns may act alone.
         follows_load: whether its unknowns ``offset.<c>`` belong to components of the
@@ -94,5 +96,5 @@ class Effect:
 
 
 def at(frame: str, kind: str) -> str:
-    """Name of an unknown or parameter that belongs to a frame."""
+    """Return the name of an unknown or parameter that belongs to a frame."""
     return f"{frame}.{kind}" if kind else frame

@@ -1,4 +1,4 @@
-"""The actual coordinate of a drive is the command plus a constant."""
+"""Encoder offset: the actual coordinate of a drive is the command plus a constant."""
 
 from assembly.effects.effect import Effect, Unknown, Values
 from assembly.effects.places import drives, own_unit, with_screws

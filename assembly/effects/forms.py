@@ -1,11 +1,11 @@
-"""Forms that a function of one or two variables can have.
+"""Forms of a function of one or two variables.
 
 A form is linear in most of its numbers: each of those multiplies one column, so that a
-fit finds them all at once.  The others, its *shapes* (a time constant, a period), bend
-the columns themselves.
+fit finds them all together.  The others, its *shapes* (a time constant, a period),
+enter the columns nonlinearly.
 
 ========== ============================== =====================================
-form       numbers of the columns         what they multiply
+form       numbers of the columns         columns that they multiply
 ========== ============================== =====================================
 powers     ``0``, ``1``, ``2`` ..;        x^i;
            ``i.j`` of two variables       x^i y^j
@@ -14,21 +14,22 @@ waves      ``k.sine``, ``k.cosine``;      of k turns of x, in 2 pi or ``period``
 spline     ``1`` .. ``n``;                value at the k-th of n even knots from
            ``j.k`` of two variables       ``first`` to ``last``; natural and cubic
                                           between, constant beyond them
-lag        ``gain``, ``start``            x behind a lag of ``time_constant`` (of
-                                          ``time`` itself 1 - exp); what is left of
-                                          the state at time 0, exp
-creep      ``gain``, ``start``            likewise, of a load that comes at once
+lag        ``gain``, ``start``            x with a first-order lag of
+                                          ``time_constant`` (for ``time`` itself
+                                          1 - exp); decay of the state at time 0
+creep      ``gain``, ``start``            the same for a load applied in steps
 step       ``size``                       0 below ``at``, 1 from there on
 slow_wave  ``sine``, ``cosine``           of x in turns of ``period``
-reversal   ``0``, ``1``, ``2`` ..         direction of x, times y^k; of a load or a
-                                          wrench y its size
-slip       ``size``                       -1 to 1: what slips ``depth`` after x turned
+reversal   ``0``, ``1``, ``2`` ..         direction of x, times y^k; the size of y
+                                          if y is a load or a wrench
+slip       ``size``                       -1 to 1: friction element that slips after
+                                          a motion x of ``depth``
 scaled_    ``k.sine``, ``k.cosine``       of k turns of x, times y
 waves
 reversal_  ``k.sine``, ``k.cosine``       direction of x times waves of y, or of x
 waves
-knee       ``below``, ``above``;          what of x is between -``at`` and ``at``; what
-           ``size``                       is beyond; -1 to 1, reached at ``at``
+knee       ``below``, ``above``;          part of x within -``at`` to ``at``; part
+           ``size``                       beyond; -1 to 1, reached at ``at``
 ========== ============================== =====================================
 
 Sources:
@@ -45,8 +46,8 @@ from numpy.typing import NDArray
 
 Shapes = Mapping[str, float]
 Inputs = Sequence[NDArray]
-_MOST = 999  # powers, waves and knots
-_INDEX = re.compile("0|-?[1-9][0-9]{0,8}")  # a whole number, as it is written
+_MOST = 999  # largest number of powers, waves and knots
+_INDEX = re.compile("0|-?[1-9][0-9]{0,8}")  # a whole number, as written
 
 
 @dataclass(frozen=True)
@@ -54,16 +55,18 @@ class Form:
     """One form.
 
     Attributes:
-        name: as in robot files.
-        summary: one line for people.
-        most: variables that it can have at most.
-        shapes: names of numbers in which it is not linear, by whether it needs them.
-        indices: least and largest whole numbers that a column's name begins with; None
-            where it has none.
-        words: with which a column's name ends, ``""`` for nothing.
-        basis: (R, p) columns, from their names, the inputs (R,) each, and the shapes.
-        remembers: whether its first variable's past counts.
-        least: variables that it must have.
+        name: name in robot files.
+        summary: one line of description.
+        most: largest number of variables.
+        shapes: names of numbers in which it is not linear, and whether each is
+            required.
+        indices: least and largest whole numbers at the beginning of a column's name;
+            None if it has none.
+        words: possible ends of a column's name, ``""`` for none.
+        basis: function that returns (R, p) columns, from their names, the inputs (R,)
+            each, and the shapes.
+        remembers: whether the past of its first variable matters.
+        least: smallest number of variables.
     """
 
     name: str
@@ -77,7 +80,7 @@ class Form:
     least: int = 1
 
     def is_column(self, name: str, variables: int) -> bool:
-        """Whether a number's name is one of a column's, with so many variables."""
+        """Return whether a name is a column's in a form of so many variables."""
         head, word = name, ""
         if self.words != ("",):
             head, _, word = name.rpartition(".")
@@ -94,7 +97,7 @@ class Form:
 
 
 def column_indices(name: str) -> list[int]:
-    """The whole numbers with which a column's name begins."""
+    """Return the whole numbers at the beginning of a column's name."""
     return [int(part) for part in name.split(".") if _INDEX.fullmatch(part)]
 
 
@@ -136,7 +139,7 @@ _ENDS = ("first", "last")
 
 
 def natural_spline(knots: NDArray, x: NDArray) -> NDArray:
-    """(R, n) natural cubic splines that are 1 at one of n knots and 0 at the others."""
+    """Return (R, n) natural cubic splines, each 1 at one of n knots, else 0."""
     from scipy.interpolate import CubicSpline
 
     if len(knots) < 2:
@@ -147,14 +150,14 @@ def natural_spline(knots: NDArray, x: NDArray) -> NDArray:
 
 
 def roughness(count: int) -> NDArray:
-    """Integral of the squared curvature of a natural spline over n even knots.
+    """Return integral of the squared curvature of a natural spline over n even knots.
 
     Args:
         count: n of knots.
 
     Returns:
-        (n, n) [1/steps^3] R with integral = v R v of the values v at the knots, the
-        distance of two knots being 1.
+        (n, n) [1/steps^3] R with integral = v R v for the values v at the knots; the
+        distance of two knots is 1.
 
     Sources:
         Green, Silverman, Nonparametric Regression, section 2.1.2 (R = Q B^-1 Q').
@@ -168,7 +171,7 @@ def roughness(count: int) -> NDArray:
 
 
 def _remembered(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Inputs are the lagged variable, and what is left of the state at time 0."""
+    """Return columns from the lagged variable and the decaying state at time 0."""
     return np.column_stack([inputs[name == "start"] for name in names])
 
 
@@ -179,35 +182,35 @@ def _step(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
 
 
 def _reversal(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Inputs are a direction and, of two variables, what its size depends on."""
+    """Return columns of a direction, times powers of a second input if present."""
     size = inputs[1] if len(inputs) > 1 else np.ones_like(inputs[0])
     return _stacked([inputs[0] * size ** int(name) for name in names], inputs)
 
 
 def _scaled_waves(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Inputs are an angle, and what the waves are multiplied by."""
+    """Return waves of an angle, times the second input."""
     return _waves(names, inputs[:1], shapes) * inputs[1][:, None]
 
 
 def _reversal_waves(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Inputs are a direction and an angle."""
+    """Return waves of an angle, times a direction."""
     return _waves(names, inputs[1:], shapes) * inputs[0][:, None]
 
 
 def _slip(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """The input is what slips after the variable, from -1 to 1."""
+    """Return the state of the slipping element, from -1 to 1."""
     return _stacked([inputs[0]] * len(names), inputs)
 
 
 def _knee(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """The input is a load; its first part goes as far as the knee, either way."""
+    """Return the parts of a load up to the knee and beyond, in both directions."""
     first = np.clip(inputs[0], -shapes["at"], shapes["at"])
     parts = {"below": first, "above": inputs[0] - first, "size": first / shapes["at"]}
     return _stacked([parts[name] for name in names], inputs)
 
 
 def _stacked(columns: Sequence[NDArray], inputs: Inputs) -> NDArray:
-    """(R, p) columns, each as long as the inputs."""
+    """Return the (R, p) columns, each as long as the inputs."""
     rows = len(inputs[0])
     if not columns:
         return np.zeros((rows, 0))
@@ -218,7 +221,7 @@ _WAVES = ("sine", "cosine")
 
 
 def _memory(name: str, summary: str) -> Form:
-    """A form that lags behind its variable."""
+    """Return a form that lags behind its variable."""
     return Form(
         name, summary, 1, {"time_constant": True}, None, ("gain", "start"), _remembered,
         remembers=True,
@@ -253,7 +256,7 @@ FORMS: dict[str, Form] = {
 
 
 def shape_names(form: Form, variables: int) -> dict[str, bool]:
-    """Names of the numbers in which a form is not linear, and whether it needs them."""
+    """Return the names of the shapes of a form, and whether each is required."""
     if form.name == "spline" and variables > 1:
         return {f"{end}.{k}": True for k in (1, 2) for end in _ENDS}
     return dict(form.shapes)

@@ -1,8 +1,8 @@
-"""Formulas that users write: a small grammar, read without running anything.
+"""Formulas written by users: a small grammar, evaluated without executing code.
 
-Numbers, names, ``+ - * / **``, brackets, ``pi`` and the functions below.  Units are
-checked: a sum adds like to like, a function is given a number (rad counts as one), and
-the units of the parameters are found by that.
+It has numbers, names, ``+ - * / **``, brackets, ``pi`` and the functions below.  Units
+are checked: the terms of a sum must have equal units, and the argument of a function
+must be a number (rad counts as one).  The units of the parameters follow from this.
 
 Sources:
     Kennedy, Relational Parametricity and Units of Measure, POPL 1997 (units of
@@ -27,23 +27,23 @@ _OPERATIONS: dict[type, Callable[[NDArray, NDArray], NDArray]] = {
     ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply,
     ast.Div: np.divide, ast.Pow: np.power,
 }  # fmt: skip
-_LONGEST = 500  # characters
-_DEEPEST = 50  # brackets, operations one in the other
+_LONGEST = 500  # largest number of characters
+_DEEPEST = 50  # deepest nesting of brackets and operations
 _SAME = 1e-9  # exponents of units that differ by less are equal
-Unit = Mapping[str, float]  # exponents of m, N, s, K ..; rad is none
+Unit = Mapping[str, float]  # exponents of m, N, s, K ..; rad has none
 
 
 def parse_formula(text: str) -> ast.expr:
-    """The tree of a formula.
+    """Return the tree of a formula.
 
     Args:
-        text: such as ``"a*sin(3*q) + b"``.
+        text: text such as ``"a*sin(3*q) + b"``.
 
     Returns:
         The expression, of the grammar's nodes alone.
 
     Raises:
-        BadInput: it is none; what is wrong is named.
+        BadInput: the text is no formula; the message names the error.
     """
     if len(text) > _LONGEST:
         raise BadInput(
@@ -61,7 +61,7 @@ def parse_formula(text: str) -> ast.expr:
 
 
 def _check(node: ast.AST, depth: int) -> None:
-    """Refuse whatever the grammar does not have."""
+    """Reject parts that are not in the grammar."""
     match node:
         case _ if depth > _DEEPEST:
             raise BadInput(f"found a formula nested deeper than {_DEEPEST}")
@@ -87,7 +87,7 @@ def _check(node: ast.AST, depth: int) -> None:
 
 
 def names_in(tree: ast.expr) -> list[str]:
-    """Names of variables and parameters, in order of use."""
+    """Return the names of variables and parameters, in order of use."""
     called = {id(n.func) for n in ast.walk(tree) if isinstance(n, ast.Call)}
     nodes = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
     nodes.sort(key=lambda n: n.col_offset)
@@ -96,10 +96,10 @@ def names_in(tree: ast.expr) -> list[str]:
 
 
 def evaluate(tree: ast.expr, known: Mapping[str, NDArray]) -> NDArray:
-    """The value of a formula.
+    """Return the value of a formula.
 
     Args:
-        tree: of it.
+        tree: tree of the formula.
         known: numbers or arrays (R,) by name.
 
     Returns:
@@ -129,18 +129,18 @@ def _value(node: ast.AST, known: Mapping[str, NDArray]) -> NDArray:
 def parameter_units(
     tree: ast.expr, variables: Mapping[str, Unit], result: Unit
 ) -> dict[str, Unit]:
-    """Units of a formula's parameters, so that those of the whole fit.
+    """Return the units of a formula's parameters that make its units consistent.
 
     Args:
-        tree: of the formula.
+        tree: tree of the formula.
         variables: units of its variables by name.
-        result: unit that the formula must have; a mere number is taken as SI.
+        result: unit that the formula must have; a bare number counts as SI.
 
     Returns:
-        Exponents by parameter; one that any unit fits counts as a number.
+        Exponents by parameter; a parameter that any unit fits counts as a number.
 
     Raises:
-        BadInput: no units fit; where they clash is named.
+        BadInput: no units are consistent; the message names the conflict.
     """
     units = _Units(variables)
     whole = units.of(tree)
@@ -152,13 +152,13 @@ def parameter_units(
 
 @dataclass
 class _Units:
-    """Equations between units; a unit is exponents of m, N .. and of ``?name``."""
+    """Equations between units; a unit has exponents of m, N .. and of ``?name``."""
 
     variables: Mapping[str, Unit]
     known: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def of(self, node: ast.AST) -> dict[str, float]:
-        """The unit of a part of a formula, what clashes within refused."""
+        """Return the unit of a part of a formula; refuse conflicts within it."""
         match node:
             case ast.Name(id=name) if name in self.variables:
                 return dict(self.variables[name])
@@ -191,7 +191,7 @@ class _Units:
         return {}
 
     def reduced(self, unit: Mapping[str, float]) -> dict[str, float]:
-        """A unit with what is known of parameters put in."""
+        """Return a unit with the known units of parameters inserted."""
         reduction: dict[str, float] = {}
         for name, k in unit.items():
             reduction = _added(reduction, self.known.get(name, {name: 1.0}), k)
@@ -200,7 +200,7 @@ class _Units:
     def equal(
         self, one: Mapping[str, float], other: Mapping[str, float], where: str
     ) -> None:
-        """Two units are the same; what that says of a parameter is kept."""
+        """Equate two units, and keep the consequence for a parameter."""
         left = self.reduced(_added(one, other, -1.0))
         free = next((name for name in left if name.startswith("?")), None)
         if free is not None:
@@ -214,7 +214,7 @@ class _Units:
             )
 
     def of_parameters(self, names: list[str]) -> dict[str, Unit]:
-        """Units of parameters; what nothing says is a number."""
+        """Return the units of parameters; an undetermined one is a number."""
         reduced = {name: self.reduced({f"?{name}": 1.0}) for name in names}
         return {
             name: {k: v for k, v in unit.items() if not k.startswith("?")}
@@ -223,7 +223,7 @@ class _Units:
 
 
 def _number(node: ast.AST) -> float | None:
-    """The value of a part without names, None if it has any."""
+    """Return the value of a part without names, None if it has names."""
     if any(isinstance(n, ast.Name) and n.id != "pi" for n in ast.walk(node)):
         return None
     return float(_value(node, {}))
@@ -232,13 +232,13 @@ def _number(node: ast.AST) -> float | None:
 def _added(
     one: Mapping[str, float], other: Mapping[str, float], factor: float
 ) -> dict[str, float]:
-    """Exponents of a product of two units, the second to a power."""
+    """Return the exponents of a product of two units, the second to a power."""
     names = dict.fromkeys([*one, *other])
     return {name: one.get(name, 0.0) + factor * other.get(name, 0.0) for name in names}
 
 
 def unit_text(unit: Unit) -> str:
-    """A unit as it is written, such as ``rad/N^2`` without its rad; ``1`` for none."""
+    """Return a unit as text, such as ``rad/N^2`` without its rad; ``1`` for none."""
 
     def powers(sign: float) -> list[str]:
         parts = [(name, sign * k) for name, k in unit.items() if sign * k > _SAME]

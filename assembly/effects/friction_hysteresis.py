@@ -8,7 +8,7 @@ from assembly.model.robot import Frame, Robot
 
 
 def elastic_joints(robot: Robot) -> tuple[str, ...]:
-    """Joints with a spring along their own z: elastic drives and compliant joints."""
+    """Return joints with a spring along their z: elastic drives, compliant joints."""
     softened = robot.effects.get("drive_compliance", {})
     return tuple(
         f.name
@@ -26,7 +26,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
     C = joint_compliances(conditions.robot)
     for name, tau in values.items():
         row = conditions.robot.index(name)
-        # a torque inside the joint moves it by compliance x torque, stress-free
+        # a torque inside the joint moves it by compliance x torque, without stress
         deflection = C[row] @ own_screw(conditions.robot.frames[row])
         conditions = with_screws(
             conditions, name, -tau * conditions.approach[:, None] * deflection

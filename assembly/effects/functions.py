@@ -1,8 +1,9 @@
-"""Functions at work: general effects of a robot's file, or learned from a campaign.
+"""Application of functions: general effects of a robot's file or of a diagnosis.
 
-A function changes the stress-free screws at a frame, the base, what is read or the
-load.  One that depends on a wrench, as every compliance does, makes its place yield:
-it is solved together with the equilibrium (:mod:`assembly.measurement.yields`).
+A function changes the stress-free screws at a frame, the base, the reading or the load.
+A function that depends on a wrench, as every compliance does, makes its place
+compliant: it is solved together with the equilibrium
+(:mod:`assembly.measurement.yields`).
 """
 
 from collections.abc import Iterable, Sequence
@@ -30,21 +31,21 @@ _parsed = lru_cache(maxsize=256)(parse_formula)
 
 
 def is_loaded(function: Function) -> bool:
-    """Whether it depends on what goes through the robot."""
+    """Return whether a function depends on the loads through the robot."""
     wrench = any(name.startswith("wrench.") for name in function.variables)
     return wrench or function.kind == "compliance"
 
 
 def covariates_of(robot: Robot, sessions: Iterable[str]) -> dict[str, str]:
-    """Covariates that a robot's functions depend on, each with the title of one.
+    """Return the covariates of a robot's functions, each with the title of one.
 
     Args:
-        robot: with its functions.
-        sessions: in which it is looked at.
+        robot: robot with its functions.
+        sessions: sessions that are considered.
 
     Returns:
-        Names without ``cov.``; ``time`` where a form counts it, ``approach`` where a
-        direction has no row before it to follow from.
+        Names without ``cov.``; ``time`` if a form depends on it; ``approach`` if a
+        direction has no earlier row to follow from.
     """
     owners: dict[str, str] = {}
     for function in robot.functions:
@@ -64,12 +65,12 @@ def _is_covariate(name: str) -> bool:
 
 
 def components_of(where: str) -> tuple[str, ...]:
-    """Components that a function may have at a place."""
+    """Return the components that a function may have at a place."""
     return LOADS if where == "load" else AXES
 
 
 def parameters_of(function: Function, component: str) -> dict[str, float]:
-    """A function's numbers for one of its components, the prefix taken off."""
+    """Return a function's numbers for one component, without its prefix."""
     own: dict[str, float] = {}
     for name, value in function.parameters.items():
         whose, _, rest = name.partition(".")
@@ -81,7 +82,7 @@ def parameters_of(function: Function, component: str) -> dict[str, float]:
 
 
 def columns_of(function: Function, component: str) -> list[str]:
-    """Names of the numbers in which a function is linear, prefix taken off."""
+    """Return the names of a function's linear numbers, without prefix."""
     if function.form == FORMULA:
         return []
     shapes = shape_names(FORMS[function.form], len(function.variables))
@@ -89,13 +90,13 @@ def columns_of(function: Function, component: str) -> list[str]:
 
 
 def basis(conditions: Conditions, function: Function, names: Sequence[str]) -> NDArray:
-    """What one unit of each of a function's linear numbers adds to it.
+    """Return the column of each linear number of a function.
 
     Args:
         conditions: R rows.
-        function: of a form, no formula, whose variables are no wrenches; of its
-            parameters the shapes alone are used.
-        names: p of columns, such as ``"1.sine"``.
+        function: with a form, not a formula, and without wrenches among its variables;
+            only the shapes of its parameters are used.
+        names: p names of columns, such as ``"1.sine"``.
 
     Returns:
         (R, p) in the units of the variables; NaN where a variable is not known.
@@ -106,15 +107,15 @@ def basis(conditions: Conditions, function: Function, names: Sequence[str]) -> N
 
 
 def inputs_of(conditions: Conditions, function: Function) -> NDArray:
-    """What a function is computed from, its variables' past taken into account.
+    """Return the inputs of a function, computed from its variables and their past.
 
     Args:
         conditions: R rows.
-        function: any.
+        function: any function.
 
     Returns:
-        (R, k): its variables, NaN for wrenches; of a form that remembers, what it made
-        of the first.
+        (R, k): its variables, NaN for wrenches; for a form with memory, the first
+        variable is replaced by its state.
     """
     first, *further = function.variables
     inputs = [_now(conditions, name) for name in further]
@@ -129,7 +130,7 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
         angle = inputs[0] if inputs else _now(conditions, first)
         return np.column_stack([history.direction(first)[row], angle])
     if form.name == "reversal":
-        # friction grows with the load, whichever way it pushes
+        # friction grows with the size of the load, in both directions
         sizes = [
             np.abs(x) if name.startswith("load.") else x
             for name, x in zip(further, inputs, strict=True)
@@ -137,14 +138,14 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
         return np.column_stack([history.direction(first)[row], *sizes])
     shapes = parameters_of(function, function.components[0])
     late = shapes["time_constant"]
-    if first in CLOCKS:  # what settles by itself: a step at time 0
+    if first in CLOCKS:  # it settles by itself, like a step at time 0
         return np.column_stack([1.0 - history.fading(late), history.fading(late)])[row]
     lagged = history.lagged(first, late, held=form.name == "creep")
     return np.column_stack([lagged[row], history.fading(late)[row]])
 
 
 def _now(conditions: Conditions, name: str) -> NDArray:
-    """(R,) a variable; of the rows' recorded values where they are kept."""
+    """Return a variable (R,), from the recorded rows if there are any."""
     if name.startswith("wrench."):
         return np.full(len(conditions), np.nan)
     if conditions.history is not None and conditions.row is not None:
@@ -153,12 +154,12 @@ def _now(conditions: Conditions, name: str) -> NDArray:
 
 
 def value_of(function: Function, component: str, inputs: Sequence[NDArray]) -> NDArray:
-    """A function's value.
+    """Return a function's value.
 
     Args:
-        function: any.
-        component: which of its.
-        inputs: (R,) each, as :func:`inputs_of` gives them.
+        function: any function.
+        component: one of its components.
+        inputs: (R,) each, from :func:`inputs_of`.
 
     Returns:
         (R,) [rad, m, N m, N], or per wrench for a compliance.
@@ -176,14 +177,14 @@ def value_of(function: Function, component: str, inputs: Sequence[NDArray]) -> N
 
 
 def variable_names(variables: Sequence[str]) -> dict[str, int]:
-    """Names by which a formula may call its variables.
+    """Return the names by which a formula may refer to its variables.
 
     Args:
         variables: public names.
 
     Returns:
-        Which variable each stands for: the last part, the first part where only one
-        variable has it, and the whole with ``_`` for dots.
+        Index of the variable by name: the last part, the first part if it is unique,
+        and the whole name with ``_`` for dots.
     """
     indices: dict[str, list[int]] = {}
     for k, name in enumerate(variables):
@@ -198,12 +199,12 @@ def apply_functions(
     functions: Iterable[Function],
     recorded: Conditions | None = None,
 ) -> Conditions:
-    """Conditions with functions added, each in its session.
+    """Return the conditions with functions added, each in its session.
 
     Args:
         conditions: R rows.
         functions: any number.
-        recorded: the same before other effects changed them, as functions see them.
+        recorded: the conditions before other effects, which functions see.
 
     Returns:
         Conditions with all of them.
@@ -221,7 +222,7 @@ def apply_functions(
 
 
 def in_session(conditions: Conditions, session: str | None) -> NDArray:
-    """(R,) bool: the rows of a session; all where it is None."""
+    """Return the (R,) bool: the rows of a session; all where it is None."""
     if session is None:
         return np.ones(len(conditions), dtype=bool)
     if conditions.session is None:
@@ -232,7 +233,7 @@ def in_session(conditions: Conditions, session: str | None) -> NDArray:
 def _with_function(
     conditions: Conditions, function: Function, inputs: NDArray, acts: NDArray
 ) -> Conditions:
-    """One more function, in the rows where it acts."""
+    """Add one more function, in the rows where it acts."""
     where = function.where
     named = [name.split(".")[1] for name in function.variables if "wrench" in name]
     if BASE in (where, *named):
@@ -254,7 +255,7 @@ def _with_function(
 
 
 def _check_finite(function: Function, values: NDArray, inputs: NDArray) -> None:
-    """Refuse a function that has no value where it is asked for one."""
+    """Reject a function without a finite value in a row where it acts."""
     for row in np.flatnonzero(~np.isfinite(values))[:1]:
         known = zip(function.variables, inputs[row], strict=False)
         where = ", ".join(f"{name} = {x:g}" for name, x in known)
@@ -271,8 +272,8 @@ def _yielding(
     inputs: NDArray,
     acts: NDArray,
 ) -> Conditions:
-    """A place that gives under what goes through it."""
-    slots: dict[int, int] = {}  # of the inputs, by the number of its wrench
+    """Add a place that is compliant under the wrench through it."""
+    slots: dict[int, int] = {}  # of the inputs, by the index of the wrench
     through: list[tuple[str, int]] = []
     for k, name in enumerate(function.variables):
         if name.startswith("wrench."):
@@ -306,15 +307,15 @@ def _yielding(
 def in_session_alone(
     conditions: Conditions, changed: Conditions, session: str
 ) -> Conditions:
-    """Conditions changed in the rows of one session alone.
+    """Return the conditions changed in the rows of one session alone.
 
     Args:
         conditions: R rows.
-        changed: the same with effects that change them row by row.
-        session: where these act.
+        changed: the same conditions with effects that change them row by row.
+        session: the session in which these act.
 
     Returns:
-        The mixture.
+        Changed conditions in these rows, unchanged ones in the others.
     """
     acts = in_session(conditions, session)[:, None]
 

@@ -1,4 +1,4 @@
-"""Preload and finite rotations change the stiffness: the exact model is used."""
+"""Stiffness change by preload and finite rotations: the exact model is used."""
 
 from dataclasses import replace
 

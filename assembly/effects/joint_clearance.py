@@ -1,4 +1,4 @@
-"""Clearances at joints declared tight, taken up by the load."""
+"""Clearance in joints that are declared without; the load takes it up."""
 
 from dataclasses import replace
 from functools import partial
@@ -9,11 +9,11 @@ from assembly.measurement.conditions import Conditions
 from assembly.model.robot import Clearance, Frame, Robot
 
 _KINDS = ("radial", "axial", "tilt")
-_NONE_BELOW = 1e-9  # [m, rad] a clearance below it is none
+_NONE_BELOW = 1e-9  # [m, rad] smaller clearances count as zero
 
 
 def moving_joints(robot: Robot) -> tuple[str, ...]:
-    """Joints that move and are declared tight."""
+    """Return the mobile joints that are declared without clearance."""
     return tuple(
         f.name for f in robot.frames if f.joint != "fixed" and _is_tight(f.clearance)
     )
@@ -42,7 +42,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """The clearances; a joint fitted tight has none."""
+    """Return the clearances; a joint fitted without clearance is left out."""
     return {key: size for key, size in values.items() if size > _NONE_BELOW}
 
 

@@ -1,4 +1,4 @@
-"""A body is longer than declared, along its beam or the line between its joints."""
+"""Length error of a body, along its beam or the line between its joints."""
 
 from assembly.effects.effect import Effect, Unknown, Values
 from assembly.effects.places import bodies, growing, lengthening, with_screws

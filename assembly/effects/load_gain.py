@@ -1,4 +1,4 @@
-"""The load applied is a multiple of the one recorded, plus a constant."""
+"""Load gain: the applied load is a multiple of the recorded one, plus a constant."""
 
 from dataclasses import replace
 

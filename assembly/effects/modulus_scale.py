@@ -1,4 +1,4 @@
-"""Young's modulus of a link is a multiple of the one declared."""
+"""Scale of a link's modulus: Young's modulus is a multiple of the declared one."""
 
 from dataclasses import replace
 from functools import partial
@@ -10,7 +10,7 @@ from assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
 
 
 def links(robot: Robot) -> tuple[str, ...]:
-    """Frames whose body is elastic with constants of its own, not of a library."""
+    """Return frames with an elastic body of its own constants, not from a library."""
     own = BeamLink | MeshLink | MatrixLink
     return tuple(f.name for f in robot.frames if isinstance(f.link, own))
 
@@ -36,7 +36,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Factors on the modulus from relative compliance changes, 1 / factor - 1."""
+    """Return factors on the modulus from relative changes 1 / factor - 1."""
     ends = len(".softer")
     return {name[:-ends]: 1 / (1 + s) for name, s in values.items()}
 

@@ -1,4 +1,4 @@
-"""Frames where effects act: drives and beams of a robot, and changes made to them."""
+"""Frames at which effects act, and changes to conditions at a frame."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,26 +10,26 @@ from assembly.measurement.conditions import Conditions
 from assembly.model.frame import between_origins
 from assembly.model.robot import BeamLink, Frame, Robot, beam_axis
 
-_LEAST = 1e-6  # [m] length of a body between two places
+_LEAST = 1e-6  # [m] smallest length of a body between two origins
 
 
 def drives(robot: Robot) -> tuple[str, ...]:
-    """Actuated joints."""
+    """Return the actuated joints."""
     return tuple(f.name for f in robot.frames if f.actuated)
 
 
 def turning_drives(robot: Robot) -> tuple[str, ...]:
-    """Actuated joints that turn."""
+    """Return the actuated revolute joints."""
     return tuple(f.name for f in robot.frames if f.actuated and f.joint == "revolute")
 
 
 def beams(robot: Robot) -> tuple[str, ...]:
-    """Frames whose body is a beam, which has an axis along which it lengthens."""
+    """Return frames whose body is a beam, which has an axis."""
     return tuple(f.name for f in robot.frames if isinstance(f.link, BeamLink))
 
 
 def bodies(robot: Robot) -> tuple[str, ...]:
-    """Frames whose body has a length: beams, and others between two places."""
+    """Return frames whose body has a length: beams, and others between two origins."""
     return tuple(
         f.name
         for f in robot.frames
@@ -38,19 +38,19 @@ def bodies(robot: Robot) -> tuple[str, ...]:
 
 
 def growing(robot: Robot) -> tuple[str, ...]:
-    """Frames whose bodies may be longer: beams, or all of a robot without beams."""
+    """Return frames whose length may differ: beams; without beams, all bodies."""
     return beams(robot) or bodies(robot)
 
 
 def body_axis(frame: Frame) -> tuple[float, NDArray]:
-    """Length and direction of a body.
+    """Return the length and direction of a body.
 
     Args:
-        frame: whose.
+        frame: the frame of the body.
 
     Returns:
-        [m] length, and (3,) unit vector in the frame's axes: of its beam; without one,
-        of the line from its parent's origin to its own.
+        [m] length, and (3,) unit vector in the frame's axes: those of its beam; without
+        a beam, those of the line from its parent's origin to its own.
     """
     if isinstance(frame.link, BeamLink):
         return beam_axis(frame)
@@ -60,11 +60,11 @@ def body_axis(frame: Frame) -> tuple[float, NDArray]:
 
 
 def with_screws(conditions: Conditions, frame: str, screws: NDArray) -> Conditions:
-    """Conditions with more stress-free screws at a frame.
+    """Return the conditions with more stress-free screws at a frame.
 
     Args:
         conditions: conditions of R rows.
-        frame: where.
+        frame: name of the frame.
         screws: (R, 6) or (6,) [rad, m] in the frame's axes.
 
     Returns:
@@ -78,7 +78,7 @@ def with_screws(conditions: Conditions, frame: str, screws: NDArray) -> Conditio
 def with_frame(
     conditions: Conditions, frame: str, change: Callable[[Frame], Frame]
 ) -> Conditions:
-    """Conditions of a robot with one frame changed."""
+    """Return the conditions of a robot with one frame changed."""
     row = conditions.robot.index(frame)
     frames = list(conditions.robot.frames)
     frames[row] = change(frames[row])
@@ -86,11 +86,11 @@ def with_frame(
 
 
 def lengthening(frame: Frame) -> NDArray:
-    """(6,) screw of a body that is longer by 1 m, in the frame's axes."""
+    """Return the (6,) screw of a body that is longer by 1 m, in the frame's axes."""
     return np.concatenate([np.zeros(3), body_axis(frame)[1]])
 
 
 def own_unit(robot: Robot, parameter: str) -> str:
-    """``rad`` or ``m``: unit of the motion of the joint that a parameter names."""
+    """Return the unit of a joint's own motion, ``rad`` or ``m``."""
     frame = next(f for f in robot.frames if f.name == parameter)
     return "m" if frame.joint == "prismatic" else "rad"

@@ -1,4 +1,4 @@
-"""The measuring frame is turned and shifted, or the measured point is off."""
+"""Registration: rotation and shift of the measuring frame and of the point."""
 
 from dataclasses import replace
 

@@ -12,8 +12,8 @@ from assembly.kinematics.posture import Posture
 from assembly.measurement.conditions import COVARIATES, Conditions, as_declared
 from assembly.measurement.predict import assemble_row, read
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, nearest, quoted
+from forcefit.results.display import html_table, short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,11 +21,11 @@ class AppliedEffects:
     """A posture, load and gravity with the effects of the robot's file applied.
 
     Attributes:
-        posture: of the robot with the errors, springs, clearances and foundation that
-            the effects give it.
+        posture: posture of the robot with the errors, springs, clearances and
+            foundation that the effects give it.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes, None without weight.
-        conditions: one row: all of that, and what the measuring device adds.
+        conditions: one row with all of these, and the errors of the measuring device.
     """
 
     posture: Posture
@@ -36,7 +36,7 @@ class AppliedEffects:
     __repr__, _repr_html_ = short_repr, html_table
 
     def reading(self, platform_screw: ArrayLike) -> NDArray:
-        """(6,) [rad, m] a device's reading of a platform screw."""
+        """Return the (6,) [rad, m] reading of a device for a platform screw."""
         return read(self.conditions, np.array(platform_screw, dtype=float)[None])[0]
 
 
@@ -51,19 +51,19 @@ def apply_robot_effects(
     """Apply the effects of a robot's file at one posture.
 
     Args:
-        posture: of the robot as declared.
+        posture: posture of the robot as declared.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes, added to that of the effects.
         covariates: ``temperature`` [K] above calibration, ``time`` [s], ``approach``,
-            others that functions depend on, and ``session``, by name.
+            others on which functions depend, and ``session``, by name.
         finite: whether the exact model is used.
 
     Returns:
-        All with the effects applied; without effects, what was given.
+        Posture, loads and conditions with the effects; without effects, unchanged.
 
     Raises:
-        BadInput: an effect needs a covariate that is not given, or asks for finite
-            motions, which belong to ``exact``.
+        BadInput: an effect needs a covariate that is not given, or needs finite
+            motions, which only ``exact`` has.
     """
     given = dict(covariates or {})
     robot = posture.robot
@@ -91,16 +91,16 @@ def apply_robot_effects(
 def check_covariates(
     robot: Robot, given: Mapping[str, float | str], *, finite: bool = False
 ) -> None:
-    """Refuse effects that cannot be applied under the covariates given.
+    """Reject effects that cannot be applied under the covariates given.
 
     Args:
-        robot: with the effects of its file.
+        robot: robot with the effects of its file.
         given: covariates by name.
         finite: whether the exact model is used.
 
     Raises:
-        BadInput: an unknown covariate, one that an effect needs and is not given, or
-            an effect that needs finite motions.
+        BadInput: an unknown covariate, a missing one that an effect needs, or an effect
+            that needs finite motions.
     """
     session = given.get("session")
     needed = covariates_of(robot, [str(session)])
@@ -116,7 +116,7 @@ def check_covariates(
     if finite_ones and not finite:
         raise BadInput(
             f'{robot.name}: effect "{finite_ones[0]}" asks for finite '
-            "motions; expected the command forcefit assembly exact"
+            "motions; expected forcefit assembly solve --state exact"
         )
     for name in (*robot.effects, *robot.session_effects.get(str(session), ())):
         needed |= dict.fromkeys(LIBRARY[name].needs, name)

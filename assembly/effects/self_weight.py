@@ -1,4 +1,4 @@
-"""Weight of links and bodies: gravity that the model does not declare."""
+"""Weight of links and bodies, if the model declares no gravity."""
 
 from dataclasses import replace
 

@@ -1,6 +1,6 @@
-"""A body lengthens by coefficient x length x temperature.
+"""Thermal expansion: a body lengthens by coefficient x length x temperature.
 
-Along its beam, or the line between its joints.
+It lengthens along its beam, or along the line between its joints.
 """
 
 from assembly.effects.effect import Effect, Unknown, Values

@@ -1,4 +1,4 @@
-"""Units of functions: of their variables, of what they give, of their parameters."""
+"""Units of functions: of their variables, their results and their parameters."""
 
 from assembly.effects.forms import FORMS, column_indices, shape_names
 from assembly.effects.formula import Unit, parameter_units, parse_formula, unit_text
@@ -11,14 +11,14 @@ _ANGLE: Unit = {}  # rad counts as a number
 
 
 def variable_unit(robot: Robot, name: str) -> Unit:
-    """Exponents of m, N, s, K of a variable; of a covariate without one, its name.
+    """Return the exponents of m, N, s, K of a variable; of a covariate, its name.
 
     Args:
-        robot: whose variable it is.
-        name: public.
+        robot: the robot of the variable.
+        name: public name.
 
     Returns:
-        The unit; none for angles and signs.
+        The unit; empty for angles and signs.
     """
     kind, _, rest = name.partition(".")
     if kind == "q":
@@ -35,7 +35,7 @@ def variable_unit(robot: Robot, name: str) -> Unit:
 
 
 def result_unit(function: Function, component: str) -> Unit:
-    """The unit of what a function gives in one component."""
+    """Return the unit of a function's result in one component."""
     turns = component.startswith(("r", "m"))
     if function.where == "load":
         return {"N": 1, "m": 1} if turns else {"N": 1}
@@ -48,11 +48,11 @@ def result_unit(function: Function, component: str) -> Unit:
 
 
 def units_of(robot: Robot, function: Function) -> dict[str, str]:
-    """Units of a function's parameters, as they are written.
+    """Return the units of a function's parameters, as they are written.
 
     Args:
-        robot: on which it acts.
-        function: any.
+        robot: the robot on which it acts.
+        function: any function.
 
     Returns:
         By parameter, such as ``"rad/K"``.
@@ -69,7 +69,7 @@ def units_of(robot: Robot, function: Function) -> dict[str, str]:
 def _parameter_unit(
     robot: Robot, function: Function, component: str, name: str
 ) -> str:  # fmt: skip
-    """The unit of one parameter of one component."""
+    """Return the unit of one parameter of one component."""
     given = [variable_unit(robot, variable) for variable in function.variables]
     whole = result_unit(function, component)
     angle = component.startswith("r") and function.where != "load"
@@ -104,7 +104,7 @@ def _parameter_unit(
 
 
 def turning_variables(function: Function) -> tuple[str, ...]:
-    """Variables of a function of which a wave turns once each ``period``."""
+    """Return the variables whose waves have one turn per ``period``."""
     if function.form == "reversal_waves":
         return function.variables[-1:]
     if function.form == "scaled_waves":
@@ -113,5 +113,5 @@ def turning_variables(function: Function) -> tuple[str, ...]:
 
 
 def whole_unit(unit: Unit) -> str:
-    """A variable's unit as it is written; ``rad`` where it has none."""
+    """Return a variable's unit as text; ``rad`` if it has none."""
     return unit_text(unit) if unit else "rad"

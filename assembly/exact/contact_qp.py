@@ -1,12 +1,14 @@
 r"""Quadratic energies in the clearances, convex or not, within their cones.
 
-A step of the exact equilibrium asks for the change v of the clearances u that makes
+A step of the exact equilibrium needs the change v of the clearances u that minimises
 
-    s . v + v . S v / 2  least  with  |u_k + v_k| <= 1,  H (u + v) = k,
+        s . v + v . S v / 2   subject to   |u_k + v_k| <= 1,  H (u + v) = k,
 
-where S has directions of negative curvature: normal to the active constraint
-boundaries, which is harmless, and sometimes elsewhere.  Far from the solution S is made
-convex and :mod:`assembly.solvers.conic` solves it.  Near it Newton's method on the
+    where S has directions of negative curvature: normal to the active constraint
+    boundaries, which is harmless, and sometimes elsewhere.  Far from the solution S is
+    made convex and :mod:`assembly.solvers.conic` solves the problem.  Near it Newton's
+    method on the active boundaries is exact to rounding; the conic solver has half as
+    many digits.
 active boundaries is exact to rounding; the conic solver stops at half of the digits.
 
 ======  ===========  =========  =====================================================
@@ -33,18 +35,27 @@ from assembly.solvers.cones import cone_sizes
 from assembly.solvers.conic import minimise_energy
 from assembly.solvers.method import Method
 
-AT_BOUNDARY = 1e-5  # [-] below size 1 within which a cone may be active
-_STEPS = 15  # of Newton's method on the active boundaries
-_STILL = 1e-6  # [-] size of the last, in sizes of the cones
-_ZERO_MULTIPLIER = 1e-11  # of the largest: one less negative keeps its cone active
-_LONGEST = 0.3  # [-] of a step along a boundary, which is curved
-_SHIFTS = (0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)  # of the largest curvature, to shorten it
-_LEAST_CURVATURE = 1e-10  # of the largest: smaller ones are replaced by it
+AT_BOUNDARY = 1e-5  # [-] distance from size 1 within which a cone may be active
+_STEPS = 15  # largest number of Newton steps on the active boundaries
+_STILL = 1e-6  # [-] largest last step of a solution, in sizes of the cones
+# relative to the largest: above minus this a cone stays active
+_ZERO_MULTIPLIER = 1e-11
+_LONGEST = 0.3  # [-] longest step along a boundary, which is curved
+_SHIFTS = (
+    0.0,
+    1e-9,
+    1e-8,
+    1e-7,
+    1e-6,
+    1e-5,
+)  # of the largest curvature: tried
+# relative to the largest curvature: smaller ones are replaced by it
+_LEAST_CURVATURE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class ClearanceProblem:
-    """The quadratic problem of a step; see the head of this module.
+    """The quadratic problem of a step; see the module's docstring.
 
     Attributes:
         S: (nu, nu) symmetric.
@@ -64,7 +75,10 @@ class ClearanceProblem:
 
     @cached_property
     def multipliers(self) -> tuple[NDArray, NDArray]:
-        """(cones,) [J] of cones at the start, 0 where inactive; (p,) of ``rows``."""
+        """(cones,) [J] multipliers of cones at the start, 0 if inactive.
+
+        (p,) those of ``rows``.
+        """
         touching = cone_sizes(self.start, self.group) >= 1.0 - AT_BOUNDARY
         normals = boundary_normals(self.start, touching, self.group)
         balance = np.linalg.lstsq(np.hstack([normals, self.rows.T]), -self.s)[0]
@@ -77,26 +91,26 @@ class ClearanceProblem:
 
 
 def cone_multipliers(u: NDArray, gradient: NDArray, group: NDArray) -> NDArray:
-    """(cones,) [J] multipliers of the cones, from the gradient of the energy."""
+    """Return the (cones,) [J] multipliers of the cones from the energy's gradient."""
     force = -np.bincount(group, weights=gradient * u)
     at_boundary = cone_sizes(u, group) >= 1.0 - AT_BOUNDARY
     return np.where(at_boundary, np.maximum(force, 0.0), 0.0)
 
 
 def boundary_normals(u: NDArray, active: NDArray, group: NDArray) -> NDArray:
-    """(nu, active) normals of the boundaries of the cones marked."""
+    """Return the (nu, active) normals of the boundaries of the cones marked."""
     return np.where(group[:, None] == np.flatnonzero(active), u[:, None], 0.0)
 
 
 def clearance_step(
     problem: ClearanceProblem, near: bool, method: Method = "compiled"
 ) -> tuple[NDArray, NDArray] | None:
-    """Change of the clearances that minimises the quadratic energy within the cones.
+    """Return the change of clearances that minimises the energy within the cones.
 
     Args:
         problem: the quadratic problem.
-        near: whether the solution is near enough for Newton's method to be tried.
-        method: of :func:`assembly.solvers.conic.minimise_energy`.
+        near: whether the solution is near enough to try Newton's method.
+        method: method of :func:`assembly.solvers.conic.minimise_energy`.
 
     Returns:
         The change (nu,) and the multipliers (p,) of ``rows``; None if no clearances
@@ -107,14 +121,14 @@ def clearance_step(
 
 
 def _convex(p: ClearanceProblem, method: Method) -> tuple[NDArray, NDArray] | None:
-    """The step with S made convex, first without changing the minimum."""
+    """Return the step with S made convex, if possible without changing the minimum."""
     least = float(np.linalg.eigvalsh(p.S).min(initial=0.0))
     force, _ = p.multipliers
     active = force[p.group]
     if least >= 0.0 or not active.any():
         return _conic(p, p.S, p.s, method)
-    # f (|u_k|^2 - 1) / 2 vanishes at the boundary, and normal to it nothing moves to
-    # first order: both make S convex where needed, and leave the minimum where it is
+    # f (|u_k|^2 - 1) / 2 vanishes at the boundary, and its normal does not move to
+    # first order: adding it makes S convex where needed and keeps the minimum
     normals = boundary_normals(p.start, force > 0.0, p.group)
     held = 0.99 * active
     convex = p.S + np.diag(held) - 10.0 * least * normals @ normals.T
@@ -129,7 +143,7 @@ def _convex(p: ClearanceProblem, method: Method) -> tuple[NDArray, NDArray] | No
 def _conic(
     p: ClearanceProblem, S: NDArray, s: NDArray, method: Method
 ) -> tuple[NDArray, NDArray] | None:
-    """The step of the conic solver; negative curvature is replaced by almost none."""
+    """Return the conic solver's step; a small curvature replaces negative ones."""
     values, vectors = np.linalg.eigh(S)
     floor = _LEAST_CURVATURE * max(float(np.abs(values).max(initial=0.0)), 1e-150)
     G = np.sqrt(np.maximum(values, floor))[:, None] * vectors.T
@@ -140,7 +154,7 @@ def _conic(
 
 
 def _newton(p: ClearanceProblem) -> tuple[NDArray, NDArray] | None:
-    """Newton's method on the active boundaries; None if that fails."""
+    """Return the step of Newton's method on the active boundaries; None if it fails."""
     force, rigid = p.multipliers
     u, active = p.start, force > 0.0
     for _ in range(_STEPS):

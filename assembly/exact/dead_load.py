@@ -1,10 +1,11 @@
 r"""Dead loads on finite motions: constant forces at points fixed to moving bodies.
 
-A dead load's work is linear in the pose of its body, <G, T - T_nominal>, with T the
-first three rows of the body's transform.  Then a force f at the point a of the body, in
-its axes, is f [a, 1]^T; a couple m is two opposite forces, [m]x R_nominal / 2, whose
-work is m . (axis sin angle); a beam's weight W acts at the middle of the cubic that its
-two ends clamp, (p1 + p2) / 2 + (t1 - t2) / 12 with t the end tangents times the length.
+A dead load's work is linear in the pose of its body, <G, T - T_nominal>, where T is the
+first three rows of the body's transform.  For a force f at the point a of the body, in
+its axes, G is f [a, 1]^T.  A couple m is two opposite forces, [m]x R_nominal / 2, whose
+work is m . (axis sin angle).  A beam's weight W acts at the middle of the cubic between
+its clamped ends, (p1 + p2) / 2 + (t1 - t2) / 12, with t the end tangents times the
+length.
 
 ======  =============  ==========  ==================================================
 symbol  code           shape       meaning
@@ -51,7 +52,7 @@ class DeadLoads:
 
     @cached_property
     def beyond_platform(self) -> bool:
-        """Whether anything but the platform is loaded."""
+        """Whether a body or joint other than the platform is loaded."""
         return bool(np.any(self.bodies) or np.any(self.carried))
 
 
@@ -62,17 +63,17 @@ def dead_loads(
     gravity: ArrayLike | None = None,
     point: ArrayLike = (0.0, 0.0, 0.0),
 ) -> DeadLoads:
-    """Loads as dead loads.
+    """Return the loads as dead loads.
 
     Args:
-        posture: where the robot stands, of n frames.
+        posture: the robot's configuration, of n frames.
         load: (6,) [N m, N] on the platform at a point, base axes.
         bodies: (n, 6) [N m, N] on each frame's body, at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
-        point: (3,) [m] where the load acts, platform axes: the force goes with it.
+        point: (3,) [m] where the load acts, platform axes; the force moves with it.
 
     Returns:
-        The loads; all zero where nothing is given.
+        The loads; all zero if no load is given.
     """
     count = len(posture.robot.frames)
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
@@ -94,11 +95,11 @@ def dead_loads(
 def dead_loads_of_rows(
     postures: Posture, errors: NDArray, load: NDArray, gravity: NDArray, point: NDArray
 ) -> DeadLoads:
-    """The same under many conditions at once.
+    """Return the dead loads under many conditions together.
 
     Args:
         postures: R of them, in one.
-        errors: (R, n, 6) [rad, m] screws of the bodies that come without stress.
+        errors: (R, n, 6) [rad, m] screws of the bodies in their unstressed shape.
         load: (R, 6) [N m, N] on the platform at a point, base axes.
         gravity: (R, 3) [m/s^2] base axes.
         point: (3,) [m] where the load acts, platform axes.
@@ -121,7 +122,7 @@ def dead_loads_of_rows(
 def _add_weights(
     posture: Posture, errors: NDArray, g: NDArray, on_bodies: NDArray, carried: NDArray
 ) -> NDArray:
-    """Add weights of bodies and links; return what of it acts along links, at tips."""
+    """Add weights of bodies and links; return those along links, at their tips."""
     robot, nominal = posture.robot, nominally_carried(posture)
     distributed = np.zeros_like(on_bodies)
     for i, frame in enumerate(robot.frames):
@@ -137,9 +138,9 @@ def _add_weights(
         distributed[..., i, :, :] = at_tip
         on_bodies[..., i, :, :] += at_tip
         parent = robot.parents[i]
-        if parent >= 0:  # else the base carries it
+        if parent >= 0:  # otherwise the base carries it
             # the beam's start and tangent, seen from the parent's frame after its
-            # joint: a straight beam up to the tip with its geometric error
+            # joint: the beam is straight up to the tip with its geometric error
             error = errors[..., i, :]
             off = transform(error[..., 3:], rotation_matrix(error[..., :3]))
             T = np.linalg.inv(nominal[..., parent, :, :])
@@ -153,7 +154,7 @@ def _add_weights(
 
 
 def work_of(place: Placement, loads: DeadLoads) -> float:
-    """[J] all loads' work from the nominal posture."""
+    """Return the work [J] of all loads from the nominal posture."""
     work = 0.0
     if loads.load.any():
         work += float(loads.load @ place.platform_screw)
@@ -168,7 +169,7 @@ def work_of(place: Placement, loads: DeadLoads) -> float:
 
 
 def work_gradient(place: Placement, loads: DeadLoads) -> NDArray:
-    """(N,) [J] derivative of the work by each unknown."""
+    """Return the (N,) [J] derivative of the work by each unknown."""
     gradient = place.platform_rows.T @ loads.load
     if loads.beyond_platform:
         wrenches, _ = _on_unknowns(place, loads)
@@ -177,10 +178,10 @@ def work_gradient(place: Placement, loads: DeadLoads) -> NDArray:
 
 
 def curvature_of(place: Placement, multipliers: NDArray, loads: DeadLoads) -> NDArray:
-    """Second derivative of multipliers . residual + work.
+    """Return the second derivative of multipliers . residual + work.
 
     Args:
-        place: where everything is.
+        place: the robot's placement.
         multipliers: (6 K,) of the scaled residual.
         loads: on the robot.
 
@@ -202,7 +203,7 @@ def curvature_of(place: Placement, multipliers: NDArray, loads: DeadLoads) -> ND
 
 
 def load_magnitudes(place: Placement, loads: DeadLoads) -> NDArray:
-    """(N,) [J] generalised loads on the unknowns, summed without cancellation."""
+    """Return the (N,) [J] loads on the unknowns, summed as absolute values."""
     sizes = np.abs(place.platform_rows).T @ np.abs(loads.load)
     if loads.beyond_platform:
         wrenches, _ = _on_unknowns(place, loads)
@@ -211,7 +212,7 @@ def load_magnitudes(place: Placement, loads: DeadLoads) -> NDArray:
 
 
 def largest_wrench(place: Placement, loads: DeadLoads) -> float:
-    """[N m] largest scaled wrench of the loads at the platform's origin."""
+    """Return the [N m] largest scaled wrench of the loads at the platform's origin."""
     scale = place.model.scale
     largest = float(np.abs(loads.load / scale).max())
     if loads.beyond_platform:
@@ -221,15 +222,15 @@ def largest_wrench(place: Placement, loads: DeadLoads) -> float:
 
 
 def wrenches_on_frames(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
-    """Wrenches of all loads, at the platform's nominal origin, base axes.
+    """Return the wrenches of all loads, at the platform's nominal origin, base axes.
 
     Args:
-        place: where everything is.
+        place: the robot's placement.
         loads: on the robot.
 
     Returns:
-        (n, 6) [N m, N] on all that each frame's body holds, itself among it, and (n, 6)
-        on all that its joint holds.
+        (n, 6) [N m, N] on all that each frame's body carries, itself included, and (n,
+        6) on all that its joint carries.
     """
     robot = place.model.posture.robot
     body, joint, *_ = _on_frames(place, loads)
@@ -243,7 +244,7 @@ def wrenches_on_frames(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDA
 
 
 def distributed_at_tips(place: Placement, loads: DeadLoads) -> NDArray:
-    """(n, 6) [N m, N] weights of links as they count at their tips, in axes there."""
+    """Return the (n, 6) [N m, N] links' weights as they act at their tips."""
     T = place.body_ends
     G = np.broadcast_to(loads.distributed, (len(T), 3, 4))
     moment, force, _ = _read(G, T, T[:, :3, 3])
@@ -253,7 +254,7 @@ def distributed_at_tips(place: Placement, loads: DeadLoads) -> NDArray:
 
 
 def _on_unknowns(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
-    """(N, 6) wrench of the dead loads on all that each unknown moves, and its M."""
+    """Return the (N, 6) dead loads on all that each unknown moves, and their M's."""
     model = place.model
     body, joint, M_body, M_joint = _on_frames(place, loads)
     link = (model.motion == LINK)[:, None]
@@ -265,7 +266,7 @@ def _on_unknowns(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
 def _on_frames(
     place: Placement, loads: DeadLoads
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Wrenches of dead loads on all that bodies and joints hold, and their M's."""
+    """Return the dead loads' wrenches on all that bodies and joints carry, with M's."""
     posture = place.model.posture
     return resultants(posture, loads, place.body_ends, place.carried)
 
@@ -273,17 +274,19 @@ def _on_frames(
 def resultants(
     posture: Posture, loads: DeadLoads, body_ends: NDArray, carried: NDArray
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Dead loads summed over what each frame holds, at the platform's nominal origin.
+    """Return the dead loads summed over what each frame carries.
+
+    The wrenches are read at the platform's nominal origin.
 
     Args:
-        posture: nominal; all arrays may have rows in front, as its own.
+        posture: nominal; all arrays may have leading dimensions, as its own.
         loads: on the robot.
         body_ends: (..., n, 4, 4) seen from the base.
         carried: (..., n, 4, 4) frames after their joint's coordinate.
 
     Returns:
-        (..., n, 6) [N m, N] wrenches on what bodies hold and on what joints hold, base
-        axes, and (..., n, 3, 3) [N m] their M's.
+        (..., n, 6) [N m, N] wrenches on all that bodies carry and that joints carry,
+        base axes, and (..., n, 3, 3) [N m] their M's.
     """
     robot, origin = posture.robot, posture.platform[..., None, :3, 3]
     below = (robot.on_path & ~np.eye(len(robot.frames), dtype=bool)).T
@@ -301,7 +304,7 @@ def resultants(
 
 
 def _read(G: NDArray, T: NDArray, origin: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Moments (..., n, 3) at the origin, forces (..., n, 3), and M's (..., n, 9)."""
+    """Return moments and forces (..., n, 3) at the origin, and M's (..., n, 9)."""
     points = T[..., :3, :].copy()
     points[..., 3] -= origin
     moments = np.cross(points, G, axis=-2).sum(axis=-1)

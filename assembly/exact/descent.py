@@ -4,13 +4,13 @@ Near a placement x the closures are linearised and the Lagrangian
 
     L = |y|^2 / 2 - W(x) - lambda . r(x)
 
-is expanded to second order, with its true Hessian: the closures' curvature times the
+is expanded to second order, with its true Hessian.  The closures' curvature times the
 wrenches they carry outweighs soft springs; without it Gauss-Newton stalls.  Springs and
-free motions are eliminated, :mod:`assembly.exact.contact_qp` solves the problem in the
-clearances, a restoration (retraction) brings the step back onto the closures, and it is
-accepted if it lowers energy plus a penalty on the residual.  Otherwise a proximal term
-damps it, as Levenberg and Marquardt do, measured in radians and reference lengths of
-every screw.
+free motions are eliminated, and :mod:`assembly.exact.contact_qp` solves the problem in
+the clearances.  A restoration (retraction) brings the step back onto the closures.  The
+step is accepted if it lowers energy plus a penalty on the residual.  Otherwise a
+proximal term damps it, as in the method of Levenberg and Marquardt, measured in radians
+and reference lengths of every screw.
 
 ======  =============  =============  ===============================================
 symbol  code           shape          meaning
@@ -18,8 +18,8 @@ symbol  code           shape          meaning
 A r     ``rows`` ..    (6 K, N)       closures' derivative and residual, scaled
 lambda  multipliers    (6 K,)         wrenches of the closures, scaled
 H g     ``hessian`` .. (N, N), (N,)   second derivative of L, gradient of the energy
-B       ``basis``      (N, nu + nv)   clearances and what closes after them, and
-                                      motions that change no closure
+B       ``basis``      (N, nu + nv)   clearances with the motions that keep closures,
+                                      and motions that change no closure
 ======  =============  =============  ===============================================
 
 Sources:
@@ -46,14 +46,15 @@ from assembly.kinematics.ranks import ROWS_RANK, rank_tolerance
 from assembly.solvers.cones import into_cones
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method
-from forcefit.inputs.display import numbers
+from forcefit.results.display import numbers
 
 CLOSED = 1e-12  # [rad, reference lengths] residual of a solution
-LONGEST_STEP = 1.0  # [rad, reference lengths]
-_SMALL_RESIDUAL = 1e-9  # [rad, reference lengths] whose wrenches count as small
-_LEAST_DAMPING = 1e-9  # of the largest closure wrench: resists what nothing else does
-_FIRST_DAMPING = 1e-8  # of the same, where more is needed
-_ATTEMPTS = 40  # at a step, each damped eight times as much
+LONGEST_STEP = 1.0  # [rad, reference lengths] largest change of a step
+_SMALL_RESIDUAL = 1e-9  # [rad, reference lengths] its wrenches are small
+_LEAST_DAMPING = 1e-9  # relative to the largest closure wrench: least damping
+# relative to the largest closure wrench: first damping of a refused step
+_FIRST_DAMPING = 1e-8
+_ATTEMPTS = 40  # largest number of attempts at a step, each damped eight times as much
 _RESTORATIONS = 4  # corrections of a step back onto the closures
 
 
@@ -61,8 +62,8 @@ class NotConverged(SolverFailed):
     """No equilibrium with finite motions was found near the linear one.
 
     Attributes:
-        problem: which one.
-        status: how far it is from equilibrium.
+        problem: name of the problem.
+        status: distance from equilibrium, in words.
     """
 
     def __init__(self, problem: str, status: str) -> None:
@@ -75,15 +76,15 @@ class Expansion:
     """The problem expanded at a placement.
 
     Attributes:
-        placement: where it is expanded.
+        placement: the point of expansion.
         loads: on the robot.
         gradient: (N,) [J] of energy minus work.
         hessian: (N, N) [J] of the Lagrangian.
         multipliers: (6 K,) of the closures.
         unbounded: (N,) bool, unknowns without cones.
         inverse: (nw, 6 K) pseudoinverse of their closure columns.
-        basis: (N, nu + nv), see the head of this module.
-        rigid_rows: (p, nu) closures that only clearances enter.
+        basis: (N, nu + nv) B of the module's docstring.
+        rigid_rows: (p, nu) closures without springs and free motions.
         rigid_right: (p,) their right side.
         rigid_basis: (6 K, p) their combination of the closures' rows.
     """
@@ -119,10 +120,10 @@ class Step:
 
     Attributes:
         placement: after the step.
-        gain: [J] by which the expansion falls, the cost of closing included.
-        decrement: [J] the same without that cost: what the energy could still gain.
+        gain: [J] decrease of the expansion, with the cost of closing.
+        decrement: [J] decrease of the energy without that cost: the possible gain.
         length: [rad, reference lengths] of the change.
-        rigid: (6 K,) multipliers of closures that only clearances enter.
+        rigid: (6 K,) multipliers of closures in clearances alone.
         damping: [J/rad^2] for the next step; 0 if this one was not damped.
     """
 
@@ -135,13 +136,13 @@ class Step:
 
 
 def expand(at: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
-    """Closures to first and the Lagrangian to second order.
+    """Expand the closures to first and the Lagrangian to second order.
 
     Args:
         at: a placement.
         loads: on the robot.
-        rigid: (6 K,) guess of the multipliers of closures that only clearances enter;
-            the others are those that balance springs and free motions best.
+        rigid: (6 K,) guess of the multipliers of closures in clearances alone; the
+            others are those that balance springs and free motions best.
 
     Returns:
         The expansion.
@@ -155,8 +156,8 @@ def expand(at: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
     U, S, Vt = svd(A[:, unbounded] * unit, full_matrices=True)
     tolerance = rank_tolerance(model.posture.mismatch)
     rank = int(np.sum(S > tolerance * S.max(initial=0.0)))
-    # left singular vectors of the range over their values, those of no unbounded
-    # unknown, and right singular vectors in the unknowns' units
+    # left singular vectors of the range over their values; those of the rest; right
+    # singular vectors in the unknowns' units
     range_, rigid_space, V = U[:, :rank] / S[:rank], U[:, rank:], unit[:, None] * Vt.T
     inverse = V[:, :rank] @ range_.T
     multipliers = inverse.T @ gradient[unbounded]
@@ -181,7 +182,7 @@ def expand(at: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
 
 
 def _basis(unbounded: NDArray, closing: NDArray, null_space: NDArray) -> NDArray:
-    """(N, nu + nv) of an expansion."""
+    """Return the (N, nu + nv) basis B of an expansion."""
     nu = closing.shape[1]
     basis = np.zeros((len(unbounded), nu + null_space.shape[1]))
     basis[~unbounded, :nu] = np.eye(nu)
@@ -190,7 +191,7 @@ def _basis(unbounded: NDArray, closing: NDArray, null_space: NDArray) -> NDArray
 
 
 def _independent(rows: NDArray) -> tuple[NDArray, NDArray]:
-    """Rows (m, nu) combined into independent ones (p, nu), and how (m, p)."""
+    """Return independent rows (p, nu) that span rows (m, nu), and the map (m, p)."""
     if not rows.size:
         return np.zeros((0, rows.shape[1])), np.zeros((rows.shape[0], 0))
     U, S, _ = svd(rows, full_matrices=False)
@@ -199,13 +200,13 @@ def _independent(rows: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def energy_of(at: Placement) -> float:
-    """[J] elastic energy."""
+    """Return the [J] elastic energy."""
     y = at.x[at.model.springs]
     return float(y @ y) / 2
 
 
 def potential(at: Placement, loads: DeadLoads) -> float:
-    """[J] elastic energy minus the loads' work."""
+    """Return the [J] elastic energy minus the loads' work."""
     return energy_of(at) - work_of(at, loads)
 
 
@@ -213,20 +214,20 @@ def advance(
     local: Expansion, penalty: float, damping: float, near: bool,
     method: Method = "compiled",
 ) -> Step:  # fmt: skip
-    """A step that lowers energy plus penalty.
+    """Return a step that lowers energy plus penalty.
 
     Args:
         local: the expanded problem.
-        penalty: [N m] on the norm of the scaled residual; more than the multipliers'.
+        penalty: [N m] on the norm of the scaled residual; above the multipliers'.
         damping: [J/rad^2] of the last step.
         near: whether Newton's method is tried for the clearances.
-        method: of :func:`assembly.exact.contact_qp.clearance_step`.
+        method: method of :func:`assembly.exact.contact_qp.clearance_step`.
 
     Returns:
         The step.
 
     Raises:
-        NotConverged: there is none, however short.
+        NotConverged: no step, however short, lowers them.
     """
     start = local.placement
     penalised = penalty * float(np.linalg.norm(start.residual))
@@ -235,10 +236,11 @@ def advance(
     least = max(least, pull)
     before = potential(start, local.loads) + penalised
     noise = 1e-13 * (abs(before) + abs(energy_of(start)))
-    # rounding of angles and of places in reference lengths, times what acts there
+    # rounding errors of angles and positions, times the forces on them
     noise += 1e-14 * (penalty + pull)
     for attempt in range(_ATTEMPTS):
-        # a refused Newton step is followed by the conic one before either is damped
+        # a refused Newton step is repeated by the conic solver before the step is
+        # damped
         newton = near and attempt != 1
         step = _solve(local, damping + _LEAST_DAMPING * least, newton, method)
         if step is not None and step.length <= LONGEST_STEP:
@@ -259,13 +261,13 @@ def advance(
 
 
 def problem_name(at: Placement, loads: DeadLoads) -> str:
-    """Name of the problem, for messages."""
+    """Return the name of the problem, for messages."""
     under = f" under {numbers(loads.load)} N m, N" if loads.load.any() else ""
     return f"exact equilibrium of {at.model.posture.robot.name}{under}"
 
 
 def _solve(local: Expansion, damping: float, near: bool, method: Method) -> Step | None:
-    """The expansion's minimum; None where it has none."""
+    """Return the step to the expansion's minimum; None if there is none."""
     at, model = local.placement, local.placement.model
     normal = np.zeros(len(at.x))
     normal[local.unbounded] = -local.inverse @ at.residual
@@ -305,7 +307,7 @@ def _solve(local: Expansion, damping: float, near: bool, method: Method) -> Step
 
 
 def _restored(local: Expansion, change: NDArray) -> Placement:
-    """The placement after a step and its restoration onto the closures."""
+    """Return the placement after a step and its restoration onto the closures."""
     model = local.placement.model
     x = local.placement.x + change
     x[model.bounded] = into_cones(x[model.bounded], model.joints.group)

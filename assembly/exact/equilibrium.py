@@ -1,6 +1,6 @@
-"""What holds at an equilibrium: its balance, its stability, the clearances that touch.
+"""Properties of an equilibrium: imbalance, stability, active clearances.
 
-All are read of the problem expanded there, :func:`assembly.exact.descent.expand`.
+All are computed from the expansion there, :func:`assembly.exact.descent.expand`.
 """
 
 import numpy as np
@@ -12,26 +12,26 @@ from assembly.exact.dead_load import load_magnitudes
 from assembly.exact.descent import Expansion
 from assembly.solvers.cones import cone_sizes
 
-_ANGLE_ROUNDING = 1e-5  # of a small residual: rounding of an angle
+_ANGLE_ROUNDING = 1e-5  # relative to a small residual: rounding of an angle
 
 
 def imbalance(local: Expansion) -> float:
-    """How far a placement is from equilibrium.
+    """Return how far a placement is from equilibrium.
 
     Args:
         local: the expansion there.
 
     Returns:
-        [-] largest generalised force on an unknown that nothing balances, relative to
-        the sizes of those that act on it, or to those of a residual of 1e-9, in
-        closures or in the unknown itself.
+        [-] largest unbalanced generalised force on an unknown, relative to the sum of
+        the forces on it, or to those of a residual of 1e-9 in closures or in the
+        unknown itself.
     """
     at, A, model = local.placement, local.placement.rows, local.placement.model
     unbalanced = local.gradient - A.T @ local.multipliers
     wrench = float(np.linalg.norm(local.multipliers)) + local.small_wrench
     loads = load_magnitudes(at, local.loads)
     acting = np.linalg.norm(A, axis=0) * wrench + np.abs(local.gradient) + loads
-    # what no load reaches in an open chain carries forces of rounding alone
+    # parts of an open chain without load carry forces of rounding alone
     unit = np.sqrt(np.diag(model.metric))
     acting = np.maximum(acting, local.small_wrench * unit)
     # inside a cone the force is zero; at its boundary it is normal to it
@@ -45,7 +45,7 @@ def imbalance(local: Expansion) -> float:
 
 
 def least_curvature(local: Expansion) -> float:
-    """Whether an equilibrium is stable.
+    """Return the least curvature of the potential, which shows stability.
 
     Args:
         local: the expansion there.
@@ -53,7 +53,7 @@ def least_curvature(local: Expansion) -> float:
     Returns:
         [J/rad^2] least second derivative of the potential along the motions that keep
         closures and active constraints, per squared rad and reference length of all
-        screws together; positive at a strict minimum, inf if nothing can move.
+        screws; positive at a strict minimum, inf if no motion is possible.
     """
     D, H = tangent_space(local)
     if not D.shape[1]:
@@ -65,15 +65,16 @@ def least_curvature(local: Expansion) -> float:
 def tangent_space(
     local: Expansion, hold_touching: bool = False
 ) -> tuple[NDArray, NDArray]:
-    """Motions near an equilibrium that keep closures and active clearances.
+    """Return the motions near an equilibrium that keep closures and active clearances.
 
     Args:
         local: the expansion there.
-        hold_touching: whether clearances at their bound that carry no force keep it
+        hold_touching: whether clearances at their bound without a force are kept at it
             too.
 
     Returns:
-        (N, k) a basis of them, and (k, k) [J] the potential's second derivative there.
+        (N, k) a basis of the motions, and (k, k) [J] the potential's second derivative
+        in it.
     """
     at, model = local.placement, local.placement.model
     u, group = at.x[model.bounded], model.joints.group
@@ -90,12 +91,12 @@ def tangent_space(
 
 
 def curvature_modes(D: NDArray, H: NDArray, units: NDArray) -> tuple[NDArray, NDArray]:
-    """Motions along which second derivatives do not mix.
+    """Return motions that diagonalise the second derivative (eigenmodes).
 
     Args:
         D: (N, k) basis of motions.
         H: (k, k) [J] the potential's second derivative in it.
-        units: (N,) of the unknowns, in which the modes are orthonormal.
+        units: (N,) scale of the unknowns in which the modes are orthonormal.
 
     Returns:
         (k,) [J] second derivatives, lowest first, and (N, k) the motions.
@@ -108,7 +109,7 @@ def curvature_modes(D: NDArray, H: NDArray, units: NDArray) -> tuple[NDArray, ND
 
 
 def active_clearances(local: Expansion) -> tuple[NDArray, NDArray]:
-    """Clearances that carry a force at an equilibrium.
+    """Return the clearances that carry a force at an equilibrium.
 
     Args:
         local: the expansion there.

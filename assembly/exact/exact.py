@@ -1,9 +1,9 @@
 r"""The forced assembly at least energy with finite motions: closures hold on SE(3).
 
 Springs, clearance cones and geometric errors are those of the linear virtual-joint
-model (:mod:`assembly.linear.energy`); only the closures differ: finite motions compose
-as in :mod:`assembly.exact.finite_robot`.  Minimised is the springs' energy minus
-the work of a load,
+model (:mod:`assembly.linear.energy`).  Only the closures differ: finite motions compose
+as in :mod:`assembly.exact.finite_robot`.  The springs' energy minus the work of the
+loads is minimised,
 
     minimise  |y|^2 / 2 - w . x_p(y, u, q) - W(y, u, q)
     subject to  r(y, u, q) = 0,   |u_k| <= 1 for each cone k,
@@ -67,22 +67,27 @@ from assembly.model.clearance import (
 )
 from assembly.solvers.cones import into_cones
 from assembly.solvers.method import Method, check_method
-from forcefit.inputs.display import Figures, html_table, numbers, screw_text, short_repr
+from forcefit.results.display import (
+    Figures,
+    html_table,
+    numbers,
+    screw_text,
+    short_repr,
+)
 from stiffness.screws import rotation_matrix, screw_map, transform
 
 if TYPE_CHECKING:
     import pandas
     import xarray
 
-_STEPS = 160  # at most; 3 to 5 are usual, metres of travel take 80
-_NEAR = 1e-2  # relative energy left to gain where Newton's method is tried
-_DECREMENT = 1e-14  # relative energy left to gain before the last step
-_RESTLESS = (
-    100  # steps after which what is in balance counts, though it moves in clearances
-)
-_STILL = 1e-9  # [rad, reference lengths] size of a last step that was not damped
-_STATIONARY = 1e-7  # relative imbalance of a solution; 1e-12 is usual
-_ROUNDING = 1e-30  # [J] energies of robots without errors are some 1e-48 J of rounding
+_STEPS = 160  # largest number of steps; 3 to 5 are usual, metres of travel take 80
+_NEAR = 1e-2  # relative energy still to gain below which Newton's method is tried
+_DECREMENT = 1e-14  # relative energy still to gain at the last step
+# steps after which a balanced state counts, though clearances still move
+_RESTLESS = 100
+_STILL = 1e-9  # [rad, reference lengths] size of a last step without damping
+_STATIONARY = 1e-7  # largest relative imbalance of a solution; 1e-12 is usual
+_ROUNDING = 1e-30  # [J] below it energies are rounding, some 1e-48 J without errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,20 +109,22 @@ class LinearisationError:
 
 @dataclass(frozen=True, eq=False)
 class ExactAssembly:
-    """A manipulator forced together with finite motions; exists only if converged.
+    """A manipulator assembled with finite motions; exists only if converged.
 
-    An equilibrium: stationary, closed and within the cones as reported.  Whether it
-    is a local minimum ``least_curvature`` says; that none is lower is not proved.
+    It is an equilibrium: stationary, closed and within the cones as reported.
+    ``least_curvature`` tells whether it is a local minimum.  A lower minimum is not
+    excluded.
 
     Attributes:
-        whole: where the robot stands nominally, its beams not cut.
-        cut: its frames and those of its beams' pieces.
-        linear: the linear model's solution, where the steps began.
-        expansion: of the problem here, with the multipliers of the scaled closures.
-        stationarity: [-] largest imbalance of any unknown, relative to what acts on it.
-        iterations: steps taken.
-        method: of all cone programmes on the way: ``"compiled"``, where in doubt
-            Clarabel solves them; or ``"reference"``, numpy and Clarabel alone.
+        whole: the robot's nominal configuration, with uncut beams.
+        cut: the robot with beams cut into pieces, and the map to its frames.
+        linear: the linear model's solution, the start of the steps.
+        expansion: expansion of the problem at the solution, with the multipliers of the
+            scaled closures.
+        stationarity: [-] largest relative imbalance of an unknown.
+        iterations: number of steps.
+        method: method of all cone programmes: ``"compiled"``, with Clarabel in doubt;
+            or ``"reference"``, numpy and Clarabel alone.
     """
 
     whole: Posture
@@ -131,7 +138,7 @@ class ExactAssembly:
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
     def _figures(self) -> Figures:
-        """What ``forcefit assembly exact`` prints of it."""
+        """Return the numbers that ``assembly solve --state exact`` prints."""
         return {
             "pose": f"{numbers(self.posture.pose().values())} m, rad",
             **({"load": f"{numbers(self.load)} N m, N"} if self.load.any() else {}),
@@ -142,20 +149,20 @@ class ExactAssembly:
         }
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Frames, closures and platform; see :mod:`assembly.model.tables`."""
+        """Return frames, closures and platform; see :mod:`assembly.model.tables`."""
         from assembly.model.tables import assembly_dataset
 
         return assembly_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """A row for each frame, columns (variable, component)."""
+        """Return a row for each frame, columns (variable, component)."""
         from assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "frame")
 
     @property
     def placement(self) -> Placement:
-        """Where everything is."""
+        """Positions of all frames."""
         return self.expansion.placement
 
     @property
@@ -165,7 +172,7 @@ class ExactAssembly:
 
     @property
     def loads(self) -> DeadLoads:
-        """All that acts on the robot."""
+        """All loads on the robot."""
         return self.expansion.loads
 
     @property
@@ -180,12 +187,12 @@ class ExactAssembly:
 
     @property
     def posture(self) -> Posture:
-        """Where the robot stands nominally."""
+        """Nominal configuration of the robot."""
         return self.whole
 
     @cached_property
     def energy(self) -> float:
-        """[J] elastic energy stored; 0 where what closures leave open may hide it."""
+        """[J] elastic energy; 0 where the closures' residual may explain it."""
         energy, residual = energy_of(self.placement), self.closure_residual()
         differs = differs_from_zero(energy, 0.0, self.multipliers, residual)
         return energy if differs else 0.0
@@ -209,7 +216,7 @@ class ExactAssembly:
     def link_screws(self) -> NDArray:
         """(n, 6) [rad, m] deformations of the bodies, logarithms.
 
-        A beam's in pieces is that of its end against its base.
+        A beam in pieces has the screw of its end relative to its base.
         """
         screws = self.placement.screws[LINK, self.cut.last]
         pieces = np.bincount(self.cut.owner)
@@ -232,7 +239,7 @@ class ExactAssembly:
 
     @cached_property
     def clearance_screws(self) -> NDArray:
-        """(n, 6) [rad, m] clearances, and motions of passive joints."""
+        """(n, 6) [rad, m] clearances, with motions of passive joints."""
         screws = self.placement.screws[CLEARANCE, self.cut.last]
         axes = [frame.own_axis for frame in self.posture.robot.frames]
         screws[np.arange(len(axes)), axes] += self.placement.own[self.cut.last]
@@ -240,7 +247,7 @@ class ExactAssembly:
 
     @cached_property
     def closure_wrenches(self) -> NDArray:
-        """(closures, 6) [N m, N] what each closure's second chain exerts on its first.
+        """(closures, 6) [N m, N] wrench of each closure's second chain on its first.
 
         At the platform's nominal origin, base axes.
         """
@@ -248,21 +255,21 @@ class ExactAssembly:
 
     @property
     def wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] of each link's spring: K_E times its deformation.
+        """(n, 6) [N m, N] wrench of each link's spring: K_E times its deformation.
 
-        At the frame where it is, after its small motions, in its axes there.
+        At the displaced frame's origin, in its axes.
         """
         return self._through[0]
 
     @property
     def tip_wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] what the outer part exerts on each body, at its tip."""
+        """(n, 6) [N m, N] wrench of the outer part on each body, at the body's tip."""
         own = distributed_at_tips(self.placement, self.loads)
         return self.wrenches - own[self.cut.last]
 
     @property
     def joint_wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] the same through each joint.
+        """(n, 6) [N m, N] wrench through each joint.
 
         They differ from :attr:`tip_wrenches` by loads on the body at the frame.
         """
@@ -288,11 +295,11 @@ class ExactAssembly:
         return LinearisationError(screw[:3], screw[3:], energy, energy / scale)
 
     def closure_residual(self) -> float:
-        """Largest of abs(rad) and abs(m) / reference length left open in a closure."""
+        """Return largest of abs(rad), abs(m) / reference length open in a closure."""
         return float(np.abs(self.placement.residual).max(initial=0.0))
 
     def clearance_excess(self) -> float:
-        """[-] by how much the worst clearance leaves its cone, relative to its size."""
+        """Return the largest excess [-] of a clearance over its cone, relative."""
         bounds = clearance_bounds(self.posture.robot)
         return float(clearance_excess(self.clearance_screws, bounds))
 
@@ -311,7 +318,7 @@ def solve_exact(
     """Close a manipulator at least energy with finite motions, from the linear model.
 
     Args:
-        posture: where the robot stands; its errors, clearances, links and joint
+        posture: the robot's configuration; its errors, clearances, links and joint
             springs are the robot's.
         load: (6,) [N m, N] on the platform at ``point``, base axes.  The force is
             dead; the moment's work is its product with the rotation vector.
@@ -319,12 +326,11 @@ def solve_exact(
         bodies: (n, 6) [N m, N] dead loads on the bodies of all frames, each at its
             frame's origin, base axes; moments are couples of dead forces.
         gravity: (3,) [m/s^2] base axes; see :mod:`assembly.exact.dead_load` for links.
-        point: (3,) [m] of the platform, in its axes; the force goes with it.
-        near: an equilibrium of the same posture under another load, from which to
-            start instead.
-        progress: called with the steps taken and how many there may be.
-        method: of the linear solution and of every step: ``"compiled"``, in doubt
-            Clarabel, or ``"reference"``, numpy and Clarabel alone.
+        point: (3,) [m] of the platform, in its axes; the force moves with it.
+        near: an equilibrium of the same posture under another load, used as the start.
+        progress: function called with the steps taken and their largest number.
+        method: method of the linear solution and of every step: ``"compiled"``, with
+            Clarabel in doubt; or ``"reference"``, numpy and Clarabel alone.
 
     Returns:
         The assembled manipulator: closed, stationary, within its cones.
@@ -333,8 +339,8 @@ def solve_exact(
         CannotAssemble: the linear model has no solution to start from.
         FreeMotion: a load drives a motion that nothing resists.
         NotConverged: there is no equilibrium nearby; a :class:`SolverFailed`.
-        ValueError: ``start`` belongs to another posture or other loads; ``start`` or
-            ``near`` is not the reference's, which is asked for; no such method.
+        ValueError: ``start`` belongs to another posture or other loads; the method is
+            unknown, or is ``"reference"`` while ``start`` or ``near`` is not.
     """
     check_method(method)
     if method == "reference":
@@ -371,7 +377,7 @@ def solve_exact(
 
 
 def _refuse_compiled(*starts: Assembly | ExactAssembly | None) -> None:
-    """Refuse to begin the reference's steps where a compiled method ended."""
+    """Reject to start the reference's steps from a compiled solution."""
     if any(start is not None and start.method != "reference" for start in starts):
         raise ValueError(
             "solve_exact: start or near is a compiled answer, expected one of method "
@@ -380,7 +386,7 @@ def _refuse_compiled(*starts: Assembly | ExactAssembly | None) -> None:
 
 
 def _count(joints: VirtualJoints) -> int:
-    """Number of unknowns."""
+    """Return the number of unknowns."""
     return sum(part.shape[1] for part in (joints.elastic, joints.cones, joints.free))
 
 
@@ -388,7 +394,7 @@ def _search(
     joints: VirtualJoints, linear: Assembly, loads: DeadLoads, first: NDArray | None,
     progress: Callable[[int, int], None], method: Method,
 ) -> tuple[Expansion, float, int]:  # fmt: skip
-    """Step after step from a first guess; where it ends, imbalance and count."""
+    """Iterate from a guess; return the last expansion, imbalance, number of steps."""
     model = FiniteRobot(linear.posture, joints)
     current = place(model, _first_guess(model, linear) if first is None else first)
     rigid = np.zeros(len(current.residual))
@@ -416,7 +422,7 @@ def _search(
 
 
 def _first_guess(model: FiniteRobot, linear: Assembly) -> NDArray:
-    """(N,) the linear solution as a first guess, clearances projected on the cones."""
+    """Return (N,) linear solution as first guess, clearances projected on the cones."""
     motions = np.hstack([model.joints.cones, model.joints.free])
     moved = motions.T @ linear.clearance_screws.ravel() / np.sum(motions**2, axis=0)
     x = np.concatenate([linear.elastic, moved])
@@ -427,7 +433,7 @@ def _first_guess(model: FiniteRobot, linear: Assembly) -> NDArray:
 
 
 def _energy_scale(at: Placement, linear: Assembly, loads: DeadLoads) -> float:
-    """[J] size of the energies of the problem."""
+    """Return the scale [J] of the problem's energies."""
     return max(
         energy_of(at), abs(work_of(at, loads)), 1e-3 * linear.energy_without_clearance
     )

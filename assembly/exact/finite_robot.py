@@ -1,12 +1,12 @@
 r"""A robot at a posture, with unknowns that move its frames by finite screws.
 
-At a frame, in its axes, motions act one after the other, each a screw's exponential:
+At a frame, in its axes, motions follow each other, each a screw's exponential:
 
     T_i = T_parent  F_i  exp(dl)^  exp(de)  exp(dc)  exp(db),   then the joint's own,
 
 where F_i is the nominal body, exp(dl)^ the geometric error (rotation vector and
 translation, both in the frame's axes) and the joint's own motion a turn about z, or a
-slide along it, by its coordinate plus what a passive joint adds.
+slide along it, by its coordinate plus the motion of a passive joint.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from assembly.linear.closure import VirtualJoints
 from assembly.model.robot import Robot
 from stiffness.screws import rotation_matrix, transform
 
-# the motions at a frame, in the order in which they act
+# the motions at a frame, in their order
 LINK, CLEARANCE, SPRING, OWN = range(4)
 
 
@@ -32,8 +32,9 @@ class FiniteRobot:
     """A robot at a posture, prepared for finite screws.
 
     Attributes:
-        posture: where it stands nominally.
-        joints: what may move; its columns are the unknowns y, u, q in this order.
+        posture: its nominal configuration.
+        joints: its virtual joints; their columns are the unknowns y, u, q in this
+            order.
     """
 
     posture: Posture
@@ -41,7 +42,7 @@ class FiniteRobot:
 
     @cached_property
     def _blocks(self) -> NDArray:
-        """(n, 6, N) every column, by frame and component."""
+        """(n, 6, N) all columns, by frame and component."""
         j = self.joints
         every = np.hstack([j.elastic, j.cones, j.free])
         return every.reshape(len(self.posture.robot.frames), 6, every.shape[1])
@@ -58,7 +59,7 @@ class FiniteRobot:
 
     @cached_property
     def motion(self) -> NDArray:
-        """(N,) which of a frame's motions each unknown belongs to."""
+        """(N,) index of the frame's motion to which each unknown belongs."""
         links, (nu, nq) = self.joints.links, (len(self.joints.group), self._free)
         kind = np.where(links, LINK, SPRING)
         kind = np.concatenate([kind, np.full(nu + nq, CLEARANCE)])
@@ -76,17 +77,17 @@ class FiniteRobot:
 
     @property
     def springs(self) -> slice:
-        """Where the springs are among the unknowns."""
+        """Slice of the springs among the unknowns."""
         return slice(0, len(self.joints.links))
 
     @property
     def bounded(self) -> slice:
-        """Where the clearances are among the unknowns."""
+        """Slice of the clearances among the unknowns."""
         return slice(self.springs.stop, self.springs.stop + len(self.joints.group))
 
     @cached_property
     def units(self) -> NDArray:
-        """(N,) scale of the unknowns: springs as they are, free motions in metric 1."""
+        """(N,) scale of the unknowns: 1 for springs; free motions have size 1."""
         units = np.ones(len(self.frame))
         units[self.bounded.stop :] /= np.linalg.norm(
             self.columns[self.bounded.stop :] * self.scale, axis=1
@@ -100,7 +101,7 @@ class FiniteRobot:
 
     @cached_property
     def scale(self) -> NDArray:
-        """(6,) of a screw: translations by the reference length."""
+        """(6,) factors of a screw: translations divided by the reference length."""
         return np.array([1.0, 1.0, 1.0, *[1 / self.size] * 3])
 
     @cached_property
@@ -117,7 +118,7 @@ class FiniteRobot:
 
     @cached_property
     def _order(self) -> NDArray:
-        """(N,) place of each unknown's motion along any chain that holds it."""
+        """(N,) position of each unknown's motion along any chain that contains it."""
         return 4 * self.frame + self.motion
 
     @cached_property
@@ -127,7 +128,7 @@ class FiniteRobot:
 
     @cached_property
     def chains(self) -> tuple[NDArray, NDArray]:
-        """(K, N) bool each: unknowns on a closure's first and second whole chain."""
+        """(K, N) bool, twice: unknowns on a closure's first and second chain."""
         robot = self.posture.robot
         ends = self.closed_frames
         first, second = (robot.on_path[ends[:, k]][:, self.frame] for k in (0, 1))
@@ -142,7 +143,7 @@ class FiniteRobot:
 
     @cached_property
     def on_platform(self) -> NDArray:
-        """(N,) bool, unknowns that move the platform."""
+        """(N,) bool, True for unknowns that move the platform."""
         robot = self.posture.robot
         return robot.on_path[robot.index(robot.platform)][self.frame]
 
@@ -163,7 +164,7 @@ class FiniteRobot:
 
     @cached_property
     def erring_bodies(self) -> NDArray:
-        """(n, 4, 4) bodies with their geometric errors, seen from after the parent."""
+        """(n, 4, 4) bodies with geometric errors, seen from their parent frame."""
         robot = self.posture.robot
         errors = robot.errors
         off = transform(errors[:, 3:], rotation_matrix(errors[:, :3]))
@@ -173,11 +174,11 @@ class FiniteRobot:
     def nominal_closures(self) -> NDArray:
         """(K, 4, 4) a closure's second frame seen from its first, nominally."""
         first, second = self.posture.transforms[self.closed_frames.T]
-        return inverse(first) @ second  # rounded files: not quite 1
+        return inverse(first) @ second  # not exactly 1 for rounded files
 
 
 def along_own(robot: Robot, coordinates: NDArray) -> NDArray:
-    """(..., n, 4, 4) motions about or along each joint's z by (..., n) coordinates."""
+    """Return the (..., n, 4, 4) motions about or along each joint's z by (..., n)."""
     screws = np.zeros((*coordinates.shape, 6))
     axes = [frame.own_axis for frame in robot.frames]
     screws[..., np.arange(len(axes)), axes] = coordinates
@@ -185,5 +186,5 @@ def along_own(robot: Robot, coordinates: NDArray) -> NDArray:
 
 
 def nominally_carried(posture: Posture) -> NDArray:
-    """(..., n, 4, 4) nominal frames after their joint's coordinate."""
+    """Return the (..., n, 4, 4) nominal frames after their joint's coordinate."""
     return posture.transforms @ along_own(posture.robot, posture.coordinates)

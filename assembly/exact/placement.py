@@ -12,7 +12,7 @@ V       ``moves``          (6, N)      small motion that each unknown makes
 
 The logarithm of a product of motions exp(V_1 h_1) exp(V_2 h_2) ... is, to second
 order, the sum of V_i h_i plus half of the brackets [V_i h_i, V_j h_j] of each pair in
-its order: that, with the curvature of each exponential, is the second derivative.
+its order.  The second derivative is that, plus the curvature of each exponential.
 
 Sources:
     Selig (2005), Geometric Fundamentals of Robotics, chapter 4 (brackets of screws,
@@ -70,7 +70,7 @@ class Placement:
 
     @cached_property
     def _poses(self) -> NDArray:
-        """(5, n, 4, 4) before each of a frame's motions, and after all small ones."""
+        """(5, n, 4, 4) poses before each motion of a frame, and after small ones."""
         robot = self.model.posture.robot
         link, clearance, spring = exponential(self.screws)
         local = [
@@ -105,7 +105,7 @@ class Placement:
 
     @property
     def platform(self) -> NDArray:
-        """(4, 4) where the platform is."""
+        """(4, 4) pose of the platform."""
         robot = self.model.posture.robot
         return self.transforms[robot.index(robot.platform)]
 
@@ -127,7 +127,7 @@ class Placement:
 
     @cached_property
     def _open_screws(self) -> NDArray:
-        """(K, 6) [rad, m] their logarithms."""
+        """(K, 6) [rad, m] logarithms of the open closures."""
         return logarithm(self._open)
 
     @cached_property
@@ -142,7 +142,7 @@ class Placement:
 
     @cached_property
     def _readings(self) -> NDArray:
-        """(N, 6, 6) from each unknown's screw, as it acts, to the platform's origin."""
+        """(N, 6, 6) maps of each unknown's screw to the platform's origin."""
         m = self.model
         before = self._poses[m.motion, m.frame]
         offset = before[:, :3, 3] - m.posture.platform[:3, 3]
@@ -150,7 +150,7 @@ class Placement:
 
     @cached_property
     def moves(self) -> NDArray:
-        """(6, N) small motion of what follows, at the platform's nominal origin."""
+        """(6, N) small motion that follows, read at the platform's nominal origin."""
         m = self.model
         sprung = np.concatenate([left_jacobian(self.screws), self._identity])
         local = sprung[m.motion, m.frame] @ m.columns[:, :, None]
@@ -158,7 +158,7 @@ class Placement:
 
     @property
     def _identity(self) -> NDArray:
-        """(1, n, 6, 6) for own motions, which are straight in their coordinate."""
+        """(1, n, 6, 6) identities: own motions are linear in their coordinate."""
         return np.broadcast_to(np.eye(6), (1, len(self.own), 6, 6))
 
     @cached_property
@@ -175,7 +175,7 @@ class Placement:
 
     @cached_property
     def _at_origin(self) -> NDArray:
-        """(6, N) moves of the platform, read at its present origin."""
+        """(6, N) motions of the platform, read at its present origin."""
         away = self.model.posture.platform[:3, 3] - self.platform[:3, 3]
         return screw_map(away) @ (self.moves * self.model.on_platform)
 
@@ -187,7 +187,7 @@ class Placement:
         return np.concatenate([turn, W[3:]])
 
     def curvature(self, multipliers: NDArray, load: NDArray) -> NDArray:
-        """Second derivative of multipliers . residual + load . platform screw.
+        """Return second derivative of multipliers . residual + load . platform screw.
 
         Exact where the closures hold; elsewhere off by the order of the residual.
 
@@ -212,7 +212,7 @@ class Placement:
         return H + self.exponential_curvature(through)
 
     def exponential_curvature(self, through: NDArray) -> NDArray:
-        """Part of the curvature that comes from each exponential by itself.
+        """Return the part of the curvature from each single exponential.
 
         Args:
             through: (N, 6) wrench on what each unknown moves, at the platform's nominal
@@ -231,19 +231,19 @@ class Placement:
         return (rows @ m.columns.T) * m.same_motion
 
     def load_wrench(self, load: NDArray) -> NDArray:
-        """(6,) wrench that does the load's work: at the nominal origin, base axes."""
+        """Return the (6,) wrench at the nominal origin that does the load's work."""
         moment = np.linalg.solve(turn_jacobian(self.platform_screw[:3]).T, load[:3])
         arm = self.platform_screw[3:]
         return np.concatenate([moment + np.cross(arm, load[3:]), load[3:]])
 
     def _load_curvature(self, load: NDArray) -> NDArray:
-        """Part of the curvature that the load has beside its wrench's brackets."""
+        """Return the load's curvature without that of its wrench's brackets."""
         W, turn = self._at_origin, self.platform_screw[:3]
         order = self.model._order
         V = self.moves * self.model.on_platform
         later = np.sign(order - order[:, None])
         H = (V.T @ bracket_form(self.load_wrench(load)) @ V) * later / 2
-        # a turn by w moves the origin, itself moving by v, by w x v / 2
+        # a rotation by w moves the origin, which moves by v itself, by w x v / 2
         of_force = -W[:3].T @ skew(load[3:]) @ W[3:]
         H += (of_force + of_force.T) / 2
         # exp(turn + h) = exp(J h + D(h, h) / 2) exp(turn): h for a given turn before it
@@ -254,13 +254,13 @@ class Placement:
 
 
 def place(model: FiniteRobot, x: NDArray) -> Placement:
-    """The robot moved by finite screws.
+    """Return the robot moved by finite screws.
 
     Args:
         model: the robot.
         x: (N,) the unknowns.
 
     Returns:
-        Where everything is then.
+        The positions of all frames.
     """
     return Placement(model, np.array(x, dtype=float))

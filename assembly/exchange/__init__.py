@@ -1,5 +1,5 @@
-"""Robots of other programs, in and out: URDF, MJCF, SDF.
+"""Import and export of robots of other programs: URDF, MJCF, SDF.
 
-Begin at ``robot_files.py`` and ``convert.py``; ``mechanism.py`` is what all formats
-have in common.
+Begin at ``robot_files.py`` and ``convert.py``; ``mechanism.py`` defines the
+representation common to all formats.
 """

@@ -1,8 +1,9 @@
-"""A mechanism as a robot of frames, and back.
+"""Conversion of a mechanism to a robot of frames, and back.
 
-A moving joint is a frame of the joint's name; what a fixed joint carries is a frame of
-that body's name.  A body on a moving joint gets a frame of its own where it has a mass,
-ends a chain, or is met in a loop: its axes need not be the joint's.
+A moving joint becomes a frame with the joint's name; a body on a fixed joint becomes a
+frame with that body's name.  A body on a moving joint gets its own frame if it has a
+mass, ends a chain, or is an end of a loop, because its axes may differ from the
+joint's.
 """
 
 from collections.abc import Mapping
@@ -34,13 +35,13 @@ Places = Mapping[str, tuple[str, NDArray]]
 
 @dataclass(frozen=True, eq=False)
 class RobotAndMechanism:
-    """A robot beside the mechanism it is.
+    """A robot together with the mechanism from which it was made.
 
     Attributes:
-        robot: of frames.
-        mechanism: of bodies.
-        places: where each body stands: on which frame, after that frame's motion, and
-            (4, 4) how; ``"base"`` for the root.
+        robot: the robot of frames.
+        mechanism: the mechanism of bodies.
+        places: for each body its frame, ``"base"`` for the root, and its pose (4, 4) in
+            it after that frame's motion.
     """
 
     robot: Robot
@@ -49,14 +50,15 @@ class RobotAndMechanism:
 
 
 def points_as_joints(mechanism: Mechanism, home: NDArray) -> Mechanism:
-    """Loops that meet in a point only get a ball joint, at rest in the home pose.
+    """Return a mechanism with a ball joint in each loop that meets in a point.
 
     Args:
-        mechanism: of n joints.
+        mechanism: mechanism of n joints.
         home: (n,) [rad or m] coordinates at which its loops close.
 
     Returns:
-        The mechanism at home, every loop of it holding all six directions.
+        The mechanism at home; the ball joints are at rest, and every loop constrains
+        all six directions.
     """
     poses = body_poses(mechanism, home)
     bodies = dict(mechanism.bodies)
@@ -84,13 +86,13 @@ def points_as_joints(mechanism: Mechanism, home: NDArray) -> Mechanism:
 
 
 def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
-    """The robot that a mechanism is.
+    """Return the robot of a mechanism.
 
     Args:
-        mechanism: at home, all its loops holding six directions.
+        mechanism: mechanism at home, with loops that constrain all six directions.
 
     Returns:
-        The robot, its places beside it.
+        The robot, with the mechanism and the bodies' places.
 
     Raises:
         BadInput: no body can be the platform.
@@ -147,7 +149,7 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
 
 
 def _without_base(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with another name for a joint called as what stands still."""
+    """Return the mechanism with another name for a joint called as the base."""
     names = {joint.name for joint in mechanism.joints}
     if BASE not in names:
         return mechanism
@@ -160,13 +162,13 @@ def _without_base(mechanism: Mechanism) -> Mechanism:
 
 
 def guess_platform(mechanism: Mechanism) -> str:
-    """The body at the end of the longest chain that no loop takes further.
+    """Return the body at the end of the longest chain that is not only part of a loop.
 
     Args:
-        mechanism: any.
+        mechanism: any mechanism.
 
     Returns:
-        The name of a body that carries none; of two alike, the first.
+        The name of a body that carries none; the first of equally long chains.
 
     Raises:
         BadInput: the mechanism has no joint.
@@ -177,7 +179,7 @@ def guess_platform(mechanism: Mechanism) -> str:
     if len(depth) == 1:
         raise BadInput(f"{mechanism.name}: found no joint, expected at least one")
     met = {name for loop in mechanism.loops for name in (loop.first, loop.second)}
-    # what only closes a loop is no body of the robot's own
+    # a body that only closes a loop does not belong to the main chain
     closing = [j for j in mechanism.joints if _closes(j, mechanism)]
     made = {joint.child for joint in closing}
     met |= {joint.parent for joint in closing}
@@ -188,7 +190,7 @@ def guess_platform(mechanism: Mechanism) -> str:
 
 
 def _closes(joint: Joint, mechanism: Mechanism) -> bool:
-    """Whether a joint is a part of one that closes a loop."""
+    """Return whether a joint is part of a joint that closes a loop."""
     return any(
         loop.first == f"{loop.name}.tip"
         and (joint.name == loop.name or joint.name.startswith(f"{loop.name}."))
@@ -197,7 +199,7 @@ def _closes(joint: Joint, mechanism: Mechanism) -> bool:
 
 
 def _with_ends(mechanism: Mechanism) -> Mechanism:
-    """Every loop's place becomes a body that carries nothing."""
+    """Return the mechanism with a body without mass at each loop's end."""
     bodies, joints, loops = dict(mechanism.bodies), list(mechanism.joints), []
     for loop in mechanism.loops:
         ends = []
@@ -216,15 +218,15 @@ def _with_ends(mechanism: Mechanism) -> Mechanism:
 
 
 def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
-    """The mechanism that a robot is: rigid, without clearance, its errors left aside.
+    """Return the mechanism of a robot: rigid, without clearance and errors.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         home: (n,) [rad or m] coordinates at home.
 
     Returns:
-        The mechanism; a fixed frame's body has its name, a moving one's ends in
-        ``.link``.
+        The mechanism.  The body of a fixed frame has its name, that of a moving one has
+        the suffix ``.link``.
     """
     names = {f.name for f in robot.frames}
     root = _unlike(BASE, names)
@@ -262,14 +264,14 @@ def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
 
 
 def _unlike(name: str, taken: set[str]) -> str:
-    """The name, lengthened until it is unique."""
+    """Return the name, lengthened until it is unique."""
     while name in taken:
         name += "_"
     return name
 
 
 def _lumped(name: str, frames: list[Frame]) -> Body:
-    """The rigid body of all that stands on one joint: masses, and beams as rods."""
+    """Return one rigid body for all frames on a joint: masses, and beams as rods."""
     masses, centres, spans = [], [], []
     for frame in frames:
         T = Robot("", frame.name, (replace(frame, parent=BASE),)).fixed_transforms[0]

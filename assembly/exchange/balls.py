@@ -1,4 +1,4 @@
-"""Ball joints as three turns, none of them at home, so that they are not singular."""
+"""Ball joints as three rotations that are zero at home, so that they are regular."""
 
 from dataclasses import replace
 
@@ -8,17 +8,17 @@ from assembly.exchange.mechanism import Joint, motion
 
 
 def balls_at_rest(joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
-    """Joints in which passive balls stand at zero where they were turned at home.
+    """Return joints in which passive balls have zero coordinates at home.
 
-    A ball is three turns, which lose a freedom where the second is a right angle; what
-    it is turned by at home goes into its placement.
+    A ball joint is three rotations, which lose a freedom if the second is a right
+    angle. The rotation at home therefore goes into the joint's placement.
 
     Args:
-        joints: at home.
+        joints: joints at home.
 
     Returns:
-        The same joints in the same pose; only coordinates of balls that a reader made
-        differ, their three turns standing one after another.
+        The same joints in the same pose.  Only the coordinates of balls differ that a
+        reader made of three consecutive rotations.
     """
     at_rest = list(joints)
     for i in range(len(joints) - 2):
@@ -33,9 +33,9 @@ def balls_at_rest(joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
 
 
 def _is_ball(turns: tuple[Joint, ...]) -> bool:
-    """Whether three joints are the turns of a passive ball joint of a file."""
+    """Return whether three joints are the rotations of a file's passive ball joint."""
     name = turns[0].name.removesuffix(".rx")
-    made = {f"{name}.after_rx", f"{name}.rx.after"}  # by chain(), and of MJCF
+    made = {f"{name}.after_rx", f"{name}.rx.after"}  # names made by chain() and by MJCF
     return (
         turns[0].child in made
         and [turn.name for turn in turns] == [f"{name}.r{axis}" for axis in "xyz"]

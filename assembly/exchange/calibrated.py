@@ -1,4 +1,4 @@
-"""A robot with what is known of its geometry built in, for programs without errors."""
+"""A robot with its known geometric errors built in, for programs without errors."""
 
 from dataclasses import replace
 
@@ -11,22 +11,22 @@ from assembly.measurement.conditions import as_declared
 from assembly.model.robot import BeamLink, MatrixLink, Robot
 from stiffness.screws import rotation_matrix, rotation_vector, transform
 
-# effects that are the same at every pose, temperature and load
+# effects that do not depend on pose, temperature and load
 CONSTANT = ("encoder_offset", "link_length")
 
 
 def with_calibration(home: Posture) -> Robot:
-    """The robot whose nominal geometry is the calibrated one.
+    """Return the robot whose nominal geometry is the calibrated one.
 
     Args:
-        home: of the declared robot, its geometric errors and effects with it.
+        home: home pose of the declared robot, with its geometric errors and effects.
 
     Returns:
-        The robot with geometric errors and constant effects in its frames' places, and
-        with neither left.
+        The robot with geometric errors and constant effects included in its frames, and
+        removed from its errors and effects.
 
     Raises:
-        BadInput: an effect breaks a rule of its own.
+        BadInput: an effect breaks one of its rules.
     """
     robot = home.robot
     constant = {k: v for k, v in robot.effects.items() if k in CONSTANT}
@@ -48,7 +48,7 @@ def with_calibration(home: Posture) -> Robot:
 
 
 def not_rigid(robot: Robot) -> tuple[str, ...]:
-    """In words, what of a robot file no rigid robot without clearance can hold."""
+    """Return, in words, the properties of a robot that a rigid one lacks."""
     frames = robot.frames
     kinds = {
         "elastic links": [f.name for f in frames if f.link is not None],

@@ -1,7 +1,7 @@
-"""Another program's reading of a robot's file, beside what was read here.
+"""Comparison of a robot's file as read here with its reading by MuJoCo.
 
-MuJoCo is not needed.  Where it is installed it reads URDF and MJCF in a process of its
-own: no file can end this one, nor keep it waiting for long.
+MuJoCo is optional.  If it is installed it reads URDF and MJCF in a separate process, so
+that no file can crash this one or block it for long.
 """
 
 import importlib.util
@@ -19,26 +19,26 @@ from numpy.typing import NDArray
 
 from assembly.exchange.mechanism import Mechanism
 
-AGREED = 1e-9  # [rad, m, kg over the largest] what another program may differ by
+AGREED = 1e-9  # [rad, m, kg over the largest] accepted difference
 POSTURES = 20
-_LONGEST = 60.0  # [s] that the other program may take
+_LONGEST = 60.0  # [s] longest time of the other program
 _WORKER = "from assembly.exchange.mujoco_reading import main; main()"
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What another program read in a file, compared with what was read here.
+    """Comparison of a file's content as read by another program and by forcefit.
 
     Attributes:
         reader: its name and version.
-        file: that both read.
-        why_not: the reason where it could not be compared, else empty.
-        bodies: how many were compared.
-        masses: of how many bodies.
-        loops: how many.
-        difference: the largest, [rad, m] or relative mass; lengths over the robot's
-            size where that is above 1 m.
-        where: of the largest difference, in words.
+        file: the file that both read.
+        why_not: the reason why it could not be compared, else empty.
+        bodies: number of bodies compared.
+        masses: number of bodies whose mass was compared.
+        loops: number of loops compared.
+        difference: the largest, [rad, m] or relative mass; lengths are divided by the
+            robot's size if that is above 1 m.
+        where: place of the largest difference, in words.
         weights: [kg] and (3,) [m] of bodies whose mass only the other program knows.
     """
 
@@ -54,17 +54,17 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether it found the same robot; what was not compared is no difference."""
+        """Whether no difference was found."""
         return self.difference <= AGREED
 
     def table(self) -> dict[str, Any]:
-        """Plain values for ``--json``."""
+        """Return plain values for ``--json``."""
         keys = ("reader", "file", "why_not", "bodies", "masses", "loops", "difference",
                 "where")  # fmt: skip
         return {key: getattr(self, key) for key in keys}
 
     def text(self) -> str:
-        """One line for people."""
+        """Return one line of text."""
         if self.why_not:
             return f"{self.file} was compared with no other program: {self.why_not}"
         what = f"bodies {self.bodies}, masses {self.masses}, loops {self.loops}"
@@ -83,11 +83,11 @@ def compare(mechanism: Mechanism, path: Path) -> Comparison:
     """Compare a mechanism with what another program reads in its file.
 
     Args:
-        mechanism: as it was read, or as it was written.
-        path: of the file.
+        mechanism: mechanism as it was read or written.
+        path: path of the file.
 
     Returns:
-        What was compared, or why nothing was.
+        The comparison, or the reason why none was made.
     """
     name = path.name
     if path.suffix.lower() not in {".urdf", ".xml"}:

@@ -1,4 +1,4 @@
-"""What became of a robot that was converted, for people and for machines."""
+"""Result of a conversion, as text and as plain values."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,18 +11,19 @@ from forcefit.inputs.errors import quoted
 
 @dataclass(frozen=True, eq=False)
 class Conversion:
-    """What became of a robot.
+    """Result of the conversion of a robot.
 
     Attributes:
-        robot: as it stands in the robot file, or as it was read from one.
-        files: written.
-        open_before: [rad, m] what the loops leave open where the file's own home is.
-        open_after: [rad, m] likewise in the home that was found.
-        drives_held: whether the drives stand where the file has them.
-        difference: largest of any body's pose in 100 random postures, read back.
-        comparisons: with what another program reads in the files.
-        left_out: what the new file cannot hold, in words.
-        taken: what the files leave open, and what was taken, in words.
+        robot: robot of the robot file that was written or read.
+        files: the files written.
+        open_before: [rad, m] mismatch of the loops at the file's own home.
+        open_after: [rad, m] mismatch of the loops at the home that was computed.
+        drives_held: whether the drives have the coordinates of the file.
+        difference: largest of any body's pose in 100 random postures, after reading
+            back.
+        comparisons: with readings of the files by another program.
+        left_out: parts that the new file cannot represent, in words.
+        taken: assumptions where the files are incomplete, in words.
     """
 
     robot: Robot
@@ -37,11 +38,11 @@ class Conversion:
 
     @property
     def agrees(self) -> bool:
-        """Whether no other program read another robot."""
+        """Whether no other program read a different robot."""
         return all(comparison.agrees for comparison in self.comparisons)
 
     def table(self) -> dict[str, Any]:
-        """Plain values for ``--json``."""
+        """Return plain values for ``--json``."""
         return {
             "robot": self.robot.name,
             "platform": self.robot.platform,
@@ -60,7 +61,7 @@ class Conversion:
         }
 
     def text(self) -> str:
-        """A few lines for people."""
+        """Return a few lines for people."""
         robot = self.robot
         count = len(robot.closures)
         lines = [

@@ -1,4 +1,4 @@
-"""``forcefit convert``: robots of other programs in and out, read back after writing.
+"""``forcefit convert``: import and export of robots, checked by reading back.
 
 ============  ==========================================================  ==========
 kind          read                                                        written
@@ -67,21 +67,21 @@ def convert(
         source: a ``.urdf``, ``.xml`` (MJCF), ``.sdf`` or ``.toml`` file, or the name of
             a built-in robot.
         target: a ``.toml``, ``.urdf`` or ``.xml`` file.
-        loops: YAML with ``closed_loop``, for files that have it not beside them.
+        loops: YAML with ``closed_loop``, for files without one next to them.
         overlay: TOML with elasticity, clearances, errors of frames by name.
-        points: names of loops that meet only in a point, beside those of type 3d; an
-            empty one takes the types as they stand.  Without it they are taken so too,
-            unless every loop is said to be 6d and they cannot close: then all are
-            points, and the answer says so.
-        close: of a robot file or built-in robot, as
+        points: names of loops that meet only in a point, in addition to those of type
+            3d; if empty, the types are used unchanged.  Without it they are used too,
+            unless every loop is declared 6d and they cannot close: then all loops
+            become points, and the result reports it.
+        close: for a robot file or built-in robot, as
             :func:`assembly.kinematics.closing.closing_of`; none if absent.
 
     Returns:
-        What was written and how well it is what was read.
+        The files written, and their difference from the source.
 
     Raises:
-        BadInput: a file breaks a rule, a loop cannot close, or what was written is not
-            the same robot; nothing is written then.
+        BadInput: a file breaks a rule, a loop cannot close, or the written robot
+            differs; then no file is written.
     """
     source, target = Path(source), Path(target)
     check_target(target)
@@ -104,14 +104,14 @@ def convert(
 
 
 def check_target(target: Path) -> None:
-    """Refuse a file that could not be written, before the computation.
+    """Reject a file that could not be written, before the computation.
 
     Args:
-        target: of the file; beside a URDF a YAML is written.
+        target: path of the file; for a URDF a YAML is written next to it.
 
     Raises:
-        BadInput: its ending is not one of a robot's files, or it or the YAML exists and
-            is another program's, or cannot be written.
+        BadInput: its suffix is not that of a robot file, or it or the YAML exists and
+            belongs to another program, or cannot be written.
     """
     ending = target.suffix.lower()
     if ending not in _KINDS:
@@ -126,11 +126,11 @@ def write_converted(robot: Robot, target: Path) -> Conversion:
     """Write a robot to a robot file, a URDF or an MJCF file, and read it back.
 
     Args:
-        robot: any.
+        robot: any robot.
         target: a ``.toml``, ``.urdf`` or ``.xml`` file.
 
     Returns:
-        What was written and how well it is the robot.
+        The files written, and their difference from the robot.
 
     Raises:
         BadInput: the file cannot be written, or would be another robot.
@@ -151,7 +151,7 @@ def write_converted(robot: Robot, target: Path) -> Conversion:
 def _written(
     conversion: Conversion, placed: RobotAndMechanism | None, target: Path
 ) -> Conversion:
-    """Write, read back and compare in a folder of its own, then where it belongs."""
+    """Write, read back and compare in a temporary folder, then move to the target."""
     ending, robot = target.suffix.lower(), conversion.robot
     with TemporaryDirectory() as folder:
         trial = Path(folder) / target.name
@@ -188,7 +188,7 @@ def _written(
 
 
 def _built_in(conversion: Conversion) -> tuple[Conversion, RobotAndMechanism]:
-    """The rigid mechanism of a robot, its calibration built in, its loops closed."""
+    """Return the rigid mechanism of a robot, its calibration included, loops closed."""
     posture = home_posture(conversion.robot)
     robot = with_calibration(posture)
     home = posture.coordinates
@@ -196,7 +196,7 @@ def _built_in(conversion: Conversion) -> tuple[Conversion, RobotAndMechanism]:
     mechanism = placed.mechanism
     left_out = [*conversion.left_out, *not_rigid(conversion.robot)]
     after, held = loop_residual(mechanism, home), conversion.drives_held
-    if after >= CLOSED:  # errors pull the loops apart
+    if after >= CLOSED:  # errors open the loops
         home, after, held = nearest_closed(mechanism, 0)
         pairs = zip(mechanism.joints, home, strict=True)
         joints = tuple(replace(j, position=float(q)) for j, q in pairs)
@@ -216,7 +216,7 @@ def _built_in(conversion: Conversion) -> tuple[Conversion, RobotAndMechanism]:
 
 
 def _texts(mechanism: Mechanism, target: Path) -> dict[Path, str]:
-    """Text of each file to be written."""
+    """Return the text of each file to be written."""
     if target.suffix.lower() == ".xml":
         return {target: mjcf_text(mechanism)}
     beside: LoopsFile = loops_of(mechanism)
@@ -225,7 +225,7 @@ def _texts(mechanism: Mechanism, target: Path) -> dict[Path, str]:
 
 
 def _read_back(path: Path) -> Mechanism:
-    """The mechanism of files just written."""
+    """Return the mechanism of files just written."""
     if path.suffix.lower() == ".xml":
         return read_mjcf(path)
     return read_urdf(path, read_loops(path.with_suffix(".yaml")))

@@ -15,7 +15,7 @@ class Coupling:
         leader: name of the other, None where the follower is held.
         coefficients: c_0, c_1, ..
         rest: [rad or m] of the follower.
-        leader_rest: [rad or m] likewise of the leader.
+        leader_rest: [rad or m] of the leader.
     """
 
     follower: str
@@ -25,7 +25,7 @@ class Coupling:
     leader_rest: float = 0.0
 
     def at(self, leader: float) -> tuple[float, float]:
-        """The follower's coordinate at the leader's, and its derivative."""
+        """Return follower's coordinate at a leader's coordinate, and its derivative."""
         x = leader - self.leader_rest
         value = slope = 0.0
         for c in reversed(self.coefficients):
@@ -34,7 +34,7 @@ class Coupling:
         return self.rest + value, slope
 
     def text(self) -> str:
-        """The rule in words, with the names of both joints."""
+        """Return the rule in words, with the names of both joints."""
         c = [*self.coefficients, 0.0, 0.0]
         if self.leader is None:
             return f"{self.follower} = {self.rest + c[0]:g}"
@@ -48,17 +48,17 @@ class Coupling:
 
 
 def leaders_first(couplings: Sequence[Coupling], file: str) -> tuple[Coupling, ...]:
-    """Couplings sorted so that a leader's own comes first.
+    """Return the couplings sorted so that a leader's own coupling comes first.
 
     Args:
-        couplings: in any order.
-        file: for messages.
+        couplings: couplings in any order.
+        file: name of the file, for error messages.
 
     Returns:
         The couplings.
 
     Raises:
-        BadInput: a joint follows two others, itself, or one that follows it.
+        BadInput: a joint follows two others, itself, or one of its followers.
     """
     of: dict[str, Coupling] = {}
     for coupling in couplings:

@@ -1,4 +1,4 @@
-"""What a loops file adds to a robot's own: loops, drives, ball joints, a home."""
+"""Data that a loops file adds to a robot: loops, drives, ball joints, a home."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -20,17 +20,17 @@ def with_loops(
     mechanism: Mechanism, loops: LoopsFile | None, parts: Mapping[str, Sequence[str]],
     driven: set[str],
 ) -> Mechanism:  # fmt: skip
-    """The mechanism with loops, drives, platform and home of a loops file.
+    """Return the mechanism with loops, drives, platform and home of a loops file.
 
     Args:
-        mechanism: as its own file has it.
-        loops: None without such a file.
-        parts: the file's joints, each with the names of the joints it was made of.
-        driven: joints that the robot's own file names as driven.
+        mechanism: mechanism of the file.
+        loops: the loops file, None without one.
+        parts: the file's joints, with the names of the joints made of each.
+        driven: joints that the robot's own file declares as driven.
 
     Returns:
-        The mechanism.  Drives are those that the loops file names, else ``driven``,
-        else, in a robot without loops, every joint.
+        The mechanism.  Its drives are those of the loops file, else ``driven``, else,
+        in a robot without loops, all joints.
 
     Raises:
         BadInput: a name that the robot does not have.
@@ -44,9 +44,9 @@ def with_loops(
     mechanism, parts = _retyped(mechanism, loops.turns, parts)
     ends = {name: name for name in mechanism.bodies}
     children = {joint.name: joint.child for joint in mechanism.joints}
-    # a joint of several freedoms ends at its last part
+    # the end of a joint of several freedoms is that of its last part
     ends |= {name: children[several[-1]] for name, several in parts.items()}
-    # links of fixed joints may share the joint's name: both are the same place
+    # a link on a fixed joint may have the joint's name: both are the same place
     count, closed = len(mechanism.loops), list(mechanism.loops)
     for i, (pair, point) in enumerate(zip(loops.pairs, loops.points, strict=True), 1):
         for name in pair:
@@ -96,7 +96,7 @@ def with_loops(
 def _followed(
     joints: tuple[Joint, ...], couplings: Sequence[Coupling], loops: LoopsFile
 ) -> tuple[Joint, ...]:
-    """Joints that follow others, at home where their leaders take them."""
+    """Return the joints, with followers at the home coordinates by their rule."""
     at = {joint.name: joint.position for joint in joints}
     for coupling in couplings:
         name = coupling.follower
@@ -114,7 +114,7 @@ def _followed(
 def _couplings_said(
     joints: tuple[Joint, ...], couplings: Sequence[Coupling]
 ) -> Iterator[str]:
-    """Joints that follow others become drives of their own, which must be said."""
+    """Report joints with a rule that become independent drives."""
     driven = {joint.name for joint in joints if joint.actuated}
     for coupling in couplings:
         line = f"mimic: {coupling.text()} is a drive of its own: command it so"
@@ -129,7 +129,7 @@ def _couplings_said(
 def _retyped(
     mechanism: Mechanism, turns: Mapping[str, str], parts: Mapping[str, Sequence[str]]
 ) -> tuple[Mechanism, dict[str, list[str]]]:
-    """Joints that a CAD export wrote as one turn, as what they really are."""
+    """Return joints with their declared types, which a CAD export had lost."""
     bodies, joints = dict(mechanism.bodies), list[Joint]()
     now = {name: list(several) for name, several in parts.items()}
     for joint in mechanism.joints:

@@ -1,4 +1,4 @@
-"""Whether what was written is what was meant: random postures compared."""
+"""Accuracy of a written robot: comparison in random postures."""
 
 import numpy as np
 
@@ -13,16 +13,16 @@ _POSTURES = 100
 
 
 def largest_difference(placed: RobotAndMechanism) -> float:
-    """Where bodies stand, by the mechanism and by the robot, in random postures.
+    """Return the largest difference of bodies' poses, in random postures.
 
-    All joints of the trees are moved, within 1 rad or m of home: loops need not close.
+    All joints of the trees are moved, within 1 rad or m of home; loops need not close.
 
     Args:
-        placed: the two, one of them read back from a file.
+        placed: robot and mechanism, one of them read back from a file.
 
     Returns:
-        Largest difference of any entry of any body's transform, lengths over the
-        largest distance from the base where that is above 1 m.
+        Largest difference of any entry of a body's transform; lengths are divided by
+        the largest distance from the base if that is above 1 m.
 
     Raises:
         BadInput: one of the two has joints that the other lacks.
@@ -45,7 +45,7 @@ def largest_difference(placed: RobotAndMechanism) -> float:
         reach = max(1.0, max(np.abs(T[:3, 3]).max() for T in poses.values()))
         scale = np.array([[1.0, 1.0, 1.0, 1 / reach]])
         for name, (frame, at) in placed.places.items():
-            if frame == BASE:  # the root, whatever its name
+            if frame == BASE:  # the root, independent of its name
                 continue
             gap = (poses[name] - frames[frame] @ at)[:3] * scale
             worst = max(worst, float(np.abs(gap).max()))

@@ -42,17 +42,17 @@ def robot_of_file(
     points: Sequence[str] | None = None,
     ask: bool = True,
 ) -> tuple[Conversion, RobotAndMechanism]:
-    """The robot of a file of another program.
+    """Return the robot of a file of another program.
 
     Args:
         source: a URDF, MJCF or SDF file.
-        loops: YAML with ``closed_loop``; None: the one beside a URDF.
+        loops: YAML with ``closed_loop``; None: the one next to a URDF.
         overlay: TOML with elasticity, clearances, errors of frames by name.
         points: names of loops that meet only in a point.
-        ask: whether another program that is installed reads the file too.
+        ask: whether another installed program also reads the file, for comparison.
 
     Returns:
-        The robot and what became of it, nothing written, and the mechanism that it is.
+        The robot with the report of its conversion (no files), and its mechanism.
 
     Raises:
         BadInput: a file breaks a rule, or a loop cannot close.
@@ -103,17 +103,17 @@ def robot_of_file(
 def _closed(
     mechanism: Mechanism, source: Path, beside: LoopsFile | None
 ) -> tuple[Mechanism, NDArray, bool, tuple[str, ...]]:
-    """The mechanism with a home in which its loops close.
+    """Return the mechanism with a home in which its loops close.
 
     Args:
-        mechanism: as it was read.
-        source: its file.
-        beside: the loops file if the types in it may be generated defaults: its loops
-            are taken for points where they cannot close otherwise.  None otherwise.
+        mechanism: mechanism as it was read.
+        source: path of the mechanism's file.
+        beside: the loops file if its types may be generated defaults: its loops become
+            points if they cannot close otherwise.  Else None.
 
     Returns:
-        The mechanism, its home (n,) [rad or m], whether the drives stand where the file
-        has them, and what was taken, in words.
+        The mechanism, its home (n,) [rad or m], whether the drives have the file's
+        coordinates, and the assumptions made, in words.
 
     Raises:
         BadInput: the loops cannot close.
@@ -141,7 +141,7 @@ def _closed(
 
 
 def _named_platform(overlay: Path | str) -> str | None:
-    """The platform that an overlay names, None if it names none."""
+    """Return the platform that an overlay names, None if it names none."""
     given = read_toml(overlay)
     if not given.has("platform"):
         return None
@@ -152,7 +152,7 @@ def _laid_over(
     placed: RobotAndMechanism, source: Path, overlay: Path | str | None,
     named: str | None,
 ) -> Robot:  # fmt: skip
-    """The robot with an overlay; a body that it names as platform is its frame."""
+    """Return the robot with an overlay; a platform may be named by body."""
     content = robot_table(placed.robot)
     if overlay is None:
         return robot_of(Table(content, str(source), ""), source.stem)
@@ -163,7 +163,7 @@ def _laid_over(
 
 
 def _left_out(placed: RobotAndMechanism, named: str | None) -> tuple[str, ...]:
-    """What of the file no robot of frames holds, in words."""
+    """Return, in words, the parts of the file that no robot of frames has."""
     mechanism = placed.mechanism
     weight = mechanism.bodies[mechanism.root].mass
     lines = list(mechanism.left_out)
@@ -178,7 +178,7 @@ def _left_out(placed: RobotAndMechanism, named: str | None) -> tuple[str, ...]:
 
 
 def _weighed(mechanism: Mechanism, comparison: Comparison) -> Mechanism:
-    """Masses of meshes as the other program has them, or said to be left out."""
+    """Return bodies with the other program's masses of meshes, or report the lack."""
     known = comparison.weights
     bodies = dict(mechanism.bodies)
     for name, (mass, centre) in known.items():

@@ -1,4 +1,4 @@
-"""A home pose in which loops close, where the one of the file is open."""
+"""A home pose in which loops close, near that of the file."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -17,37 +17,38 @@ from assembly.model.robot import JOINTS
 from forcefit.inputs.errors import BadInput, quoted
 from stiffness.screws import rotation_vector, skew, transform
 
-CLOSED = 1e-10  # [rad, m] what a closed loop may leave open
-_SCREWED_TIGHT = 1e-14  # scaled residual at which nothing is left but rounding
-_STARTS = 20  # random starts, farther and farther from the file's own
-_STARTS_ALONE = 12  # of one loop, to find the one at fault
-_STEPS = 200  # of one start
+CLOSED = 1e-10  # [rad, m] largest mismatch of a closed loop
+_SCREWED_TIGHT = 1e-14  # scaled residual below which only rounding remains
+_STARTS = 20  # number of random starts, at increasing distance from the file's own
+_STARTS_ALONE = 12  # number of starts for a single loop, to find one that cannot close
+_STEPS = 200  # largest number of steps from a start
 _LONGEST_STEP = 0.3  # [rad or lengths]
-_STALLED = 0.999  # the sum of squares after ten steps over what it was before
+# ratio of the sums of squares over ten steps above which a search has stalled
+_STALLED = 0.999
 
 
 def loop_residual(mechanism: Mechanism, coordinates: NDArray) -> float:
-    """[rad, m] largest component that any loop leaves open."""
+    """Return the largest component [rad, m] of all loops' mismatch."""
     residual = _Loops(mechanism, 1.0).equations(coordinates)[0]
     return float(np.abs(residual).max(initial=0.0))
 
 
 def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
-    """Coordinates near the file's own at which all loops close.
+    """Return the coordinates near the file's own at which all loops close.
 
-    The drives are held first; where that does not close they move too; then random
-    starts (always the same) follow, each farther away.
+    First the drives are held.  If the loops do not close the drives move too.  Then
+    random starts (always the same) follow, each farther away.
 
     Args:
-        mechanism: of n joints.
-        file: for messages.
+        mechanism: mechanism of n joints.
+        file: name of the file, for error messages.
 
     Returns:
-        (n,) [rad or m] the coordinates, and whether the drives stand where the file
-        has them.
+        (n,) [rad or m] the coordinates, and whether the drives have the file's
+        coordinates.
 
     Raises:
-        BadInput: no start closes; the loop at fault is named with what it leaves open.
+        BadInput: no start closes; the message has the loop at fault and its mismatch.
     """
     coordinates, residual, held = nearest_closed(mechanism, 0)
     if residual >= CLOSED:
@@ -63,7 +64,7 @@ def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
 
 
 def _check_alone(mechanism: Mechanism, file: str) -> None:
-    """Refuse a loop that does not close even if the others stay open."""
+    """Reject a loop that does not close even without the other loops."""
     (loop,) = mechanism.loops
     residual = nearest_closed(mechanism, _STARTS_ALONE)[1]
     if residual >= CLOSED:
@@ -76,15 +77,15 @@ def _check_alone(mechanism: Mechanism, file: str) -> None:
 
 
 def nearest_closed(mechanism: Mechanism, starts: int) -> tuple[NDArray, float, bool]:
-    """Coordinates near the file's own that leave the loops least open.
+    """Return coordinates near the file's own with the least mismatch of the loops.
 
     Args:
-        mechanism: of n joints.
-        starts: random ones, beside the file's own.
+        mechanism: mechanism of n joints.
+        starts: number of random starts, in addition to the file's own coordinates.
 
     Returns:
-        (n,) [rad or m] the coordinates, what they leave open [rad, m], and whether the
-        drives stand where the file has them.
+        (n,) [rad or m] the coordinates, their mismatch [rad, m], and whether the drives
+        have the file's coordinates.
     """
     loops = _Loops(mechanism, _size(mechanism))
     coordinates, residual, held = mechanism.home, np.inf, True
@@ -99,7 +100,7 @@ def nearest_closed(mechanism: Mechanism, starts: int) -> tuple[NDArray, float, b
 
 
 def _attempts(mechanism: Mechanism, starts: int) -> Iterator[tuple[NDArray, bool]]:
-    """Starts, and whether the drives are held."""
+    """Yield starts, and whether the drives are held."""
     start = mechanism.home
     yield start, True
     yield start, False
@@ -112,10 +113,10 @@ def _attempts(mechanism: Mechanism, starts: int) -> Iterator[tuple[NDArray, bool
 
 
 def _solve(loops: "_Loops", start: NDArray, hold: bool) -> NDArray:
-    """Levenberg-Marquardt from one start: the coordinates where it ends."""
+    """Return the end of a Levenberg-Marquardt search from one start."""
     followers = [follower for follower, *_ in loops.coupled]
     driven = loops.actuated.copy()
-    driven[followers] = False  # they go where their leaders take them
+    driven[followers] = False  # their leaders determine them
     free = loops.moving & loops.concerned & ~(hold & driven)
     unit = np.where(loops.kinds == 2, loops.size, 1.0)
     q, damping = start.astype(float), 1e-3
@@ -129,7 +130,7 @@ def _solve(loops: "_Loops", start: NDArray, hold: bool) -> NDArray:
                 break
             before = r @ r
         A = (J * unit)[:, free]
-        # rows added below, so that the condition is not squared
+        # damping as added rows, so that the condition number is not squared
         damped = np.vstack([A, np.sqrt(damping) * np.eye(A.shape[1])])
         x = np.linalg.lstsq(damped, np.append(r, np.zeros(A.shape[1])), rcond=None)[0]
         x *= min(1.0, _LONGEST_STEP / max(np.abs(x).max(initial=0.0), 1e-300))
@@ -147,7 +148,7 @@ def _solve(loops: "_Loops", start: NDArray, hold: bool) -> NDArray:
 
 
 def _size(mechanism: Mechanism) -> float:
-    """[m] longest distance between neighbouring joints, 1 if all are points."""
+    """Return the longest distance [m] of neighbouring joints, 1 if all are points."""
     lengths = [np.linalg.norm(joint.placement[:3, 3]) for joint in mechanism.joints]
     return float(max(lengths, default=0.0)) or 1.0
 
@@ -156,7 +157,7 @@ def _size(mechanism: Mechanism) -> float:
 class _Loops:
     """The equations of loops and of joints that follow others.
 
-    Every joint turns about or slides along its own z here.
+    Here every joint rotates about or slides along its own z.
     """
 
     mechanism: Mechanism
@@ -179,7 +180,7 @@ class _Loops:
 
     @cached_property
     def tree(self) -> tuple[NDArray, NDArray, dict[str, tuple[int, NDArray]]]:
-        """Parents (n,), frames in them (n, 4, 4); each body's joint and place on it."""
+        """Parents (n,), frames in them (n, 4, 4); by body its joint and pose on it."""
         on: dict[str, tuple[int, NDArray]] = {self.mechanism.root: (-1, np.eye(4))}
         parents, fixed = [], []
         for row, joint in enumerate(self.mechanism.joints):
@@ -193,7 +194,7 @@ class _Loops:
 
     @cached_property
     def ends(self) -> list[tuple[tuple[int, NDArray], tuple[int, NDArray], NDArray]]:
-        """Each loop's two places: joint, place on it; and which rows it asks for."""
+        """Both ends of each loop, joint and pose on it; and its constrained rows."""
         on, places = self.tree[2], []
         for loop in self.mechanism.loops:
             (i, A), (j, B) = on[loop.first], on[loop.second]
@@ -203,7 +204,7 @@ class _Loops:
 
     @cached_property
     def carried(self) -> NDArray:
-        """(n + 1, n) which joints move what stands on a joint; last row: the root."""
+        """(n + 1, n) bool, joints that move the bodies on each joint; last, root."""
         parents = self.tree[0]
         marks = np.zeros((len(parents) + 1, len(parents)))
         for i, parent in enumerate(parents):
@@ -213,7 +214,7 @@ class _Loops:
 
     @cached_property
     def concerned(self) -> NDArray:
-        """(n,) bool: joints on one side of a loop and not on the other."""
+        """(n,) bool, joints on one side of a loop and not on the other."""
         marks = np.zeros(len(self.kinds), dtype=bool)
         for (i, _), (j, _), _ in self.ends:
             marks |= self.carried[i] != self.carried[j]
@@ -227,7 +228,7 @@ class _Loops:
 
     @cached_property
     def coupled(self) -> list[tuple[int, int, Coupling]]:
-        """Rows of follower and leader, -1 without one, and their rule."""
+        """Rows of follower and leader, -1 without a leader, and their rule."""
         row = {joint.name: k for k, joint in enumerate(self.mechanism.joints)}
         return [
             (row[one.follower], row.get(one.leader or "", -1), one)
@@ -235,7 +236,7 @@ class _Loops:
         ]
 
     def equations(self, q: NDArray) -> tuple[NDArray, NDArray]:
-        """What is open, translations over the size, and its derivatives by q."""
+        """Return the mismatch, translations over the size, and its derivatives by q."""
         parents, fixed, _ = self.tree
         before, after = place_frames(parents, self.kinds, fixed, q)
         p = before[:, :3, 3]

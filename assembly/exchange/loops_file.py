@@ -1,14 +1,14 @@
-"""``robot.yaml``: what stands beside a URDF that cannot say it, loops and drives.
+"""``robot.yaml``: loops and drives of a URDF, which the format itself lacks.
 
 The convention of the example_parallel_robots: ``closed_loop`` pairs names of joints or
-links that coincide, ``type`` says ``6d`` or ``3d`` (only the points), ``name_mot``
-names the drives; ``joint_name`` and ``joint_type`` make a joint SPHERICAL, FIXED or a
-UJOINT about two axes (_XY, _YX, ..), which CAD exports write as one turn.  ``home``
-(coordinates by joint) and ``platform`` are ours; other readers pass over them.
+links that coincide, ``type`` is ``6d`` or ``3d`` (only the points), ``name_mot`` names
+the drives.  ``joint_name`` and ``joint_type`` make a joint SPHERICAL, FIXED or a UJOINT
+about two axes (_XY, _YX, ..), which CAD exports write as one rotation.  ``home``
+(coordinates by joint) and ``platform`` are our additions; other readers ignore them.
 
-The authors' generator writes ``6d`` for every loop, "that is not very general", and
-leaves the rest to be corrected by hand.  So a file that says nothing else may not mean
-it: its loops count as points where they cannot close otherwise.
+The authors' generator writes ``6d`` for every loop, "that is not very general", to be
+corrected by hand.  So a file with only ``6d`` may be uncorrected: its loops become
+points if they cannot close otherwise.
 
 Sources:
     Batto, de Matteis, example-parallel-robots: ``loader_tools.py``, ``generateYAML``.
@@ -33,17 +33,17 @@ TURNS = {"FIXED": "", "SPHERICAL": "xyz"} | {
 
 @dataclass(frozen=True)
 class LoopsFile:
-    """What a loops file says.
+    """The content of a loops file.
 
     Attributes:
         file: its name, for messages.
         pairs: names of joints or links that meet.
         points: for each pair, whether only the points meet.
-        drives: names of the driven joints; None where the file does not say.
-        turns: axes, such as ``"xyz"``, about which a joint really turns, by joint.
+        drives: names of the driven joints; None if the file has none.
+        turns: actual axes of a joint, such as ``"xyz"``, by joint.
         home: [rad or m] coordinates at home by joint.
         platform: name of a link, or None.
-        passed_over: keys that mean nothing here.
+        passed_over: unknown keys.
     """
 
     file: str = ""
@@ -62,7 +62,7 @@ class LoopsFile:
 
 
 def find_loops_file(robot: Path) -> Path | None:
-    """The loops file that belongs to a robot: of its name, or ``robot.yaml`` beside."""
+    """Return the loops file of a robot: its name with ``.yaml``, or ``robot.yaml``."""
     for path in (robot.with_suffix(".yaml"), robot.parent / "robot.yaml"):
         if path.is_file():
             return path
@@ -76,10 +76,10 @@ def read_loops(path: Path | str) -> LoopsFile:
         path: a YAML file.
 
     Returns:
-        What it says.
+        The content of the file.
 
     Raises:
-        BadInput: it is not YAML, or a key holds something else than it should.
+        BadInput: the file is not YAML, or a key has an invalid value.
     """
     table = Table(_yaml(path), str(path), "")
     given = _list(table, "closed_loop")
@@ -108,10 +108,10 @@ def read_loops(path: Path | str) -> LoopsFile:
 
 
 def with_points(loops: LoopsFile, names: Sequence[str]) -> LoopsFile:
-    """The same loops, some of which meet only in a point, whatever their type says.
+    """Return loops with some declared as points, independent of their type.
 
     Args:
-        loops: of a file.
+        loops: loops of a file.
         names: ``loop1`` for the first, or the name of either end; ``all``.
 
     Returns:
@@ -136,7 +136,7 @@ def with_points(loops: LoopsFile, names: Sequence[str]) -> LoopsFile:
 
 
 def loops_text(loops: LoopsFile) -> str:
-    """A loops file's text, every number with all its digits."""
+    """Return the text of a loops file, with all digits of every number."""
     rows = [f"[{_word(a)}, {_word(b)}]" for a, b in loops.pairs]
     kinds = ["3d" if point else "6d" for point in loops.points]
     lines = [
@@ -154,7 +154,7 @@ def loops_text(loops: LoopsFile) -> str:
 
 
 def _yaml(path: Path | str) -> dict[str, Any]:
-    """Root mapping of a YAML file."""
+    """Return the root mapping of a YAML file."""
     with naming_packages(f"{path}: YAML"):
         import yaml
 
@@ -175,7 +175,7 @@ def _yaml(path: Path | str) -> dict[str, Any]:
 
 
 def _list(table: Table, key: str) -> list[Any]:
-    """A list, which may be empty."""
+    """Return a list, which may be empty."""
     value = table.get(key)
     if value is None:
         return []
@@ -185,7 +185,7 @@ def _list(table: Table, key: str) -> list[Any]:
 
 
 def _names(table: Table, key: str) -> tuple[str, ...]:
-    """A list of names."""
+    """Return a list of names."""
     values = _list(table, key)
     for value in values:
         if not isinstance(value, str):
@@ -194,7 +194,7 @@ def _names(table: Table, key: str) -> tuple[str, ...]:
 
 
 def _turns(table: Table) -> dict[str, str]:
-    """``joint_name`` and ``joint_type``, one type for each name."""
+    """Return ``joint_name`` and ``joint_type``, one type for each name."""
     names, kinds = _names(table, "joint_name"), _names(table, "joint_type")
     if len(names) != len(kinds):
         message = f"found {len(kinds)}, expected one for each of {len(names)} joints"
@@ -207,7 +207,7 @@ def _turns(table: Table) -> dict[str, str]:
 
 
 def _pair(table: Table, index: int, pair: object) -> tuple[str, str]:
-    """Two names that differ."""
+    """Return two names that differ."""
     names = pair if isinstance(pair, list) else []
     names = [name for name in names if isinstance(name, str)]
     if len(names) != 2 or pair != names or names[0] == names[1]:
@@ -217,7 +217,7 @@ def _pair(table: Table, index: int, pair: object) -> tuple[str, str]:
 
 
 def unknown_name(loops: LoopsFile, key: str, name: str, valid: list[str]) -> str:
-    """The message for a name that the robot does not have."""
+    """Return the message for a name that the robot does not have."""
     return (
         f"{loops.file}: {key}: found {quoted(name)}, expected a joint or link of the "
         f"robot{nearest(name, valid)}"
@@ -225,14 +225,14 @@ def unknown_name(loops: LoopsFile, key: str, name: str, valid: list[str]) -> str
 
 
 def _word(text: str) -> str:
-    """A text between double quotes, as YAML and JSON both read it."""
+    """Return a text in double quotes, valid in YAML and JSON."""
     import json
 
     return json.dumps(text)
 
 
 def _number(value: float) -> str:
-    """A number that YAML reads as one: an exponent needs a point before it."""
+    """Return a number in a form that YAML reads as one: a point before the exponent."""
     text = repr(float(value))
     mantissa, e, exponent = text.partition("e")
     if e and "." not in mantissa:

@@ -1,8 +1,8 @@
-"""What URDF, MJCF and SDF have in common: bodies, joints of one freedom, loops.
+"""Common representation of URDF, MJCF and SDF: bodies, joints of one freedom, loops.
 
-A joint carries its child: the child stands at ``placement @ motion @ after`` in its
-parent, where the motion is about or along ``axis``.  Joints of several freedoms are
-chains of these, with bodies of no mass between them.  All in metres, radians, kg.
+A joint carries its child: the pose of the child in its parent is ``placement @ motion @
+after``, with the motion about or along ``axis``.  Joints of several freedoms are chains
+of these, with bodies without mass between them.  Units are metres, radians, kg.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,7 @@ from assembly.exchange.coupling import Coupling
 from forcefit.inputs.table import BadInput, nearest, quoted
 from stiffness.screws import UNIT_VECTORS, rotation_matrix, transform
 
-WORLD = "world"  # the link that stands still
+WORLD = "world"  # name of the fixed link
 HERE = np.eye(4)
 HERE.setflags(write=False)
 
@@ -39,12 +39,12 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """What holds a body to its parent; see the head of this module.
+    """A joint between a body and its parent; see the module's docstring.
 
     Attributes:
         name: unique among joints.
         kind: ``"fixed"``, ``"revolute"`` or ``"prismatic"``.
-        parent: name of the body it stands on.
+        parent: name of the body that carries it.
         child: name of the body it carries.
         placement: (4, 4) of the joint, seen from the parent.
         axis: (3,) unit vector in the joint's axes.
@@ -52,8 +52,8 @@ class Joint:
         position: [rad or m] coordinate at home.
         actuated: whether a drive holds it.
         limits: [rad or m] least and largest coordinate, None where it has none.
-        stiffness: [N m/rad or N/m] of a spring in its freedom, 0 without one.
-        rest: [rad or m] coordinate at which that spring carries nothing.
+        stiffness: [N m/rad or N/m] of a spring along its motion, 0 without one.
+        rest: [rad or m] coordinate at which that spring is without load.
     """
 
     name: str
@@ -72,15 +72,15 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """Two places of two bodies that meet.
+    """Two places on two bodies that coincide.
 
     Attributes:
-        name: of the loop.
+        name: name of the loop.
         first: name of the one body.
         second: name of the other.
-        at_first: (4, 4) the place, seen from the first body.
-        at_second: (4, 4) likewise from the second.
-        point: only the origins meet, the axes are free: a ball joint.
+        at_first: (4, 4) pose of the place in the first body.
+        at_second: (4, 4) pose of the place in the second body.
+        point: whether only the origins coincide and the axes are free: a ball joint.
     """
 
     name: str
@@ -96,16 +96,17 @@ class Mechanism:
     """A tree of bodies from its root, and loops.
 
     Attributes:
-        name: of the robot.
-        root: name of the body that stands still.
-        bodies: by name; the root is one of them.
+        name: name of the robot.
+        root: name of the fixed body.
+        bodies: bodies by name; the root is one of them.
         joints: parents first.
         loops: pairs of places that meet.
-        platform: name of a body, None where the file does not say.
-        left_out: what the file says and a mechanism cannot hold, in words.
-        taken: what the file leaves open, and what was taken, in words.
-        couplings: joints that follow others, no leader after its follower.
-        unweighed: names of bodies whose mass is that of meshes, which are not read.
+        platform: name of a body, None if the file has none.
+        left_out: parts of the file that a mechanism cannot represent, in words.
+        taken: assumptions where the file is incomplete, in words.
+        couplings: joints that follow others; a leader's coupling comes before its
+            followers'.
+        unweighed: names of bodies with masses of meshes, which are not read.
     """
 
     name: str
@@ -128,18 +129,19 @@ class Mechanism:
 def parents_first(joints: Sequence[Joint], bodies: Mapping[str, Body], file: str) -> (
     tuple[str, tuple[Joint, ...]]
 ):  # fmt: skip
-    """The root of a tree, and its joints sorted so that parents come first.
+    """Return the root of a tree, and its joints sorted so that parents come first.
 
     Args:
-        joints: in any order.
+        joints: joints in any order.
         bodies: all of them.
-        file: for messages.
+        file: name of the file, for error messages.
 
     Returns:
         Name of the root, and the joints.
 
     Raises:
-        BadInput: a body is missing, has two parents, or hangs on no root or on several.
+        BadInput: a body is missing, has two parents, or is connected to no root or to
+            several.
     """
     carried: dict[str, Joint] = {}
     below: dict[str, list[Joint]] = {name: [] for name in bodies}
@@ -179,14 +181,14 @@ def parents_first(joints: Sequence[Joint], bodies: Mapping[str, Body], file: str
 
 
 def body_poses(mechanism: Mechanism, coordinates: NDArray) -> dict[str, NDArray]:
-    """Where every body stands.
+    """Return the poses of all bodies.
 
     Args:
-        mechanism: of n joints.
+        mechanism: mechanism of n joints.
         coordinates: (n,) [rad or m] of all joints, in their order.
 
     Returns:
-        (4, 4) seen from the root, by the body's name.
+        (4, 4) pose seen from the root, by the body's name.
     """
     poses = {mechanism.root: np.eye(4)}
     for joint, q in zip(mechanism.joints, coordinates, strict=True):
@@ -196,7 +198,7 @@ def body_poses(mechanism: Mechanism, coordinates: NDArray) -> dict[str, NDArray]
 
 
 def motion(joint: Joint, coordinate: float) -> NDArray:
-    """(4, 4) what a joint does at a coordinate [rad or m]."""
+    """Return the (4, 4) motion of a joint at a coordinate [rad or m]."""
     along = coordinate * joint.axis
     if joint.kind == "revolute":
         return transform(np.zeros(3), rotation_matrix(along))
@@ -207,11 +209,11 @@ def chain(
     name: str, parent: str, child: str, placement: NDArray, after: NDArray,
     freedoms: Sequence[tuple[str, str, NDArray]],
 ) -> tuple[list[Joint], list[Body]]:  # fmt: skip
-    """A joint of several freedoms as joints of one, through bodies without mass.
+    """Return a joint of several freedoms as joints of one, with bodies without mass.
 
     Args:
-        name: of the whole; each part adds its own to it.
-        parent: body it stands on.
+        name: name of the whole joint; each part adds its own name to it.
+        parent: parent body.
         child: body it carries.
         placement: (4, 4) seen from the parent.
         after: (4, 4) of the child, seen from the last part after its motion.
@@ -235,10 +237,10 @@ def chain(
 
 
 def ball(turns: str = "xyz") -> list[tuple[str, str, NDArray]]:
-    """Freedoms of a ball joint as three turns, singular only far from home."""
+    """Return a ball joint as three rotations, singular only far from home."""
     return [(f"r{axis}", "revolute", np.array(UNIT_VECTORS[axis])) for axis in turns]
 
 
 def slides() -> list[tuple[str, str, NDArray]]:
-    """Freedoms of a shift in space as three slides."""
+    """Return a translation in space as three slides."""
     return [(f"t{axis}", "prismatic", np.array(UNIT_VECTORS[axis])) for axis in "xyz"]

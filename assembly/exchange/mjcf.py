@@ -1,9 +1,9 @@
-"""MJCF in: MuJoCo's bodies, joints, and equality constraints as loops.
+"""Import of MJCF: MuJoCo's bodies, joints, and equality constraints as loops.
 
 Sources:
     MuJoCo documentation, XML reference: angles are in degrees unless the compiler says
-    radian; joints turn at ``pos`` in the body, in the order written; a ``frame`` places
-    what stands in it and is no body.
+    radian; joints act at ``pos`` in the body, in the order written; a ``frame`` places
+    its elements and is no body.
 """
 
 from collections.abc import Iterator
@@ -38,15 +38,16 @@ _REFUSED = ("composite", "flexcomp", "flex")
 _SECTIONS = ("compiler", "option", "size", "statistic", "visual", "asset", "default",
              "custom", "keyframe", "contact", "sensor", "worldbody", "equality",
              "tendon", "actuator")  # fmt: skip
-_READ = ("name", "type", "pos", "axis", "ref", "class")  # of a joint
+# attributes of a joint that are read
+_READ = ("name", "type", "pos", "axis", "ref", "class")
 _SPRING = ("stiffness", "springref")
 _RANGE = ("range", "limited")
-_COUNTS = {"ball": 4, "free": 7}  # of a joint's numbers in a key
+_COUNTS = {"ball": 4, "free": 7}  # number of a joint's values in a key
 
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Where elements stand: their body, (4, 4) in it, defaults and unit of angles."""
+    """Place of elements: their body, (4, 4) in it, defaults and unit of angles."""
 
     body: str
     offset: NDArray
@@ -56,7 +57,7 @@ class _Place:
 
 @dataclass
 class _Reading:
-    """What is gathered while the bodies of a file are walked through."""
+    """Data collected while the bodies of a file are read."""
 
     rules: MassRules
     defaults: dict[str, dict[str, dict[str, str]]]
@@ -66,22 +67,22 @@ class _Reading:
     sites: dict[str, tuple[str, NDArray]] = field(default_factory=dict)
     extra: dict[str, list[str]] = field(default_factory=dict)
     coordinates: dict[str, str] = field(default_factory=dict)  # kinds, in order of qpos
-    number: int = 0  # of bodies so far
+    number: int = 0  # number of bodies so far
     unweighed: list[str] = field(default_factory=list)
 
 
 def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
-    """Mechanism of an MJCF file.
+    """Return the mechanism of an MJCF file.
 
     Args:
         path: the file; others that it includes or attaches are read too.
-        loops: a file that adds to its loops and drives, or None.
+        loops: a file with further loops and drives, or None.
 
     Returns:
-        The mechanism; its home is the key ``home`` where there is one.
+        The mechanism; its home is the key ``home`` if there is one.
 
     Raises:
-        BadInput: a rule of the format is broken, or an element is not known here.
+        BadInput: a rule of the format is broken, or an element is unknown.
     """
     root = expanded(read_xml(path, "mujoco"))
     for node in root.descendants():
@@ -103,7 +104,7 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     rests = {j.name: j.position for j in order if j.name in reading.coordinates}
     equality = reading.defaults["main"].get("equality", {})
     ties = Ties(root, equality, reading.sites, rests, reading.parts, reading.extra)
-    # constraints hold where the file is written, before any key
+    # constraints hold in the pose of the file, before any key
     closed = tuple(ties.loops(body_poses(mechanism, mechanism.home)))
     driven = ties.driven()
     couplings = leaders_first(list(ties.couplings(driven)), str(path))
@@ -113,7 +114,7 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     free = [name for name, kind in reading.coordinates.items() if kind == "free"]
     floating = counted("free joints that no loop ties to the ground", free)
     unweighed = tuple(reading.unweighed)
-    if unweighed and reading.rules.total > 0:  # all masses depend on theirs
+    if unweighed and reading.rules.total > 0:  # all masses depend on the missing ones
         unweighed = tuple(name for name in reading.bodies if name != WORLD)
     mechanism = replace(
         mechanism, joints=joints, loops=closed, left_out=left_out, couplings=couplings,
@@ -124,7 +125,7 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
 
 
 def _platform(root: Node, reading: _Reading) -> str | None:
-    """The body that ``<custom><text name="platform">`` names."""
+    """Return the body that ``<custom><text name="platform">`` names."""
     for group in root.children("custom"):
         for text in group.children("text"):
             if text.text("name") == "platform" and text.text("data") in reading.bodies:
@@ -133,14 +134,14 @@ def _platform(root: Node, reading: _Reading) -> str | None:
 
 
 def _defaults(root: Node) -> dict[str, dict[str, dict[str, str]]]:
-    """Attributes by class and element, each class with what its parents say."""
+    """Return attributes by class and element; each class inherits from its parents."""
     classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
 
     def gather(node: Node, inherited: dict[str, dict[str, str]], name: str) -> None:
         own = {tag: dict(values) for tag, values in inherited.items()}
         for inner in node.children():
             if inner.tag != "default":
-                # connect, weld and joint of constraints share their defaults
+                # connect, weld and joint constraints have the same defaults
                 own.setdefault(inner.tag, {}).update(inner.element.attrib)
         classes[name] = own
         for inner in node.children("default"):
@@ -150,13 +151,13 @@ def _defaults(root: Node) -> dict[str, dict[str, dict[str, str]]]:
         name = node.text("class", "main")
         attached = node.has("attached")
         gather(node, {} if attached else classes["main"], name)
-        if not attached:  # the outermost class is main, whatever it is called
+        if not attached:  # the outermost class is main, independent of its name
             classes["main"] = classes[name]
     return classes
 
 
 def _filled(node: Node, childclass: str, reading: _Reading) -> Node:
-    """An element with the defaults of its class filled in."""
+    """Return an element with the defaults of its class filled in."""
     name = node.text("class", childclass)
     if name not in reading.defaults:
         hint = nearest(name, reading.defaults)
@@ -168,16 +169,16 @@ def _filled(node: Node, childclass: str, reading: _Reading) -> Node:
 
 
 def _inside(frame: Node, place: _Place) -> _Place:
-    """Where the elements of a frame stand."""
+    """Return the place of the elements of a frame."""
     T = place.offset @ _pose(frame, place.angles)
     angles = place.angles
-    if frame.has(UNIT):  # of another model
+    if frame.has(UNIT):  # from another model
         angles = Angles(frame.number(UNIT, "rad"), frame.text(SEQUENCE))
     return _Place(place.body, T, frame.text("childclass", place.childclass), angles)
 
 
 def _elements(node: Node, place: _Place) -> Iterator[tuple[Node, _Place]]:
-    """Elements of a body as they are written, in frames too, bodies not opened."""
+    """Yield elements of a body in their order, in frames too, without nested bodies."""
     for inner in node.children():
         if inner.tag == "frame":
             yield from _elements(inner, _inside(inner, place))
@@ -186,7 +187,7 @@ def _elements(node: Node, place: _Place) -> Iterator[tuple[Node, _Place]]:
 
 
 def _walk(node: Node, place: _Place, reading: _Reading) -> None:
-    """What stands in a body beside its joints and its mass."""
+    """Read the elements of a body other than its joints and its mass."""
     for inner, at in _elements(node, place):
         if inner.tag == "body":
             _add_body(inner, at, reading)
@@ -201,7 +202,7 @@ def _walk(node: Node, place: _Place, reading: _Reading) -> None:
 
 
 def _add_body(node: Node, at: _Place, reading: _Reading) -> None:
-    """A body, the joints it stands on, and all inside of it."""
+    """Add a body, its joints, and all elements inside it."""
     reading.number += 1
     name = node.optional("name") or f"body{reading.number}"
     if name in reading.bodies:
@@ -228,7 +229,7 @@ def _add_body(node: Node, at: _Place, reading: _Reading) -> None:
 
 
 def _massive(node: Node, place: _Place, reading: _Reading) -> Body:
-    """A body with its mass, of what is written and of its shapes."""
+    """Return a body with its mass, as written or from its shapes."""
     written, shapes = None, []
     for inner, at in _elements(node, place):
         if inner.tag == "inertial":
@@ -248,7 +249,7 @@ def _massive(node: Node, place: _Place, reading: _Reading) -> Body:
 
 
 def _freedoms(node: Node, place: _Place, reading: _Reading) -> Iterator[Joint]:
-    """The joints of a body, of one freedom each, in the body's axes."""
+    """Return the joints of a body, of one freedom each, in the body's axes."""
     number = 0
     for inner, at in _elements(node, place):
         if inner.tag not in {"joint", "freejoint"}:
@@ -278,14 +279,14 @@ def _freedoms(node: Node, place: _Place, reading: _Reading) -> Iterator[Joint]:
 
 
 def _pose(node: Node, angles: Angles) -> NDArray:
-    """(4, 4) of an element with ``pos`` and any kind of orientation."""
+    """Return the (4, 4) pose of an element with ``pos`` and any kind of orientation."""
     return placed(node.numbers("pos", 3, "m", _ZERO), orientation(node, angles))
 
 
 def _at_key(
     root: Node, reading: _Reading, joints: tuple[Joint, ...]
 ) -> tuple[Joint, ...]:
-    """Joints at the positions of the key named home."""
+    """Return the joints at the positions of the key named home."""
     keys = [k for group in root.children("keyframe") for k in group.children("key")]
     counts = {name: _COUNTS.get(kind, 1) for name, kind in reading.coordinates.items()}
     for key in keys:

@@ -1,14 +1,14 @@
-"""MJCF written out: other files included, copies made, other models attached.
+"""Expansion of MJCF: included files, replicated bodies, attached models.
 
-MuJoCo could do this (``MjSpec``), but is an extra, and the second reader that this one
-is compared with.  Its places lack the file of an include, and its XML has six digits
-(MuJoCo 3.17).
+MuJoCo could do this (``MjSpec``), but it is optional, and it is the second reader with
+which this one is compared.  Its error positions lack the included file, and its XML has
+six digits (MuJoCo 3.17).
 
 Sources:
-    MuJoCo documentation, XML reference: ``include`` puts in the elements of a file;
-    copy i of ``replicate`` stands i offsets and turns on, its names end in i with as
-    many digits as the count has; ``attach`` puts a body of another model, with that
-    model's angles, defaults and constraints, all names behind a prefix.
+    MuJoCo documentation, XML reference: ``include`` inserts the elements of a file;
+    copy i of ``replicate`` is moved by i offsets and rotations, and its names end in i
+    with as many digits as the count has; ``attach`` inserts a body of another model,
+    with that model's angles, defaults and constraints, all names with a prefix.
 """
 
 import copy
@@ -24,10 +24,10 @@ from assembly.exchange.orientation import from_euler, to_quaternion
 from assembly.exchange.xml_file import Node, placed, read_xml
 from forcefit.inputs.errors import BadInput, quoted
 
-_DEEPEST = 10  # files in files
+_DEEPEST = 10  # largest depth of nested files
 _MOST_COPIES = 10_000
 _MOST_ELEMENTS = 200_000
-# keys whose values are names, of an element or of what it refers to
+# keys whose values are names, of an element or of one it refers to
 _NAMES = ("name", "class", "childclass", "joint", "joint1", "joint2", "jointinparent",
           "body", "body1", "body2", "site", "site1", "site2", "refsite", "slidersite",
           "cranksite", "tendon", "tendon1", "tendon2", "geom", "mesh")  # fmt: skip
@@ -36,23 +36,23 @@ UNIT, SEQUENCE = "attached.unit", "attached.sequence"
 
 
 def expanded(root: Node, depth: int = 0) -> Node:
-    """An MJCF file as one in which every body is written out.
+    """Return an MJCF file as one in which every body is written out.
 
     Args:
-        root: of the file, changed in place.
-        depth: how many files lead to it.
+        root: root of the file, changed in place.
+        depth: number of files that include it.
 
     Returns:
         The root.
 
     Raises:
-        BadInput: a file is missing or is no MJCF, files stand too deep, copies are too
-            many, or a model or body to be attached is not there.
+        BadInput: a file is missing or is no MJCF, files are nested too deep, copies are
+            too many, or a model or body to be attached is not there.
     """
     if depth > _DEEPEST:
         raise BadInput(f"{root.file}: found models more than {_DEEPEST} deep")
     _include(root.element, root, Path(root.file).parent, 0)
-    _attach(root, depth)  # before copies are made of what is attached
+    _attach(root, depth)  # before attached elements are copied
     angles = Angles.of(root)
     for world in root.children("worldbody"):
         _replicate(world.element, root, angles)
@@ -62,7 +62,7 @@ def expanded(root: Node, depth: int = 0) -> Node:
 
 
 def _include(element: Any, root: Node, folder: Path, depth: int) -> None:
-    """Elements of other files in the place of ``include``."""
+    """Replace ``include`` by the elements of the file."""
     inside: list[Any] = []
     for inner in element:
         if inner.tag != "include":
@@ -79,7 +79,7 @@ def _include(element: Any, root: Node, folder: Path, depth: int) -> None:
 
 
 def _replicate(element: Any, root: Node, angles: Angles) -> None:
-    """Frames with copies in the place of ``replicate``, the innermost first."""
+    """Replace ``replicate`` by frames with copies, the innermost first."""
     inside: list[Any] = []
     for inner in element:
         _replicate(inner, root, angles)
@@ -96,7 +96,7 @@ def _replicate(element: Any, root: Node, angles: Angles) -> None:
 def _copies(
     node: Node, angles: Angles, ties: list[tuple[Any, Any]]
 ) -> Iterator[Any]:  # fmt: skip
-    """The frames of one ``replicate``; what ties their bodies is copied too."""
+    """Return the frames of one ``replicate``, with copied constraints."""
     count = node.number("count", "copies")
     if not 1 <= count <= _MOST_COPIES or count % 1:
         expected = f"expected a whole number from 1 to {_MOST_COPIES}"
@@ -120,7 +120,7 @@ def _copies(
 
 
 def _end(element: Any, keys: tuple[str, ...], ending: str) -> None:
-    """Lengthen names of an element and of all inside it."""
+    """Append an ending to the names of an element and of all elements inside it."""
     for one in element.iter():
         for key in keys:
             if key in one.attrib:
@@ -128,12 +128,12 @@ def _end(element: Any, keys: tuple[str, ...], ending: str) -> None:
 
 
 def _words(values: Any) -> str:
-    """Numbers with all their digits."""
+    """Return the numbers as text, with all their digits."""
     return " ".join(repr(float(value)) for value in values)
 
 
 def _attach(root: Node, depth: int) -> None:
-    """Frames with parts of other models in the place of ``attach``."""
+    """Replace ``attach`` by frames with parts of other models."""
     worlds = [world.element for world in root.children("worldbody")]
     places = [
         (outer, inner)
@@ -142,7 +142,7 @@ def _attach(root: Node, depth: int) -> None:
     ]  # fmt: skip
     if not places:
         return
-    # copies, as each is changed; of this model as it is written
+    # copies, as each is changed; of this model in its written form
     own = copy.deepcopy(root.element)
     others = {
         name: (file, element)
@@ -164,14 +164,14 @@ def _attach(root: Node, depth: int) -> None:
 
 
 def _other(model: Node, root: Node, depth: int) -> tuple[str, str, Any]:
-    """Name, file and written-out element of a model asset."""
+    """Return name, file and expanded element of a model asset."""
     other = read_xml(Path(root.file).parent / model.text("file"), "mujoco")
     name = model.optional("name") or other.optional("model") or Path(other.file).stem
     return name, other.file, expanded(other, depth + 1).element
 
 
 def _attached(node: Node, root: Node, other: Node) -> Any:
-    """A frame with a part of a model; its constraints are added to the root."""
+    """Return a frame with a part of a model; add its constraints to the root."""
     prefix, angles = node.optional("prefix"), Angles.of(other)
     for element in other.element.iter():
         for key in _NAMES:
@@ -185,7 +185,7 @@ def _attached(node: Node, root: Node, other: Node) -> Any:
             held = [one for one in all_of_it if one.get("name") == wanted][:1]
             if not held:
                 raise node.bad(tag, f"found {quoted(node.text(tag))}, no {tag} of it")
-    # its own defaults, and none of this model's where it has none
+    # its own defaults; without them none of this model's
     for default in [d.element for d in other.children("default")] or [
         Element("default")
     ]:
@@ -202,7 +202,7 @@ def _attached(node: Node, root: Node, other: Node) -> Any:
 
 
 def _ties_within(root: Node, part: Any) -> list[tuple[Any, Any]]:
-    """Constraints, tendons and actuators of a part alone, each with its section."""
+    """Return constraints, tendons and actuators within a part, with their sections."""
     names, ties = {one.get("name") for one in part.iter()}, []
     for section in root.children("tendon", "equality", "actuator"):
         for tie in section.element:

@@ -1,4 +1,4 @@
-"""MJCF's joints as joints of one freedom, and their places in a key."""
+"""MJCF's joints as joints of one freedom, and their values in a key."""
 
 from dataclasses import replace
 
@@ -15,19 +15,19 @@ _ZERO = np.zeros(3)
 
 
 def several_freedoms(given: Node, name: str, kind: str, offset: NDArray) -> list[Joint]:
-    """A ball joint, or the six freedoms of a body that nothing holds.
+    """Return a ball joint, or the six freedoms of a free body.
 
     Args:
         given: the element, defaults filled in.
-        name: of the joint.
+        name: name of the joint.
         kind: ``"ball"`` or ``"free"``.
         offset: (4, 4) of the frame in which it is written, seen from the body.
 
     Returns:
-        Joints of one freedom, in order, their bodies left open.
+        Joints of one freedom, in order, without their bodies.
 
     Raises:
-        BadInput: a number is none.
+        BadInput: a number is invalid.
     """
     freedoms = ball() if kind == "ball" else slides() + ball()
     anchor = np.eye(4)
@@ -47,20 +47,20 @@ def several_freedoms(given: Node, name: str, kind: str, offset: NDArray) -> list
 def one_freedom(
     given: Node, name: str, kind: str, offset: NDArray, angles: Angles
 ) -> Joint:
-    """A hinge or a slide, with its spring.
+    """Return a hinge or a slide, with its spring.
 
     Args:
         given: the element, defaults filled in.
-        name: of the joint.
+        name: name of the joint.
         kind: ``"revolute"`` or ``"prismatic"``.
         offset: (4, 4) of the frame in which it is written, seen from the body.
-        angles: of the file.
+        angles: unit of angles in the file.
 
     Returns:
-        The joint, its bodies left open.
+        The joint, without its bodies.
 
     Raises:
-        BadInput: a number is none, or the axis is no direction.
+        BadInput: a number is invalid, or the axis has no direction.
     """
     unit = angles.unit
     pos = given.numbers("pos", 3, "m", _ZERO)
@@ -74,7 +74,7 @@ def one_freedom(
         stiffness = given.number("stiffness", "N m/rad or N/m")
         rest = given.number("springref", "angle or m", 0.0)
         rest *= unit if kind == "revolute" else 1.0
-    # the coordinate at rest is ref: the joint's own zero lies before it
+    # the rest coordinate is ref, so the joint's own zero is shifted by it
     return replace(
         joint, placement=anchor @ motion(joint, -ref), position=ref,
         stiffness=stiffness, rest=rest, limits=_limits(given, kind, angles),
@@ -82,7 +82,7 @@ def one_freedom(
 
 
 def _limits(node: Node, kind: str, angles: Angles) -> tuple[float, float] | None:
-    """Range of a hinge or slide; ``limited`` absent means that a range binds."""
+    """Return the range of a hinge or slide; without ``limited`` a range is binding."""
     limited = node.optional("limited") or "auto"
     binds = limited == "true" or (limited == "auto" and angles.range_limits)
     if not node.has("range") or not binds:
@@ -95,12 +95,12 @@ def _limits(node: Node, kind: str, angles: Angles) -> tuple[float, float] | None
 
 
 def at_key(key: Node, joint: Joint, values: NDArray) -> Joint:
-    """A joint at its numbers of a key; the first of several takes up their motion.
+    """Return a joint at its values of a key; the first of several takes their motion.
 
     Args:
         key: the element.
-        joint: of one freedom, or the first of a ball or free joint.
-        values: one number, a quaternion, or a place and a quaternion.
+        joint: joint of one freedom, or the first of a ball or free joint.
+        values: one number, a quaternion, or a position and a quaternion.
 
     Returns:
         The joint at home.
@@ -116,7 +116,7 @@ def at_key(key: Node, joint: Joint, values: NDArray) -> Joint:
     turn = placed(
         values[:-4] if len(values) == 7 else _ZERO, from_quaternion(quaternion)
     )
-    # a free body's numbers are its place in the world, a ball's its turn from rest
+    # values of a free body are its pose in the world, of a ball its turn from rest
     return replace(
         joint, placement=turn if len(values) == 7 else joint.placement @ turn
     )

@@ -1,4 +1,4 @@
-"""Masses of MJCF's bodies: written, or made of shapes, bounded and scaled.
+"""Masses of MJCF's bodies: as written, or from shapes, bounded and scaled.
 
 Sources:
     MuJoCo documentation, XML reference, compiler (``inertiafromgeom``,
@@ -19,19 +19,19 @@ from assembly.exchange.shapes import area, together, volume
 from assembly.exchange.xml_file import Node
 
 _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
-_REGULAR = 1e-6  # [kg] bounds up to it only let a body without mass be moved
+_REGULAR = 1e-6  # [kg] smaller bounds only allow bodies without mass to move
 _KINDS = (*_SIZES, "plane", "hfield", "mesh", "sdf")
 
 
 @dataclass(frozen=True, eq=False)
 class MassRules:
-    """What the compiler does with masses.
+    """The compiler's rules for masses.
 
     Attributes:
-        from_shapes: ``true``, ``false`` or ``auto``: where none is written.
+        from_shapes: ``true``, ``false`` or ``auto``: only if no mass is written.
         groups: least and largest group of the shapes that count.
-        least: [kg] of every body.
-        total: [kg] to which all are scaled, if above zero.
+        least: [kg] least mass of every body.
+        total: [kg] sum to which all masses are scaled, if above zero.
     """
 
     from_shapes: str = "auto"
@@ -41,7 +41,7 @@ class MassRules:
 
     @staticmethod
     def of(root: Node) -> "MassRules":
-        """As the file's compilers say, the last counts."""
+        """Return the rules of the file's compilers; the last one counts."""
         rules = MassRules()
         for node in root.children("compiler"):
             groups = node.numbers(
@@ -58,7 +58,7 @@ class MassRules:
         return rules
 
     def applied(self, bodies: Mapping[str, Body]) -> dict[str, Body]:
-        """Bodies of a file, each at least as heavy as it says, all scaled."""
+        """Return the bodies of a file, with least mass, scaled to the total."""
         least = self.least if self.least > _REGULAR else 0.0
         bounded = {
             name: replace(body, mass=max(body.mass, least)) if name != WORLD else body
@@ -72,17 +72,17 @@ class MassRules:
 
 
 def written_mass(inertial: Node, offset: NDArray) -> tuple[float, NDArray]:
-    """[kg] and (3,) [m] of ``inertial``, seen from its body.
+    """Return [kg] and (3,) [m] of ``inertial``, seen from its body.
 
     Args:
         inertial: the element.
-        offset: (4, 4) of the frame in which it stands, seen from the body.
+        offset: (4, 4) of its frame, seen from the body.
 
     Returns:
         Mass and centre.
 
     Raises:
-        BadInput: the mass is below zero, or a number is none.
+        BadInput: the mass is negative, or a number is invalid.
     """
     mass = inertial.number("mass", "kg")
     if mass < 0:
@@ -94,18 +94,18 @@ def written_mass(inertial: Node, offset: NDArray) -> tuple[float, NDArray]:
 def shape_mass(
     geom: Node, T: NDArray, rules: MassRules
 ) -> tuple[float, NDArray] | None:
-    """[kg] and (3,) [m] of a shape; None where it is a mesh, whose volume is not known.
+    """Return [kg] and (3,) [m] of a shape; None for a mesh, of unknown volume.
 
     Args:
         geom: the element, defaults filled in.
-        T: (4, 4) where it stands in its body.
-        rules: of the file.
+        T: (4, 4) pose in its body.
+        rules: rules of the file.
 
     Returns:
         Mass and centre.
 
     Raises:
-        BadInput: a size or mass is not what it should be.
+        BadInput: a size or mass is invalid.
     """
     kind = geom.choice("type", _KINDS, "sphere")
     group = geom.number("group", "-", 0.0)
@@ -127,7 +127,7 @@ def shape_mass(
 
 
 def _sizes(geom: Node, kind: str) -> list[float]:
-    """[m] sizes of a shape, lengths and edges whole."""
+    """Return the [m] sizes of a shape, with full lengths and edges."""
     given = geom.optional("size").split()
     count = _SIZES[kind]
     if geom.has("fromto"):
@@ -136,7 +136,7 @@ def _sizes(geom: Node, kind: str) -> list[float]:
         radius = _first(geom, len(given))
         sizes = [radius, half] if count == 2 else [radius, radius, half]
     else:
-        # numbers beyond those that the shape needs mean nothing
+        # numbers beyond those of the shape are ignored
         sizes = geom.numbers("size", max(count, len(given)), "m").tolist()[:count]
     if min(sizes) <= 0:
         raise geom.bad("size", f"found {min(sizes):g}, expected > 0 [m]")
@@ -146,12 +146,12 @@ def _sizes(geom: Node, kind: str) -> list[float]:
 
 
 def _first(geom: Node, count: int) -> float:
-    """[m] the first size."""
+    """Return the first size [m]."""
     return float(geom.numbers("size", max(1, count), "m")[0])
 
 
 def _thomsen(half_axes: list[float]) -> float:
-    """[m^2] area of an ellipsoid, to 1 %."""
+    """Return the [m^2] area of an ellipsoid, to 1 %."""
     a, b, c = (x**1.6075 for x in half_axes)
     return 4 * math.pi * ((a * b + b * c + c * a) / 3) ** (1 / 1.6075)
 
@@ -160,13 +160,13 @@ def body_of(
     name: str, written: tuple[float, NDArray] | None,
     shapes: list[tuple[float, NDArray]], rules: MassRules,
 ) -> Body:  # fmt: skip
-    """A body of what is written of its mass and of its shapes.
+    """Return a body from its written mass and its shapes.
 
     Args:
-        name: of the body.
+        name: name of the body.
         written: [kg] and (3,) [m], None without ``inertial``.
-        shapes: the same of each shape.
-        rules: of the file.
+        shapes: [kg] and (3,) [m] of each shape.
+        rules: rules of the file.
 
     Returns:
         The body.

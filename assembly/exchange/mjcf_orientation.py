@@ -1,4 +1,4 @@
-"""Orientations of MJCF: five ways to write one, in degrees or radians."""
+"""Orientations of MJCF: five forms, in degrees or radians."""
 
 import math
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ from stiffness.screws import rotation_matrix
 
 @dataclass(frozen=True)
 class Angles:
-    """How a file writes angles.
+    """The conventions of a file for angles.
 
     Attributes:
         unit: [rad] of its unit.
-        sequence: axes of its Euler angles; capitals stand still.
-        range_limits: whether a joint with a range is limited without saying so.
+        sequence: axes of its Euler angles; capitals are fixed axes.
+        range_limits: whether a joint with a range is limited by default.
     """
 
     unit: float
@@ -27,7 +27,7 @@ class Angles:
 
     @staticmethod
     def of(root: Node) -> "Angles":
-        """As the file's compilers say."""
+        """Return the conventions of the file's compilers."""
         unit, sequence, automatic = "degree", "xyz", "true"
         for compiler in root.children("compiler"):
             unit = compiler.choice("angle", ("degree", "radian"), unit)
@@ -43,17 +43,17 @@ class Angles:
 
 
 def orientation(node: Node, angles: Angles) -> NDArray:
-    """(3, 3) orientation of an element; none if it says nothing of it.
+    """Return the (3, 3) orientation of an element; the identity if it has none.
 
     Args:
-        node: with one of quat, axisangle, euler, xyaxes, zaxis.
-        angles: how its file writes them.
+        node: node with one of quat, axisangle, euler, xyaxes, zaxis.
+        angles: conventions of its file.
 
     Returns:
         The rotation.
 
     Raises:
-        BadInput: a direction of no length, or not as many numbers as asked for.
+        BadInput: a direction of zero length, or a wrong number of values.
     """
     if node.has("quat"):
         q = node.numbers("quat", 4, "-")
@@ -82,17 +82,18 @@ def orientation(node: Node, angles: Angles) -> NDArray:
 
 
 def site_pose(node: Node, angles: Angles) -> NDArray:
-    """(4, 4) of a site or shape, which may be placed by its two ends.
+    """Return the (4, 4) pose of a site or shape, which two ends may define.
 
     Args:
-        node: with ``pos`` and an orientation, or ``fromto``.
-        angles: how its file writes them.
+        node: node with ``pos`` and an orientation, or ``fromto``.
+        angles: conventions of its file.
 
     Returns:
-        Its place; by two ends the middle between them, z from the second to the first.
+        Its pose; for two ends the middle between them, with z from the second to the
+        first.
 
     Raises:
-        BadInput: both ``pos`` and ``fromto``, or two ends that are one.
+        BadInput: both ``pos`` and ``fromto``, or two ends that coincide.
     """
     if not node.has("fromto"):
         return placed(

@@ -1,10 +1,10 @@
-"""What ties MJCF's bodies beside joints: equality constraints, tendons, actuators.
+"""Connections of MJCF's bodies other than joints: equalities, tendons, actuators.
 
 Sources:
-    MuJoCo documentation, XML reference, equality: ``connect`` and ``weld`` hold what
-    coincides in the initial configuration unless sites or ``relpose`` say more; of a
-    weld ``anchor`` is a place of body2, which meets the place of ``relpose`` in body1;
-    joint1 = rest1 + polynomial in (joint2 - rest2).
+    MuJoCo documentation, XML reference, equality: ``connect`` and ``weld`` constrain
+    places that coincide in the initial configuration, unless sites or ``relpose`` are
+    given; in a weld ``anchor`` is a place of body2, which coincides with the place of
+    ``relpose`` in body1; joint1 = rest1 + polynomial in (joint2 - rest2).
 """
 
 from collections.abc import Iterator, Mapping
@@ -31,15 +31,15 @@ _DRIVEN_BY = ("joint", "jointinparent")
 
 @dataclass
 class Ties:
-    """Constraints of a file, and what of it is left out.
+    """Constraints of a file, and its parts that are left out.
 
     Attributes:
         root: ``<mujoco>``.
-        defaults: attributes of ``equality`` by default.
+        defaults: default attributes of ``equality``.
         sites: body and (4, 4) place in it, by name.
         rests: [rad or m] coordinate in the initial configuration by joint.
-        parts: joints of one freedom by that of the whole.
-        extra: what is left out, with names; added to.
+        parts: joints of one freedom by the name of the whole joint.
+        extra: parts that are left out, with names; extended while reading.
     """
 
     root: Node
@@ -50,12 +50,12 @@ class Ties:
     extra: dict[str, list[str]] = field(default_factory=dict)
 
     def leave_out(self, what: str, name: str) -> None:
-        """Take down what is not converted."""
+        """Record a part that is not converted."""
         self.extra.setdefault(what, []).append(name)
 
     @cached_property
     def equalities(self) -> list[Node]:
-        """Active constraints, those by default too; others are left out."""
+        """Active constraints, also by default; others are left out."""
         given = [n for g in self.root.children("equality") for n in g.children()]
         default = self.defaults.get("active", "true")
         off = [node for node in given if node.element.get("active", default) == "false"]
@@ -64,7 +64,7 @@ class Ties:
         return [node for node in given if node not in off]
 
     def loops(self, poses: Mapping[str, NDArray]) -> Iterator[Loop]:
-        """``connect`` and ``weld`` as loops.
+        """Yield ``connect`` and ``weld`` as loops.
 
         Args:
             poses: (4, 4) of all bodies in the initial configuration.
@@ -73,7 +73,7 @@ class Ties:
             The loops.
 
         Raises:
-            BadInput: a body or site is not there, or both ends are of one body.
+            BadInput: a body or site does not exist, or both ends are on one body.
         """
         names: set[str] = set()
         for count, node in enumerate(self.equalities, 1):
@@ -92,9 +92,9 @@ class Ties:
             yield loop
 
     def _loop(self, node: Node, name: str, poses: Mapping[str, NDArray]) -> Loop:
-        """One ``connect`` or ``weld``."""
+        """Return one ``connect`` or ``weld`` as a loop."""
         point = node.tag == "connect"
-        # a weld whose turns weigh nothing holds its anchor only
+        # a weld without torque scale constrains its anchor only
         point |= node.number("torquescale", "-", 1.0) == 0.0
         if node.has("site1"):
             (a, A), (b, B) = (
@@ -117,17 +117,17 @@ class Ties:
         return Loop(name, a, b, A, B, point)
 
     def couplings(self, driven: set[str]) -> Iterator[Coupling]:
-        """``joint`` constraints: joints that follow others.
+        """Yield ``joint`` constraints: joints that follow others.
 
         Args:
             driven: joints with an actuator.
 
         Yields:
-            The couplings; of a driven follower of a joint without a drive the inverse,
-            where the rule is a straight line.
+            The couplings.  If the follower is driven and the leader is not, the
+            inverse, for linear rules.
 
         Raises:
-            BadInput: a joint is not there, or has several freedoms.
+            BadInput: a joint does not exist, or has several freedoms.
         """
         for node in self.equalities:
             if node.tag != "joint":
@@ -152,7 +152,7 @@ class Ties:
                 yield Coupling(first, leader, tuple(rules), rest, other)
 
     def driven(self) -> set[str]:
-        """Joints with an actuator; other actuators are left out."""
+        """Return the joints with an actuator; other actuators are left out."""
         names = set()
         for group in self.root.children("actuator"):
             for node in group.children():
@@ -173,7 +173,7 @@ class Ties:
         return names
 
     def tendons(self) -> None:
-        """Leave out tendons and what holds them, by name."""
+        """Record tendons and their constraints as left out, by name."""
         for group in self.root.children("tendon"):
             for node in group.children():
                 self.leave_out(f"tendon{LOADED}", f"{node.tag} {_name(node)}".strip())
@@ -183,7 +183,7 @@ class Ties:
 
 
 def _polynomial(node: Node) -> list[float]:
-    """Five coefficients; those that are not written are the format's default."""
+    """Return five coefficients; missing ones have the format's default."""
     count = len(node.optional("polycoef").split())
     default = [0.0, 1.0, 0.0, 0.0, 0.0]
     if not count:
@@ -193,13 +193,13 @@ def _polynomial(node: Node) -> list[float]:
 
 
 def _name(node: Node, keys: "list[str] | tuple[str, ...]" = ()) -> str:
-    """Of an element, or of what it holds."""
+    """Return the name of an element, or of an element in it."""
     found = (node.optional(key) for key in ("name", *keys))
     return next((name for name in found if name), "")
 
 
 def _known(node: Node, key: str, valid: Mapping[str, Any]) -> Any:
-    """What a name stands for."""
+    """Return the object of a name."""
     name = node.text(key)
     if name not in valid:
         raise node.bad(key, f"found {quoted(name)}{nearest(name, valid)}")

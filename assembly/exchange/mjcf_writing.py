@@ -1,4 +1,4 @@
-"""MJCF out: bodies inside bodies, loops as weld constraints, the home as a key."""
+"""Export of MJCF: nested bodies, loops as weld constraints, the home as a key."""
 
 from xml.sax.saxutils import quoteattr
 
@@ -13,14 +13,14 @@ _KINDS = {"revolute": "hinge", "prismatic": "slide"}
 
 
 def mjcf_text(mechanism: Mechanism) -> str:
-    """An MJCF file's text.
+    """Return the text of an MJCF file.
 
     Args:
-        mechanism: whose children stand in their joints' own frames.
+        mechanism: mechanism with children in their joints' own frames.
 
     Returns:
-        The text.  MuJoCo lets no body move without a mass: the compiler gives those
-        that have none the smallest that does.
+        The text.  In MuJoCo a moving body needs a mass, so the compiler sets the
+        smallest possible one for bodies without mass.
     """
     moving = [joint for joint in mechanism.joints if joint.kind != "fixed"]
     lines = [
@@ -54,7 +54,7 @@ def mjcf_text(mechanism: Mechanism) -> str:
 
 
 def depth_first(mechanism: Mechanism, moving: bool = False) -> list[Joint]:
-    """Joints in the order in which nested bodies are written; only moving ones."""
+    """Return joints in the order of nested bodies; only moving ones on request."""
     below: dict[str, list[Joint]] = {}
     for joint in mechanism.joints:
         below.setdefault(joint.parent, []).append(joint)
@@ -67,7 +67,7 @@ def depth_first(mechanism: Mechanism, moving: bool = False) -> list[Joint]:
 
 
 def _bodies(mechanism: Mechanism) -> list[str]:
-    """Nested bodies; a loop, as chains may be longer than Python recurses."""
+    """Return nested bodies; by a loop, as chains may exceed Python's recursion."""
     lines: list[str] = []
     open_bodies = [mechanism.root]
 
@@ -93,7 +93,8 @@ def _bodies(mechanism: Mechanism) -> list[str]:
                 f'{pad}  <joint name={name} type="{kind}" axis="{axis}"{limits}/>'
             )
         if body.mass:
-            # the format refuses masses in a row, which have no inertia about it
+            # the format refuses collinear masses, which have no inertia about their
+            # line
             J = body.inertia + _SMALLEST_INERTIA * np.eye(3)
             full = numbers(np.array([J[0, 0], J[1, 1], J[2, 2],
                                      J[0, 1], J[0, 2], J[1, 2]]))  # fmt: skip

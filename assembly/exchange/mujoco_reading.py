@@ -1,7 +1,7 @@
-"""What MuJoCo reads in a robot's file, beside what was read here.
+"""Comparison of MuJoCo's reading of a robot's file with the reading here.
 
-Its own compiler and kinematics say where bodies stand, what they weigh and how far
-constraints are open, in random postures.
+MuJoCo's own compiler and kinematics compute poses and masses of bodies and the mismatch
+of constraints, in random postures.
 """
 
 import pickle
@@ -20,37 +20,38 @@ from assembly.exchange.xml_file import read_xml
 from forcefit.inputs.errors import one_line
 from stiffness.screws import rotation_vector
 
-_LIGHTEST = 1.01e-6  # [kg] what a body without a mass may get, to be moved at all
+# [kg] largest mass that MuJoCo gives a body without mass, to move it
+_LIGHTEST = 1.01e-6
 _UNIT_INERTIA = {"ixx": "1", "iyy": "1", "izz": "1", "ixy": "0", "ixz": "0", "iyz": "0"}
 _DRAWN = {"visual", "collision", "gazebo", "transmission", "loop_joint"}
 
 
 def compare_here(mechanism: Mechanism, path: Path) -> Comparison:
-    """Compare a mechanism with what MuJoCo reads in its file, in this process.
+    """Compare a mechanism with MuJoCo's reading of its file, in this process.
 
     Args:
-        mechanism: as it was read, or as it was written.
-        path: of a URDF or MJCF file.
+        mechanism: mechanism as it was read or written.
+        path: path of a URDF or MJCF file.
 
     Returns:
-        What was compared, or why nothing was.
+        The comparison, or the reason why none was made.
     """
     import mujoco
 
     reader = f"MuJoCo {mujoco.__version__}"
-    mujoco.set_mju_user_warning(lambda _: None)  # it would write a log file
+    mujoco.set_mju_user_warning(lambda _: None)  # otherwise it would write a log file
     try:
         with catch_warnings():
             simplefilter("ignore")
             model, whole = _model(mujoco, path)
         return _compared(mujoco, model, mechanism, Comparison(reader, path.name), whole)
-    except Exception as error:  # of many kinds, from C++
+    except Exception as error:  # C++ exceptions of many kinds
         words = one_line(" ".join(str(error).split()), 160)
         return Comparison(reader, path.name, f"{reader} does not read it ({words})")
 
 
 def main() -> None:
-    """Compare what a file of :mod:`assembly.exchange.comparison` says, in a process."""
+    """Compare files of :mod:`assembly.exchange.comparison` in a separate process."""
     given, made = Path(sys.argv[1]), Path(sys.argv[2])
     with given.open("rb") as file:
         mechanism, path = pickle.load(file)
@@ -60,7 +61,7 @@ def main() -> None:
 
 
 def _model(mujoco: Any, path: Path) -> tuple[Any, bool]:
-    """The compiled model, and whether its meshes were there."""
+    """Return the compiled model, and whether its meshes were found."""
     if path.suffix.lower() == ".urdf":
         return _settled(mujoco, mujoco.MjSpec.from_string(_bare_urdf(path))), True
     try:
@@ -79,7 +80,7 @@ def _model(mujoco: Any, path: Path) -> tuple[Any, bool]:
 
 
 def _settled(mujoco: Any, spec: Any) -> Any:
-    """A model in which bodies keep their frames and may have no mass."""
+    """Return a model whose bodies keep their frames and may have no mass."""
     compiler = spec.compiler
     compiler.fusestatic = compiler.alignfree = 0
     for joint in spec.joints:
@@ -93,14 +94,14 @@ def _settled(mujoco: Any, spec: Any) -> Any:
 
 
 def _bare_urdf(path: Path) -> str:
-    """A URDF without shapes, whose meshes may be elsewhere."""
+    """Return a URDF without shapes, because meshes may be missing."""
     from xml.etree.ElementTree import Element, tostring
 
     root = read_xml(path, "robot").element
     for element in list(root.iter()):
         if element.tag.endswith(":joint") or element.get("quat_xyzw"):
             raise ValueError(f"its URDF has no {element.tag} of this kind")
-        if element.tag == "inertia":  # of thin rods refused, and not compared
+        if element.tag == "inertia":  # refused for thin rods, and not compared
             element.attrib.update(_UNIT_INERTIA)
         for inner in list(element):
             if inner.tag in _DRAWN or ":" in inner.tag:
@@ -117,7 +118,7 @@ def _bare_urdf(path: Path) -> str:
 def _compared(
     mujoco: Any, model: Any, mechanism: Mechanism, start: Comparison, whole: bool
 ) -> Comparison:
-    """The comparison in random postures."""
+    """Return the comparison in random postures."""
     bodies = _body_names(model)
     strange = [name for name in bodies[1:] if name not in mechanism.bodies]
     unread = {} if not strange else {f"body {strange[0]}, which was not read,": np.inf}
@@ -163,19 +164,19 @@ def _compared(
 
 
 def _widen(gaps: dict[str, float], where: str, gap: float) -> None:
-    """Keep the largest gap of a place."""
+    """Keep the largest difference of each place."""
     gaps[where] = max(gaps.get(where, 0.0), float(gap))
 
 
 def _body_names(model: Any) -> list[str]:
-    """Of all bodies; those without are numbered, as they are here."""
+    """Return the names of all bodies; unnamed ones are numbered as in this reader."""
     return [model.body(i).name or f"body{i}" for i in range(model.nbody)]
 
 
 def _mass_gaps(
     model: Any, mechanism: Mechanism, bodies: list[tuple[int, str]]
 ) -> dict[str, float]:
-    """Relative differences of masses, and of centres [m]."""
+    """Return the relative differences of masses, and of centres [m]."""
     gaps: dict[str, float] = {}
     for i, name in bodies:
         body, mass = mechanism.bodies[name], float(model.body_mass[i])
@@ -188,7 +189,7 @@ def _mass_gaps(
 
 
 def _rules(mujoco: Any, model: Any) -> dict[str, tuple[int, float]]:
-    """Rows and scales of turns of active constraints, by the names they have here."""
+    """Return rows and rotation scales of active constraints, by their names here."""
     kinds = int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)
     active = [i for i in range(model.neq) if model.eq_active0[i]]
     return {
@@ -198,7 +199,7 @@ def _rules(mujoco: Any, model: Any) -> dict[str, tuple[int, float]]:
 
 
 def _rows(mujoco: Any, data: Any, constraint: int) -> NDArray:
-    """Rows of one equality constraint."""
+    """Return the rows of one equality constraint."""
     equal = data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
     return np.asarray(equal & (data.efc_id == constraint))
 
@@ -206,7 +207,7 @@ def _rows(mujoco: Any, data: Any, constraint: int) -> NDArray:
 def _placed(
     mujoco: Any, model: Any, data: Any, mechanism: Mechanism, q: NDArray
 ) -> dict[str, NDArray]:
-    """Poses of all bodies here; MuJoCo's are in ``data``, at the same coordinates."""
+    """Return poses of all bodies, at the coordinates of MuJoCo's ``data``."""
     names, kinds = _body_names(model), mujoco.mjtJoint
     row = {j.name: k for k, j in enumerate(mechanism.joints) if j.kind != "fixed"}
     known: set[str] = set()
@@ -225,7 +226,7 @@ def _placed(
         }:  # fmt: skip
             known |= {f"{name}.{part}" for part in ("tx", "ty", "tz", "rx", "ry", "rz")}
             several.append((i, name, bool(first)))
-    # joints that the other program does not know stay where the file has them
+    # joints that the other program does not know keep the file's coordinate
     held = [joint.name not in known for joint in mechanism.joints]
     poses = body_poses(mechanism, np.where(held, 0.0, q))
     for i, name, first in several:

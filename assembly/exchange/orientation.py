@@ -1,8 +1,8 @@
-"""Orientations as other programs write them: roll-pitch-yaw, quaternions, Euler angles.
+"""Orientations in other programs' forms: roll-pitch-yaw, quaternions, Euler angles.
 
 Sources:
-    Shoemake (1994), Euler angle conversion, Graphics Gems IV: the third angle computed
-    with the first one given, so that nothing is lost where the second is a right angle.
+    Shoemake (1994), Euler angle conversion, Graphics Gems IV: the third angle is
+    computed from the first, which keeps accuracy if the second is a right angle.
 """
 
 import math
@@ -16,13 +16,13 @@ _UNIT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def from_roll_pitch_yaw(angles: ArrayLike) -> NDArray:
-    """(3, 3) rotation about the fixed x, then y, then z by (3,) angles [rad]."""
+    """Return the (3, 3) rotation about fixed x, then y, then z by (3,) angles [rad]."""
     roll, pitch, yaw = np.asarray(angles, dtype=float)
     return _about("z", yaw) @ _about("y", pitch) @ _about("x", roll)
 
 
 def to_roll_pitch_yaw(R: NDArray) -> tuple[float, float, float]:
-    """Angles [rad] of a (3, 3) rotation; the inverse of the above to rounding."""
+    """Return the angles [rad] of a (3, 3) rotation, inverse of the function above."""
     roll = math.atan2(R[2, 1], R[2, 2])
     c, s = math.cos(roll), math.sin(roll)
     pitch = math.atan2(-R[2, 0], s * R[2, 1] + c * R[2, 2])
@@ -31,7 +31,7 @@ def to_roll_pitch_yaw(R: NDArray) -> tuple[float, float, float]:
 
 
 def from_quaternion(q: ArrayLike) -> NDArray:
-    """(3, 3) rotation of a quaternion ``[w x y z]`` of any length but zero."""
+    """Return the (3, 3) rotation of a quaternion ``[w x y z]`` of nonzero length."""
     w, x, y, z = np.asarray(q, dtype=float) / np.linalg.norm(q)
     return np.array([
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -41,7 +41,7 @@ def from_quaternion(q: ArrayLike) -> NDArray:
 
 
 def to_quaternion(R: NDArray) -> tuple[float, float, float, float]:
-    """Unit quaternion ``[w x y z]`` of a (3, 3) rotation."""
+    """Return the unit quaternion ``[w x y z]`` of a (3, 3) rotation."""
     turn = rotation_vector(R)
     angle = float(np.linalg.norm(turn))
     half = np.sinc(angle / (2 * np.pi)) / 2 * turn  # sin(a / 2) along the axis
@@ -49,11 +49,11 @@ def to_quaternion(R: NDArray) -> tuple[float, float, float, float]:
 
 
 def from_euler(angles: ArrayLike, sequence: str) -> NDArray:
-    """(3, 3) rotation by three angles [rad] about axes such as ``"xyz"``.
+    """Return the (3, 3) rotation by three angles [rad] about axes such as ``"xyz"``.
 
     Args:
         angles: (3,) in the order of the sequence.
-        sequence: three letters; small ones turn with the body, capitals stand still.
+        sequence: three letters; small letters are body axes, capitals fixed axes.
 
     Returns:
         The rotation.
@@ -66,7 +66,7 @@ def from_euler(angles: ArrayLike, sequence: str) -> NDArray:
 
 
 def onto(axis: ArrayLike) -> NDArray:
-    """(3, 3) smallest rotation that brings z onto a unit vector."""
+    """Return the (3, 3) smallest rotation that brings z onto a unit vector."""
     x, y, z = np.asarray(axis, dtype=float)
     sine = math.hypot(x, y)
     if sine == 0.0:
@@ -76,5 +76,5 @@ def onto(axis: ArrayLike) -> NDArray:
 
 
 def _about(axis: str, angle: float) -> NDArray:
-    """(3, 3) turn about a coordinate axis."""
+    """Return the (3, 3) turn about a coordinate axis."""
     return rotation_matrix(angle * np.array(_UNIT[axis]))

@@ -1,7 +1,7 @@
-"""A small TOML laid over a converted robot: elasticity, clearances, tolerances.
+"""A small TOML file that adds elasticity, clearances, tolerances to a robot.
 
-The robot's own file may then be made again, by a CAD program say, and what was measured
-or looked up stays where it is.
+It is separate from the robot's own file, which may then be written again, for example
+by a CAD program, without loss of measured data.
 """
 
 from collections.abc import Mapping
@@ -12,26 +12,27 @@ from typing import Any
 from forcefit.inputs.errors import nearest, quoted
 from forcefit.inputs.table import Table, read_toml
 
-_PLACED = ("parent", "translation", "rotation", "dh", "joint")  # the robot's own file's
+# keys that are valid only in the robot's own file
+_PLACED = ("parent", "translation", "rotation", "dh", "joint")
 _WHOLE = ("name", "description", "platform", "effect", "frame")
 
 
 def lay_over(robot: Mapping[str, Any], overlay: Path | str) -> Table:
-    """A robot's table with an overlay's keys added or replaced.
+    """Return a robot's table with an overlay's keys added or replaced.
 
     Args:
-        robot: as :func:`assembly.files.robot_file.robot_table` gives it, its paths
-            leading from the overlay's folder.
-        overlay: the file: ``[[frame]]`` with a ``name`` (``*`` stands for any letters)
-            and any keys of a frame but those that place it; ``platform``,
-            ``description``, ``[[effect]]`` of the whole.
+        robot: table of :func:`assembly.files.robot_file.robot_table`; its paths start
+            in the overlay's folder.
+        overlay: the file: ``[[frame]]`` with a ``name`` (``*`` matches any letters) and
+            any keys of a frame except those of its placement; ``platform``,
+            ``description``, ``[[effect]]`` of the whole robot.
 
     Returns:
-        The root table, ready to be read; its mistakes name the overlay.
+        The root table, ready to be read; error messages name the overlay.
 
     Raises:
-        BadInput: the overlay is not TOML, names a frame that the robot lacks, or
-            places one.
+        BadInput: the overlay is not TOML, names an unknown frame, or changes a
+            placement.
     """
     given = read_toml(overlay)
     content = dict(robot)

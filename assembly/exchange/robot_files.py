@@ -1,4 +1,4 @@
-"""Robots read from and written to files of any kind, by the ending of their names."""
+"""Import and export of robots in files of any kind, by their suffix."""
 
 import os
 from dataclasses import replace
@@ -12,32 +12,32 @@ from assembly.robots import load_robot as load_declared
 from forcefit.inputs.table import BadInput, read_bytes
 
 OTHERS = (".urdf", ".xml", ".sdf")
-_BLANKS = b"\xef\xbb\xbf \r\n\t"  # and a byte order mark
-# of what is left out, words that say that it may change results
+_BLANKS = b"\xef\xbb\xbf \r\n\t"  # a byte order mark and blanks
+# words in a remark which say that an omission may change results
 _WEIGHTY = ("mimic:", "no platform", "no drive", "may carry load", "masses")
 
 
 def load_robot(
     name: str | Path, close: Closing | None = None, *, links: bool = True
 ) -> Robot:
-    """A built-in robot by its name, or the robot of a file of any kind.
+    """Return a built-in robot by its name, or the robot of a file of any kind.
 
     Args:
-        name: such as ``"irsbot2"``, or the path of a robot file, a URDF (with its loops
-            beside it), MJCF or SDF file.
-        close: makes of a robot as declared one whose closures hold, as
+        name: name such as ``"irsbot2"``, or the path of a robot file, a URDF (with its
+            loops next to it), MJCF or SDF file.
+        close: function that makes the closures of a declared robot hold, as
             :mod:`assembly.kinematics.closing` does; none if absent.
         links: whether links given by a mesh or a library are solved or read now, which
-            solvers need; without them a robot can be placed, written and converted,
-            and its assembly zone be found.
+            solvers need.  Without them a robot can be placed, written and converted,
+            and its assembly zone can be computed.
 
     Returns:
-        The robot; of other programs' files what was taken and what was left out is
-        among its remarks.
+        The robot; its remarks include the assumptions and omissions for a file of
+        another program.
 
     Raises:
         BadInput: neither a built-in name nor a file, the file breaks a rule, or a mesh
-            or a library that it names is not usable.
+            or library that it names is not usable.
     """
     robot = _load_declared(name, close)
     try:
@@ -47,7 +47,7 @@ def load_robot(
 
 
 def _load_declared(name: str | Path, close: Closing | None) -> Robot:
-    """The robot of a name or of a file, its links as they are declared."""
+    """Return the robot of a name or of a file, with links as declared."""
     path = Path(name)
     if path.suffix.lower() not in OTHERS:
         if os.path.isfile(path) and read_bytes(path).lstrip(_BLANKS)[:1] == b"<":
@@ -71,17 +71,17 @@ def _load_declared(name: str | Path, close: Closing | None) -> Robot:
 
 
 def write_robot(robot: Robot, path: str | Path) -> None:
-    """Write a robot to a file of the kind that its ending says.
+    """Write a robot to a file of the kind given by the suffix.
 
     Args:
         robot: to be written.
-        path: ``.toml``: a robot file, which holds all of the robot; ``.urdf`` (and a
-            YAML beside it) or ``.xml`` (MJCF): its rigid bodies and joints, see
-            ``forcefit convert``, which says what they leave out.
+        path: ``.toml``: a robot file, which holds the complete robot; ``.urdf`` (and a
+            YAML next to it) or ``.xml`` (MJCF): its rigid bodies and joints; see
+            ``forcefit convert``, which reports what they leave out.
 
     Raises:
-        BadInput: another ending, a file of another program is there, or it cannot be
-            written.
+        BadInput: another suffix, a file of another program exists there, or it cannot
+            be written.
     """
     path = Path(path)
     if path.suffix.lower() == ".toml":

@@ -1,7 +1,7 @@
-"""SDF in: links, and joints that may close loops by themselves.
+"""Import of SDF: links, and joints that may close loops.
 
 Sources:
-    sdformat.org, specification 1.12; see also the modules beside this one.
+    sdformat.org, specification 1.12; see also the modules ``sdf_*.py``.
 """
 
 from collections.abc import Iterator
@@ -39,18 +39,18 @@ _HELD_OF_AXIS = ("xyz", "use_parent_model_frame", "mimic")
 
 
 def read_sdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
-    """Mechanism of an SDF file with one model, others perhaps inside it.
+    """Return the mechanism of an SDF file with one model, perhaps with nested models.
 
     Args:
         path: the file.
-        loops: a file that names drives and adds loops, or None.
+        loops: a file with drives and further loops, or None.
 
     Returns:
-        The mechanism: a tree from the world, or from the first link where it stands;
-        joints that the tree does not need become loops.
+        The mechanism: a tree from the world, or from the first link at its pose; joints
+        that the tree does not need become loops.
 
     Raises:
-        BadInput: a rule of the format is broken, or a joint is of no known type.
+        BadInput: a rule of the format is broken, or a joint has an unknown type.
     """
     root = read_xml(path, "sdf")
     frames = frames_of(root)
@@ -88,17 +88,17 @@ def _tree(
     frames: Frames, ends: dict[str, tuple[str, str]], bodies: dict[str, Body],
     first: str, held: list[Joint],
 ) -> tuple[list[Joint], dict[str, list[str]], list[Loop]]:  # fmt: skip
-    """Joints that reach every body from the root, and loops of the others."""
+    """Return joints that reach every body from the root, and loops of other joints."""
     reached = {first} if held or WORLD not in bodies else {WORLD}
     tree, loops, waiting = held, list[Loop](), list(ends)
     parts: dict[str, list[str]] = {}
     while waiting:
-        # in the order written; those that reach nothing yet wait
+        # in the order written; joints that reach no body yet wait
         name = next((n for n in waiting if reached & set(ends[n])), waiting[0])
         waiting.remove(name)
         parent, child = ends[name]
         tip, backwards = "", child in reached
-        if backwards and parent in reached:  # it closes a loop
+        if backwards and parent in reached:  # the joint closes a loop
             tip, backwards = f"{name}.tip", False
             bodies[tip] = Body(tip)
             loops.append(Loop(name, tip, child))
@@ -114,9 +114,9 @@ def _tree(
 
 
 def _of_axis(joint: Node, tag: str, part: Node) -> str:
-    """What of an axis is left out, in words, empty if it is converted."""
+    """Return the part of an axis that is left out, in words; empty if none is."""
     spring = part.child("spring_stiffness")
-    # other joints of several freedoms, and second axes of others, are not read
+    # further axes of joints of several freedoms are not read
     crossed = joint.optional("type") in {"universal", "revolute2"}
     taken = crossed or (tag == "axis" and joint.optional("type") != "ball")
     if not taken and spring is not None and spring.number("", "-") > 0:
@@ -130,7 +130,7 @@ def _of_axis(joint: Node, tag: str, part: Node) -> str:
 
 
 def _taken(words: dict[str, str]) -> Iterator[str]:
-    """What was taken for masses, each with the links' names."""
+    """Return the assumptions on masses, each with the links' names."""
     by_words: dict[str, list[str]] = {}
     for name, line in words.items():
         if line:
@@ -140,7 +140,7 @@ def _taken(words: dict[str, str]) -> Iterator[str]:
 
 
 def _left_out(frames: Frames, root: Node) -> Iterator[str]:
-    """What an SDF says and a robot of frames cannot hold."""
+    """Return the parts of an SDF that a robot of frames cannot represent."""
     extra: dict[str, list[str]] = {}
 
     def add(what: str, name: str) -> None:

@@ -2,8 +2,8 @@
 
 Sources:
     sdformat.org, specification 1.12 and "Pose frame semantics": a link's pose is in its
-    model's frame, a joint's in its child's, a frame's in what it is attached to, unless
-    ``relative_to`` says another; names of nested models are joined by ``::``.
+    model's frame, a joint's in its child's, a frame's in its ``attached_to``, unless
+    ``relative_to`` names another; names of nested models are joined by ``::``.
 """
 
 import math
@@ -22,19 +22,19 @@ from forcefit.inputs.errors import BadInput, nearest, quoted
 MODEL = "__model__"
 FRAMES = ("link", "joint", "frame")
 _AROUND = f"{WORLD}::"
-_NESTED = 20  # models inside models
-_OLD = 1.4  # version until which axes are seen from the model
+_NESTED = 20  # largest depth of nested models
+_OLD = 1.4  # last version in which axes are seen from the model
 
 
 @dataclass(frozen=True)
 class Named:
-    """An element that has a pose, and what stands before names in its model.
+    """An element with a pose, and the prefix of names in its model.
 
     Attributes:
-        node: of a link, joint, frame or model.
-        scope: empty in the outermost model, such as ``"arm::"`` in one inside,
-            ``"world::"`` in the world around it.
-        old: whether its file is of a version in which axes are seen from the model.
+        node: node of a link, joint, frame or model.
+        scope: prefix: empty in the outermost model, such as ``"arm::"`` in a nested
+            one, ``"world::"`` in the world around it.
+        old: whether axes are seen from the model, as in old versions of the format.
     """
 
     node: Node
@@ -44,12 +44,12 @@ class Named:
 
 @dataclass
 class Frames:
-    """Named frames of a model and of models inside it, placed when first asked for.
+    """Named frames of a model and of nested models, placed on first use.
 
     Attributes:
-        model: the outermost.
-        named: links, joints, frames and models by their names from outside.
-        poses: (4, 4) seen from the world, of those that were asked for.
+        model: the outermost model.
+        named: links, joints, frames and models by their full names.
+        poses: (4, 4) seen from the world, of those placed so far.
     """
 
     model: Node
@@ -57,11 +57,11 @@ class Frames:
     poses: dict[str, NDArray] = field(default_factory=dict)
 
     def of(self, tag: str) -> Iterator[tuple[str, Named]]:
-        """Names and elements of one kind, as they are written."""
+        """Return the names and elements of one kind, in the order written."""
         return ((k, v) for k, v in self.named.items() if v.node.tag == tag)
 
     def name(self, name: str, scope: str, node: Node, key: str = "") -> str:
-        """The name from outside of a name in a model, or an error of an element."""
+        """Return full name for a name in a model, or raise an error of an element."""
         if name == WORLD or (name, scope) == (MODEL, _AROUND):
             return WORLD
         own = f"{self.model.optional('name')}::"
@@ -75,7 +75,7 @@ class Frames:
         raise node.bad(key, f"found {quoted(name)}, expected a link or frame{hint}")
 
     def pose(self, name: str, asked: tuple[str, ...] = ()) -> NDArray:
-        """(4, 4) seen from the world, by the name from outside."""
+        """Return the (4, 4) pose seen from the world, by the full name."""
         if name == WORLD:
             return np.eye(4)
         if name not in self.poses:
@@ -84,7 +84,7 @@ class Frames:
                 raise node.bad("pose", "found a ring of relative_to")
             own = node.child("pose")
             relative = ""
-            if own is not None:  # "frame" until 1.6
+            if own is not None:  # called "frame" until 1.6
                 relative = own.optional("relative_to") or own.optional("frame")
             relative = relative or self._default(name)
             base = self.pose(self.name(relative, scope, node, "pose"), (*asked, name))
@@ -98,14 +98,14 @@ class Frames:
         return self.poses[name]
 
     def _default(self, name: str) -> str:
-        """What a pose is relative to where it does not say so."""
+        """Return the default frame of a pose without ``relative_to``."""
         node = self.named[name].node
         if node.tag == "joint":
             return word(node, "child")
         return (node.optional("attached_to") if node.tag == "frame" else "") or MODEL
 
     def link(self, name: str, asked: tuple[str, ...] = ()) -> str:
-        """Name of the link that something is attached to, ``"world"`` of the world."""
+        """Return the link to which a frame is attached, ``"world"`` for the world."""
         if name == WORLD:
             return WORLD
         node, scope = self.named[name].node, self.named[name].scope
@@ -119,7 +119,7 @@ class Frames:
         return self.link(self.name(to, scope, node), (*asked, name))
 
     def _canonical(self, scope: str, model: Node) -> str:
-        """The link that a model's own frame is attached to."""
+        """Return the link to which a model's own frame is attached."""
         given = model.optional("canonical_link")
         if given:
             return self.link(self.name(given, scope, model, "canonical_link"))
@@ -130,22 +130,22 @@ class Frames:
 
 
 def frames_of(root: Node) -> Frames:
-    """All named frames of a file's one model, and of the world around it.
+    """Return all named frames of a file's one model, and of the world around it.
 
     Args:
         root: ``<sdf>``.
 
     Returns:
-        The frames, none placed yet.
+        The frames, not placed yet.
 
     Raises:
-        BadInput: a name is missing or found twice, or not one model is there.
+        BadInput: a name is missing or not unique, or there is not exactly one model.
     """
     worlds = list(root.children("world"))
     models = [m for group in (root, *worlds) for m in group.children("model")]
-    if len(models) > 1:  # the ground, say
+    if len(models) > 1:  # such as the ground
         models = [m for m in models if not _is_static(m)]
-    if not models:  # one that is elsewhere
+    if not models:  # in an included file
         given = [i for group in (root, *worlds) for i in group.children("include")]
         models = given if len(given) == 1 else []
     if len(models) != 1:
@@ -162,13 +162,13 @@ def frames_of(root: Node) -> Frames:
 
 
 def _is_static(model: Node) -> bool:
-    """Whether a model stands still."""
+    """Return whether a model is static."""
     static = model.child("static")
     return static is not None and static.content.lower() in {"true", "1"}
 
 
 def _gather(frames: Frames, model: Node, scope: str, outer: str, old: bool) -> None:
-    """Take up what a model holds, models inside it too."""
+    """Collect the elements of a model, also in nested models."""
     if scope.count("::") > _NESTED:
         raise model.bad("", f"found models more than {_NESTED} deep")
     frames.named[scope + MODEL] = Named(model, outer, old)
@@ -188,17 +188,17 @@ def _gather(frames: Frames, model: Node, scope: str, outer: str, old: bool) -> N
 
 
 def _take(frames: Frames, node: Node, scope: str, name: str, old: bool) -> None:
-    """Take up a link, joint or frame; a link's name counts before a joint's."""
+    """Add a link, joint or frame; a link's name has precedence over a joint's."""
     full = scope + name
     if full in frames.named and frames.named[full].node.tag != node.tag:
-        full += f"_{node.tag}"  # as libsdformat renames it
+        full += f"_{node.tag}"  # libsdformat renames it in this way
     if full in frames.named:
         raise node.bad("name", "found it twice; expected names that differ")
     frames.named[full] = Named(node, scope, old)
 
 
 def _is_old(root: Node) -> bool:
-    """Whether a file is of a version in which axes are seen from the model."""
+    """Return whether axes are seen from the model in a file's version."""
     try:
         return float(root.optional("version")) <= _OLD
     except ValueError:
@@ -206,17 +206,17 @@ def _is_old(root: Node) -> bool:
 
 
 def included(node: Node) -> tuple[Node, bool]:
-    """The model of a file that another includes, and whether that is an old one.
+    """Return the model of an included file, and whether its version is old.
 
     Args:
-        node: ``<include>``, whose address is a file or folder beside its own file's
-            folder or beside one of the folders around it.
+        node: ``<include>``; its address is a file or folder next to the folder of its
+            own file, or next to a parent folder.
 
     Returns:
         The model with the name, pose and placement frame of the include.
 
     Raises:
-        BadInput: no such file is there, or it is no file of one model.
+        BadInput: the file does not exist, or is no file of one model.
     """
     if node.optional("merge") in {"true", "1"}:
         raise node.bad("merge", "found it; expected a model with names of its own")
@@ -248,17 +248,17 @@ def included(node: Node) -> tuple[Node, bool]:
 
 
 def word(node: Node, tag: str) -> str:
-    """Text of an element inside that names a link.
+    """Return the text of an inner element that names a link.
 
     Args:
         node: a joint.
-        tag: of the element.
+        tag: tag of the element.
 
     Returns:
         The name.
 
     Raises:
-        BadInput: it is missing or empty.
+        BadInput: the attribute is missing or empty.
     """
     inner = node.child(tag)
     if inner is None or not inner.content:
@@ -267,7 +267,7 @@ def word(node: Node, tag: str) -> str:
 
 
 def own_pose(node: Node) -> NDArray:
-    """(4, 4) of a pose element by itself; an empty one is no motion.
+    """Return the (4, 4) transform of a pose element; identity if it is empty.
 
     Args:
         node: ``<pose>``.
@@ -276,7 +276,7 @@ def own_pose(node: Node) -> NDArray:
         The transform.
 
     Raises:
-        BadInput: other numbers than it should have.
+        BadInput: a wrong number of values.
     """
     kind = node.optional("rotation_format") or "euler_rpy"
     if kind not in {"euler_rpy", "quat_xyzw"}:

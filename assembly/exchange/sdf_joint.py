@@ -1,8 +1,9 @@
-"""A joint of SDF as joints of one freedom; ``<gazebo>`` in a URDF holds such too.
+"""A joint of SDF as joints of one freedom; also for ``<gazebo>`` in a URDF.
 
 Sources:
     sdformat.org, specification 1.12, ``<joint>``; until 1.4 an axis is seen from the
-    model's frame, until 1.6 ``use_parent_model_frame`` says so, then ``expressed_in``.
+    model's frame, until 1.6 with ``use_parent_model_frame``, later with
+    ``expressed_in``.
 """
 
 from dataclasses import replace
@@ -28,10 +29,10 @@ _Z = (0.0, 0.0, 1.0)
 
 
 def joint_ends(frames: Frames, named: Named) -> tuple[str, str]:
-    """Links of a joint's parent and child, which may name frames attached to them.
+    """Return links of a joint's parent and child, which may name attached frames.
 
     Args:
-        frames: of the model.
+        frames: frames of the model.
         named: the joint.
 
     Returns:
@@ -57,21 +58,21 @@ def joint_parts(
     frames: Frames, name: str, named: Named, ends: tuple[str, str], carried: str,
     backwards: bool = False,
 ) -> tuple[list[Joint], list[Body]]:  # fmt: skip
-    """A joint as joints of one freedom, from the child to the parent if backwards.
+    """Return a joint as joints of one freedom, from child to parent if backwards.
 
     Args:
-        frames: of the model.
-        name: of the joint.
+        frames: frames of the model.
+        name: name of the joint.
         named: its element.
         ends: links of parent and child.
-        carried: name of the body that stands on it.
+        carried: name of the body on it.
         backwards: whether the tree reaches the child first.
 
     Returns:
         The joints and the bodies between them.
 
     Raises:
-        BadInput: the joint is of no known type, or an axis is no direction.
+        BadInput: the joint has an unknown type, or an axis has no direction.
     """
     node = named.node
     kind = node.choice("type", _KINDS, "")
@@ -98,13 +99,13 @@ def joint_parts(
         joint = Joint(name, one, parent, carried, placement, axis, after)
         return [joint if one == "fixed" else _of_axis(joint, node, "axis")], []
     joints, between = chain(name, parent, carried, placement, after, parts)
-    tags = {"first": "axis", "second": "axis2"}  # a ball's turns have none
+    tags = {"first": "axis", "second": "axis2"}  # a ball's rotations have none
     known = [tags.get(part, "") for part, _, _ in parts]
     return [_of_axis(j, node, t) for j, t in zip(joints, known, strict=True)], between
 
 
 def _of_axis(joint: Joint, node: Node, tag: str) -> Joint:
-    """The joint of one freedom with the range and the spring of its axis."""
+    """Return the joint of one freedom with range and spring of its axis."""
     axis = node.child(tag)
     if axis is None:
         return joint
@@ -123,7 +124,7 @@ def _of_axis(joint: Joint, node: Node, tag: str) -> Joint:
 
 
 def _axis(frames: Frames, named: Named, tag: str, at: NDArray) -> NDArray:
-    """(3,) direction in the joint's axes."""
+    """Return the (3,) direction in the joint's axes."""
     axis = named.node.child(tag)
     if axis is None:
         return np.array(_Z)
@@ -146,11 +147,11 @@ def _axis(frames: Frames, named: Named, tag: str, at: NDArray) -> NDArray:
 def joint_couplings(
     frames: Frames, name: str, named: Named, parts: dict[str, list[str]]
 ) -> list[Coupling]:
-    """What a joint's axes follow (``<mimic>``).
+    """Return the couplings of a joint's axes (``<mimic>``).
 
     Args:
-        frames: of the model.
-        name: of the joint.
+        frames: frames of the model.
+        name: name of the joint.
         named: its element.
         parts: names of the joints of one freedom by that of the whole.
 
@@ -158,7 +159,7 @@ def joint_couplings(
         A coupling for each axis that follows another.
 
     Raises:
-        BadInput: it follows a joint or an axis that is not there.
+        BadInput: the joint follows a joint or an axis that does not exist.
     """
     couplings = []
     for tag in ("axis", "axis2"):
@@ -182,7 +183,7 @@ def joint_couplings(
 
 
 def _part(mimic: Node, parts: list[str], tag: str) -> str:
-    """The joint of one freedom that is an axis of a joint."""
+    """Return the joint of one freedom for an axis of a joint."""
     if len(parts) == 1 and tag == "axis":
         return parts[0]
     ends = {"axis": ".first", "axis2": ".second"}.get(tag, "?")
@@ -193,6 +194,6 @@ def _part(mimic: Node, parts: list[str], tag: str) -> str:
 
 
 def _number(node: Node, key: str, default: float) -> float:
-    """A number of an element inside."""
+    """Return a number of an inner element."""
     inner = node.child(key)
     return default if inner is None else inner.number("", "-")

@@ -1,9 +1,9 @@
-"""Masses of SDF's links: written, by the format's default, or made of shapes.
+"""Masses of SDF's links: as written, by the format's default, or from shapes.
 
 Sources:
     sdformat.org, specification 1.12, ``<inertial>``: a link without it, or without its
-    mass, has 1 kg; with ``auto`` densities of the collisions count, 1000 kg/m^3 where
-    none is given, and a mass beside it is kept.
+    mass, has 1 kg; with ``auto`` densities of the collisions are used, 1000 kg/m^3 by
+    default, and a given mass is kept.
 """
 
 import numpy as np
@@ -14,8 +14,8 @@ from assembly.exchange.sdf_frames import Frames, Named, own_pose
 from assembly.exchange.shapes import together, volume
 from assembly.exchange.xml_file import Node
 
-_DEFAULT_MASS = 1.0  # [kg]
-_DEFAULT_DENSITY = 1000.0  # [kg/m^3]
+_DEFAULT_MASS = 1.0  # [kg] the format's default
+_DEFAULT_DENSITY = 1000.0  # [kg/m^3] the format's default
 # keys of a shape's sizes, and how many numbers each has
 _SIZES = {"box": {"size": 3}, "sphere": {"radius": 1}, "ellipsoid": {"radii": 3},
           "cylinder": {"radius": 1, "length": 1},
@@ -24,18 +24,18 @@ _SIZES = {"box": {"size": 3}, "sphere": {"radius": 1}, "ellipsoid": {"radii": 3}
 
 
 def link_body(frames: Frames, name: str, named: Named) -> tuple[Body, str]:
-    """A link's body, and what was taken for its mass where the file does not say it.
+    """Return a link's body, and the assumption if the file has no mass.
 
     Args:
-        frames: of the model.
-        name: of the link.
+        frames: frames of the model.
+        name: name of the link.
         named: the link.
 
     Returns:
-        The body, and words; empty where the file has the mass.
+        The body, and words; empty if the file has the mass.
 
     Raises:
-        BadInput: a mass or a size is not above zero.
+        BadInput: a mass or a size is not positive.
     """
     node = named.node
     inertial = node.child("inertial")
@@ -59,7 +59,7 @@ def link_body(frames: Frames, name: str, named: Named) -> tuple[Body, str]:
 def _of_shapes(
     frames: Frames, named: Named, inertial: Node
 ) -> tuple[float, NDArray]:  # fmt: skip
-    """[kg] and (3,) [m] of all collisions of a link."""
+    """Return [kg] and (3,) [m] of all collisions of a link."""
     density = _density(inertial, _DEFAULT_DENSITY)
     masses, centres = [], []
     for collision in named.node.children("collision"):
@@ -73,7 +73,7 @@ def _of_shapes(
             )  # fmt: skip
         T = _placed(frames, named, collision)
         sizes = _sizes(shape)
-        # a cone's centre lies a quarter of its length above its foot
+        # a cone's centre is at a quarter of its length from its foot
         above = -sizes[1] / 4 if shape.tag == "cone" else 0.0
         centres.append(T[:3, :3] @ [0.0, 0.0, above] + T[:3, 3])
         masses.append(_density(collision, density) * volume(shape.tag, sizes))
@@ -81,7 +81,7 @@ def _of_shapes(
 
 
 def _sizes(shape: Node) -> list[float]:
-    """[m] a shape's sizes, all above zero."""
+    """Return a shape's sizes [m], all positive."""
     sizes: list[float] = []
     for key, count in _SIZES[shape.tag].items():
         inner = shape.child(key)
@@ -94,7 +94,7 @@ def _sizes(shape: Node) -> list[float]:
 
 
 def _density(node: Node, default: float) -> float:
-    """[kg/m^3] of an element that may say it."""
+    """Return the density [kg/m^3] of an element, or the default."""
     inner = node.child("density")
     if inner is None:
         return default
@@ -105,7 +105,7 @@ def _density(node: Node, default: float) -> float:
 
 
 def _placed(frames: Frames, named: Named, collision: Node) -> NDArray:
-    """(4, 4) of a collision in its link."""
+    """Return the (4, 4) pose of a collision in its link."""
     pose = collision.child("pose")
     if pose is None:
         return np.eye(4)

@@ -1,4 +1,4 @@
-"""Volumes and centres of simple bodies, for masses that a file makes of shapes."""
+"""Volumes and centres of simple bodies, for masses from shapes."""
 
 import math
 from collections.abc import Sequence
@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 
 def volume(shape: str, sizes: Sequence[float]) -> float:
-    """Volume of a body.
+    """Return the volume of a body.
 
     Args:
         shape: ``box`` (three edges), ``sphere`` (radius), ``ellipsoid`` (three
             half axes), ``cylinder``, ``capsule`` (without its caps) or ``cone``
             (radius, length).
-        sizes: [m] as many as the shape has.
+        sizes: [m] sizes of the shape.
 
     Returns:
         [m^3].
@@ -31,11 +31,11 @@ def volume(shape: str, sizes: Sequence[float]) -> float:
 
 
 def area(shape: str, sizes: Sequence[float]) -> float:
-    """Surface of a body.
+    """Return the surface of a body.
 
     Args:
         shape: ``box``, ``sphere``, ``cylinder`` or ``capsule``, see :func:`volume`.
-        sizes: [m] likewise.
+        sizes: [m] sizes of the shape.
 
     Returns:
         [m^2].
@@ -53,7 +53,7 @@ def area(shape: str, sizes: Sequence[float]) -> float:
 def together(masses: Sequence[float], centres: Sequence[NDArray]) -> (
     tuple[float, NDArray]
 ):  # fmt: skip
-    """Mass and centre of bodies that are one.
+    """Return the mass and centre of several bodies together.
 
     Args:
         masses: [kg] of each.

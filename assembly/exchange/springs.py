@@ -1,4 +1,4 @@
-"""Springs of joints: those at rest at home, and those that would load the robot."""
+"""Springs of joints: those without load at home, and those that load the robot."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,18 +6,18 @@ from numpy.typing import NDArray
 from assembly.exchange.mechanism import Joint, Mechanism
 from assembly.exchange.xml_file import counted
 
-_AT_REST = 1e-9  # [rad or m] from home
-_OWN = {"revolute": 2, "prismatic": 5}  # place of a joint's own freedom among six
+_AT_REST = 1e-9  # [rad or m] largest distance from home
+_OWN = {"revolute": 2, "prismatic": 5}  # index of a joint's own component of a screw
 
 
 def springs_at_rest(mechanism: Mechanism) -> dict[str, NDArray]:
-    """Joint stiffnesses of passive joints whose springs carry nothing at home.
+    """Return stiffnesses of passive joints whose springs have no load at home.
 
     Args:
-        mechanism: at home.
+        mechanism: mechanism at home.
 
     Returns:
-        (6, 6) [N m/rad .. N/m] by joint, rigid but for the joint's own freedom.
+        (6, 6) [N m/rad .. N/m] by joint, rigid except along the joint's own motion.
     """
     matrices = {}
     for joint in mechanism.joints:
@@ -29,13 +29,13 @@ def springs_at_rest(mechanism: Mechanism) -> dict[str, NDArray]:
 
 
 def other_springs(mechanism: Mechanism) -> tuple[str, ...]:
-    """In words, springs that are not converted.
+    """Return texts on springs that are not converted.
 
     Args:
-        mechanism: at home.
+        mechanism: mechanism at home.
 
     Returns:
-        A line for those beside drives, and one for those under load at home.
+        A line for springs at drives, and a line for springs under load at home.
     """
     springs = [joint for joint in mechanism.joints if _is_spring(joint)]
     driven = [joint.name for joint in springs if joint.actuated]
@@ -49,10 +49,10 @@ def other_springs(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def _is_spring(joint: Joint) -> bool:
-    """Whether a joint has a spring in its freedom."""
+    """Return whether a joint has a spring along its motion."""
     return joint.stiffness > 0 and joint.kind in _OWN
 
 
 def _at_rest(joint: Joint) -> bool:
-    """Whether the joint's spring carries nothing at home."""
+    """Return whether the joint's spring has no load at home."""
     return abs(joint.position - joint.rest) < _AT_REST

@@ -1,25 +1,25 @@
-"""Elements of unknown type, and whether they may tie bodies to one another."""
+"""Elements of unknown type that may connect bodies."""
 
 from collections.abc import Container, Mapping
 
 from assembly.exchange.xml_file import Node
 from forcefit.inputs.errors import quoted
 
-# of a name: what refers to bodies and neither holds nor moves them; a plugin is a
-# program, which the answer names
+# words in names of elements that refer to bodies without constraining or moving them;
+# the report names plugins, which are programs
 _HARMLESS = ("collision", "collide", "material", "transmission", "control", "sensor",
              "plugin", "gripper", "visual", "group", "state")  # fmt: skip
 
 
 def refuse_ties(node: Node, owners: Mapping[str, str]) -> None:
-    """Refuse an unknown element that names two bodies, which it may tie.
+    """Reject an unknown element that names two bodies, which it may connect.
 
     Args:
         node: an element that is not converted.
-        owners: bodies by their names and by those of frames that stand on them.
+        owners: bodies by their names and by those of frames on them.
 
     Raises:
-        BadInput: it names two of them, and is of no harmless kind.
+        BadInput: the element names two bodies, and its kind may connect them.
     """
     if _is_harmless(node):
         return
@@ -32,19 +32,19 @@ def refuse_ties(node: Node, owners: Mapping[str, str]) -> None:
 
 
 def _is_harmless(node: Node) -> bool:
-    """Whether an element is of a kind that refers to bodies and holds none."""
+    """Return whether an element refers to bodies without constraining them."""
     return any(part in node.tag.lower() for part in _HARMLESS)
 
 
 def may_tie(node: Node, names: Container[str]) -> str:
-    """Words for an element left out that may tie joints or bodies, else none.
+    """Return words for an element left out that may connect bodies, else none.
 
     Args:
         node: an element that is not converted.
-        names: of joints and bodies.
+        names: names of joints and bodies.
 
     Returns:
-        What is added to its name.
+        The words to be added to its name.
     """
     unknown = node.tag == "plugin" or not _is_harmless(node)
     if unknown and len(node.names_in(names)) > 1:

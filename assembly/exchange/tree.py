@@ -1,4 +1,4 @@
-"""Where the frames of a tree of joints stand; each joint acts about or along its z."""
+"""Poses of the frames of a tree of joints, each about or along its z."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 def place_frames(
     parents: NDArray, kinds: NDArray, fixed: NDArray, q: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Transforms of all frames, before and after the motion of their own joint.
+    """Return transforms of all frames, before and after their joint's motion.
 
     Args:
         parents: (n,) rows, each before its children, -1 for the base.

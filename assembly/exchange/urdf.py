@@ -1,8 +1,8 @@
-"""URDF in: links, joints, and the loops that a file beside it adds.
+"""Import of URDF: links, joints, and the loops of a separate file.
 
 Sources:
-    ROS wiki, urdf/XML/joint and urdf/XML/link: a child link stands in the joint's own
-    frame after its motion; an absent axis is x; rpy are turns about fixed axes.
+    ROS wiki, urdf/XML/joint and urdf/XML/link: a child link is in the joint's own frame
+    after its motion; an absent axis is x; rpy are rotations about fixed axes.
 """
 
 from collections.abc import Iterator, Mapping
@@ -35,18 +35,18 @@ _HELD = {"origin", "parent", "child", "axis", "mimic"}
 
 
 def read_urdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
-    """Mechanism of a URDF.
+    """Return the mechanism of a URDF.
 
     Args:
         path: the file.
-        loops: what stands beside it, None for an open chain.
+        loops: its loops file, None for an open chain.
 
     Returns:
-        The mechanism.  Drives are those that the loops file names, else those with a
-        transmission, else, in a robot without loops, every joint.
+        The mechanism.  Its drives are those of the loops file, else those with a
+        transmission, else, in a robot without loops, all joints.
 
     Raises:
-        BadInput: a rule of the format is broken, or a joint is of no known type.
+        BadInput: a rule of the format is broken, or a joint has an unknown type.
     """
     root = read_xml(path, "robot")
     for node in root.descendants():
@@ -86,7 +86,7 @@ def read_urdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
 
 
 def _add(node: Node, parts: dict[str, list[str]], several: list[Joint]) -> None:
-    """Take up the parts of a joint, whose name must be new."""
+    """Add the parts of a joint, whose name must be new."""
     name = node.text("name")
     if name in parts:
         raise node.bad("name", "found it twice; expected names that differ")
@@ -94,7 +94,7 @@ def _add(node: Node, parts: dict[str, list[str]], several: list[Joint]) -> None:
 
 
 def _body(node: Node) -> Body:
-    """A link and its mass."""
+    """Return a link and its mass."""
     name, inertial = node.text("name"), node.child("inertial")
     mass = None if inertial is None else inertial.child("mass")
     if inertial is None or mass is None:
@@ -108,7 +108,7 @@ def _body(node: Node) -> Body:
 
 
 def _joints(node: Node) -> tuple[list[Joint], list[Body]]:
-    """A joint as joints of one freedom, and the bodies between them."""
+    """Return a joint as joints of one freedom, and the bodies between them."""
     ends = []
     for tag in ("parent", "child"):
         end = node.child(tag)
@@ -127,18 +127,18 @@ def _joints(node: Node) -> tuple[list[Joint], list[Body]]:
 
 
 def _limits(node: Node) -> tuple[float, float] | None:
-    """Range of a joint, None of one that is continuous or says none."""
+    """Return the range of a joint, None if it is continuous or has none."""
     limit = node.child("limit")
     if limit is None or node.text("type") in {"fixed", "continuous"}:
         return None
     ends = (limit.element.get("lower"), limit.element.get("upper"))
-    # absent means 0 in the format; both absent is how files say that there are none
+    # an absent end means 0 in the format; files without limits leave out both
     lower, upper = ("0" if end is None else end for end in ends)
     return None if ends == (None, None) else limit.limits(lower, upper)
 
 
 def _couplings(nodes: list[Node], joints: dict[str, Joint]) -> Iterator[Coupling]:
-    """Joints that follow another (``<mimic>``)."""
+    """Yield joints that follow another (``<mimic>``)."""
     for node in nodes:
         mimic = node.child("mimic")
         if mimic is None:
@@ -156,7 +156,7 @@ def _couplings(nodes: list[Node], joints: dict[str, Joint]) -> Iterator[Coupling
 def _left_out(
     root: Node, joints: list[Node], bodies: Mapping[str, Body]
 ) -> tuple[str, ...]:
-    """What a URDF says and a robot of frames cannot hold."""
+    """Return the parts of a URDF that a robot of frames cannot represent."""
     links = list(root.children("link"))
     owners = {name: name for name in bodies}
     # Drake's frames on links

@@ -1,9 +1,9 @@
-"""Freedoms and places of URDF's joints.
+"""Freedoms and poses of URDF's joints.
 
 Sources:
-    ROS wiki, urdf/XML/joint: an absent axis is x; rpy are turns about fixed axes.
-    Drake, multibody/parsing: of ``drake:joint`` a universal turns about x, then y, a
-    planar lies in x and y.
+    ROS wiki, urdf/XML/joint: an absent axis is x; rpy are rotations about fixed axes.
+    Drake, multibody/parsing: a universal ``drake:joint`` rotates about x, then y, a
+    planar one moves in x and y.
 """
 
 import numpy as np
@@ -21,16 +21,16 @@ _ZERO = np.zeros(3)
 
 
 def joint_freedoms(node: Node) -> list[tuple[str, str, NDArray]]:
-    """Name, kind and axis of each freedom of a joint; of a fixed one that it is fixed.
+    """Return name, kind and axis of each freedom of a joint, or that it is fixed.
 
     Args:
-        node: a joint; one with a prefix is of Drake, with axes of its own.
+        node: a joint; a prefix means a joint of Drake, with its own axes.
 
     Returns:
-        The freedoms, in the order in which they move what stands on the joint.
+        The freedoms, in the order in which they move the child.
 
     Raises:
-        BadInput: no known type, or an axis is no direction.
+        BadInput: an unknown type, or an axis has no direction.
     """
     own_axes = ":" in node.tag
     kind = node.choice("type", _KINDS_OF_DRAKE if own_axes else _KINDS, "")
@@ -58,7 +58,7 @@ def joint_freedoms(node: Node) -> list[tuple[str, str, NDArray]]:
 
 
 def pose_of(origin: Node) -> NDArray:
-    """(4, 4) of an element with ``xyz`` and ``rpy``, or ``quat_xyzw`` (URDF 1.2)."""
+    """Return (4, 4) pose of an element with ``xyz`` and ``rpy`` or ``quat_xyzw``."""
     shift = origin.numbers("xyz", 3, "m", _ZERO)
     if not origin.has("quat_xyzw"):
         turn = from_roll_pitch_yaw(origin.numbers("rpy", 3, "rad", _ZERO))
@@ -70,6 +70,6 @@ def pose_of(origin: Node) -> NDArray:
 
 
 def _axis(node: Node, tag: str, default: NDArray) -> NDArray:
-    """(3,) unit direction of an element inside a joint."""
+    """Return the (3,) unit direction of an inner element of a joint."""
     axis = node.child(tag)
     return default if axis is None else axis.unit_vector("xyz", default)

@@ -1,9 +1,9 @@
-"""Loops that a URDF itself holds: ``<loop_joint>``, and joints in ``<gazebo>``.
+"""Loops in a URDF itself: ``<loop_joint>``, and joints in ``<gazebo>``.
 
 Sources:
     Isaac Sim, URDF importer, and Drake before 2018: ``loop_joint`` places a joint at
-    ``link1`` and at ``link2``.  Gazebo: what stands in ``<gazebo>`` is SDF, added to
-    the model whose frame is that of the URDF's root.
+    ``link1`` and at ``link2``.  Gazebo: the content of ``<gazebo>`` is SDF, added to
+    the model with the frame of the URDF's root.
 """
 
 from collections.abc import Iterator
@@ -34,26 +34,27 @@ Closing = tuple[str, list[Joint], list[Body], Loop]
 def with_closing_joints(
     mechanism: Mechanism, root: Node, parts: dict[str, list[str]]
 ) -> Mechanism:
-    """The mechanism with the loops of its own file.
+    """Return the mechanism with the loops of its own file.
 
     Args:
-        mechanism: of the file's links and joints.
+        mechanism: mechanism of the file's links and joints.
         root: the file's element.
-        parts: names of the joints of one freedom by that of the whole; those of
+        parts: names of the joints of one freedom by that of the whole joint; those of
             closing joints are added.
 
     Returns:
         The mechanism.
 
     Raises:
-        BadInput: a closing joint names a link that is not there, or twice the same.
+        BadInput: a closing joint names a link that does not exist, or the same link
+            twice.
     """
     bodies, joints = dict(mechanism.bodies), list(mechanism.joints)
     loops = list(mechanism.loops)
     for node, (name, several, between, loop) in _closing(mechanism, root):
         if name in parts or any(name == one.name for one in loops):
             raise node.bad("name", "found it twice; expected names that differ")
-        if several:  # a point has no joint whose coordinate could be named
+        if several:  # a point has no joint with a coordinate
             parts[name] = [joint.name for joint in several]
         joints += several
         bodies |= {body.name: body for body in between}
@@ -62,7 +63,7 @@ def with_closing_joints(
 
 
 def _closing(mechanism: Mechanism, root: Node) -> Iterator[tuple[Node, Closing]]:
-    """Closing joints of both kinds."""
+    """Yield closing joints of both kinds."""
     for node in root.children():
         if node.tag.split(":")[-1] == "loop_joint":
             yield node, _loop_joint(mechanism, node)
@@ -79,7 +80,7 @@ def _closing(mechanism: Mechanism, root: Node) -> Iterator[tuple[Node, Closing]]
 
 
 def _loop_joint(mechanism: Mechanism, node: Node) -> Closing:
-    """A joint between two places; a ball joint is a point that both share."""
+    """Return a joint between two places; for a ball joint, a common point."""
     name = node.text("name")
     (first, A), (second, B) = (_place(mechanism, node, tag) for tag in _ENDS)
     if first == second:
@@ -101,7 +102,7 @@ _ENDS = ("link1", "link2")
 
 
 def _place(mechanism: Mechanism, node: Node, tag: str) -> tuple[str, NDArray]:
-    """A link, and (4, 4) the place in it."""
+    """Return a link, and the (4, 4) pose of the place in it."""
     end = node.child(tag)
     if end is None:
         raise node.bad(tag, "missing; expected a link and a place in it")
@@ -113,7 +114,7 @@ def _place(mechanism: Mechanism, node: Node, tag: str) -> tuple[str, NDArray]:
 
 
 def _gazebo_joint(mechanism: Mechanism, frames: Frames, node: Node) -> Closing:
-    """A joint of SDF between links of the URDF, in the pose of all coordinates zero."""
+    """Return a joint of SDF between links of the URDF, with all coordinates zero."""
     name = node.text("name")
     named = frames.named[name] = Named(node, "")
     parent, child = (

@@ -1,4 +1,4 @@
-"""URDF out, and its loops file: numbers keep all their digits."""
+"""Export of URDF and of its loops file, with all digits of numbers."""
 
 from xml.sax.saxutils import quoteattr
 
@@ -12,14 +12,14 @@ XML_MARK = "<!-- Written by forcefit. -->"
 
 
 def urdf_text(mechanism: Mechanism) -> str:
-    """A URDF's text.
+    """Return the text of a URDF.
 
     Args:
-        mechanism: whose children stand in their joints' own frames (``after`` is no
-            motion), as those of robots of frames do.
+        mechanism: mechanism with children in their joints' own frames (``after`` is the
+            identity), as for robots of frames.
 
     Returns:
-        The text; its loops, drives and home are :func:`loops_of`.
+        The text; :func:`loops_of` returns its loops, drives and home.
     """
     lines = [XML_MARK, f"<robot name={quoteattr(mechanism.name)}>"]
     for body in mechanism.bodies.values():
@@ -30,7 +30,7 @@ def urdf_text(mechanism: Mechanism) -> str:
 
 
 def loops_of(mechanism: Mechanism) -> LoopsFile:
-    """What stands beside the URDF of a mechanism."""
+    """Return the content of the loops file of a mechanism's URDF."""
     moving = [joint for joint in mechanism.joints if joint.kind != "fixed"]
     return LoopsFile(
         pairs=tuple((loop.first, loop.second) for loop in mechanism.loops),
@@ -42,12 +42,12 @@ def loops_of(mechanism: Mechanism) -> LoopsFile:
 
 
 def numbers(values: NDArray | tuple[float, ...]) -> str:
-    """Numbers between blanks, all their digits kept."""
+    """Return numbers separated by blanks, with all their digits."""
     return " ".join(repr(float(value)) for value in values)
 
 
 def _link(body: Body) -> list[str]:
-    """``<link>`` with its inertial, if it has a mass."""
+    """Return ``<link>`` with its inertial, if it has a mass."""
     name = quoteattr(body.name)
     if not body.mass:
         return [f"  <link name={name}/>"]
@@ -67,7 +67,7 @@ def _link(body: Body) -> list[str]:
 
 
 def _joint(joint: Joint) -> list[str]:
-    """``<joint>``; one that turns without limits is continuous."""
+    """Return ``<joint>``; a revolute joint without limits is continuous."""
     kind = joint.kind
     if kind == "revolute" and joint.limits is None:
         kind = "continuous"
@@ -81,7 +81,7 @@ def _joint(joint: Joint) -> list[str]:
     ]
     if joint.kind != "fixed":
         lines.append(f'    <axis xyz="{numbers(joint.axis)}"/>')
-    if kind in {"revolute", "prismatic"}:  # the format asks for limits here
+    if kind in {"revolute", "prismatic"}:  # the format requires limits here
         lower, upper = joint.limits or (-1e3, 1e3)
         lines.append(
             f'    <limit lower="{lower!r}" upper="{upper!r}" effort="1e6" '

@@ -1,4 +1,4 @@
-"""XML files read: no entities, no other file, and every mistake one message."""
+"""Reader of XML files: no entities, no other file, and one message per mistake."""
 
 import re
 from collections.abc import Container, Iterator
@@ -14,21 +14,21 @@ from forcefit.inputs.errors import BadInput, describe, nearest, one_line, quoted
 from forcefit.inputs.table import read_text
 from stiffness.screws import transform
 
-_DEEPEST = 200  # elements inside elements
-# comments, which others let hold "--", and declarations, which they let stand late
+_DEEPEST = 200  # largest depth of nested elements
+# comments, which may contain "--" in some files, and declarations in a wrong place
 _SKIPPED = re.compile(
     r"<!\[CDATA\[.*?(?:\]\]>|\Z)|<!--.*?(?:-->|\Z)|<\?xml\s[^<>]*>", re.S
 )
 
-_ENDLESS = 1e3  # [rad or m] limits as far as this bind nothing
+_ENDLESS = 1e3  # [rad or m] larger limits are not binding
 
 
 @dataclass(frozen=True)
 class Node:
-    """An element of an XML file, with where it stands for messages.
+    """An element of an XML file, with its position for messages.
 
     Attributes:
-        element: of :mod:`xml.etree.ElementTree`.
+        element: element of :mod:`xml.etree.ElementTree`.
         file: its file's name.
     """
 
@@ -42,23 +42,23 @@ class Node:
 
     @property
     def place(self) -> str:
-        """Its name and its own ``name``, for messages."""
+        """Its tag and its own ``name``, for messages."""
         name = self.element.get("name")
         return self.tag if name is None else f"{self.tag} {quoted(name)}"
 
     def bad(self, key: str, message: str) -> BadInput:
-        """The error for an attribute of this element, to be raised by the caller."""
+        """Return an error for an attribute of this element, for the caller to raise."""
         place = f"{self.place}.{key}" if key else self.place
         return BadInput(f"{self.file}: {place}: {message}")
 
     def children(self, *tags: str) -> Iterator["Node"]:
-        """Elements inside of these names; of all names if none is given."""
+        """Yield inner elements of these names; all if no name is given."""
         for element in self.element:
             if not tags or element.tag in tags:
                 yield Node(element, self.file)
 
     def descendants(self) -> Iterator["Node"]:
-        """All elements inside, at any depth, and this one first."""
+        """Yield this element and all inner elements, at any depth."""
         for element in self.element.iter():
             yield Node(element, self.file)
 
@@ -68,7 +68,7 @@ class Node:
         return (self.element.text or "").strip()
 
     def names_in(self, valid: Container[str]) -> list[str]:
-        """Which of some names the element holds, in attributes and texts, in order."""
+        """Return the valid names in the element's attributes and texts, in order."""
         found: dict[str, None] = {}
         for node in self.descendants():
             words = [*node.element.attrib.values(), node.content]
@@ -76,23 +76,23 @@ class Node:
         return list(found)
 
     def child(self, tag: str) -> "Node | None":
-        """The first element inside of this name, None without one."""
+        """Return the first inner element of this name, None without one."""
         return next(self.children(tag), None)
 
     def has(self, key: str) -> bool:
-        """Whether an attribute is there."""
+        """Return whether an attribute exists."""
         return self.element.get(key) is not None
 
     def optional(self, key: str) -> str:
-        """An attribute's text without blanks around it, empty if absent or empty."""
+        """Return an attribute's text without blanks around it, empty if absent."""
         return str(self.element.get(key, "")).strip()
 
     def text(self, key: str, default: str | None = None) -> str:
-        """An attribute's text.
+        """Return an attribute's text.
 
         Args:
             key: its name.
-            default: taken where it is absent; absent is an error without one.
+            default: value of an absent attribute, which is an error without a default.
 
         Returns:
             The text without blanks around it.
@@ -106,7 +106,7 @@ class Node:
         return str(value).strip()
 
     def choice(self, key: str, valid: tuple[str, ...], default: str) -> str:
-        """An attribute that is one of a few words."""
+        """Return an attribute that is one of a few words."""
         value = self.text(key, default)
         if value not in valid:
             names = " | ".join(valid)
@@ -118,19 +118,20 @@ class Node:
     def numbers(
         self, key: str, count: int, unit: str, default: NDArray | None = None
     ) -> NDArray:
-        """Finite numbers of an attribute, between blanks.
+        """Return the finite numbers of an attribute, between blanks.
 
         Args:
             key: its name; empty for the element's own text.
-            count: how many.
-            unit: for the message.
-            default: taken where it is absent; absent is an error without one.
+            count: number of values.
+            unit: unit for the error message.
+            default: values of an absent attribute, which is an error without a default.
 
         Returns:
             (count,) numbers.
 
         Raises:
-            BadInput: absent without a default, another count, not finite or huge.
+            BadInput: absent without a default, a wrong number of values, not finite or
+                too large.
         """
         text = self.element.get(key) if key else self.element.text or ""
         expected = f"expected {count} finite number{'s' * (count > 1)} [{unit}]"
@@ -147,26 +148,26 @@ class Node:
         return values
 
     def number(self, key: str, unit: str, default: float | None = None) -> float:
-        """One finite number of an attribute; see :meth:`numbers`."""
+        """Return one finite number of an attribute; see :meth:`numbers`."""
         given = None if default is None else np.array([default])
         return float(self.numbers(key, 1, unit, given)[0])
 
     def limits(
         self, lower: str | None, upper: str | None, unit: float = 1.0
     ) -> tuple[float, float] | None:
-        """Least and largest coordinate of a joint from two texts.
+        """Return the least and largest coordinate of a joint from two texts.
 
         Args:
-            lower: a number, infinite or of any size; None where it is absent.
-            upper: likewise.
-            unit: by which they are multiplied.
+            lower: a number, infinite or of any size; None if absent.
+            upper: a number, infinite or of any size; None if absent.
+            unit: factor of both.
 
         Returns:
-            Both [rad or m], 1e6 for one that is absent or larger; None where neither
-            binds, or where they leave no range.
+            Both [rad or m], 1e6 for an absent or larger one; None if neither is
+            binding, or if their range is empty.
 
         Raises:
-            BadInput: no number.
+            BadInput: a text is no number.
         """
         ends = []
         for text, far in ((lower, -LARGEST_LENGTH), (upper, LARGEST_LENGTH)):
@@ -181,25 +182,25 @@ class Node:
         return (ends[0], ends[1]) if binds and ends[0] < ends[1] else None
 
     def unit_vector(self, key: str, default: NDArray | None = None) -> NDArray:
-        """(3,) direction of an attribute, of length 1."""
+        """Return the (3,) direction of an attribute, of length 1."""
         vector = self.numbers(key, 3, "-", default)
         length = float(np.linalg.norm(vector))
         if length < 1e-9:
             raise self.bad(key, f"found {describe(vector.tolist())}, not a direction")
-        # what is of length 1 to rounding stays as it is written
+        # a vector of length 1 to rounding is not changed
         return vector if abs(length - 1.0) < 1e-15 else vector / length
 
 
 def read_xml(path: Path | str, *roots: str) -> Node:
-    """Root element of an XML file, as tolerant readers of robots take it.
+    """Return the root element of an XML file, as tolerantly as other readers.
 
     Args:
         path: the file.
         roots: names that its root element may have.
 
     Returns:
-        The element.  Namespaces are not resolved: a name keeps its prefix, known or
-        not, and ``xmlns`` changes nothing.
+        The element.  Namespaces are not resolved: a name keeps its prefix, and
+        ``xmlns`` has no effect.
 
     Raises:
         BadInput: the file cannot be read, is not XML, declares entities or a document
@@ -220,18 +221,18 @@ def read_xml(path: Path | str, *roots: str) -> Node:
 
 
 def _parsed(text: str, path: Path | str) -> Any:
-    """Root element of a text without entities and document types."""
+    """Return the root element of a text without entities and document types."""
     from xml.etree.ElementTree import TreeBuilder
     from xml.parsers.expat import ExpatError, ParserCreate
 
     def refuse(*_: object) -> int:
-        raise BadInput(
-            f"{path}: found a document type or an entity, expected neither: what they "
-            "name would be read too"
+        raise ValueError(
+            "found a document type or an entity, expected neither: what they name "
+            "would be read too"
         )
 
     builder = TreeBuilder()
-    parser = ParserCreate()  # without a separator: prefixes stay in the names
+    parser = ParserCreate()  # without a separator prefixes stay in the names
     parser.buffer_text = True
     parser.StartElementHandler = builder.start
     parser.EndElementHandler = builder.end
@@ -250,20 +251,20 @@ def _parsed(text: str, path: Path | str) -> Any:
 
 
 def _blank_lines(match: re.Match[str]) -> str:
-    """Line ends of what is skipped, so that messages count lines as editors do."""
+    """Return the line ends of skipped text, so that line numbers stay correct."""
     text = match[0]
     return text if text.startswith("<![CDATA[") else "\n" * text.count("\n")
 
 
 def placed(translation: NDArray, rotation: NDArray) -> NDArray:
-    """(4, 4) read-only transform."""
+    """Return the (4, 4) read-only transform."""
     T = transform(translation, rotation)
     T.setflags(write=False)
     return T
 
 
 def counted(what: str, names: list[str]) -> tuple[str, ...]:
-    """One line that says how many things are left out, with the first names."""
+    """Return a line with the number of things left out, and the first names."""
     if not names:
         return ()
     named = [name for name in names if name]

@@ -13,10 +13,10 @@ from forcefit.inputs.table import Table, nearest, quoted
 
 
 def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
-    """A robot with the effects of its file.
+    """Return a robot with the effects of its file.
 
     Args:
-        robot: of the same file, without them.
+        robot: robot of the same file, without them.
         tables: every ``[[effect]]``.
 
     Returns:
@@ -50,7 +50,7 @@ def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
 
 
 def _parameters(table: Table, robot: Robot, effect: str) -> Values:
-    """The parameters of one effect of the library."""
+    """Return the parameters of one effect of the library."""
     allowed = parameter_names(robot, effect)
     inner = table.table("parameters") if table.has("parameters") else None
     table.finish()
@@ -60,7 +60,7 @@ def _parameters(table: Table, robot: Robot, effect: str) -> Values:
             hint = nearest(key, allowed)
             message = f"found {quoted(key)}, which is no parameter of {effect} here"
             raise table.bad("parameters", f"{message}{hint}")
-    # times must pass: nothing settles at once, nor in a negative time, nor in none said
+    # time constants must be given and positive
     times = {key for key in allowed if LIBRARY[effect].unit(robot, key) == "s"}
     for key in sorted(times - set(given)):
         owner = key.rpartition(".")[0]
@@ -75,13 +75,13 @@ def _parameters(table: Table, robot: Robot, effect: str) -> Values:
 
 
 def effect_tables(robot: Robot) -> list[dict[str, Any]]:
-    """What a robot file says of a robot's effects.
+    """Return the tables of a robot's effects for a robot file.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
-        One table each; :func:`with_effects` reads them back to the same.
+        One table each; :func:`with_effects` reads them back to the same effects.
     """
 
     def listed(
@@ -99,10 +99,10 @@ def effect_tables(robot: Robot) -> list[dict[str, Any]]:
 
 
 def parameter_names(robot: Robot, effect: str) -> tuple[str, ...]:
-    """Public names of all parameters that an effect may have on a robot.
+    """Return the public names of all parameters that an effect may have on a robot.
 
     Args:
-        robot: any.
+        robot: any robot.
         effect: a name of the library.
 
     Returns:

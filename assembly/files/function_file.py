@@ -1,4 +1,4 @@
-"""``[[effect]]`` named ``function`` of a robot file, in and out."""
+"""``[[effect]]`` named ``function`` of a robot file, read and written."""
 
 import math
 from collections.abc import Mapping
@@ -35,18 +35,18 @@ _KINDS_OF_VARIABLES = (
 
 
 def read_function(table: Table, robot: Robot) -> Function:
-    """One general effect.
+    """Return one general effect.
 
     Args:
         table: an ``[[effect]]`` whose name is ``function``.
-        robot: of the same file.
+        robot: robot of the same file.
 
     Returns:
-        The function, everything in it checked.
+        The function, completely checked.
 
     Raises:
-        BadInput: an unknown place, component, variable, form or parameter, one that is
-            missing, or a formula that is none or whose units clash.
+        BadInput: an unknown place, component, variable, form or parameter, a missing
+            one, or a formula that is invalid or has inconsistent units.
     """
     label = table.text("label", "", longest=200)
     if label:
@@ -89,7 +89,7 @@ def read_function(table: Table, robot: Robot) -> Function:
 
 
 def _words(table: Table, key: str, most: int) -> tuple[str, ...]:
-    """Different names, at least one."""
+    """Return distinct names, at least one."""
     value = table.require(key, f"1 to {most} names")
     if isinstance(value, list) and all(isinstance(v, str) for v in value):
         if 1 <= len(value) <= most and len(set(value)) == len(value):
@@ -100,7 +100,7 @@ def _words(table: Table, key: str, most: int) -> tuple[str, ...]:
 def _numbers(
     table: Table, key: str, least: float = -math.inf
 ) -> Mapping[str, float]:  # fmt: skip
-    """Numbers by name; none if the key is absent."""
+    """Return the numbers by name; none if the key is absent."""
     if not table.has(key):
         return {}
     inner = table.table(key)
@@ -108,7 +108,7 @@ def _numbers(
 
 
 def _check_variable(table: Table, name: str, robot: Robot) -> None:
-    """Refuse a variable that conditions do not have."""
+    """Reject a variable that conditions do not have."""
     kind, _, rest = name.partition(".")
     frames = [frame.name for frame in robot.frames]
     if kind == "q":
@@ -131,7 +131,7 @@ def _check_variable(table: Table, name: str, robot: Robot) -> None:
 
 
 def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
-    """Refuse numbers that the form does not have, or that it lacks."""
+    """Reject parameters that the form does not have, and missing ones."""
     for name in function.std:
         if name not in function.parameters:
             hint = nearest(name, function.parameters)
@@ -176,7 +176,7 @@ def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
 
 
 def _check_knots(table: Table, function: Function, component: str) -> None:
-    """A spline has a value at each of its knots, and room between them."""
+    """Check that a spline has a value at each knot, and that knots are distinct."""
     names = columns_of(function, component)
     indices = np.array([column_indices(name) for name in names])
     wanted = math.prod(indices.max(axis=0).tolist()) if names else 2
@@ -191,7 +191,7 @@ def _check_knots(table: Table, function: Function, component: str) -> None:
 
 
 def _check_formula(table: Table, function: Function, robot: Robot) -> None:
-    """A formula of known names whose units fit."""
+    """Check that a formula has known names and consistent units."""
     aliases = variable_names(function.variables)
     try:
         tree = parse_formula(function.formula)
@@ -217,7 +217,7 @@ def _check_formula(table: Table, function: Function, robot: Robot) -> None:
 
 
 def _example(form: Any) -> str:
-    """How a form's parameters are called."""
+    """Return an example of the names of a form's parameters."""
     word = form.words[0]
     name = word if form.indices is None else f"1.{word}" if word else "1"
     shapes = [quoted(shape) for shape in form.shapes]
@@ -225,13 +225,14 @@ def _example(form: Any) -> str:
 
 
 def function_table(function: Function) -> dict[str, Any]:
-    """What a robot file says of a function.
+    """Return the table of a function for a robot file.
 
     Args:
-        function: of a robot.
+        function: function of a robot.
 
     Returns:
-        Keys and plain values; :func:`read_function` reads them back to the same.
+        Keys and plain values; :func:`read_function` reads them back to the same
+        function.
     """
     table: dict[str, Any] = {"name": FUNCTION}
     if function.label:

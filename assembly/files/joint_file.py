@@ -8,22 +8,23 @@ from assembly.model.robot import LOCKED, Clearance
 from forcefit.inputs.number_arrays import find_fault, number_array
 from forcefit.inputs.table import Table
 
-_LEAST_CLEARANCE = 1e-30  # [rad, m] less is none; its square must be a number
+# [rad, m] smaller values are refused, because their square is 0
+_LEAST_CLEARANCE = 1e-30
 _CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad"}
 
 
 def read_clearance(table: Table) -> Clearance | None:
-    """The ``clearance`` table, None if absent.
+    """Return the ``clearance`` table, None if absent.
 
     Args:
-        table: of a ``[[frame]]``.
+        table: table of a ``[[frame]]``.
 
     Returns:
-        The bounds that are given.
+        The given bounds.
 
     Raises:
-        BadInput: an unknown key, or not a finite number >= 0, nor one so small that its
-            square is 0.
+        BadInput: an unknown key, a value that is not a finite number >= 0, or one so
+            small that its square is 0.
     """
     if not table.has("clearance"):
         return None
@@ -42,16 +43,16 @@ def read_clearance(table: Table) -> Clearance | None:
 
 
 def read_joint_stiffness(table: Table, free: int | None = None) -> NDArray | None:
-    """K_B as a full matrix; infinities only on its diagonal.
+    """Return K_B as a full matrix; infinities only on its diagonal.
 
     Args:
-        table: of a ``[[frame]]``.
-        free: row along which a passive joint moves; 0 there, in its whole row and
-            column, leaves it free.  None if the joint does not move by itself.
+        table: table of a ``[[frame]]``.
+        free: row along which a passive joint moves; zeros in its row and column leave
+            it free.  None if the joint is not passive.
 
     Returns:
-        (6, 6) [N m/rad .. N/m] symmetric positive definite but for a row and column of
-        zeros along a free motion; None if absent.
+        (6, 6) [N m/rad .. N/m] symmetric positive definite, except for a row and column
+        of zeros along a free motion; None if absent.
 
     Raises:
         BadInput: another shape, not a stiffness, or ``inf`` along the free motion.
@@ -95,23 +96,23 @@ def read_joint_stiffness(table: Table, free: int | None = None) -> NDArray | Non
 
 
 def _has_rows(value: list) -> bool:
-    """Whether a list holds lists."""
+    """Return whether a list holds lists."""
     return any(isinstance(row, list) for row in value)
 
 
 def definite(table: Table, key: str, K: NDArray) -> NDArray:
-    """A stiffness matrix, refused unless it is symmetric positive definite.
+    """Return a stiffness matrix, after a check that it is positive definite.
 
     Args:
-        table: where it was read.
-        key: of it there.
+        table: the table that was read.
+        key: its key there.
         K: (n, n) [N m/rad .. N/m] finite; any part of a stiffness.
 
     Returns:
-        (n, n) the same, exactly symmetric.
+        (n, n) the same matrix, exactly symmetric.
 
     Raises:
-        BadInput: it is not; a term that shows it is given, counted from 1.
+        BadInput: the matrix is not positive definite; the message names an entry.
     """
     if not K.size:
         return K

@@ -18,8 +18,8 @@ from forcefit.inputs.table import Table, describe, quoted
 from forcefit.inputs.writing import path_from
 from stiffness.surface.surface import UNITS
 
-_SMALLEST_LENGTH = 1e-12  # [m] below that of any machine
-_MOST_PIECES = 100  # of a beam; 8 leave 1e-4 of a quarter turn
+_SMALLEST_LENGTH = 1e-12  # [m] shorter than any machine's
+_MOST_PIECES = 100  # most pieces of a beam; with 8 the error is 1e-4 of a quarter turn
 _ONE_SECTION = (
     '"radius" [, "inner_radius"] or "width", "height" or '
     '"area", "I_y", "I_z", "J", "shear_y", "shear_z"'
@@ -37,7 +37,7 @@ _SECTIONS: dict[str, dict[str, str]] = {  # keys of each kind, and their units
 
 
 def read_link(frame: Table) -> Link | None:
-    """The link of a ``[[frame]]``: exactly one of beam, stiffness, mesh, library.
+    """Return link of a ``[[frame]]``: exactly one of beam, stiffness, mesh, library.
 
     Args:
         frame: the frame's table; its keys ``link`` and ``up`` are read.
@@ -53,7 +53,7 @@ def read_link(frame: Table) -> Link | None:
     link = frame.table("link")
     kinds = [kind for kind in _KINDS if link.has(kind)]
     if not kinds and not set(link.content) <= {*_MATERIAL, "up", "pieces"}:
-        link.finish()  # a misspelt kind gets its suggestion
+        link.finish()  # reports a misspelt kind with a suggestion
     if len(kinds) != 1:
         given = " and ".join(map(quoted, kinds)) or "none of them"
         names = " | ".join(map(quoted, _KINDS))
@@ -73,7 +73,7 @@ def read_link(frame: Table) -> Link | None:
 
 
 def _beam_link(link: Table) -> BeamLink:
-    """``beam = { ... }`` and its material."""
+    """Return ``beam = { ... }`` and its material."""
     beam = link.table("beam")
     theory = beam.choice("theory", ("timoshenko", "euler"), "timoshenko")
     length = _size(beam, "length", "m") if beam.has("length") else None
@@ -91,7 +91,7 @@ def _beam_link(link: Table) -> BeamLink:
 
 
 def _pieces(link: Table) -> int:
-    """Springs in a row, 1 if not said; a design may give a whole number as 8.0."""
+    """Return the number of springs in series, 1 by default; 8.0 counts as whole."""
     count = link.number("pieces", "-", 1.0, least=1.0, below=_MOST_PIECES + 1.0)
     if count != round(count):
         raise link.bad("pieces", f"found {count:g}, expected a whole number")
@@ -99,14 +99,14 @@ def _pieces(link: Table) -> int:
 
 
 def _section(beam: Table) -> dict[str, float]:
-    """Numbers of the section, one of the three kinds."""
+    """Return the numbers of the section, one of the three kinds."""
     keys_of_kind = {
         kind: [key for key in keys if beam.has(key)] for kind, keys in _SECTIONS.items()
     }
     kinds = [kind for kind, keys in keys_of_kind.items() if keys]
     if len(kinds) != 1:
         if not kinds:
-            beam.finish()  # a misspelt key gets its suggestion
+            beam.finish()  # reports a misspelt key with a suggestion
         names = (
             " and ".join(quoted(keys_of_kind[kind][0]) for kind in kinds)
             or "no section"
@@ -123,7 +123,7 @@ def _section(beam: Table) -> dict[str, float]:
 
 
 def _mesh_link(link: Table, frame: Table) -> MeshLink:
-    """``mesh = { surface, base, tip, ... }`` and its material."""
+    """Return ``mesh = { surface, base, tip, ... }`` and its material."""
     from stiffness.fem.part_text import read_parts
 
     mesh = link.table("mesh")
@@ -152,7 +152,7 @@ def _mesh_link(link: Table, frame: Table) -> MeshLink:
 
 
 def _interface(mesh: Table, key: str) -> Any:
-    """Where a mesh meets a joint, as written; its syntax is checked."""
+    """Return interface of a mesh with a joint, as written; its syntax is checked."""
     from stiffness.surface.interface import parse_interface
 
     value = mesh.require(key, 'an interface such as "z=0.452"')
@@ -163,7 +163,7 @@ def _interface(mesh: Table, key: str) -> Any:
 
 
 def _check_interface_table(table: Table) -> None:
-    """``{ plane = { point, normal }, radius }`` or ``{ bore = { ... } }``."""
+    """Check ``{ plane = { point, normal }, radius }`` or ``{ bore = { ... } }``."""
     kind, direction = ("bore", "axis") if table.has("bore") else ("plane", "normal")
     inner = table.table(kind)
     inner.array("point", (3,), "m", largest=LARGEST_LENGTH)
@@ -177,7 +177,7 @@ def _check_interface_table(table: Table) -> None:
 
 
 def _library_link(link: Table) -> LibraryLink:
-    """``library = "path/to/library#key"``."""
+    """Return ``library = "path/to/library#key"``."""
     value = link.text("library")
     path, _, key = value.rpartition("#")
     if not (path and key):
@@ -187,7 +187,7 @@ def _library_link(link: Table) -> LibraryLink:
 
 
 def _material(link: Table) -> dict[str, Any]:
-    """Young's modulus, Poisson's ratio and, if given, density."""
+    """Return Young's modulus, Poisson's ratio and, if given, density."""
     return {
         "young": _size(link, "young", "Pa"),
         "poisson": link.number("poisson", "-", above=-1.0, below=0.5),
@@ -196,7 +196,7 @@ def _material(link: Table) -> dict[str, Any]:
 
 
 def _size(table: Table, key: str, unit: str) -> float:
-    """A positive number whose powers do not leave the range of floats."""
+    """Return a positive number whose powers neither overflow nor vanish."""
     length = unit == "m"
     largest = LARGEST_LENGTH if length else LARGEST
     smallest = _SMALLEST_LENGTH if length else 1 / LARGEST
@@ -208,7 +208,7 @@ def _size(table: Table, key: str, unit: str) -> float:
 
 
 def _direction(table: Table, key: str) -> tuple[float, float, float] | None:
-    """A direction, None if absent."""
+    """Return a direction, None if absent."""
     if not table.has(key):
         return None
     vector = table.array(key, (3,), "direction", largest=LARGEST_LENGTH)
@@ -219,22 +219,22 @@ def _direction(table: Table, key: str) -> tuple[float, float, float] | None:
 
 
 def _path(table: Table, key: str, path: str) -> Path:
-    """A path relative to the file that names it."""
+    """Return a path relative to the file that contains it."""
     if path.strip() in {"", ".", ".."}:
         raise table.bad(key, f"found {describe(path)}, expected a file")
     return Path(table.file).parent / path
 
 
 def link_table(link: Link, folder: Path | None = None) -> dict[str, Any]:
-    """The keys of a frame's table for its link.
+    """Return the keys of a frame's table for its link.
 
     Args:
-        link: of a robot.
-        folder: of the file to be written, to which paths are made relative; paths are
-            unchanged without one.
+        link: link of a robot.
+        folder: folder of the file to be written; paths are made relative to it, or are
+            unchanged without it.
 
     Returns:
-        The ``link`` table, and beside it the frame's ``up`` for a mesh that has one.
+        The ``link`` table, and the frame's ``up`` for a mesh that has one.
     """
     if isinstance(link, MatrixLink):
         return {"link": {"stiffness": link.stiffness.tolist()}}
@@ -261,7 +261,7 @@ def link_table(link: Link, folder: Path | None = None) -> dict[str, Any]:
 
 
 def _from(folder: Path | None, path: Path) -> str:
-    """A path relative to the new file's folder."""
+    """Return a path relative to the new file's folder."""
     if folder is None or path.is_absolute():
         return str(path)
     return path_from(folder.resolve(), path.resolve())

@@ -1,4 +1,4 @@
-"""Robot files read and written (``docs/robot_files.md``), every rule checked."""
+"""Robot files read and written (``docs/robot_files.md``), with all rules checked."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -42,16 +42,17 @@ from forcefit.inputs.writing import (
 from stiffness.screws import rotation_matrix, rotation_vector
 
 Closing = Callable[[Robot], Robot]
-_LONGEST_NAME = 200  # characters
-MOST_FRAMES = 2000  # of a robot; its closures would take minutes
+_LONGEST_NAME = 200  # largest number of characters
+MOST_FRAMES = 2000  # most frames of a robot; more closures would take minutes
 
 
 def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
-    """Robot of a robot file.
+    """Return the robot of a robot file.
 
     Args:
         path: a ``.toml`` file in the public format.
-        close: makes of the robot as declared one whose closures hold; none if absent.
+        close: function that makes the closures of the declared robot hold; none if
+            absent.
 
     Returns:
         The robot; its nominal closures hold in its home pose.  Meshes and libraries of
@@ -64,12 +65,12 @@ def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
 
 
 def robot_of(root: Table, name: str, close: Closing | None = None) -> Robot:
-    """Robot of a robot file's root table.
+    """Return the robot of a robot file's root table.
 
     Args:
         root: the table; paths in it are relative to the folder of ``root.file``.
-        name: of the robot if the table has none.
-        close: of :func:`read_robot`.
+        name: name of the robot if the table has none.
+        close: see :func:`read_robot`.
 
     Returns:
         The robot; its nominal closures hold in its home pose.
@@ -86,11 +87,11 @@ def robot_of(root: Table, name: str, close: Closing | None = None) -> Robot:
 
 
 def declared_robot(root: Table, name: str) -> Robot:
-    """Robot of a root table as it is written; its closures are not checked.
+    """Return the robot of a root table as written, without a check of its closures.
 
     Args:
-        root: of a robot file.
-        name: of the robot if the table has none.
+        root: root of a robot file.
+        name: name of the robot if the table has none.
 
     Returns:
         The robot; lengths of its beams may still be unknown.
@@ -113,14 +114,11 @@ def declared_robot(root: Table, name: str) -> Robot:
     robot = replace(
         robot, learned_range=ranges, reference_point=point, diagnosis=diagnosis
     )
-    try:
-        return with_effects(robot, effects)
-    except BadInput as error:
-        raise BadInput(f"{root.file}: {error}") from None
+    return with_effects(robot, effects)
 
 
 def _drawn(root: Table, name: str, description: str) -> Robot:
-    """Robot of a file of bodies and joints."""
+    """Return the robot of a file of bodies and joints."""
     drawing = read_drawing(root, name, description)
     root.finish()
     try:
@@ -134,11 +132,7 @@ def _drawn(root: Table, name: str, description: str) -> Robot:
 
 
 def _framed(root: Table, name: str, description: str) -> Robot:
-    """Robot of a file of frames and closures."""
-    if root.get("format", 1) != 1:
-        raise root.bad(
-            "format", f"found {describe(root.get('format'))}, expected 1 | 2"
-        )
+    """Return the robot of a file of frames and closures."""
     platform = root.text("platform", expected="the name of a frame")
     tables = root.tables("frame"), root.tables("closure")
     root.finish()
@@ -160,7 +154,7 @@ def _framed(root: Table, name: str, description: str) -> Robot:
 
 
 def _learned_range(root: Table) -> dict[str, tuple[float, float]]:
-    """Least and largest values by variable, of none where the file says nothing."""
+    """Return least and largest values by variable; empty if the file has none."""
     ranges: dict[str, tuple[float, float]] = {}
     if not root.has("learned_range"):
         return ranges
@@ -176,7 +170,7 @@ def _learned_range(root: Table) -> dict[str, tuple[float, float]]:
 
 
 def _reference_point(root: Table) -> tuple[float, float, float] | None:
-    """Point at which the robot was identified, platform axes, None if not given."""
+    """Return the point at which the robot was identified, None if not given."""
     if not root.has("reference_point"):
         return None
     x, y, z = root.array("reference_point", (3,), "m", largest=LARGEST_LENGTH).tolist()
@@ -184,8 +178,8 @@ def _reference_point(root: Table) -> tuple[float, float, float] | None:
 
 
 def _diagnosis(root: Table) -> dict[str, Any]:
-    """What the file says of the diagnosis that made it, a path made absolute."""
-    # a record for people and programs: texts, numbers and lists are kept as they are
+    """Return the file's record of its diagnosis, with an absolute path."""
+    # texts, numbers and lists are kept unchanged
     content: dict[str, Any] = {}
     if root.has("diagnosis"):
         table = root.table("diagnosis")
@@ -205,7 +199,7 @@ def _diagnosis(root: Table) -> dict[str, Any]:
 
 
 def _is_record(value: object) -> bool:
-    """Whether a value is a text, a finite number, a truth value or a list of such."""
+    """Return whether a value is a text, finite number, truth value or list of these."""
     if isinstance(value, list):
         return all(_is_record(one) for one in value)
     if isinstance(value, float):
@@ -214,7 +208,7 @@ def _is_record(value: object) -> bool:
 
 
 def _remarks(tables: list[Table]) -> tuple[str, ...]:
-    """A remark on frames with ``dh`` without ``alpha``, which turns their axis."""
+    """Return a remark on frames with ``dh`` but without ``alpha``."""
     # the other three are often zero; a forgotten alpha changes the machine
     dh = {table.content["name"]: table.content.get("dh") for table in tables}
     without_alpha = [
@@ -226,7 +220,7 @@ def _remarks(tables: list[Table]) -> tuple[str, ...]:
 
 
 def _frame(table: Table) -> Frame:
-    """One ``[[frame]]``."""
+    """Return one ``[[frame]]``."""
     name = table.text("name", longest=_LONGEST_NAME)
     table.place = f"frame {quoted(name)}"
     joint = table.choice("joint", JOINTS, "fixed")
@@ -263,13 +257,13 @@ def _frame(table: Table) -> Frame:
 
 
 def _numbers(table: Table, key: str, count: int, unit: str) -> NDArray:
-    """Lengths or angles, zero where absent."""
+    """Return the lengths or angles, zero where absent."""
     zero = np.zeros(count)
     return table.array(key, (count,), unit, zero, largest=LARGEST_LENGTH)
 
 
 def _limits(table: Table) -> tuple[float, float] | None:
-    """Least and largest coordinate that may be commanded, None if not given."""
+    """Return least and largest coordinate of a command, None if not given."""
     if not table.has("limits"):
         return None
     least, most = table.array("limits", (2,), "rad or m", largest=LARGEST_LENGTH)
@@ -280,7 +274,7 @@ def _limits(table: Table) -> tuple[float, float] | None:
 
 
 def _tolerance(table: Table) -> NDArray | None:
-    """Standard deviations of the geometric error, None where none are given."""
+    """Return standard deviations of the geometric error, None if not given."""
     if not table.has("tolerance"):
         return None
     sigma = table.array("tolerance", (6,), "rad, m", largest=LARGEST_LENGTH)
@@ -291,7 +285,7 @@ def _tolerance(table: Table) -> NDArray | None:
 
 
 def _placement(table: Table) -> tuple[NDArray, NDArray]:
-    """Translation and rotation vector, given as such or by ``dh``."""
+    """Return the translation and rotation vector, given as such or by ``dh``."""
     given = [key for key in ("translation", "rotation") if table.has(key)]
     if not table.has("dh"):
         return (
@@ -314,7 +308,7 @@ def _placement(table: Table) -> tuple[NDArray, NDArray]:
 
 
 def _closure(table: Table, names: list[str]) -> tuple[str, str]:
-    """One ``[[closure]]``."""
+    """Return one ``[[closure]]``."""
     value = table.require("frames", "two frame names")
     table.finish()
     proper = isinstance(value, list) and all(isinstance(v, str) for v in value)
@@ -327,7 +321,7 @@ def _closure(table: Table, names: list[str]) -> tuple[str, str]:
 
 
 def _check_known(table: Table, key: str, name: str, names: list[str]) -> None:
-    """Refuse a name that no frame has."""
+    """Reject a name that is not that of a frame."""
     if name == BASE:
         message = 'found "base"; expected a frame (add a fixed one whose parent is it)'
         raise table.bad(key, message)
@@ -338,7 +332,7 @@ def _check_known(table: Table, key: str, name: str, names: list[str]) -> None:
 
 
 def _check_meeting_frames(robot: Robot) -> None:
-    """A frame where chains meet must have no joint of its own."""
+    """Check that a frame where chains meet has no joint of its own."""
     meeting = {"platform": [robot.platform]}
     for number, pair in enumerate(robot.closures, 1):
         meeting[f"closure[{number}].frames"] = list(pair)
@@ -360,7 +354,7 @@ def write_robot(robot: Robot, path: Path | str) -> None:
 
     Args:
         robot: to be written.
-        path: of the new file; relative paths of meshes and libraries are written
+        path: path of the new file; relative paths of meshes and libraries are written
             relative to its folder.
 
     Raises:
@@ -384,11 +378,11 @@ def write_robot(robot: Robot, path: Path | str) -> None:
 
 
 def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
-    """The content of a robot file.
+    """Return the content of a robot file.
 
     Args:
-        robot: any.
-        folder: of the file to be written, to which paths are made relative.
+        robot: any robot.
+        folder: folder of the file to be written, to which paths are made relative.
 
     Returns:
         Plain values; :func:`robot_of` reads them back to the same robot.
@@ -415,11 +409,11 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
 
 
 def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
-    """The content of ``[[frame]]``, defaults left out.
+    """Return the content of ``[[frame]]``, defaults left out.
 
     Args:
-        frame: of a robot.
-        folder: of the file to be written, to which paths are made relative.
+        frame: frame of a robot.
+        folder: folder of the file to be written, to which paths are made relative.
 
     Returns:
         Keys and plain values of the file format.
@@ -454,8 +448,8 @@ def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
 
 
 def _toml(value: Any) -> str:
-    """A value in TOML, arrays and tables inline; floats keep all their digits."""
-    # tomli-w writes every number of an array on a line of its own
+    """Return a value in TOML, arrays and tables inline, floats with all digits."""
+    # tomli-w writes every number of an array on its own line
     if isinstance(value, bool | np.bool_):
         return str(value).lower()
     if isinstance(value, str):
@@ -469,11 +463,11 @@ def _toml(value: Any) -> str:
 
 
 def _key(name: str) -> str:
-    """A key, between quotes where a dot or more would be read as something else."""
+    """Return a key, in quotes if it would otherwise be read differently."""
     bare = name and all(c.isascii() and (c.isalnum() or c in "-_") for c in name)
     return name if bare else _toml(name)
 
 
 def _escaped(c: str) -> str:
-    """A character as it stands between double quotes."""
+    """Return a character as written in double quotes."""
     return f"\\u{ord(c):04x}" if c < " " or c in '"\\\x7f' else c

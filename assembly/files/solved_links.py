@@ -1,7 +1,7 @@
-"""Links given by a mesh or a library, found once, when a robot is loaded.
+"""Stiffness of links given by a mesh or a library, computed when a robot is loaded.
 
-Afterwards a robot holds all that solvers need of its links: they open no file and run
-no finite elements.
+Afterwards a robot holds all data of its links that solvers need; these open no file and
+run no finite elements.
 """
 
 import hashlib
@@ -25,15 +25,15 @@ if TYPE_CHECKING:
     from stiffness.fem.fea import FemOptions, MeshedLink
 
 _LOG = logging.getLogger(__name__)
-# of this process: links of one shape and material are solved once
+# in this process links of one shape and material are solved once
 _SOLVED: dict[str, MeshSolution] = {}
 
 
 def solve_links(robot: Robot) -> Robot:
-    """Find the stiffness of every link that a mesh or a library gives.
+    """Compute the stiffness of every link that a mesh or a library gives.
 
     Args:
-        robot: as read, or made in Python.
+        robot: robot as read, or made in Python.
 
     Returns:
         The robot that solvers take; the same object if it has no such link.
@@ -41,7 +41,7 @@ def solve_links(robot: Robot) -> Robot:
     Raises:
         BadInput: a file cannot be read or is not usable, or an interface is not.
     """
-    # libraries first: what can be refused is refused before the finite elements
+    # libraries first, so that they are refused before the finite elements
     frames = [
         frame
         for frame in sorted(robot.frames, key=lambda f: isinstance(f.link, MeshLink))
@@ -59,25 +59,25 @@ def solve_links(robot: Robot) -> Robot:
 
 
 def _note(done: int, total: int) -> None:
-    """How many links are known, for those who show progress."""
+    """Return the number of known links, for a progress display."""
     known = {"done": done, "total": total}
     _LOG.debug("%d of %d links", done, total, extra=known)
 
 
 def solved_link(frame: Frame, accuracy: float = 0.005) -> Link:
-    """The link of one frame, with what its mesh or its library gives.
+    """Return the link of one frame, with the data of its mesh or its library.
 
     Args:
         frame: one with a mesh or a library link.
-        accuracy: of finite elements, asked of every entry of K_E relative to
+        accuracy: required of the finite elements, for every entry of K_E relative to
             sqrt(K_ii K_jj).
 
     Returns:
         The link.
 
     Raises:
-        BadInput: a file cannot be read or is not usable, an interface is not, ``up``
-            lies along the link, or the distance of the interfaces is not that of the
+        BadInput: a file cannot be read or is not usable, an interface is not, ``up`` is
+            parallel to the link, or the distance of the interfaces is not that of the
             two origins.
         ValueError: the frame has another link.
     """
@@ -95,7 +95,7 @@ def solved_link(frame: Frame, accuracy: float = 0.005) -> Link:
 
 
 def _from_library(link: LibraryLink) -> LibraryLink:
-    """The link with its entry's compliance."""
+    """Return the link with its entry's compliance."""
     from stiffness.report.library import read_compliance
 
     C = read_compliance(link.library, link.key)
@@ -104,7 +104,7 @@ def _from_library(link: LibraryLink) -> LibraryLink:
 
 
 def _solution(frame: Frame, link: MeshLink, accuracy: float) -> MeshSolution:
-    """The finite elements of a mesh link; those of this process are kept."""
+    """Return the finite-element solution of a mesh link, cached in this process."""
     from stiffness.fem.fea import FemOptions
     from stiffness.surface.surface_files import named_solid
 
@@ -145,13 +145,13 @@ def _solve(
 
 
 def _as_stored(solved: "MeshedLink") -> "MeshedLink":
-    """Without what only a further refinement needs: the part's own surface."""
+    """Return the solution without the surface, which only refinement needs."""
     solid = replace(solved.level.solid, walls={}, surface=None)
     return replace(solved, level=replace(solved.level, solid=solid))
 
 
 def _digest(path: Path) -> str:
-    """SHA-256 of a file."""
+    """Return the SHA-256 of a file."""
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
@@ -160,7 +160,7 @@ def _digest(path: Path) -> str:
 
 
 def _check_place(frame: Frame, link: MeshLink, mesh_span: NDArray) -> None:
-    """Refuse interfaces that are not as far apart as the origins they stand for."""
+    """Reject interfaces whose distance differs from that of their origins."""
     try:
         section_axes(mesh_span, link.up)
     except BadInput as error:
@@ -176,5 +176,5 @@ def _check_place(frame: Frame, link: MeshLink, mesh_span: NDArray) -> None:
 
 
 def _point(p: NDArray) -> str:
-    """Coordinates for a message."""
+    """Return the coordinates for a message."""
     return "(" + ", ".join(f"{x:.6g}" for x in p) + ") m"

@@ -1,7 +1,7 @@
 """Solutions of mesh links on disk: finite elements of the same link run once.
 
-A solution is found by a digest of everything that its numbers depend on.  Files are
-written whole or not at all; one that cannot be used counts as absent.
+A solution is identified by a digest of everything on which its numbers depend.  Files
+are written completely or not at all; an unusable one counts as absent.
 """
 
 import hashlib
@@ -29,29 +29,29 @@ from forcefit.inputs.program import sources_hash
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import whole_file
 
-# they read surfaces, make meshes and solve: another version may round differently
+# libraries that read surfaces, mesh and solve: another version may round differently
 _LIBRARIES = ("numpy", "scipy", "pytetwild", "pypardiso", "mkl", "pyvista", "vtk",
               "gmsh", "meshio")  # fmt: skip
-_UNUSED = 90 * 86_400  # [s] since a solution was read or written: it is removed
+_UNUSED = 90 * 86_400  # [s] without use, after which a solution is removed
 
 
 def solution_key(link: MeshLink, digest: str, options: object) -> str:
-    """Name of the solution of a link.
+    """Return the name of the solution of a link.
 
     Args:
-        link: to be solved.  Where its surface lies and how its mesh is turned is left
-            out: a solution is in the mesh's axes.
+        link: to be solved.  The path of its surface and the orientation of its mesh are
+            left out, because a solution is in the mesh's axes.
         digest: SHA-256 of the surface file.
         options: :class:`stiffness.fem.fea.FemOptions` of the solution.
 
     Returns:
-        A digest of the link, the options and the program; links of one key have equal
-        solutions.
+        A digest of the link, the options and the program; links with the same key have
+        equal solutions.
     """
     from stiffness.surface.surface_files import named_solid
 
     file, solid = named_solid(link.surface)
-    name = Path(f"{file.suffix.lower()}#{solid}")  # the ending says how it is read
+    name = Path(f"{file.suffix.lower()}#{solid}")  # the suffix determines the reader
     content = replace(link, surface=name, up=None, frame_up=None, axis=None)
     text = "\n".join([digest, repr(content), repr(options), _program()])
     return hashlib.sha256(text.encode()).hexdigest()
@@ -59,20 +59,20 @@ def solution_key(link: MeshLink, digest: str, options: object) -> str:
 
 @cache
 def _program() -> str:
-    """SHA-256 of what reads surfaces and solves links."""
+    """Return the SHA-256 of the code that reads surfaces and solves links."""
     return sources_hash((forcefit.inputs, stiffness, assembly.files), _LIBRARIES)
 
 
 def stored_solution(key: str, solve: Callable[[], MeshSolution]) -> MeshSolution:
-    """The solution of a key: from the disk, or solved and stored.
+    """Return the solution of a key: from the disk, or solved and stored.
 
     Args:
-        key: of :func:`solution_key`.
-        solve: called where no solution is stored; other processes that ask for this key
-            wait until it is done.
+        key: result of :func:`solution_key`.
+        solve: function called if no solution is stored; other processes that need this
+            key wait until it is done.
 
     Returns:
-        The solution, the same to the last bit in both cases.
+        The solution, bit-identical in both cases.
     """
     folder = cache_folder()
     if folder is None:
@@ -90,7 +90,7 @@ def stored_solution(key: str, solve: Callable[[], MeshSolution]) -> MeshSolution
 
 @contextmanager
 def _one_process(mark: Path) -> Generator[None, None, None]:
-    """One process at a time; all at once on a disk that is full or has no locks."""
+    """Admit one process at a time; all if the disk is full or has no locks."""
     with ExitStack() as stack:
         with suppress(OSError):
             stack.enter_context(locked_file(mark))
@@ -102,7 +102,7 @@ def _one_process(mark: Path) -> Generator[None, None, None]:
 
 
 def _read(path: Path, key: str) -> MeshSolution | None:
-    """A stored solution; None if there is none, or a file of something else."""
+    """Return a stored solution; None if it is absent or of another kind."""
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
             content = json.loads(str(stored["content"]))
@@ -119,7 +119,7 @@ def _read(path: Path, key: str) -> MeshSolution | None:
 
 
 def _write(path: Path, key: str, solution: MeshSolution) -> None:
-    """Write a solution whole or not at all; a full or read-only disk is no error."""
+    """Write a solution completely or not at all; a full disk is no error."""
     arrays: list[NDArray] = []
     content = json.dumps({"key": key, "solution": _encoded(solution, arrays)})
     named: dict[str, Any] = {str(k): array for k, array in enumerate(arrays)}
@@ -132,14 +132,14 @@ def _write(path: Path, key: str, solution: MeshSolution) -> None:
 
 
 def _remove_unused(folder: Path) -> None:
-    """Remove solutions that were not used for long, as those of older programs."""
+    """Remove solutions without recent use, such as those of older programs."""
     for path in folder.glob("link-*.npz"):
         if time.time() - path.stat().st_mtime > _UNUSED:
             path.unlink()
 
 
 def _encoded(value: Any, arrays: list[NDArray]) -> Any:
-    """A value in terms of JSON; arrays are appended to a list and numbered."""
+    """Return a value in terms of JSON; arrays are appended to a list and numbered."""
     if isinstance(value, np.ndarray):
         arrays.append(value)
         return {"array": str(len(arrays) - 1)}
@@ -160,7 +160,7 @@ def _encoded(value: Any, arrays: list[NDArray]) -> Any:
 
 
 def _decoded(value: Any, arrays: Mapping[str, NDArray]) -> Any:
-    """The value of :func:`_encoded`."""
+    """Return the value of :func:`_encoded`."""
     if isinstance(value, list):
         return [_decoded(v, arrays) for v in value]
     if not isinstance(value, dict):
@@ -177,7 +177,7 @@ def _decoded(value: Any, arrays: Mapping[str, NDArray]) -> Any:
 
 @cache
 def _kinds() -> dict[str, Any]:
-    """Classes that a solution is made of."""
+    """Return the classes of which a solution consists."""
     from stiffness.fem.adaptive_step import Level
     from stiffness.fem.condensation import Condensed
     from stiffness.fem.elements import Elements

@@ -1,4 +1,5 @@
-"""All compiled code, C++, and which module of it is used.
+"""Compiled C++ code, and the choice of its module.
 
-Begin at ``choice.py``; ``kernels.h`` lists the functions, ``records.h`` what they take.
+Begin with ``choice.py``; ``kernels.h`` lists the functions, ``records.h`` their
+arguments.
 """

@@ -1,4 +1,4 @@
-// Arrays of Python's as addresses, each checked: its numbers, its shape, its order.
+// Addresses of Python arrays; their number type, shape and order are checked.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -9,7 +9,8 @@
 
 namespace nb = nanobind;
 
-// How many rows arrays have that have the same number: what the first of them has.
+// Numbers of rows of arrays that must have equal numbers of rows: that of the first
+// array.
 struct Size {
     int64_t value = -1;
 };
@@ -25,7 +26,7 @@ inline std::string text(const Size &size) {
 }
 inline std::string text(int64_t size) { return std::to_string(size); }
 
-// One line that names the argument, what was found and what was expected.
+// One line that names the argument, the value found and the value expected.
 [[noreturn]] inline void refuse(
     nb::handle given, const char *name, std::string dtype, bool written,
     std::initializer_list<std::string> sizes) {
@@ -47,8 +48,8 @@ inline std::string text(int64_t size) { return std::to_string(size); }
             .c_str());
 }
 
-// Where an array's numbers are, none where it has none; of a T that is not constant it
-// can be written to.
+// Address of an array's numbers; null for an empty array.  Numbers of a T that is not
+// const may be written.
 template <typename T, typename... Sizes>
 T *address(nb::handle given, const char *name, Sizes &&...sizes) {
     nb::ndarray<T, nb::c_contig, nb::device::cpu> found;
@@ -84,8 +85,8 @@ inline const int64_t *indices(
     return all;
 }
 
-// First rows of groups, and where the last one ends: from 0 on, none before the other,
-// none beyond the limit; `whole`, the last at it.
+// First rows of groups, and the end of the last group: from 0, increasing and at most the
+// limit; if `whole`, the last one equals the limit.
 inline const int64_t *starts(
     nb::handle given, const char *name, int64_t limit, bool whole, Size &size) {
     const int64_t *all = integers(given, name, size);

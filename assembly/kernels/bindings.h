@@ -1,5 +1,5 @@
-// What Python sees of the compiled functions.  Arrays are checked in the bindings and
-// nowhere else; while a function runs, other threads of Python may.
+// Python's interface to the compiled functions.  Only the bindings check arrays.  While a
+// function runs, other Python threads may run.
 #pragma once
 
 #include <nanobind/nanobind.h>

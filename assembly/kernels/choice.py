@@ -1,8 +1,8 @@
-"""Which of the compiled modules is used: the best for this processor, found at import.
+"""Choice of the compiled module, at import: the best one for the processor.
 
-On x86-64 there is a module for each level of its instructions (x86-64 psABI), and the
-same numbers to the last bit in each; ``FORCEFIT_MARCH`` names another level than the
-highest that the processor has.  Elsewhere there is one module.
+On x86-64 there is a module for each level of instructions (x86-64 psABI).  All modules
+give the same numbers to the last bit.  ``FORCEFIT_MARCH`` names another level than the
+processor's highest.  Other processors have one module.
 """
 
 import os
@@ -19,13 +19,13 @@ _VARIABLE = "FORCEFIT_MARCH"
 
 
 def levels_here() -> list[str]:
-    """Levels that this processor has, the lowest first; none elsewhere than on x86-64.
+    """Return levels of this processor, the lowest first; none except on x86-64.
 
     Returns:
-        Names as :data:`LEVELS` has them.
+        Names in :data:`LEVELS`.
 
     Raises:
-        ImportError: the compiled modules are not there.
+        ImportError: the compiled modules are missing.
     """
     if not _on_x86_64():
         return []
@@ -34,14 +34,14 @@ def levels_here() -> list[str]:
 
 
 def chosen() -> ModuleType:
-    """The module for this processor, or for the level that ``FORCEFIT_MARCH`` names.
+    """Return module for this processor, or for the level that ``FORCEFIT_MARCH`` names.
 
     Returns:
         The compiled functions.
 
     Raises:
-        BadInput: the variable names no level, or one that the processor has not.
-        ImportError: the module is not there, or the processor is older than all.
+        BadInput: the variable names no level, or one that the processor lacks.
+        ImportError: the module is missing, or the processor lacks the lowest level.
     """
     wanted, here = os.environ.get(_VARIABLE), levels_here()
     if wanted and wanted not in here:
@@ -57,12 +57,12 @@ def chosen() -> ModuleType:
 
 
 def _on_x86_64() -> bool:
-    """Whether this processor is of that kind."""
+    """Return whether the processor is an x86-64 one."""
     return platform.machine().lower() in {"x86_64", "amd64"}
 
 
 def _load(name: str) -> ModuleType:
-    """A compiled module of this folder."""
+    """Return a compiled module of this folder."""
     full = f"{__package__}.{name}"
     if find_spec(full) is None:
         raise ImportError(

@@ -1,4 +1,4 @@
-// The compiled functions that Python calls.
+// Declarations of the compiled functions that Python calls.
 #pragma once
 
 #include "records.h"
@@ -22,16 +22,16 @@ void bound_all(
 // The classical compliance of every point.
 void comply_all(const Robot &robot, const Points &points, Compliances &out);
 
-// A cone programme from within, whatever the guess u (nu,); y (r + p,) of G's rows stays
-// as it is.
+// Interior-point method of a cone programme, from any guess u (nu,); y (r + p,) of G's
+// rows is not changed.
 void interior_point(const ConeProblem &given, const Limits &limits, double *u, double *y);
 
-// The same by Newton's method, from the guess of u and of H's multipliers.
+// Newton's method for the same programme, from a guess of u and of H's multipliers.
 void newton(const ConeProblem &given, const Limits &limits, double *u, double *y);
 
-// Overwrites lower and upper bound (2,), and the screw (6,) that attains the lower; how
-// many support functions it took: where these were too many the bounds are wider than
-// asked.
+// Overwrites lower and upper bound (2,), and the screw (6,) that attains the lower one.
+// Returns the number of support functions; with too many of them the bounds are wider
+// than required.
 int64_t farthest(const AskedBody &asked, double *bounds, double *screw);
 
 // Follows every target along its straight line.

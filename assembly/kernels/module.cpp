@@ -3,9 +3,9 @@
 #include "solvers/real.h"
 
 NB_MODULE(MODULE, m) {
-    nanobind::set_leak_warnings(false);  // robots stay known until the program ends
+    nanobind::set_leak_warnings(false);  // robots remain until the program ends
     m.attr("lanes") = LANE_SPACE::LANES;
-    m.attr("sources") = SOURCES;  // a digest of what it was made from
+    m.attr("sources") = SOURCES;  // digest of the source files
     bind_linear(m);
     bind_kinematics(m);
     bind_solvers(m);

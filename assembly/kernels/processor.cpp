@@ -1,4 +1,4 @@
-// Which level of x86-64 this processor has, and its system allows: x86-64 psABI, table 3.1.
+// Level of x86-64 that the processor has and the system allows: x86-64 psABI, table 3.1.
 #include <cpuid.h>
 #include <nanobind/nanobind.h>
 

@@ -1,10 +1,10 @@
-// What Python hands to the kernels, as addresses of arrays and how many rows they have.
+// Arguments from Python to the kernels: addresses of arrays and their numbers of rows.
 #pragma once
 
 #include <cstdint>
 #include <functional>
 
-// A robot: assembly/linear/robot_structure.py's Structure, and how many there are.
+// A robot: Structure of assembly/linear/robot_structure.py, and its array sizes.
 struct Robot {
     double size;
     int64_t platform;
@@ -29,8 +29,8 @@ struct Points {
     int64_t own_posture, own_errors, own_loads;
 };
 
-// Problem (22), one row a point: `out` of assembly/linear/lanes.py; `elastic` only
-// where it is requested.
+// Solution of problem (22), one row for each point: `out` of assembly/linear/lanes.py;
+// `elastic` only on request.
 struct Solutions {
     int64_t *outcome;
     double *energy, *bound, *without_clearance, *work, *platform_screw, *clearances,
@@ -51,7 +51,8 @@ struct Compliances {
     int64_t *status;
 };
 
-// Where the solution of (22) leaves the points, one row each; see lanes.py.
+// Inputs of later problems from the solution of (22), one row for each point; see
+// lanes.py.
 struct Centres {
     const double *screws, *clearances, *motions;
 };
@@ -63,8 +64,8 @@ struct ClearanceLoads {
     const int64_t *cone_of;
 };
 
-// What is asked of (27): from the platform's origin to the point whose error is meant; of
-// upper minus lower bounds.
+// Request of (27): vector from the platform's origin to the point whose error is bounded,
+// and required width between upper and lower bound.
 struct Asked {
     const double *offset, *tolerance;  // (3,), (2,)
 };
@@ -82,26 +83,26 @@ struct ConeProblem {
     const double *G, *h, *d, *H, *k;      // (r, nu), (r,), (nu,), (p, nu), (p,)
 };
 
-// The gap that is asked for, and of Newton's method most steps and the first sigma.
+// Required gap; for Newton's method the largest number of steps and the first sigma.
 struct Limits {
     double relative, absolute, first_sigma;
     int64_t steps;
 };
 
-// A body of platform screws; the half, 0 or 3, that is meant, and what is asked of upper
-// minus lower bounds.
+// A body of platform screws, its half (0 or 3), and the required width between upper and
+// lower bound.
 struct AskedBody {
     int64_t p, cones, half;
     const int64_t *starts;                      // (cones + 1,)
     const double *centre, *map, *rows, *start;  // (6,), (6, nv), (p, nv), (nv,)
     double tolerance;
-    // where a support function is not found here: of a direction (3,) its certified
-    // height, the screw (6,) that attains it, and the gradient X^T d - H^T n (nv,)
+    // if no support function is found here: for a direction (3,) its certified height,
+    // the screw (6,) that attains it, and the gradient X^T d - H^T n (nv,)
     std::function<void(const double *, double *, double *, double *)> support;
 };
 
-// A set {|u_k| <= 1 for each cone k, H u = e}, whose right sides e may differ, and what is
-// asked of it: count directions d of length 1, each with what may be left of d.u.
+// A set {|u_k| <= 1 for each cone k, H u = e}, with different right sides e, and the
+// request: count directions d of length 1, each with the accepted gap of d.u.
 struct Directions {
     int64_t count, p, cones;
     const int64_t *starts;                                  // (cones + 1,)
@@ -109,8 +110,8 @@ struct Directions {
                                                           // (count, p), (count,)
 };
 
-// The farthest points, one row a direction: u (count, nu), the multipliers (count, p) of
-// H u = e, and whether the method came as close as asked.
+// The farthest points, one row for each direction: u (count, nu), the multipliers (count,
+// p) of H u = e, and whether the gap was reached.
 struct FarthestPoints {
     double *points, *multipliers;
     int64_t *solved;
@@ -147,7 +148,7 @@ struct Ellipsoid {
     const int64_t *starts;  // (cones + 1,)
 };
 
-// Trajectories of a walk, `every` of them between two platform screws that are kept.
+// Trajectories of a walk, `every` of them between two stored platform screws.
 struct Trajectories {
     int64_t kept, every;
     const double *to_screw;  // (6, nu)

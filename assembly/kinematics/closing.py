@@ -1,9 +1,9 @@
-"""Robots whose nominal closures do not hold: what is left open becomes an error.
+"""Robots whose nominal closures do not hold: the mismatch becomes an error.
 
 Published dimensions are rounded, and so are the coordinates of redundant drives.  A
-frame's body, or the elastic drives, then take up what the closures leave open.  The
-robot's nominal geometry closes afterwards; its geometric errors make it the robot that
-was given.
+frame's body, or the elastic drives, then take up the mismatch of the closures.  The
+nominal geometry of the returned robot closes; with its geometric errors it is the robot
+that was given.
 """
 
 from collections.abc import Callable, Mapping
@@ -19,8 +19,8 @@ from assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, nearest
 from stiffness.screws import rotation_matrix, rotation_vector, transform
 
-_OPEN = 1e-9  # [rad, m] what is left open where closures hold
-_SMALL = 0.1  # [rad, m] a geometric error is a small motion
+_OPEN = 1e-9  # [rad, m] largest mismatch of closures that hold
+_SMALL = 0.1  # [rad, m] largest error that counts as a small motion
 
 
 def closing_of(
@@ -29,20 +29,20 @@ def closing_of(
     joints: Mapping[str, float] | None = None,
     own_errors: bool = True,
 ) -> Callable[[Robot], Robot] | None:
-    """What makes a robot's closures hold, as ``--rest`` and ``--mismatch`` ask.
+    """Return a function that closes a robot, as ``--rest`` and ``--mismatch`` specify.
 
     Args:
         rest: name of a frame, see :func:`rest_in`.
         mismatch: ``"spring"``, see :func:`preloaded`.
-        joints: coordinates of drives for the latter.
-        own_errors: whether the robot keeps its errors; else it has those alone that its
-            closures make, as where drawn errors replace its own.
+        joints: coordinates of drives for ``mismatch``.
+        own_errors: whether the robot keeps its errors; otherwise it has only those of
+            its closures, as if drawn errors replace its own.
 
     Returns:
-        A function of the robot as declared; None where nothing is asked.
+        A function of the robot as declared; None if neither is given.
 
     Raises:
-        BadInput: another mismatch than spring.
+        BadInput: ``mismatch`` is not ``"spring"``.
     """
     if mismatch not in {None, "spring"}:
         raise BadInput(f'--mismatch: found "{str(mismatch)[:60]}", expected spring')
@@ -60,18 +60,18 @@ def closing_of(
 
 
 def rest_in(robot: Robot, name: str) -> Robot:
-    """The robot with what its closure leaves open as a geometric error of a frame.
+    """Return the robot with its closure's mismatch as a geometric error of a frame.
 
     Args:
-        robot: whose passive joints are moved as near to closing as they come, its
-            drives at their ``position``.
-        name: of a frame in the loop that does not close.
+        robot: its passive joints are moved as near to closing as possible, with drives
+            at their ``position``.
+        name: name of a frame in the loop that does not close.
 
     Returns:
         The robot whose nominal geometry closes; with its errors it is the one given.
 
     Raises:
-        BadInput: no such frame, it is in no loop that is open, or the rest is no small
+        BadInput: no such frame, no loop through it is open, or the mismatch is no small
             motion.
     """
     if name not in (names := [f.name for f in robot.frames]):
@@ -95,7 +95,7 @@ def rest_in(robot: Robot, name: str) -> Robot:
 
 
 def _corrected(robot: Robot, row: int, X: NDArray) -> Robot:
-    """The robot whose frame ends at X of where it did, and errs by the inverse."""
+    """Return the robot whose frame is moved by X, and whose error is the inverse."""
     frame = robot.frames[row]
     body = transform(frame.translation, rotation_matrix(frame.rotation)) @ X
     error = frame.geometric_error
@@ -120,20 +120,20 @@ def _corrected(robot: Robot, row: int, X: NDArray) -> Robot:
 
 
 def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
-    """The robot at drive coordinates that do not fit, its elastic drives preloaded.
+    """Return a robot with drive coordinates that do not close, its drives preloaded.
 
     Args:
-        robot: with redundant drives that are elastic.
+        robot: robot with redundant drives that are elastic.
         joints: coordinates [rad or m] of drives by frame; others keep their
             ``position``.
 
     Returns:
-        The robot whose home pose is the nearest that closes; each drive errs by the
-        difference to what was asked of it, which its spring takes up.
+        The robot whose home pose is the nearest that closes.  The error of each drive
+        is the difference to its requested coordinate, which its spring takes up.
 
     Raises:
-        BadInput: an unknown drive; coordinates that none near by fit; a drive that
-            differs and is rigid.
+        BadInput: an unknown drive; no closing coordinates nearby; a drive with a
+            difference is rigid.
     """
     target = joint_target(robot, joints or {})
     assert target.coordinates is not None
@@ -174,7 +174,7 @@ def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
 
 
 def _positioned(robot: Robot, q: NDArray) -> Robot:
-    """The robot with other coordinates at home."""
+    """Return the robot with other coordinates at home."""
     moves = mobile(robot)
     frames = tuple(
         replace(frame, position=float(value)) if moving else frame
@@ -184,12 +184,12 @@ def _positioned(robot: Robot, q: NDArray) -> Robot:
 
 
 def _independent(robot: Robot, T: NDArray) -> NDArray:
-    """(n,) bool: drives that together hold the robot, the first in its file."""
+    """Return (n,) bool: drives that together hold the robot, the first in its file."""
     A = closure_matrices(robot, T)[0][0]
     driven = np.array([f.actuated for f in robot.frames])[mobile(robot)]
     loose = ~driven
     for column in np.flatnonzero(driven)[::-1]:
-        # a drive may be left free where the others hold it through the closures
+        # a drive may be free if the others hold it through the closures
         others = np.append(np.flatnonzero(loose), column)
         if _rank(A[:, others]) > _rank(A[:, loose]):
             loose[column] = True
@@ -199,5 +199,5 @@ def _independent(robot: Robot, T: NDArray) -> NDArray:
 
 
 def _rank(A: NDArray) -> int:
-    """Number of singular values that are not rounding."""
+    """Return the number of singular values above rounding."""
     return int(np.linalg.matrix_rank(A, tol=1e-6)) if A.size else 0

@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 from assembly.kinematics.nominal import mobile, motion_screws, size_of
 from assembly.model.robot import Robot
 
-# relative size of a singular value of closures that counts as none: they hold to 1e-10,
-# and beside a singularity a posture is known only to some root of that
+# relative size below which a singular value of closures counts as zero: closures hold
+# to 1e-10, and near a singularity a posture is known only to a root of that
 SINGULAR = 1e-6
-_NOISE = 30.0  # of it, times what closures leave open
+_NOISE = 30.0  # noise of singular values over the closure error
 
 
 @lru_cache(maxsize=64)
 def closure_signs(robot: Robot) -> NDArray:
-    """(closures, n) +1 on a closure's first chain, -1 on its second, 0 where shared."""
+    """Return (closures, n): +1 on the first chain, -1 on the second, 0 if shared."""
     paths = robot.on_path.astype(int)
     pairs = [(robot.index(a), robot.index(b)) for a, b in robot.closures]
     count = len(robot.frames)
@@ -26,10 +26,10 @@ def closure_signs(robot: Robot) -> NDArray:
 
 
 def closure_matrices(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Velocities of closures, drives and platform for unit rates of the mobile joints.
+    """Return velocities of closures, drives and platform for unit joint rates.
 
     Args:
-        robot: of n frames, m of them mobile, a driven, with c closures.
+        robot: robot of n frames, m of them mobile, a driven, with c closures.
         T: (k, n, 4, 4) frames seen from the base.
 
     Returns:
@@ -55,10 +55,10 @@ def closure_matrices(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray, NDArra
 
 
 def locked_closures(robot: Robot, T: NDArray) -> NDArray:
-    """Velocities of closures for unit rates of the joints that no drive holds.
+    """Return velocities of closures for unit rates of the passive joints.
 
     Args:
-        robot: of n frames, p of them passive joints, with c closures.
+        robot: robot of n frames, p of them passive joints, with c closures.
         T: (k, n, 4, 4) frames seen from the base.
 
     Returns:
@@ -69,18 +69,19 @@ def locked_closures(robot: Robot, T: NDArray) -> NDArray:
 
 
 def locked_ranks(robot: Robot, T: NDArray) -> NDArray:
-    """(k,) ranks of :func:`locked_closures`."""
+    """Return the (k,) ranks of :func:`locked_closures`."""
     values = np.linalg.svd(locked_closures(robot, T), compute_uv=False)
     return (values > SINGULAR * values[:, :1].clip(1e-300)).sum(axis=1)
 
 
 def redundant_drives(robot: Robot, T: NDArray, left_open: float = 0.0) -> int:
-    """How many drives a robot has beyond those that hold it.
+    """Return the number of drives that the robot could lose and still be held.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         T: (n, 4, 4) frames seen from the base.
-        left_open: [rad, m] by closures there: singular values of its size are none.
+        left_open: [rad, m] closure error there: singular values of its size count as
+            zero.
 
     Returns:
         Their number: the rank of all closures minus that with the drives locked.

@@ -1,6 +1,7 @@
-"""Continuation to several targets side by side, compiled.
+"""Continuation to several targets in parallel, compiled.
 
-One target in each lane of the processor's vector registers; no lane depends on another.
+Each lane of the processor's vector registers takes one target; no lane depends on
+another.
 """
 
 from typing import Any
@@ -13,13 +14,13 @@ from assembly.kinematics.track import Track
 
 
 def tree_of(fields: dict[str, Any]) -> Any:
-    """A robot's tree for C++.
+    """Return a robot's tree for C++.
 
     Args:
         fields: arrays and numbers of ``Tree`` in ``assembly/kernels/records.h``.
 
     Returns:
-        The same, checked.
+        The tree, checked.
 
     Raises:
         ValueError: an array has another shape, type or order of its numbers.
@@ -31,14 +32,15 @@ def follow_side_by_side(
     tree: Any, start: NDArray, poses: NDArray, held: NDArray, guess: bool,
     track: Track,
 ) -> None:  # fmt: skip
-    """Follow every target along its straight line.
+    """Follow the robot to every target along its straight line.
 
     Args:
-        tree: of the robot.
+        tree: tree of the robot.
         start: (n,) coordinates at home.
-        poses: (k, 6) ``[tx ty tz rx ry rz]``, NaN where free; no rows if not asked.
+        poses: (k, 6) ``[tx ty tz rx ry rz]``, NaN where free; no rows if not given.
         held: (k, n) coordinates, NaN where free.
-        guess: the start is one, and does not close: one step, of any length.
+        guess: whether the start is a guess that does not close: then one step of any
+            length.
         track: to fill.
     """
     out = (track.coordinates, track.progress, track.transforms, track.closure_mismatch)
@@ -48,7 +50,7 @@ def follow_side_by_side(
     asked = np.isfinite(np.hstack([poses, held]) if len(poses) else held)
     left = np.arange(len(held))
     while left.size:
-        # those of a call ask for the same entries
+        # targets of one call prescribe the same entries
         same = (asked[left] == asked[left[0]]).all(axis=1)
         rows, left = left[same], left[~same]
         whole = len(rows) == len(held)
@@ -64,5 +66,5 @@ def _follow(
     tree: Any, given: tuple[NDArray, NDArray, NDArray], guess: bool,
     out: tuple[NDArray, ...],
 ) -> None:  # fmt: skip
-    """Targets that ask for the same entries: start, poses and held coordinates."""
+    """Follow targets that prescribe the same entries of pose and coordinates."""
     kernels.follow_all(tree, *map(np.ascontiguousarray, given), guess, *out)

@@ -1,9 +1,9 @@
-"""Postures on the far side of a singularity: no way from home avoids it.
+"""Postures beyond a singularity: every path from home crosses it.
 
 With drives locked, the closures' matrix A (6 c, p) of the passive joints has rank r at
-all postures but the singular ones.  Between bases of its range and of its row space,
-carried along a path from home, it is a square matrix with a determinant; a change of
-its sign is a singularity that was crossed.
+almost all postures.  Between bases of its range and of its row space, carried along a
+path from home, it is a square matrix with a determinant.  A change of the determinant's
+sign shows that a singularity was crossed.
 """
 
 from functools import lru_cache
@@ -17,23 +17,23 @@ from assembly.kinematics.posture import Posture, home_posture, pose_components
 from assembly.kinematics.singular_posture import rank_near
 from assembly.model.robot import Robot
 
-_ALIKE = 0.3  # product of the cosines between two bases that one step may join
+_ALIKE = 0.3  # product of the cosines between two bases that one step may connect
 _STEPS = (
     4,
     32,
-)  # of a path on which they turn farther; more where the first does not do
+)  # steps of a path on which the bases rotate farther; more if the first do not suffice
 
 
 def beyond_singularity(robot: Robot, target: Target, T: NDArray) -> NDArray:
-    """Which postures lie on the far side of a singularity, seen from home.
+    """Return which postures lie beyond a singularity, seen from home.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         target: k poses or joint coordinates that were reached from home.
         T: (k, n, 4, 4) frames there.
 
     Returns:
-        (k,) bool.  None where home is singular itself: it has no side.
+        (k,) bool.  All False if home itself is singular.
     """
     home = home_posture(robot)
     start = locked_closures(robot, home.transforms[None])
@@ -55,13 +55,13 @@ def beyond_singularity(robot: Robot, target: Target, T: NDArray) -> NDArray:
 
 @lru_cache(maxsize=16)
 def home_rank(robot: Robot) -> int:
-    """Rank of the locked closures at home or near by."""
+    """Return the rank of the locked closures at home or nearby."""
     home = home_posture(robot)
     return rank_near(robot, home.coordinates, home.transforms)
 
 
 def _compared(A: NDArray, B: NDArray, rank: int) -> tuple[NDArray, NDArray]:
-    """Signs of B (k, m, p) between the bases of A, and how alike both bases are.
+    """Return signs of B (k, m, p) between the bases of A, and the bases' similarity.
 
     Returns:
         (k,) signs of the determinants; (k,) 1 where both bases span the same, 0 where
@@ -83,7 +83,7 @@ def _compared(A: NDArray, B: NDArray, rank: int) -> tuple[NDArray, NDArray]:
 def _along(
     robot: Robot, home: Posture, target: Target, steps: int, rank: int, ends: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """The same with bases carried along the paths from home; the least alike."""
+    """Return signs and least overlaps of bases carried along the paths from home."""
     before = locked_closures(robot, home.transforms[None]).repeat(len(ends), axis=0)
     signs, alike = np.ones(len(ends)), np.ones(len(ends))
     for k in range(1, steps + 1):
@@ -91,7 +91,7 @@ def _along(
         if k < steps:
             track = follow(robot, home.coordinates, _part(home, target, k / steps))
             A = locked_closures(robot, track.transforms)
-            # a part of the way that is not reached alone is left out
+            # a part of the path that cannot be reached alone is left out
             A = np.where(track.reached[:, None, None], A, before)
         sign, near = _compared(before, A, rank)
         signs, alike, before = signs * sign, np.minimum(alike, near), A
@@ -99,7 +99,7 @@ def _along(
 
 
 def _part(home: Posture, target: Target, part: float) -> Target:
-    """The target at a part of the straight line from home to it."""
+    """Return the target at a fraction of the straight line from home to it."""
 
     def between(start: NDArray, end: NDArray | None) -> NDArray | None:
         return None if end is None else start + part * (end - start)

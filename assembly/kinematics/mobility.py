@@ -17,21 +17,21 @@ _PLATFORM_RANK = 1e-6
 
 @dataclass(frozen=True)
 class Mobility:
-    """Counts at one posture; every joint rigid but for its own motion.
+    """Degrees of freedom at one posture; every joint rigid except for its own motion.
 
     Attributes:
-        freedoms: independent motions of the joints that keep all closures, drives free.
-        platform_freedoms: independent motions of the platform among them; the others
-            are local motions of the legs with the platform at rest.
-        freedoms_drives_locked: the same as ``freedoms`` with the actuated joints
-            locked.
-        platform_freedoms_drives_locked: likewise of the platform.
-        redundant_constraints: rows of all joints' constraints, actuated joints locked,
-            minus their rank: independent internal loads of the rigid robot.
-        drives: actuated joints.
+        freedoms: number of joint motions that keep all closures, drives free.
+        platform_freedoms: number of independent motions of the platform among them;
+            the others are local motions of the legs with the platform at rest.
+        freedoms_drives_locked: as ``freedoms``, with the actuated joints locked.
+        platform_freedoms_drives_locked: as ``platform_freedoms``, likewise.
+        redundant_constraints: number of rows of all joints' constraints, actuated
+            joints locked, minus their rank: independent internal loads of the rigid
+            robot.
+        drives: number of actuated joints.
         locked_freedoms: as ``freedoms_drives_locked``.
-        overconstraint: closure equations that the others already imply, drives free.
-        smallest_singular_value: [-] least one above zero of the constraint matrix,
+        overconstraint: number of closure equations that the others imply, drives free.
+        smallest_singular_value: [-] least nonzero one of the constraint matrix,
             lengths divided by the robot's size: near zero is near a singularity.
     """
 
@@ -47,14 +47,14 @@ class Mobility:
 
 
 def mobility(posture: Posture, tolerance: float = 1e-8) -> Mobility:
-    """Mobility and redundant constraints at a posture.
+    """Return the mobility and redundant constraints at a posture.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         tolerance: relative size below which a singular value counts as zero.
 
     Returns:
-        The counts.
+        The numbers.
 
     Sources:
         Zlatanov, Bonev, Gosselin (2002), Constraint singularities of parallel

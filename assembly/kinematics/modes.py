@@ -1,8 +1,8 @@
-"""Ways from a singular home pose, where several operation modes meet.
+"""Tracks from a singular home pose, where several operation modes meet.
 
-There the closures and a pose given in part, or the drives, do not say which mode the
-robot takes: rounding would choose.  Here the platform keeps what was not given as it is
-at home, if it can: first all of it, then its rotation, then its translation.
+There the closures and a partial pose, or the drives, do not determine the mode:
+rounding would choose.  So the platform keeps the components that are not given as at
+home, if possible: first all of them, then its rotation, then its translation.
 """
 
 from dataclasses import fields
@@ -15,8 +15,8 @@ from assembly.kinematics.nominal import Target, follow
 from assembly.kinematics.track import Track
 from assembly.model.robot import Robot
 
-_CLOSED = 1e-8  # [rad, m] most that closures and pose may leave open in a mode
-# components [tx ty tz rx ry rz] that stay, in the order in which they are tried
+_CLOSED = 1e-8  # [rad, m] largest error of closures and pose in a mode
+# components [tx ty tz rx ry rz] that are kept, in the order in which they are tried
 _KEPT = (range(6), range(3, 6), range(3))
 
 
@@ -26,12 +26,12 @@ def follow_in_mode(
     """Follow the closures from home to many targets, in a mode where modes meet.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         home: (n,) [rad or m] coordinates of the home pose.
         pose: (6,) ``[tx ty tz rx ry rz]`` [m, rad] of the platform there.
         target: k poses or sets of coordinates.
-        singular: whether modes meet at home.  Elsewhere what is not given is held only
-            where the target cannot be reached otherwise.
+        singular: whether modes meet at home.  Elsewhere components not given are kept
+            only if the target cannot be reached otherwise.
 
     Returns:
         The ends of the tracks, and their progress.
@@ -50,7 +50,7 @@ def follow_in_mode(
 
 
 def _held(target: Target, pose: NDArray, kept: range) -> Target:
-    """The target, and components of the pose that it does not give as they are."""
+    """Return the target with components that it does not give taken from the pose."""
     goal = np.full((len(target), 6), np.nan)
     if target.pose is not None:
         goal = np.array(target.pose, dtype=float)
@@ -62,7 +62,7 @@ def _try(
     robot: Robot, home: NDArray, target: Target, track: Track, rows: NDArray,
     whatever: bool,
 ) -> None:  # fmt: skip
-    """Follow other targets, into these rows of a track where they are reached."""
+    """Follow other targets; fill these rows of a track if they are reached."""
     found = follow(robot, home, target)
     good = whatever | (found.reached & (found.mismatch < _CLOSED))
     for one in fields(Track):

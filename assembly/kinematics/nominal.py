@@ -1,8 +1,8 @@
-"""The nominal closures, solved: joint coordinates at which the perfect robot closes.
+"""Solution of the nominal closures: joint coordinates at which the robot closes.
 
-Many targets are followed at once, each along its straight line from the home pose.
-Steps are damped Gauss-Newton of least norm, so what the closures and the target leave
-undetermined stays unchanged, and overconstrained robots are no special case.  The
+Many targets are followed together, each along its straight line from the home pose.
+Steps are damped Gauss-Newton of least norm.  So coordinates that closures and target
+leave undetermined do not change, and overconstrained robots are no special case.  The
 loops are compiled: :mod:`assembly.kinematics.continuation_side_by_side`.
 """
 
@@ -40,27 +40,27 @@ class Target:
         return 0 if given is None else len(given)
 
     def rows(self, which: NDArray) -> "Target":
-        """Some of the targets."""
+        """Return a selection of the targets."""
         parts = (self.pose, self.coordinates)
         return Target(*(None if part is None else part[which] for part in parts))
 
 
 def size_of(robot: Robot) -> float:
-    """[m] reference length: the longest body of the robot, 1 if all are points."""
+    """Return reference length [m]: that of the longest body, 1 if all are points."""
     lengths = np.linalg.norm(robot.fixed_transforms[:, :3, 3], axis=1)
     return float(lengths.max()) or 1.0
 
 
 def mobile(robot: Robot) -> NDArray:
-    """(n,) bool: joints that are not fixed."""
+    """Return the (n,) bool: joints that are not fixed."""
     return np.array([f.joint != "fixed" for f in robot.frames])
 
 
 def motion_screws(robot: Robot, T: NDArray) -> NDArray:
-    """Screws by which unit joint motions move what is attached, at the base origin.
+    """Return the screws of unit joint motions, read at the base origin.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         T: (..., n, 4, 4) frames.
 
     Returns:
@@ -75,9 +75,9 @@ def motion_screws(robot: Robot, T: NDArray) -> NDArray:
 
 @lru_cache(maxsize=64)
 def _tree(robot: Robot) -> dict[str, Any]:
-    """Fields of a compiled tree, once for each robot."""
+    """Return the fields of a compiled tree, once for each robot."""
     pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
-    # a joint's motion comes after its own frame
+    # a joint's motion acts after its own frame
     carries = robot.on_path - np.eye(len(robot.frames))
     moved = [carries[a] - carries[b] for a, b in pairs]
     moved.append(carries[robot.index(robot.platform)])
@@ -96,7 +96,7 @@ def _tree(robot: Robot) -> dict[str, Any]:
 
 @lru_cache(maxsize=64)
 def _tree_side_by_side(robot: Robot) -> Any:
-    """The same for C++."""
+    """Return the C++ tree of a robot."""
     return tree_of(_tree(robot))
 
 
@@ -104,10 +104,10 @@ def follow(robot: Robot, start: NDArray, target: Target, guess: bool = False) ->
     """Follow the nominal closures from one configuration to many targets.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         start: (n,) coordinates that close.
         target: k poses or sets of held coordinates.
-        guess: the start need not close: it is the first guess of one step.
+        guess: whether the start is a guess that need not close; then one step is made.
 
     Returns:
         The ends of the tracks, and their progress.

@@ -1,9 +1,9 @@
-"""Beams in pieces: one link as several springs in a row.
+"""Beams in pieces: one link as several springs in series.
 
-A spring at a beam's end is the beam as long as it bends little: its error grows with
-the square of the angle.  Cut into n pieces of L / n, each a frame with a spring of its
-own, the angle of each falls with n and the error with n squared.  For small motions
-nothing changes: beams end to end are one beam.
+A single spring at a beam's end is accurate as long as the beam bends little: its error
+grows with the square of the angle.  Cut into n pieces of L / n, each a frame with its
+own spring, the angle of each falls with n and the error with n squared.  For small
+motions the result does not change.
 """
 
 from dataclasses import dataclass, replace
@@ -18,13 +18,15 @@ from stiffness.screws import rotation_matrix
 
 @dataclass(frozen=True, eq=False)
 class CutRobot:
-    """A robot whose beams in pieces are rows of frames.
+    """A robot whose beams are cut into pieces, each a frame.
 
     Attributes:
-        robot: of m frames, m >= n.
-        owner: (m,) row of the frame, in the robot that was cut, that each belongs to.
-        last: (n,) row here of each of those frames: a beam's last piece ends there.
-        back: (m,) [m] from a frame's own origin to the piece's end, along the beam.
+        robot: robot of m frames, m >= n.
+        owner: (m,) row of the frame, in the robot before the cut, to which each
+            belongs.
+        last: (n,) row of each original frame in the cut robot: the beam's last piece.
+        back: (m,) [m] distance from a frame's own origin to the piece's end, along the
+            beam.
     """
 
     robot: Robot
@@ -33,10 +35,11 @@ class CutRobot:
     back: NDArray
 
     def cut(self, posture: Posture) -> Posture:
-        """The same posture with a frame for each piece; many in one likewise.
+        """Return one posture or many with a frame for each piece.
 
         Args:
-            posture: of the robot that was cut, arrays (..., n) and (..., n, 4, 4).
+            posture: posture of the robot before the cut, arrays (..., n) and (..., n,
+                4, 4).
 
         Returns:
             Arrays (..., m) and (..., m, 4, 4).
@@ -51,20 +54,20 @@ class CutRobot:
         return Posture(self.robot, q, T, posture.mismatch)
 
     def spread(self, rows: NDArray) -> NDArray:
-        """Rows of frames (..., n, k) where their beams end, (..., m, k), else zero."""
+        """Return (..., m, k): rows (..., n, k) at the beams' ends, else zero."""
         spread = np.zeros((*rows.shape[:-2], len(self.owner), rows.shape[-1]))
         spread[..., self.last, :] = rows
         return spread
 
 
 def cut_beams(robot: Robot) -> CutRobot:
-    """A robot with a frame for every piece of its beams.
+    """Return a robot with a frame for every piece of its beams.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
 
     Returns:
-        The cut robot; the same frames where no beam is in pieces.
+        The cut robot; the same frames if no beam has several pieces.
     """
     frames: list[Frame] = []
     owner, last, back = [], [], []
@@ -80,7 +83,7 @@ def cut_beams(robot: Robot) -> CutRobot:
 
 
 def _pieces(frame: Frame) -> list[tuple[Frame, float]]:
-    """Frames of one body from its base out, and how far each is from its tip."""
+    """Return frames of one body from its base on, with their distance from its tip."""
     link = frame.link
     if not isinstance(link, BeamLink) or link.pieces == 1:
         return [(frame, 0.0)]

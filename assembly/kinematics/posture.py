@@ -9,7 +9,7 @@ M_j     ``paths``           (..., n,6,6)  eqs (13)-(15): screw at frame j, in it
                                           axes -> at the platform, in base axes
 ======  ==================  ============  =========================================
 
-Eq. (14) is off by one as printed: its product down to h = j maps a screw written in
+Eq. (14) as printed is off by one: its product down to h = j maps a screw written in
 frame ant(j).  ``paths`` maps one written in frame j itself, ``[R 0; [p_j - p]x R, R]``.
 """
 
@@ -29,13 +29,14 @@ from assembly.kinematics.singular_posture import is_singular
 from assembly.kinematics.track import Track
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
-from forcefit.inputs.display import Figures, brief, html_table, numbers, short_repr
 from forcefit.inputs.table import BadInput, nearest
+from forcefit.results.display import Figures, brief, html_table, numbers, short_repr
 from stiffness.screws import rotation_matrix, rotation_vector, screw_map
 
 POSE = ("tx", "ty", "tz", "rx", "ry", "rz")
-_HOME_TOLERANCE = 1e-6  # [rad, m] what rounded robot files may leave open at home
-_SMALL = 1e-5  # of the reference length: the same of robots smaller than 100 mm
+_HOME_TOLERANCE = 1e-6  # [rad, m] accepted mismatch at home, for rounded robot files
+# relative to the reference length: the same for robots smaller than 100 mm
+_SMALL = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +49,8 @@ class Posture:
         robot: the manipulator.
         coordinates: (..., n) [rad or m] of every joint, 0 for fixed ones.
         transforms: (..., n, 4, 4) frames seen from the base, without imperfections.
-        mismatch: (...) [rad, m] largest nominal closure error left (rounded files);
-            dropped.
+        mismatch: (...) [rad, m] largest nominal closure error (rounded files); it is
+            ignored.
     """
 
     robot: Robot
@@ -60,7 +61,7 @@ class Posture:
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
     def _figures(self) -> Figures:
-        """Pose of the platform and coordinates of the drives."""
+        """Return the pose of the platform and coordinates of the drives."""
         if self.transforms.ndim > 3:
             return {"postures": str(self.transforms.shape[:-3])}
         frames = self.robot.frames
@@ -76,7 +77,7 @@ class Posture:
         }
 
     def __getitem__(self, rows: Any) -> "Posture":
-        """One of many postures, by a whole number; or some of them."""
+        """Return one of many postures, by its number, or a selection."""
         mismatch = np.broadcast_to(self.mismatch, self.transforms.shape[:-3])[rows]
         return replace(
             self, coordinates=self.coordinates[rows], transforms=self.transforms[rows],
@@ -98,7 +99,7 @@ class Posture:
 
     @property
     def distinct(self) -> "tuple[Posture, NDArray]":
-        """Of R postures the c distinct ones, and (R,) which of them each is."""
+        """The c distinct of R postures, and (R,) the index of each in them."""
         coordinates, transforms, which = _distinct(
             Unchanged(self.coordinates), Unchanged(self.transforms)
         )
@@ -106,18 +107,18 @@ class Posture:
         return distinct, which
 
     def pose(self) -> dict[str, float]:
-        """Nominal platform pose by component, rotation vector in base axes."""
+        """Return nominal platform pose by component, rotation vector in base axes."""
         return dict(zip(POSE, pose_components(self.platform).tolist(), strict=True))
 
 
 def together(postures: Sequence[Posture]) -> Posture:
-    """Many postures of one robot in one.
+    """Return k postures of one robot as one object.
 
     Args:
         postures: k of them, k > 0.
 
     Returns:
-        The same with a leading axis.
+        The postures with a leading axis.
     """
     return Posture(
         postures[0].robot, np.array([p.coordinates for p in postures]),
@@ -128,7 +129,7 @@ def together(postures: Sequence[Posture]) -> Posture:
 
 @dataclass(frozen=True)
 class Unchanged:
-    """Return a read-only array, so that results derived from it can be cached."""
+    """A read-only array, so that results derived from it can be cached."""
 
     numbers: NDArray
 
@@ -140,14 +141,14 @@ class Unchanged:
 
 
 def _maps_to(transforms: NDArray, platform: int) -> NDArray:
-    """(..., n, 6, 6) maps from screws at each frame to one of them, base axes."""
+    """Return (..., n, 6, 6) maps of screws at each frame to one of them, base axes."""
     offsets = transforms[..., :3, 3] - transforms[..., platform, None, :3, 3]
     return screw_map(offsets, transforms[..., :3, :3])
 
 
 @lru_cache(maxsize=2)
 def _paths(transforms: Unchanged, platform: int) -> NDArray:
-    """The same of many postures, once for all robots that stand there."""
+    """Return the maps at many postures, cached for all robots with these transforms."""
     paths = _maps_to(transforms.numbers, platform)
     paths.flags.writeable = False
     return paths
@@ -157,7 +158,7 @@ def _paths(transforms: Unchanged, platform: int) -> NDArray:
 def _distinct(
     coordinates: Unchanged, transforms: Unchanged
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Rows with distinct coordinates of both, and which of them each row has."""
+    """Return rows with distinct coordinates, and the index of each row in them."""
     q = coordinates.numbers
     _, first, which = np.unique(q, axis=0, return_index=True, return_inverse=True)
     return q[first], transforms.numbers[first], which.reshape(-1)
@@ -165,13 +166,13 @@ def _distinct(
 
 @lru_cache(maxsize=8)
 def _digest(array: Unchanged) -> bytes:
-    """Of an array's numbers."""
+    """Return the digest of an array's numbers."""
     return blake2b(np.ascontiguousarray(array.numbers).tobytes()).digest()
 
 
 @dataclass(frozen=True)
 class Content:
-    """Key of a cache: postures that stand alike, with arrays of the same numbers."""
+    """Key of a cache: postures with equal transforms, and arrays of equal numbers."""
 
     digest: bytes
     postures: Posture = field(compare=False)
@@ -181,15 +182,15 @@ class Content:
 def content_of(
     postures: Posture, arrays: tuple[NDArray, ...], names: object
 ) -> Content:
-    """The key of what is computed of postures and arrays, whatever else a robot has.
+    """Return the key of a result that depends on postures and arrays alone.
 
     Args:
-        postures: one, or many in one; of them the transforms and the frames' parents.
-        arrays: of numbers.
-        names: whatever else it depends on, by its ``repr``.
+        postures: one, or many in one; the key has their transforms and frames' parents.
+        arrays: arrays of numbers.
+        names: anything else on which it depends, by its ``repr``.
 
     Returns:
-        The key, which also holds what it was made of.
+        The key, which also holds the objects it was made of.
     """
     digest = blake2b(repr((names, [a.shape for a in arrays])).encode())
     for array in (postures.robot.parents, *arrays):
@@ -199,23 +200,23 @@ def content_of(
 
 
 def pose_components(T: NDArray) -> NDArray:
-    """(..., 6) ``[tx ty tz rx ry rz]`` of transforms, see :data:`POSE`."""
+    """Return ``[tx ty tz rx ry rz]`` (..., 6) of transforms, see :data:`POSE`."""
     return np.concatenate([T[..., :3, 3], rotation_vector(T[..., :3, :3])], axis=-1)
 
 
 @lru_cache(maxsize=64)
 def home_posture(robot: Robot) -> Posture:
-    """The home pose: actuated joints at ``position``, passive ones solved from it.
+    """Return the home pose: actuated joints at ``position``, passive ones solved.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
         The posture.
 
     Raises:
-        BadInput: a closure does not hold to 1e-6 rad and m, or 1e-5 of the longest
-            body where that is less; it is named.
+        BadInput: a closure does not hold to 1e-6 rad and m, or 1e-5 of the longest body
+            if that is less; the message names it.
     """
     actuated = np.array([f.actuated for f in robot.frames])
     held = np.where(actuated, robot.positions, np.nan)
@@ -237,7 +238,7 @@ def home_posture(robot: Robot) -> Posture:
 
 
 def _left_open(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray]:
-    """(closures,) [rad] and [m] largest components left open in each closure."""
+    """Return the (closures,) [rad] and [m] largest errors of each closure."""
     pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
     first, second = (T[[pair[k] for pair in pairs]] for k in (0, 1))
     between = first[:, :3, :3] @ np.swapaxes(second[:, :3, :3], -1, -2)
@@ -246,14 +247,14 @@ def _left_open(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _either(turned: float, shifted: float, least: float) -> str:
-    """The mismatch in the unit in which it is too large, and what is expected."""
+    """Return the mismatch in the unit in which it is too large, and the expectation."""
     if shifted < least:
         return f"{turned:.3g} rad with the actuated joints held, expected < 1e-06"
     return f"{shifted:.3g} m with the actuated joints held, expected < {least:.3g}"
 
 
 def _way_out(robot: Robot, T: NDArray, left_open: float = 0.0) -> str:
-    """What redundant drives can do, where there are some."""
+    """Return advice on redundant drives, if there are any."""
     count = redundant_drives(robot, T, left_open)
     if count <= 0:
         return ""
@@ -266,7 +267,7 @@ def _way_out(robot: Robot, T: NDArray, left_open: float = 0.0) -> str:
 
 @lru_cache(maxsize=64)
 def home_is_singular(robot: Robot) -> bool:
-    """Whether operation modes meet at home; see :func:`is_singular`."""
+    """Return whether operation modes meet at home; see :func:`is_singular`."""
     home = home_posture(robot)
     return is_singular(robot, home.coordinates, home.transforms)
 
@@ -276,16 +277,16 @@ def place_robot(
     pose: Mapping[str, float] | None = None,
     joints: Mapping[str, float] | None = None,
 ) -> Posture:
-    """The posture of a nominal platform pose, or of actuated coordinates.
+    """Return the posture of a nominal platform pose, or of actuated coordinates.
 
     The closures are followed from the home pose along a straight line, so the assembly
-    mode is the home pose's.  What the input leaves undetermined stays near home.  At a
-    singular home pose operation modes meet: there the platform keeps what is not given
-    as it is at home, if it can, its rotation first.
+    mode is that of the home pose.  Components that the input leaves undetermined stay
+    near home.  At a singular home pose operation modes meet: there the platform keeps
+    the components that are not given, if possible, its rotation first.
 
     Args:
-        robot: any.
-        pose: some of ``tx ty tz`` [m], ``rx ry rz`` [rad], the platform's translation
+        robot: any robot.
+        pose: any of ``tx ty tz`` [m], ``rx ry rz`` [rad], the platform's translation
             and rotation vector in base axes; components not given are free.
         joints: coordinates [rad or m] of actuated joints by frame; the others keep
             their ``position``.
@@ -295,7 +296,7 @@ def place_robot(
 
     Raises:
         BadInput: both or an unknown name given, a value not finite, or out of reach;
-            the message gives the distance that is missing.
+            the message gives the missing distance.
     """
     if pose and joints:
         raise BadInput("found both a pose and joints, expected one of them")
@@ -312,7 +313,7 @@ def place_robot(
 
 
 def pose_target(pose: Mapping[str, float]) -> Target:
-    """A single platform pose as a target; see :func:`place_robot`."""
+    """Return a single platform pose as a target; see :func:`place_robot`."""
     goal = np.full((1, 6), np.nan)
     for name, value in pose.items():
         if name not in POSE:
@@ -323,7 +324,7 @@ def pose_target(pose: Mapping[str, float]) -> Target:
 
 
 def joint_target(robot: Robot, joints: Mapping[str, float]) -> Target:
-    """Actuated coordinates as a target; see :func:`place_robot`."""
+    """Return the actuated coordinates as a target; see :func:`place_robot`."""
     actuated = [f.name for f in robot.frames if f.actuated]
     goal = np.where([f.actuated for f in robot.frames], robot.positions, np.nan)
     for name, value in joints.items():
@@ -335,7 +336,7 @@ def joint_target(robot: Robot, joints: Mapping[str, float]) -> Target:
 
 
 def _finite(whose: str, value: float, largest: float) -> float:
-    """The value, refused if it is not a finite number, or beyond any machine."""
+    """Return the value, refused if it is not a finite number, or beyond any machine."""
     if not np.isfinite(value):
         raise BadInput(f"{whose}: found {value}, expected a finite number")
     if abs(value) > largest:
@@ -347,10 +348,10 @@ def _finite(whose: str, value: float, largest: float) -> float:
 def place_many(
     robot: Robot, poses: ArrayLike
 ) -> tuple[list[Posture | None], list[str]]:
-    """Postures of many nominal platform poses at once.
+    """Return the postures of many nominal platform poses together.
 
     Args:
-        robot: any.
+        robot: any robot.
         poses: (k, 6) ``[tx ty tz rx ry rz]`` [m, rad], NaN where a component is free.
 
     Returns:
@@ -366,10 +367,10 @@ def place_many(
 def place_many_joints(
     robot: Robot, coordinates: ArrayLike
 ) -> tuple[list[Posture | None], list[str]]:
-    """Postures of many sets of actuated coordinates at once.
+    """Return the postures of many sets of actuated coordinates together.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         coordinates: (k, n) [rad or m] of the joints held, NaN for those left free.
 
     Returns:
@@ -384,7 +385,7 @@ def place_many_joints(
 def _follow_many(
     robot: Robot, target: Target
 ) -> tuple[list[Posture | None], list[str]]:
-    """For each target its posture, or None and the reason."""
+    """Return the posture of each target, or None and the reason."""
     track = _follow(robot, target)
     postures = [
         _posture(robot, track, i) if reached else None
@@ -398,7 +399,7 @@ def _follow_many(
 
 
 def _follow(robot: Robot, target: Target) -> Track:
-    """Targets followed from home, in a mode where modes meet there."""
+    """Follow targets from home, in one mode where modes meet there."""
     home = home_posture(robot)
     pose = pose_components(home.platform)
     singular = home_is_singular(robot)
@@ -406,7 +407,7 @@ def _follow(robot: Robot, target: Target) -> Track:
 
 
 def unreached(robot: Robot, track: Track, target: Target, i: int) -> str:
-    """Why target i was not reached, with the distance that is missing."""
+    """Return why target i was not reached, with the missing distance."""
     if target.pose is None:
         remaining = (1.0 - track.progress[i]) * 100
         return (
@@ -440,7 +441,7 @@ def unreached(robot: Robot, track: Track, target: Target, i: int) -> str:
 
 
 def _posture(robot: Robot, track: Track, i: int) -> Posture:
-    """Row i of a track, its arrays locked."""
+    """Return row i of a track as a posture with read-only arrays."""
     q, T = track.coordinates[i].copy(), track.transforms[i].copy()
     q.setflags(write=False)
     T.setflags(write=False)

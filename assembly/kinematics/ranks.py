@@ -1,6 +1,6 @@
-"""Ranks: which singular values of closures count as zero.
+"""Ranks: thresholds below which singular values of closures count as zero.
 
-The compiled methods have the same thresholds.
+The compiled methods use the same thresholds.
 """
 
 import numpy as np
@@ -10,13 +10,13 @@ RANK = 1e-10  # relative size below which a singular value counts as zero
 ROWS_RANK = 1e-9  # the same among rows that only clearances can satisfy
 # added to RANK for the rounding of robot files, times the nominal closure error left
 MISMATCH_FACTOR = 30.0
-# what a projection leaves of columns that it removes whole is rounding of their size
+# rounding of columns that a projection removes, relative to their size
 NOISE = 1e-12
-UNBOUNDED = 1e-8  # [rad, m] of the platform for a unit of a motion nothing resists
+UNBOUNDED = 1e-8  # [rad, m] of the platform for a unit of a motion without resistance
 
 
 def rank_tolerance(mismatch: float, least: float = RANK) -> float:
-    """Relative size below which a singular value of closures counts as zero.
+    """Return the relative size below which a singular value of closures counts as zero.
 
     Args:
         mismatch: [rad, m] nominal closure error left.
@@ -29,12 +29,12 @@ def rank_tolerance(mismatch: float, least: float = RANK) -> float:
 
 
 def rank_of(values: NDArray, tolerance: float, noise: float = 0.0) -> int:
-    """How many singular values do not count as zero.
+    """Return the number of singular values that do not count as zero.
 
     Args:
         values: (k,) the largest first.
-        tolerance: share of the largest that a value has to pass.
-        noise: size that it has to pass.
+        tolerance: share of the largest that a value must exceed.
+        noise: size that it must exceed.
 
     Returns:
         The rank; 0 without values.
@@ -43,7 +43,7 @@ def rank_of(values: NDArray, tolerance: float, noise: float = 0.0) -> int:
 
 
 def noise_of(columns: ArrayLike) -> float:
-    """What a projection may leave of columns that it removes whole.
+    """Return the rounding that a projection leaves of columns that it removes.
 
     Args:
         columns: (m, n), before the projection.

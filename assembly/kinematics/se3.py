@@ -29,11 +29,11 @@ _SERIES = 9  # terms of the Stumpff series: 1e-17 at angle 1
 _STUMPFF = np.array([
     [1 / math.factorial(2 * j + k) for k in range(6)] for j in range(_SERIES)
 ])  # fmt: skip
-_ROUNDING = 1e-16  # [-] below which the series of the second derivative ends
+_ROUNDING = 1e-16  # [-] size of terms at which the series of the second derivative ends
 
 
 def exponential(screw: ArrayLike) -> NDArray:
-    """Finite motion of a constant screw acting for unit time.
+    """Return the finite motion of a constant screw acting for unit time.
 
     Args:
         screw: (..., 6) ``[RX RY RZ TX TY TZ]`` [rad, m].
@@ -51,7 +51,7 @@ def exponential(screw: ArrayLike) -> NDArray:
 
 
 def logarithm(T: ArrayLike) -> NDArray:
-    """Constant screw that makes a finite motion in unit time.
+    """Return the constant screw that makes a finite motion in unit time.
 
     Args:
         T: (..., 4, 4) of rotations by less than pi.
@@ -67,20 +67,20 @@ def logarithm(T: ArrayLike) -> NDArray:
 
 
 def inverse(T: NDArray) -> NDArray:
-    """(..., 4, 4) the inverse motions."""
+    """Return the (..., 4, 4) inverse motions."""
     R_inverse = np.swapaxes(T[..., :3, :3], -1, -2)
     return transform(-(R_inverse @ T[..., :3, 3, None])[..., 0], R_inverse)
 
 
 def turn_jacobian(turn: ArrayLike) -> NDArray:
-    """(..., 3, 3) J of SO(3): small turn in fixed axes per change of the vector."""
+    """Return the (..., 3, 3) J of SO(3): small rotation per change of the vector."""
     W = skew(turn)
     _, _, c2, c3, *_ = stumpff(np.asarray(turn, dtype=float))
     return np.eye(3) + c2 * W + c3 * (W @ W)
 
 
 def left_jacobian(screw: ArrayLike) -> NDArray:
-    """Small motion, in the axes before the motion, per change of a screw.
+    """Return small motion, in the axes before the motion, per change of a screw.
 
     Args:
         screw: (..., 6) [rad, m].
@@ -105,7 +105,7 @@ def left_jacobian(screw: ArrayLike) -> NDArray:
 
 
 def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
-    """Work of a wrench on the second-order part of a change of a screw.
+    """Return the work of a wrench on the second-order part of a change of a screw.
 
     To second order ``exp(s + h) = exp(J h + D(h, h) / 2) exp(s)``; this is the matrix
     of ``w.D(h, h)``, from the series of J in brackets, to rounding.
@@ -137,7 +137,7 @@ def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
 
 
 def _orders(screws: NDArray) -> int:
-    """How many orders of brackets count, beside the first: turns make a power each."""
+    """Return the order of brackets that counts: each order is a power of the angle."""
     most = float(np.linalg.norm(screws[..., :3], axis=-1).max(initial=0.0))
     order, size = 2, most
     while size > _ROUNDING:
@@ -147,7 +147,7 @@ def _orders(screws: NDArray) -> int:
 
 
 def bracket(screw: ArrayLike) -> NDArray:
-    """(..., 6, 6) matrix of the screws' bracket, ``bracket(a) @ b = [a, b]``."""
+    """Return (..., 6, 6) matrix of the screws' bracket, ``bracket(a) @ b = [a, b]``."""
     s = np.asarray(screw, dtype=float)
     A = np.zeros((*s.shape[:-1], 6, 6))
     A[..., :3, :3] = A[..., 3:, 3:] = skew(s[..., :3])
@@ -156,7 +156,7 @@ def bracket(screw: ArrayLike) -> NDArray:
 
 
 def bracket_form(wrench: ArrayLike) -> NDArray:
-    """(..., 6, 6) antisymmetric Omega with ``a @ Omega @ b = wrench @ [a, b]``."""
+    """Return (..., 6, 6) antisymmetric Omega: ``a @ Omega @ b = wrench @ [a, b]``."""
     w = np.asarray(wrench, dtype=float)
     form = np.zeros((*w.shape[:-1], 6, 6))
     form[..., :3, :3] = -skew(w[..., :3])
@@ -165,7 +165,7 @@ def bracket_form(wrench: ArrayLike) -> NDArray:
 
 
 def stumpff(turn: NDArray) -> list[NDArray]:
-    """Stumpff functions c_0 .. c_5 of the angle, c_k = sum (-a^2)^j / (2j + k)!.
+    """Return Stumpff functions c_0 .. c_5 of the angle, c_k = sum (-a^2)^j / (2j + k)!.
 
     Args:
         turn: (..., 3) [rad] rotation vectors.

@@ -1,10 +1,10 @@
-"""Postures at which first order decides nothing: the locked robot gains a freedom.
+"""Singular postures, where the locked robot gains a freedom.
 
-With its drives locked a robot keeps as many freedoms as its closures leave.  Where it
-keeps more than at the postures near by, these closures are dependent at first order
-only: small errors move the robot far, or not at all, and equations (17) to (27), which
-are linear in them, answer neither whether the robot can be assembled nor how large its
-errors are.
+With its drives locked a robot keeps the freedoms that its closures leave.  Where it
+keeps more than at nearby postures, its closures are dependent at first order only.
+Small errors then move the robot far, or not at all.  Equations (17) to (27) are linear
+in them; they decide neither whether the robot can be assembled nor how large its errors
+are.
 Operation modes meet there (Zlatanov, Bonev, Gosselin 2002).
 
 Begin with :func:`is_singular`.
@@ -22,23 +22,23 @@ from assembly.kinematics.closure_rates import (
 from assembly.kinematics.nominal import Target, follow, mobile, size_of
 from assembly.model.robot import Robot
 
-_ASIDE = 0.02  # [rad or lengths] to postures near by
-_NEIGHBOURS = 6  # of them: any that stands apart from the singularity will do
-_APART = 1e-5  # relative size of a singular value that is not zero there
-_CLOSED = 1e-8  # [rad, m] most that a posture near by may leave open
-_NOISE = 1e3  # singular values that this times what is left open may make
+_ASIDE = 0.02  # [rad or lengths] distance of nearby postures
+_NEIGHBOURS = 6  # number of nearby postures; one off the singularity suffices
+_APART = 1e-5  # relative size of a singular value that is nonzero there
+_CLOSED = 1e-8  # [rad, m] largest closure error of a nearby posture
+_NOISE = 1e3  # times the closure error: singular values below it count as zero
 
 
 def is_singular(robot: Robot, q: NDArray, T: NDArray) -> bool:
-    """Whether the robot with locked drives keeps more freedoms than near by.
+    """Return whether the locked robot has more freedoms than at nearby postures.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         q: (n,) [rad or m] coordinates of all joints.
         T: (n, 4, 4) frames seen from the base.
 
     Returns:
-        Not so where it keeps as many all around, as a robot without drives.
+        False if it has as many everywhere, as a robot without drives.
     """
     rank = int(locked_ranks(robot, T[None])[0])
     # no posture has a rank above the number of columns
@@ -47,10 +47,10 @@ def is_singular(robot: Robot, q: NDArray, T: NDArray) -> bool:
 
 
 def rank_near(robot: Robot, q: NDArray, T: NDArray) -> int:
-    """The largest rank of the locked closures at a posture and at those near by.
+    """Return the largest rank of the locked closures at a posture and near it.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         q: (n,) [rad or m] coordinates of all joints.
         T: (n, 4, 4) frames seen from the base.
 
@@ -71,7 +71,7 @@ def rank_near(robot: Robot, q: NDArray, T: NDArray) -> int:
 
 
 def _steps_aside(robot: Robot, T: NDArray) -> NDArray:
-    """(some, n) [rad or m] joint steps that keep the closures at first order."""
+    """Return (count, n) joint steps that keep the closures at first order."""
     A = closure_matrices(robot, T[None])[0][0]
     _, values, Vt = np.linalg.svd(A)
     rank = int((values > SINGULAR * values[:1]).sum())

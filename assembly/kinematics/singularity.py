@@ -1,9 +1,9 @@
 r"""Distance of a posture to singularities of each kind, and the joints involved.
 
-The closures of the rigid robot let its drives and its platform move together in a
-space of directions.  With an orthonormal basis of it, rates (q_a, t) of drives and
-platform side by side, Q_a^T Q_a + Q_t^T Q_t = 1: the two halves have singular values
-cos(a_i) and sin(a_i), and the map from the drives to the platform has tan(a_i).
+The closures of the rigid robot let its drives and its platform move in a space of
+directions.  In an orthonormal basis of it, with rates (q_a, t) of drives and platform,
+Q_a^T Q_a + Q_t^T Q_t = 1.  The two halves have singular values cos(a_i) and sin(a_i),
+and the map from the drives to the platform has tan(a_i).
 
 ======== ==================== ==================================================
 code     zero means           kind of Gosselin and Angeles
@@ -13,7 +13,7 @@ serial   a drive moves, the   1st (type 1): the platform loses a freedom
 parallel the platform moves,  2nd (type 2): the locked robot gains a freedom
          no drive does
 closure  a closure transmits  constraint: the robot gains a freedom, or changes
-         no wrench any more   its assembly mode
+         no wrench            its assembly mode
 ======== ==================== ==================================================
 
 Lengths count in units of the robot's longest body, angles in radians.
@@ -34,12 +34,13 @@ from assembly.kinematics.nominal import Target, follow, mobile, size_of
 from assembly.kinematics.posture import home_posture
 from assembly.kinematics.ranks import rank_of
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, largest_row, short_repr
+from forcefit.results.display import html_table, largest_row, short_repr
 from stiffness.screws import SCREW
 
 KINDS = ("serial", "parallel", "closure")
 _RANK = 1e-9  # relative size below which a singular value counts as zero
-_PERTURBATIONS = (0.0, 0.013, -0.021)  # [rad or lengths] of the drives, for ranks
+# [rad or lengths] motions of the drives, to compute ranks
+_PERTURBATIONS = (0.0, 0.013, -0.021)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,10 +51,10 @@ class Singularities:
         serial: (k,) sine of the least angle a_i, 0 at a serial singularity; at most 1.
         parallel: (k,) cosine of the largest angle a_i, 0 at a parallel singularity.
         closure: (k,) least singular value of the closures that is not always zero.
-        serial_joints: (k, n) rates at which the serial singularity would move.
-        parallel_joints: (k, n) rates at which the parallel one would.
-        parallel_screws: (k, 6) the platform's motion then.
-        closure_joints: (k, n) rates that the closures resist least.
+        serial_joints: (k, n) joint rates of the motion at the serial singularity.
+        parallel_joints: (k, n) joint rates of the motion at the parallel singularity.
+        parallel_screws: (k, 6) the platform's motion there.
+        closure_joints: (k, n) joint rates that the closures resist least.
     """
 
     serial: NDArray
@@ -70,7 +71,7 @@ class Singularities:
     def condition(self) -> NDArray:
         """(k,) tan(a_max) / tan(a_min): condition of the map from drives to platform.
 
-        For robots with as many drives as freedoms; NaN without drives.
+        For robots with equally many drives and freedoms; NaN without drives.
         """
         least, most = self.serial, self.parallel
         rest = np.sqrt((1 - least**2).clip(0.0) * (1 - most**2).clip(0.0))
@@ -78,11 +79,11 @@ class Singularities:
             return rest / (least * most)
 
     def names(self, robot: Robot, near: float) -> list[str]:
-        """For each posture the singularities nearer than ``near``, with their joints.
+        """Return for each posture the singularities nearer than ``near``, with joints.
 
         Args:
-            robot: the one they are of.
-            near: size below which a distance is named.
+            robot: the same robot.
+            near: distance below which a singularity is named.
 
         Returns:
             Such as ``"parallel: left.elbow, platform TY"``; empty where none is near.
@@ -109,22 +110,22 @@ class Singularities:
 
 
 def find_singularities(robot: Robot, transforms: NDArray) -> Singularities:
-    """Distances to singularities at many postures.
+    """Return the distances to singularities at many postures.
 
     Args:
-        robot: of n frames; only its geometry matters.
+        robot: robot of n frames; only its geometry matters.
         transforms: (k, n, 4, 4) frames seen from the base.
 
     Returns:
-        The distances, in the order given; 1 where a kind does not exist, as closure
-        singularities of a robot without closures.
+        The distances, in the order given; 1 for a kind that does not exist, such as
+        closure singularities of a robot without closures.
     """
     return _measure(robot, transforms, _generic_ranks(robot))
 
 
 @dataclass(frozen=True)
 class _Ranks:
-    """Ranks away from singularities: of closures, of Q, of its platform half."""
+    """Ranks away from singularities: of closures, of Q, of its platform part."""
 
     closures: int
     motions: int
@@ -133,7 +134,7 @@ class _Ranks:
 
 @lru_cache(maxsize=16)
 def _generic_ranks(robot: Robot) -> _Ranks:
-    """The largest ranks at home and at perturbed drives."""
+    """Return the largest ranks at home and at perturbed drives."""
     home = home_posture(robot)
     driven = np.array([f.actuated for f in robot.frames])
     unit = np.array([
@@ -153,12 +154,12 @@ def _generic_ranks(robot: Robot) -> _Ranks:
 
 
 def _rank(A: NDArray, least: float = _RANK) -> int:
-    """How many singular values are above rounding, or above another size."""
+    """Return the number of singular values above rounding, or above another size."""
     return rank_of(np.linalg.svd(A, compute_uv=False), least, noise=least)
 
 
 def _null_space(A: NDArray, rank: int) -> tuple[NDArray, NDArray, NDArray]:
-    """Null space (k, m - rank, m), the least singular value above it and its row."""
+    """Return the null space, the least singular value above it, and its row."""
     if not rank:
         return np.broadcast_to(np.eye(A.shape[2]), (len(A), *A.shape[2:] * 2)), *(
             np.ones(len(A)), np.zeros((len(A), A.shape[2]))
@@ -168,7 +169,7 @@ def _null_space(A: NDArray, rank: int) -> tuple[NDArray, NDArray, NDArray]:
 
 
 def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
-    """The distances, with the ranks that they would have away from singularities."""
+    """Return distances, given the ranks away from singularities."""
     A, B, _ = closure_matrices(robot, T)
     N, closure, resisting = _null_space(A, ranks.closures)
     measured = _drives_and_platform(N, B, ranks)
@@ -202,9 +203,9 @@ def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
 
 
 def _ranks_there(moved: NDArray, generic: _Ranks) -> _Ranks:
-    """Ranks where closures leave more motions than they generally do."""
+    """Return the ranks where closures leave more motions than they generally do."""
     motions = _rank(moved, SINGULAR)
-    # motions that move drives alone everywhere are no serial singularity here either
+    # motions that move only drives everywhere are no serial singularity here either
     always = generic.motions - generic.platform
     return _Ranks(generic.closures, motions, min(motions - always, 6))
 
@@ -212,11 +213,11 @@ def _ranks_there(moved: NDArray, generic: _Ranks) -> _Ranks:
 def _drives_and_platform(
     N: NDArray, B: NDArray, ranks: _Ranks
 ) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
-    """Serial and parallel distance of motions (k, r, m), their rates, a screw."""
+    """Return serial and parallel distances, their motions' joint rates, a screw."""
     drives = B.shape[2] - 6
     W, t, Q = np.linalg.svd(N @ B, full_matrices=False)
     Q = Q[:, : ranks.motions]
-    # joint rates that go with the rows of Q
+    # joint rates of the rows of Q
     rates = np.swapaxes(W[:, :, : ranks.motions], 1, 2) @ N
     rates = rates / np.maximum(t[:, : ranks.motions, None], 1e-300)
     serial, still_platform = _least(Q[..., drives:], ranks.platform)
@@ -231,7 +232,7 @@ def _drives_and_platform(
 
 
 def _least(half: NDArray, rank: int) -> tuple[NDArray, NDArray]:
-    """Singular value number ``rank`` of (k, r, c) halves, and its combination."""
+    """Return singular value ``rank`` of halves (k, r, c), and its combination."""
     if not rank:
         return np.ones(len(half)), np.zeros(half.shape[:2])
     U, values, _ = np.linalg.svd(half, full_matrices=True)

@@ -1,4 +1,4 @@
-"""Where a continuation ends, target by target."""
+"""End of a continuation for each target."""
 
 from dataclasses import dataclass
 
@@ -10,10 +10,11 @@ class Track:
     """End of the continuation to each target.
 
     Attributes:
-        coordinates: (k, n) joint coordinates where it ends.
+        coordinates: (k, n) joint coordinates at the end.
         transforms: (k, n, 4, 4) frames there.
-        progress: (k,) part of the way; 1 where the target was reached.
-        closure_mismatch: (k, closures) [rad, m] largest component left open.
+        progress: (k,) fraction of the path; 1 if the target was reached.
+        closure_mismatch: (k, closures) [rad, m] largest component of each closure
+            error.
     """
 
     coordinates: NDArray
@@ -23,10 +24,10 @@ class Track:
 
     @property
     def reached(self) -> NDArray:
-        """(k,) bool."""
+        """(k,) bool, True if the target was reached."""
         return self.progress == 1.0
 
     @property
     def mismatch(self) -> NDArray:
-        """(k,) [rad, m] largest component left open in any closure."""
+        """(k,) [rad, m] largest component of all closure errors."""
         return self.closure_mismatch.max(axis=1, initial=0.0)

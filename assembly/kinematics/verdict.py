@@ -1,4 +1,4 @@
-"""Whether a posture may be used: within the joints' limits, regular, on home's side."""
+"""Whether a posture is usable: within joint limits, regular, on home's side."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,24 +18,24 @@ from assembly.model.statuses import BEYOND_LIMITS, BEYOND_SINGULARITY, SINGULAR
 
 SINGULAR_WORDS = "singular posture: first order decides nothing"
 _FAR_SIDE = "not connected to home without passing a singularity"
-_ROUNDING = 1e-8  # [rad, reference lengths] by which a limit may be passed
+_ROUNDING = 1e-8  # [rad, reference lengths] accepted excess over a limit
 
 
 def verdicts(
     robot: Robot, target: Target, q: NDArray, T: NDArray, near: NDArray | None = None
 ) -> list[tuple[str, str]]:
-    """Status and reason of postures that were reached.
+    """Return the status and reason of postures that were reached.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         target: k poses or sets of coordinates.
         q: (k, n) [rad or m] coordinates where they were reached.
         T: (k, n, 4, 4) frames there.
-        near: (k,) bool, which of them may be singular; all if absent.
+        near: (k,) bool, True where a posture may be singular; all if absent.
 
     Returns:
         For each :data:`BEYOND_LIMITS`, :data:`SINGULAR` or :data:`BEYOND_SINGULARITY`
-        and why; both empty where nothing is to be said.
+        and the reason; both empty if the posture is usable.
     """
     limits = [limits_passed(robot, coordinates) for coordinates in q]
     near = np.ones(len(q), dtype=bool) if near is None else near
@@ -55,7 +55,7 @@ def verdicts(
 
 
 def _singular(robot: Robot, q: NDArray, T: NDArray, near: NDArray) -> NDArray:
-    """(k,) bool: postures whose locked closures have a lower rank than near by."""
+    """Return the (k,) bool of postures whose locked closures have too low a rank."""
     singular = near.copy()
     if near.any():
         singular[near] = locked_ranks(robot, T[near]) < home_rank(robot)
@@ -65,10 +65,10 @@ def _singular(robot: Robot, q: NDArray, T: NDArray, near: NDArray) -> NDArray:
 
 
 def limits_passed(robot: Robot, q: NDArray) -> str:
-    """Joints beyond their limits, by how much and what the limits are.
+    """Describe the joints beyond their limits, by how much, and the limits.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         q: (n,) [rad or m] coordinates.
 
     Returns:
@@ -82,7 +82,7 @@ def limits_passed(robot: Robot, q: NDArray) -> str:
         room = _ROUNDING * (size_of(robot) if slides else 1.0)
         low, high = frame.limits[0] - room, frame.limits[1] + room
         if frame.passive and not slides:
-            # a whole turn of a joint that no drive counts changes nothing
+            # whole turns of a joint that is no drive do not count
             value -= 2 * np.pi * np.floor((value - low) / (2 * np.pi))
         if not low <= value <= high:
             texts.append(
@@ -93,10 +93,10 @@ def limits_passed(robot: Robot, q: NDArray) -> str:
 
 
 def posture_remarks(posture: Posture) -> list[str]:
-    """What is to be known of a posture beside its solution, a sentence each.
+    """Return remarks on a posture, a sentence each.
 
     Args:
-        posture: of a robot.
+        posture: posture of a robot.
 
     Returns:
         The operation mode where several meet at home, joints beyond their limits, and
@@ -120,7 +120,7 @@ def posture_remarks(posture: Posture) -> list[str]:
 
 
 def _mode(home: Posture, posture: Posture) -> str:
-    """Name of the operation mode in which the platform came from home."""
+    """Return the name of the operation mode in which the platform came from home."""
     moved = posture.platform @ np.linalg.inv(home.platform)
     turned = np.abs(moved[:3, :3] - np.eye(3)).max() > _ROUNDING
     shift = posture.platform[:3, 3] - home.platform[:3, 3]

@@ -11,9 +11,9 @@ w       ``wrenches``          (n, 6)    of each link's spring, at the frame in i
 E       ``energy``            J         of all springs
 ======  ====================  ========  ==============================================
 
-Wrenches come from the multipliers of the closures, not from eqs (23)-(26): springs in
-series carry the same wrench, which (23) adds to itself, and the paths to the platform
-alone, (24)-(26), sum to zero on an unloaded platform.
+Wrenches come from the multipliers of the closures, not from eqs (23)-(26).  Springs in
+series carry the same wrench, which (23) adds to itself.  The wrenches of (24)-(26),
+along the path to the platform alone, sum to zero on an unloaded platform.
 """
 
 from dataclasses import dataclass
@@ -35,39 +35,39 @@ from assembly.linear.load import (
 from assembly.linear.reference.reduction import reduce_problem
 from assembly.linear.rounding import ROUNDING, closure_rounding, differs_from_zero
 from assembly.linear.solution import Solution
-from assembly.model.clearance import Compliant, clearance_bounds, clearance_excess
+from assembly.model.clearance import clearance_bounds, clearance_excess
 from assembly.model.point_results import N, plain
+from assembly.model.statuses import OK
 from assembly.solvers.cones import cone_sizes, cone_sums
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
-from forcefit.inputs.display import (
+from forcefit.results.display import (
     Figures,
     largest,
     largest_row,
-    numbers,
-    screw_text,
     short_repr,
 )
+from forcefit.results.text import forced_lines
 
 if TYPE_CHECKING:
     import pandas
     import xarray
 
-_ROUNDED = 1e-9  # of the largest wrench
-_NOTHING = 1e-12  # [N m, N]
+_ROUNDED = 1e-9  # share of the largest wrench below which a component is rounding
+_NOTHING = 1e-12  # [N m, N] size below which a component is rounding
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Assembly(Solution[N]):
-    """A manipulator forced together at least energy; or many, with a leading axis.
+    """A manipulator assembled at least energy; or many points, with a leading axis.
 
-    ``[i]`` of many is one of them; where it has no solution that raises why.  The
-    fields are those of :class:`~assembly.linear.solution.Solution`.
+    Of many points ``[i]`` is one; without a solution it raises the reason.  The fields
+    are those of :class:`~assembly.linear.solution.Solution`.
     """
 
     summary = short_repr
 
     def _figures(self) -> Figures:
-        """What ``forcefit assembly solve`` prints of it."""
+        """Return the numbers that ``forcefit assembly solve`` prints."""
         if self.of_many:
             energy = np.asarray(self.energy)
             solved = np.isfinite(energy)
@@ -77,12 +77,9 @@ class Assembly(Solution[N]):
                 "platform error": f"at most {largest(self.platform_screw[solved])}",
             }
         forces = np.linalg.norm(without_rounding(self.tip_wrenches)[:, 3:], axis=1)
-        most = largest_row(forces)  # bodies in a row carry the same force
+        most = largest_row(forces)  # links in series carry the same force
         return {
-            "pose": f"{numbers(self.posture.pose().values())} m, rad",
-            **({"load": f"{numbers(self.load)} N m, N"} if self.load.any() else {}),
-            "energy": f"{self.energy:.6g} J",
-            "platform error": screw_text(self.platform_screw),
+            **forced_lines(self),
             "largest force": f"{forces[most]:.4g} N, in "
             f"{self.posture.robot.frames[most].name}",
             "certificate": f"closure residual {self.closure_residual():.1e}, clearance "
@@ -90,13 +87,13 @@ class Assembly(Solution[N]):
         }
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Frames, closures and platform, or points; :mod:`assembly.model.tables`."""
+        """Return a data set; see :mod:`assembly.model.tables`."""
         from assembly.model.tables import assembly_dataset
 
         return super().to_xarray() if self.of_many else assembly_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """A row for each frame, or each point, columns (variable, component)."""
+        """Return a row for each frame, or each point, columns (variable, component)."""
         from assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point" if self.of_many else "frame")
@@ -115,7 +112,7 @@ class Assembly(Solution[N]):
 
     @cached_property
     def energy(self) -> N:
-        """(...) [J] elastic, stored; 0 where the certificate cannot tell it from 0."""
+        """(...) [J] elastic energy; 0 where the certificate cannot exclude 0."""
         nonzero = differs_from_zero(
             self.stored, self.duality_gap(), self.multipliers,
             self.closure_residual() + self.rounding,
@@ -124,7 +121,7 @@ class Assembly(Solution[N]):
 
     @property
     def stored(self) -> N:
-        """(...) [J] in the springs of the numerical solution."""
+        """(...) [J] energy in the springs of the numerical solution."""
         return plain(np.vecdot(self.elastic, self.elastic) / 2)
 
     @cached_property
@@ -135,7 +132,7 @@ class Assembly(Solution[N]):
 
     @cached_property
     def work(self) -> N:
-        """(...) [J] of the loads on all small screws but the errors."""
+        """(...) [J] work of the loads on all small screws except the errors."""
         joints = self.clearance_screws + self.joint_screws
         on_bodies = np.vecdot(self.frame_loads.body, _flat(self.link_screws))
         return plain(on_bodies + np.vecdot(self.frame_loads.joint, _flat(joints)))
@@ -178,24 +175,24 @@ class Assembly(Solution[N]):
     def closure_wrenches(self) -> NDArray:
         """(..., closures, 6) [N m, N] each closure's second chain exerts on its first.
 
-        At the platform's origin, base axes.  Where rigid parts are overconstrained
-        they are not determined; these are then the smallest ones.
+        At the platform's origin, base axes.  Where rigid parts are overconstrained,
+        the wrenches are not unique; these are then the smallest ones.
         """
         size = self.linearisation.size
         return _by_frames(self.multipliers) / np.array([1, 1, 1, size, size, size])
 
     @cached_property
     def wrenches(self) -> NDArray:
-        """(..., n, 6) [N m, N] of each link's spring: K_E times its deformation.
+        """(..., n, 6) [N m, N] wrench of each link's spring: K_E times its deformation.
 
-        At the frame's origin, in its axes.  The link's own weight counts at its two
-        ends here; :attr:`tip_wrenches` are what its section at the tip transmits.
+        At the frame's origin, in its axes.  The link's own weight acts at its two ends
+        here; :attr:`tip_wrenches` are the wrenches through its section at the tip.
         """
         return self._closing + _by_frames(self.frame_loads.body)
 
     @cached_property
     def tip_wrenches(self) -> NDArray:
-        """(..., n, 6) [N m, N] what the outer part exerts on each body, at its tip.
+        """(..., n, 6) [N m, N] wrench of the outer part on each body, at its tip.
 
         At the frame's origin, in its axes; the body's own weight acts along it.
         """
@@ -203,7 +200,7 @@ class Assembly(Solution[N]):
 
     @cached_property
     def start_wrenches(self) -> NDArray:
-        """(..., n, 6) [N m, N] of links under their own weight, at their starts.
+        """(..., n, 6) [N m, N] wrenches at the starts of links under their own weight.
 
         At the link's start, in its frame's axes; NaN for bodies without such a weight.
         """
@@ -213,7 +210,7 @@ class Assembly(Solution[N]):
 
     @cached_property
     def joint_wrenches(self) -> NDArray:
-        """(..., n, 6) [N m, N] the same through each joint: K_B times its screw.
+        """(..., n, 6) [N m, N] wrench through each joint: K_B times its screw.
 
         They differ from :attr:`tip_wrenches` by loads on the body at the frame.
         """
@@ -229,9 +226,10 @@ class Assembly(Solution[N]):
     def bound(self) -> N:
         """(...) [J] certified lower bound of energy minus the load's work.
 
-        The complementary energy of these wrenches, whatever they are: every assembly
-        has at least -w.dl - w.C w/2 - (the most that clearances can gain).  How the
-        problem was solved does not enter; free motions count as no larger than here.
+        The complementary energy of these wrenches.  Every assembly has at least the
+        energy -w.dl - w.C w/2 - (largest work of w on the clearances), for any wrenches
+        w in equilibrium.  So the bound does not depend on how the problem was solved.
+        Free motions count as no larger than in this solution.
         """
         joint, springs = _flat(self.joint_wrenches), self._balancing
         clearances = cone_sizes(joint @ self.joints.cones, self.joints.group)
@@ -242,7 +240,7 @@ class Assembly(Solution[N]):
 
     @property
     def _balancing(self) -> NDArray:
-        """(..., ny) [sqrt(2 J)] the springs' deformations that balance the wrenches."""
+        """(..., ny) [sqrt(2 J)] springs' deformations that balance the wrenches."""
         columns, links = self.joints.elastic, self.joints.links
         body, joint = _flat(self.wrenches), _flat(self.joint_wrenches)
         return np.where(links, body @ columns, joint @ columns)
@@ -253,14 +251,14 @@ class Assembly(Solution[N]):
         bodies: ArrayLike | None = None,
         gravity: ArrayLike | None = None,
     ) -> bool:
-        """Whether these, as of :func:`solve_assembly`, are its loads."""
+        """Return whether the assembly has these loads, see :func:`solve_assembly`."""
         other = all_loads(self.posture, load, bodies, gravity)
         return np.array_equal(other.body, self.frame_loads.body) and np.array_equal(
             other.joint, self.frame_loads.joint
         )
 
     def closure_residual(self) -> N:
-        """(...) largest of abs(rad) and abs(m) / reference length open in a closure."""
+        """Return (...) largest closure error: abs(rad), abs(m) / reference length."""
         return self._residual
 
     @cached_property
@@ -268,11 +266,11 @@ class Assembly(Solution[N]):
         residual = np.abs(_times(self.linearisation.rows, _flat(self.screws)))
         return plain(residual.max(axis=-1, initial=0.0))
 
-    def clearance_excess(self, compliant: Compliant = "elastic") -> N:
-        """(...) [-] by how much the worst clearance leaves its cone, of its size."""
-        if compliant == "elastic" and "_excess" in vars(self):
+    def clearance_excess(self, own_axes_free: bool = False) -> N:
+        """(...) [-] largest excess of a clearance over its cone, relative to it."""
+        if not own_axes_free and "_excess" in vars(self):
             return self._excess
-        bounds = clearance_bounds(self.posture.robot, compliant)
+        bounds = clearance_bounds(self.posture.robot, own_axes_free)
         return plain(clearance_excess(self.clearance_screws, bounds))
 
     @cached_property
@@ -281,17 +279,17 @@ class Assembly(Solution[N]):
 
     @cached_property
     def rounding(self) -> N:
-        """(...) [rad, lengths] what rounding may leave open in a closure."""
+        """(...) [rad, lengths] bound of the closure error that rounding can cause."""
         size = self.linearisation.size
         return plain(closure_rounding(self._errors, self.joints, size))
 
     @cached_property
     def uncertainty(self) -> N:
-        """(...) [J] the duality gap without cancellation, rounding counted in.
+        """(...) [J] duality gap computed without cancellation, with rounding added.
 
-        Energy minus its bound is |y - s|^2 / 2, with s the springs' deformations that
-        balance the wrenches, plus for each cone what its wrench could still gain, plus
-        the work of the multipliers on the closures' residual.
+        Energy minus its bound is |y - s|^2 / 2, where s are the springs' deformations
+        that balance the wrenches.  To it are added the work that each cone's wrench
+        could still gain, and the work of the multipliers on the closures' residual.
         """
         joint, springs = _flat(self.joint_wrenches), self.elastic - self._balancing
         group, on_cones = self.joints.group, joint @ self.joints.cones
@@ -308,7 +306,7 @@ class Assembly(Solution[N]):
         )  # fmt: skip
 
     def duality_gap(self) -> N:
-        """(...) [J] certified: energy is at most this above the least possible."""
+        """Return (...) [J] certified bound of the energy above the least possible."""
         return self._gap
 
     @cached_property
@@ -316,8 +314,8 @@ class Assembly(Solution[N]):
         return plain(np.maximum(self.potential - self.bound, 0.0))  # NaN stays NaN
 
     def relative_gap(self) -> N:
-        """(...) [-] duality gap by energy, or by 1e-4 of that without clearance."""
-        # inside an assembly zone the least energy is zero, and no gap relative to it
+        """Return (...) [-] duality gap over energy, or 1e-4 of that at no clearance."""
+        # inside an assembly zone the least energy is zero, so a floor replaces it
         least = np.maximum(1e-4 * np.asarray(self.energy_without_clearance), 1e-300)
         return plain(self.duality_gap() / np.maximum(self.stored, least))
 
@@ -329,32 +327,32 @@ class Assembly(Solution[N]):
         """
         largest_energy = self.energy_without_clearance + np.abs(self.work)
         allowed = GAP * self.energy + GAP_WITHOUT_CLEARANCE * largest_energy
-        return (self.duality_gap() <= allowed) & (np.asarray(self.status) == "ok")
+        return (self.duality_gap() <= allowed) & (np.asarray(self.status) == OK)
 
 
 def _flat(screws: NDArray) -> NDArray:
-    """(..., 6n) of (..., n, 6)."""
+    """Reshape screws (..., n, 6) to (..., 6n)."""
     return screws.reshape(*screws.shape[:-2], -1)
 
 
 def _by_frames(screws: NDArray) -> NDArray:
-    """(..., n, 6) of (..., 6n)."""
+    """Reshape screws (..., 6n) to (..., n, 6)."""
     return screws.reshape(*screws.shape[:-1], -1, 6)
 
 
 def _times(matrices: NDArray, vectors: NDArray) -> NDArray:
-    """Matrices (..., a, b) times vectors (..., b)."""
+    """Return the matrices (..., a, b) times vectors (..., b)."""
     return (matrices @ vectors[..., None])[..., 0]
 
 
 def without_rounding(wrenches: NDArray) -> NDArray:
-    """Wrenches without components that are rounding of the others.
+    """Return the wrenches with components that are rounding set to 0.
 
     Args:
         wrenches: (..., n, 6) [N m, N] of the n bodies of a robot.
 
     Returns:
-        The same, 0 what is below 1e-9 of the largest of a robot, or below 1e-12.
+        The same; 0 where below 1e-9 of the robot's largest component, or below 1e-12.
     """
     sizes = np.abs(wrenches)
     largest = sizes.max(axis=(-2, -1), keepdims=True, initial=0.0)
@@ -368,10 +366,10 @@ def all_loads(
     bodies: ArrayLike | None,
     gravity: ArrayLike | None,
 ) -> FrameLoads:
-    """Loads on all small screws, from the arguments of ``solve_assembly``.
+    """Return the loads on all small screws, from the arguments of ``solve_assembly``.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
         bodies: (n, 6) [N m, N] wrenches on the bodies of all frames.
         gravity: (3,) [m/s^2] base axes.

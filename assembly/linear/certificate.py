@@ -1,6 +1,6 @@
-"""What the certificate of a least energy proves: energies, closures, and the screw.
+"""Errors that the certificate of a least energy excludes: energy, closures, screw.
 
-The distance from the computed platform screw to any of least energy is certified too.
+The distance from the computed platform screw to any of least energy is bounded too.
 
 The energy is quadratic in the springs' scaled deformations y, E = y.y/2 less the work
 of the loads, and a solution whose gap is g is at most g above the least.  So, with w_k
@@ -8,10 +8,11 @@ the wrench on cone k,
 
     |y - y_least| <= sqrt(2 g),          |w_k| - w_k.u_k <= g for each cone,
 
-of both solutions: springs are known, and so are the clearances whose constraint is
-active.  Clearances that nothing loads are not: the energy does not depend on them, and
-the minimiser is not unique.  Both sets of platform screws are convex; how far they
-extend along each axis is a cone programme with a certified height.
+for the computed solution and any of least energy.  So the springs are known, and so are
+the clearances whose constraint is active.  Clearances without load are not: the energy
+does not depend on them, and the minimiser is not unique.  Both sets of platform screws
+are convex; a cone programme with a certified height bounds their extent along each
+axis.
 """
 
 from dataclasses import dataclass, replace
@@ -31,12 +32,12 @@ from assembly.linear.rounding import SPREAD, stiffness_spread
 from assembly.solvers.cones import cone_sizes
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE, SolverFailed
 
-LARGEST_RESIDUAL = 1e-9  # [rad, reference lengths] accepted of a closure
-LARGEST_EXCESS = 1e-9  # [-] accepted of a clearance
-_SCREW, _SCREW_SHARE = 1e-5, 1e-3  # [rad, m], and of its size: accepted of the screw
-_AMPLIFIED = 10.0  # factor by which closures may amplify what springs move
-_WIDTH = 3e-5  # of a distance: upper minus lower bound
-_HELD = 0.1  # [-] of a cone: a load that leaves it more room does not hold it
+LARGEST_RESIDUAL = 1e-9  # [rad, reference lengths] accepted residual of a closure
+LARGEST_EXCESS = 1e-9  # [-] accepted excess of a clearance over its cone
+_SCREW, _SCREW_SHARE = 1e-5, 1e-3  # [rad, m] and relative: accepted error of the screw
+_AMPLIFIED = 10.0  # factor by which closures may amplify the springs' motion
+_WIDTH = 3e-5  # required upper minus lower bound, relative to the distance
+_HELD = 0.1  # [-] share of a cone: a load that leaves more free does not fix it
 
 
 @dataclass(frozen=True)
@@ -44,13 +45,13 @@ class ScrewBound:
     """Distances from the computed platform screw to any of least energy.
 
     Attributes:
-        rotation: [rad] at most this; infinite where the platform turns freely.
-        translation: [m] likewise, at the platform's origin.
-        rotation_open: [rad] of it what clearances leave open at no cost of energy: the
+        rotation: [rad] upper bound; infinite where the platform turns freely.
+        translation: [m] upper bound, at the platform's origin.
+        rotation_open: [rad] part of it that clearances without load leave open: the
             screw is not unique, and the farthest one is at most this far.
-        translation_open: [m] likewise.
-        rotation_error: [rad] the rest: the numerical error.
-        translation_error: [m] likewise.
+        translation_open: [m] the same for the translation.
+        rotation_error: [rad] part of it that is numerical error.
+        translation_error: [m] the same for the translation.
     """
 
     rotation: float
@@ -62,14 +63,15 @@ class ScrewBound:
 
 
 def unproved(assembly: Assembly) -> str:
-    """What the certificate leaves unproved.
+    """Return sentences on the properties that the certificate does not prove.
 
-    Proved is an assembly that closes to 1e-9 (rad, or m per reference length), with
-    clearances within 1e-9 of their bounds, whose energy is at most 1e-8 of it, and of
-    the loads' work, plus 1e-12 of that without clearance above the least possible.
+    Proved is an assembly whose closures hold to 1e-9 (rad, or m per reference length),
+    whose clearances are within 1e-9 of their bounds, and whose energy is close to the
+    least possible: above it by at most 1e-8 of the energy and of the loads' work, plus
+    1e-12 of the energy without clearance.
 
     Args:
-        assembly: of least energy.
+        assembly: assembly of least energy.
 
     Returns:
         Sentences joined by semicolons; empty if all is proved.
@@ -81,7 +83,7 @@ def unproved(assembly: Assembly) -> str:
     allowed = GAP * (assembly.stored + abs(assembly.work))
     allowed += GAP_WITHOUT_CLEARANCE * assembly.energy_without_clearance
     sentences = []
-    # written so that NaN is not proved
+    # written so that NaN counts as not proved
     if not gap <= allowed:
         sentences.append(
             f"the energy is proved least to {gap:.1e} J only, expected {allowed:.1e} J"
@@ -98,14 +100,16 @@ def unproved(assembly: Assembly) -> str:
 
 
 def unproved_screw(assembly: Assembly, bound: ScrewBound) -> list[str]:
-    """What of the platform screw the gap leaves unproved, where it is unique.
+    """Return which halves of the platform screw the gap does not determine.
+
+    Only parts of the screw that are unique are judged.
 
     Args:
-        assembly: of least energy.
-        bound: of its platform screw.
+        assembly: assembly of least energy.
+        bound: bound of the platform screw's error.
 
     Returns:
-        A sentence for each half that is not proved to 1e-5 rad or m plus 1e-3 of it.
+        A sentence for each half whose error may exceed 1e-5 rad or m plus 1e-3 of it.
     """
     allowed = _allowed(assembly)
     spread = stiffness_spread(assembly.joints, assembly.linearisation.size)
@@ -122,13 +126,13 @@ def unproved_screw(assembly: Assembly, bound: ScrewBound) -> list[str]:
 
 
 def _allowed(assembly: Assembly) -> NDArray:
-    """(2,) [rad, m] largest error accepted of the platform screw."""
+    """Return the (2,) [rad, m] largest error accepted of the platform screw."""
     halves = assembly.platform_screw.reshape(2, 3)
     return _SCREW + _SCREW_SHARE * np.linalg.norm(halves, axis=1)
 
 
 def _springs_determined(assembly: Assembly) -> bool:
-    """Whether springs, as far as the gap leaves them open, hardly move a frame."""
+    """Return whether the gap limits the springs so that frames hardly move."""
     frames, springs = len(assembly.posture.robot.frames), assembly.elastic.size
     blocks = assembly.joints.elastic.reshape(frames, 6, springs)
     moved = np.linalg.norm(assembly.posture.paths @ blocks, axis=(0, 2))
@@ -144,15 +148,15 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
         assembly: the computed one, with its wrenches.
 
     Returns:
-        The bounds, from nothing but its certificate.  Those of the screw and of its
-        error are of boxes around the sets, so up to sqrt(3) times the distances.
+        The bounds, from the certificate alone.  They are bounds of boxes around the
+        sets, so up to sqrt(3) times the distances.
     """
     gap, lin = assembly.uncertainty, assembly.linearisation
     open_closures = lin.rows @ assembly.screws.ravel()
     residual = float(np.linalg.norm(open_closures)) + assembly.rounding
 
     def unloaded(joints: VirtualJoints) -> MovingCones:
-        """Clearances on which the energy does not depend."""
+        """Return the clearances on which the energy does not depend."""
         columns, start, group, room = _room(assembly, joints, gap)
         free = room >= 1.0
         columns = columns[:, free]
@@ -164,7 +168,7 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
         )
 
     def uncertain(joints: VirtualJoints) -> MovingCones:
-        """All that the gap leaves open: clearances, springs and the residual."""
+        """Return all that the gap leaves open: clearances, springs and the residual."""
         columns, start, group, room = _room(assembly, joints, gap)
         springs = joints.elastic * np.sqrt(2.0 * gap)
         columns = np.hstack([columns * room, springs])
@@ -181,8 +185,8 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
         )
 
     kept: frozenset[int] = frozenset()
-    total = _extents(within_bounds(assembly, "elastic", kept, uncertain))
-    open_set = within_bounds(assembly, "elastic", kept, unloaded)
+    total = _extents(within_bounds(assembly, kept, uncertain))
+    open_set = within_bounds(assembly, kept, unloaded)
     not_unique = _extents(open_set)
     with np.errstate(invalid="ignore"):
         error = np.maximum(total - not_unique, 0.0)
@@ -198,24 +202,24 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
 def _room(
     assembly: Assembly, joints: VirtualJoints, gap: float
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Room that least energy leaves to the clearances.
+    """Return the range that least energy leaves to the clearances.
 
     Returns:
-        Clearances' columns, where they start, their cones, and the room (nu,) left: 1
-        where it is the whole cone; else this assembly and any of least energy are no
-        farther apart than it, in sizes of the cone.
+        Clearances' columns, their start values, their cones, and the range (nu,) left:
+        1 where it is the whole cone; else the largest distance, in sizes of the cone,
+        of this assembly from any of least energy.
     """
     group = joints.group
     load = cone_sizes(joints.cones.T @ assembly.joint_wrenches.ravel(), group)
     share = np.divide(gap, load, out=np.full(len(load), np.inf), where=load > 0.0)
-    # an interval's last share; of a disc the width of the cap of that height
+    # range in an interval: the distance from its end; in a disc: the width of a cap
     room = np.where(np.bincount(group) > 1, 2.0 * np.sqrt(2.0 * share), share)
     room = np.where(room < _HELD, room, 1.0)
     return joints.cones, clearances_in(assembly, joints), group, room[group]
 
 
 def _farthest(reachable: ReachableSet, part: int, box: float) -> float:
-    """[rad or m] certified largest distance from the centre, no more than the box's."""
+    """Return the certified largest distance [rad or m] from the centre, at most box."""
     if not 0.0 < box < np.inf:
         return box
     about_centre = replace(reachable, centre=np.zeros(6))
@@ -226,12 +230,12 @@ def _farthest(reachable: ReachableSet, part: int, box: float) -> float:
 
 
 def _extents(reachable: ReachableSet) -> NDArray:
-    """(6,) [rad, m] how far the set extends from its centre, to either side."""
+    """Return the set's (6,) [rad, m] extents from its centre, larger sides."""
     extents = []
     for d in np.concatenate([np.eye(6), -np.eye(6)]):
         try:
             height = reachable.support(d).height
             extents.append(height - float(d @ reachable.centre))
-        except SolverFailed:  # nothing is known in that direction
+        except SolverFailed:  # no bound is known in that direction
             extents.append(np.inf)
     return np.maximum(np.reshape(extents, (2, 6)).max(axis=0), 0.0)

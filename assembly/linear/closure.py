@@ -29,30 +29,29 @@ from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
 from assembly.model.clearance import (
     CONES,
-    Compliant,
     clearance_bounds,
     scales_with_margin,
 )
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.links import compliance_factor, joint_compliances, link_compliances
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, quoted
+from forcefit.results.display import html_table, short_repr
 
 
 @dataclass(frozen=True, eq=False)
 class VirtualJoints:
-    """All that may move in a robot beside its drives, as columns of small screws.
+    """Columns of small screws that may move in a robot, except its drives.
 
     Attributes:
-        robot: of n frames.
+        robot: robot of n frames.
         elastic: (6n, ny) columns of links and joint springs.
         links: (ny,) bool, columns that belong to links; the others are joints'.
         cones: (6n, nu) columns of bounded clearances, each the size of its bound.
-        group: (nu,) which cone a column belongs to: two columns for a disc.
-        scaled: (nu,) bool, whether the margin's factor scales the cone.
+        group: (nu,) cone of each column: two columns for a disc.
+        scaled: (nu,) bool, whether the margin's factor scales the column's cone.
         free: (6n, nq) unit columns of unbounded motions.
-        bounded_motion: frames whose bound of the passive joint's own motion is kept.
+        bounded_motion: frames whose passive joint's own motion keeps its bound.
     """
 
     robot: Robot
@@ -68,17 +67,17 @@ class VirtualJoints:
 
 
 def virtual_joints(
-    robot: Robot, compliant: Compliant = "elastic",
+    robot: Robot, springs: bool = True, own_axes_free: bool = False,
     bounded_motion: bool | frozenset[int] = False,
 ) -> VirtualJoints:  # fmt: skip
-    """Columns of all that may move.
+    """Return the columns of all screws that may move.
 
     Args:
         robot: of n frames.
-        compliant: what passive joints with stiffness do: ``"elastic"``, all springs
-            act; ``"hinged"``, all but the one about (or along) the joint's own z, which
-            is free; ``"rigid"`` and ``"free"``, no spring acts anywhere, and the own
-            z is locked or free: the two margins of problem (21).
+        springs: whether links and joints deform; problem (21) has no springs.
+        own_axes_free: whether passive joints with stiffness move freely about (or
+            along) their own z, without its spring; else that axis is elastic, or
+            without springs rigid: the two margins of problem (21).
         bounded_motion: keep the bounds of passive joints' own motion, of all or of
             these frames.  They are large and almost never active, so they are left
             out first and checked afterwards.
@@ -88,7 +87,8 @@ def virtual_joints(
     """
     if isinstance(bounded_motion, bool):
         bounded_motion = frozenset(range(len(robot.frames)) if bounded_motion else ())
-    return _virtual_joints(_JointsKey(_parts(robot), robot), compliant, bounded_motion)
+    key = _JointsKey(_parts(robot), robot)
+    return _virtual_joints(key, springs, own_axes_free, bounded_motion)
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class _JointsKey:
 
 
 def _parts(robot: Robot) -> tuple:
-    """All that virtual joints depend on; links by identity, the robot keeps them."""
+    """Return what virtual joints depend on; links by identity, the robot keeps them."""
     return tuple(
         (
             f.parent, f.joint, f.actuated, f.clearance, id(f.link),
@@ -113,20 +113,21 @@ def _parts(robot: Robot) -> tuple:
 
 @lru_cache(maxsize=16)
 def _virtual_joints(
-    key: _JointsKey, compliant: Compliant, bounded_motion: frozenset[int]
-) -> VirtualJoints:
-    """The columns, once for all robots of the same parts."""
+    key: _JointsKey, springs: bool, own_axes_free: bool,
+    bounded_motion: frozenset[int],
+) -> VirtualJoints:  # fmt: skip
+    """Return the columns, cached for all robots of the same parts."""
     robot = key.robot
-    bounds = clearance_bounds(robot, compliant)
+    bounds = clearance_bounds(robot, own_axes_free)
     scaled = scales_with_margin(robot)
     left_out = [i not in bounded_motion for i in range(len(bounds))]
     bounds = np.where(
         np.array(left_out)[:, None] & ~scaled & (bounds > 0), np.inf, bounds
     )
     links = joints = np.zeros((0, 6, 6))
-    if compliant in {"elastic", "hinged"}:
+    if springs:
         links, joints = link_compliances(robot), joint_compliances(robot)
-    if compliant == "hinged":
+    if springs and own_axes_free:
         for C, frame in zip(joints, robot.frames, strict=True):
             if frame.compliant:
                 C[frame.own_axis] = C[:, frame.own_axis] = 0.0
@@ -145,7 +146,7 @@ def _virtual_joints(
 
 
 def _elastic(links: NDArray, joints: NDArray, count: int) -> tuple[NDArray, NDArray]:
-    """Columns of links and springs, and which of them are links'."""
+    """Return the columns of links and springs, and which of them are links'."""
     columns, is_link = [np.zeros((6 * count, 0))], []
     for compliances, link in ((links, True), (joints, False)):
         for i, C in enumerate(compliances):
@@ -158,7 +159,7 @@ def _elastic(links: NDArray, joints: NDArray, count: int) -> tuple[NDArray, NDAr
 
 
 def _cones(bounds: NDArray, scales: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Columns of the bounded clearances, their group and whether they scale."""
+    """Return the columns of bounded clearances, their cones and whether they scale."""
     rows, sizes, group, scaled = [], [], [], []
     count = 0
     for i, cone in np.argwhere((bounds > 0) & np.isfinite(bounds)):
@@ -178,7 +179,7 @@ def _cones(bounds: NDArray, scales: NDArray) -> tuple[NDArray, NDArray, NDArray]
 
 
 def _free(bounds: NDArray) -> NDArray:
-    """Unit columns of the motions without bound."""
+    """Return the unit columns of the motions without bound."""
     rows = [6 * i + r for i, cone in np.argwhere(np.isinf(bounds)) for r in CONES[cone]]
     columns = np.zeros((6 * len(bounds), len(rows)))
     columns[rows, np.arange(len(rows))] = 1.0
@@ -186,7 +187,7 @@ def _free(bounds: NDArray) -> NDArray:
 
 
 def in_reference_lengths(size: float) -> NDArray:
-    """Factors that make lengths of screws comparable with angles.
+    """Return the factors that make lengths of screws comparable with angles.
 
     Args:
         size: [m] reference length.
@@ -202,7 +203,7 @@ class Linearisation:
     """The assembly constraints at a posture.
 
     Attributes:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         size: [m] reference length.
     """
 
@@ -224,7 +225,7 @@ class Linearisation:
 
     @cached_property
     def platform(self) -> NDArray:
-        """(6, 6 n) screws to the platform screw, eq. (8), not scaled."""
+        """(6, 6 n) map of the frames' screws to the platform screw, (8), not scaled."""
         robot = self.posture.robot
         on_path = robot.on_path[robot.index(robot.platform)]
         platform = np.swapaxes(self.posture.paths * on_path[:, None, None], 0, 1)
@@ -237,10 +238,10 @@ class Linearisation:
 
 
 def linearise(posture: Posture) -> Linearisation:
-    """The assembly constraints (19)-(20) at a posture.
+    """Return the assembly constraints (19)-(20) at a posture.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
 
     Returns:
         The constraint matrix and the map to the platform screw.
@@ -253,13 +254,13 @@ def linearise(posture: Posture) -> Linearisation:
 
 @lru_cache(maxsize=64)
 def checked_size(robot: Robot) -> float:
-    """[m] reference length of a robot whose errors are small enough to compute with.
+    """Return the reference length [m] of a robot, after a check of its errors.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
-        :func:`assembly.kinematics.nominal.size_of` it.
+        The result of :func:`assembly.kinematics.nominal.size_of`.
 
     Raises:
         BadInput: a geometric error is beyond 1e6 rad or m.

@@ -1,8 +1,9 @@
 """The least energy that closes a manipulator, problem (22), at one point or at many.
 
-Compiled from the frames' poses to the certificate (:mod:`assembly.linear.lanes`), with
-loads and without.  What this does not cover, or where its certificate falls short, is
-solved by the reference (:mod:`assembly.linear.reference`), and the answer says so.
+The compiled method (:mod:`assembly.linear.lanes`) computes all steps from the frames'
+poses to the certificate, with and without loads.  The reference
+(:mod:`assembly.linear.reference`) solves points that it does not cover or certify; the
+answer's ``method`` says so.
 """
 
 from collections.abc import Sequence
@@ -33,17 +34,16 @@ from assembly.linear.rounding import (
     stiffness_spread,
 )
 from assembly.linear.solution import with_known
-from assembly.model.clearance import Compliant
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
-from assembly.model.statuses import CANNOT_ASSEMBLE, NO_EQUILIBRIUM, SOLVER_FAILED
+from assembly.model.statuses import CANNOT_ASSEMBLE, NO_EQUILIBRIUM, OK, SOLVER_FAILED
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method, check_method
 
 __all__ = ["Assembly", "CannotAssemble", "solve_assembly"]
 
-# outcomes of assembly/kernels/linear/energies.h: from the first on they are no answer,
-# and with these a bound of a passive joint's own motion, left out, may be the cause
+# outcomes of assembly/kernels/linear/energies.h: from _LEFT on they are no answer, and
+# _AT_BOUNDS may come from a bound of a passive joint's own motion that was left out
 _LEFT, _AT_BOUNDS = 2, (5, 6)
 _STATUS: dict[type[Exception], str] = {
     CannotAssemble: CANNOT_ASSEMBLE,
@@ -52,7 +52,7 @@ _STATUS: dict[type[Exception], str] = {
 }
 _NUMBERS = ("energy", "bound", "tight", "work", "residual", "excess")
 _VECTORS = ("clearances", "motions", "multipliers", "elastic")
-# arrays of k points by what they are; "tight" is the energy without clearance
+# name -> array over k points; "tight" is the energy without clearance
 _Rows = dict[str, NDArray]
 
 
@@ -90,24 +90,25 @@ def solve_assembly(
     """Close a manipulator at least energy, problem (22), under optional loads.
 
     Args:
-        posture: where the robot stands; its errors, clearances, links and joint
+        posture: the robot's configuration; its errors, clearances, links and joint
             springs are the robot's.  Or k postures of one robot.
         load: (6,) or (k, 6) [N m, N] wrench on the platform at its origin, base axes;
-            energy minus its work is then what is minimised.
+            energy minus its work is then minimised.
         bodies: (n, 6) or (k, n, 6) [N m, N] wrenches on the bodies of all frames, each
             at its frame's origin, base axes.
         gravity: (3,) or (k, 3) [m/s^2] base axes; links with a density and bodies with
             a mass then have weight.
         errors: (k, n, 6) [rad, m] geometric errors in place of the robot's, a set for
             each of k postures, or k sets at one.
-        method: ``"compiled"``, and the reference where that does not prove its answer;
-            or ``"reference"``, numpy and Clarabel alone.  The answer's ``method`` says
-            which gave it.
+        method: ``"compiled"``, with the reference for points whose answer it does not
+            prove; or ``"reference"``, numpy and Clarabel alone.  The answer's
+            ``method`` says which of them solved each point.
 
     Returns:
         The assembled manipulator; :func:`assembly.linear.certificate.unproved` says
-        where its certificate falls short even so.  Of many postures or sets of errors
-        all of them in one, where a point without a solution says so and raises nothing.
+        where the certificate falls short even so.  For many postures or sets of errors,
+        one object with all points; a point without a solution raises nothing and has
+        its reason in ``reason``.
 
     Raises:
         CannotAssemble: a closure is open that no clearance and no spring can close.
@@ -126,33 +127,33 @@ def solve_assembly(
     if posture.transforms.ndim == 3 and errors is None and loads.body.ndim == 1:
         return _solve_one(posture, wrench, loads, method)
     sets = None if errors is None else np.asarray(errors, dtype=float)
-    return _solve_many(posture, sets, wrench, loads, "elastic", method)
+    return _solve_many(posture, sets, wrench, loads, False, method)
 
 
 def with_free_own_axes(assembly: Assembly) -> Assembly:
-    """The least energy when compliant joints turn freely about their own axis.
+    """Return the least energy if compliant joints turn freely about their own axis.
 
     Args:
-        assembly: of many points.
+        assembly: assembly of many points.
 
     Returns:
-        The same points under the same loads, see ``"hinged"`` of
+        The same points under the same loads, see ``own_axes_free`` of
         :func:`assembly.linear.closure.virtual_joints`.
     """
     posture, load, loads = assembly.posture, assembly.load, assembly.frame_loads
-    return _solve_many(posture, assembly.errors, load, loads, "hinged", "compiled")
+    return _solve_many(posture, assembly.errors, load, loads, True, "compiled")
 
 
 def together_at(posture: Posture, points: Sequence[Assembly | Exception]) -> Assembly:
-    """Points that were solved each by itself, in one.
+    """Return points that were solved separately as one object.
 
     Args:
         posture: k postures, of a robot that may differ from the points' in its springs
             and clearances.
-        points: k of them, or why there is no solution.
+        points: k of them; an exception where there is no solution.
 
     Returns:
-        All of them; each is itself again by its row.
+        All of them; a row number gives one of them again.
     """
     joints, count = virtual_joints(posture.robot), len(points)
     rows = _empty(joints, count)
@@ -167,7 +168,7 @@ def together_at(posture: Posture, points: Sequence[Assembly | Exception]) -> Ass
 
 
 def failure_status(error: Exception) -> str:
-    """The status of a posture without a solution.
+    """Return the status of a posture without a solution.
 
     Args:
         error: :class:`CannotAssemble`, :class:`FreeMotion` or :class:`SolverFailed`.
@@ -181,16 +182,16 @@ def failure_status(error: Exception) -> str:
 def _solve_one(
     posture: Posture, load: NDArray, loads: FrameLoads, method: Method
 ) -> Assembly:
-    """One posture: compiled, or, in doubt or if asked, by the reference."""
+    """Solve one posture, compiled; by the reference if requested or not proved."""
     robot = posture.robot
     if method == "reference":
         return least_energy(posture, load, loads)
     rounding, acting = _rounding_of(robot), loads.rows() if loads else None
-    # a copy: the address of an array that may be written is found three times as fast
+    # a copy: C++ finds the address of a writable array three times as fast
     T = np.array(posture.transforms, ndmin=4)
     off = np.array([posture.mismatch])
     for bounded in (False, True):
-        joints, structure = structure_of(robot, "elastic", bounded)
+        joints, structure = structure_of(robot, bounded_motion=bounded)
         rows = _compiled(joints, structure, T, robot.errors[None], off, acting)
         if rows["outcome"][0] < _LEFT:
             break
@@ -201,7 +202,7 @@ def _solve_one(
     multipliers, residual = rows["multipliers"], rows["residual"] + rounding
     drop_zeros(rows["energy"], rows["bound"], multipliers, residual, acting is not None)
     if acting is None and not np.count_nonzero(multipliers):
-        rows["elastic"][:] = 0.0  # no wrenches mean no deformation but rounding
+        rows["elastic"][:] = 0.0  # without wrenches, deformations are rounding
     assembly = Assembly(
         linearisation=linearise(posture), joints=joints, load=load, frame_loads=loads,
         method="compiled", energy_without_clearance=float(rows["tight"][0]),
@@ -211,21 +212,21 @@ def _solve_one(
     return with_known(assembly, known)
 
 
-@lru_cache(maxsize=32)  # of one robot at many postures
+@lru_cache(maxsize=32)  # for one robot at many postures
 def _rounding_of(robot: Robot) -> float:
-    """[rad, lengths] what rounding may leave open in a robot's closures."""
+    """Return the bound [rad, lengths] of the closure error that rounding can cause."""
     joints, _ = structure_of(robot)
     return float(closure_rounding(robot.errors, joints, checked_size(robot)))
 
 
 def _solve_many(
     posture: Posture, errors: NDArray | None, load: NDArray, loads: FrameLoads,
-    compliant: Compliant, method: Method,
+    own_axes_free: bool, method: Method,
 ) -> Assembly:  # fmt: skip
-    """All points compiled, unless asked otherwise; one by one what that leaves."""
+    """Solve all points compiled, and those not covered or proved by the reference."""
     robot = posture.robot
     T, sets, off = _checked(posture, errors)
-    joints, structure = structure_of(robot, compliant)
+    joints, structure = structure_of(robot, True, own_axes_free)
     acting = loads.rows() if loads else None
     if acting is not None and len(T) == len(sets) == 1:  # loads alone differ
         sets = np.repeat(sets, len(acting), axis=0)
@@ -235,7 +236,7 @@ def _solve_many(
     held = _bounds_matter(structure, rows["outcome"])
     within = None
     if held.any():
-        given, own_joints = (T, sets, off, acting), (robot, compliant, True)
+        given, own_joints = (T, sets, off, acting), (robot, True, own_axes_free, True)
         within = _within_bounds(*structure_of(*own_joints), held, given, rows)
     rows |= _unsaid(count)
     if len(T) == 1 and posture.transforms.ndim > 3:
@@ -243,8 +244,8 @@ def _solve_many(
     own = None if errors is None else np.broadcast_to(sets, (count, *sets.shape[1:]))
     points = _of_rows(posture, joints, rows, load, loads, own)
     for i in np.flatnonzero(rows["outcome"] >= _LEFT).tolist():
-        one = points[i]  # where it stands, and its loads
-        _record(rows, points.apart, i, _by_reference(one, compliant))
+        one = points[i]  # posture and loads of the point
+        _record(rows, points.apart, i, _by_reference(one, own_axes_free))
     residual = rows["residual"] + closure_rounding(sets, joints, structure.size)
     _drop_rounding(rows, residual, points.loaded)
     _certify(rows, points)
@@ -252,7 +253,7 @@ def _solve_many(
 
 
 def _bounds_matter(structure: Structure, outcome: NDArray) -> NDArray:
-    """(k,) bool, points that a bound which was left out may hold."""
+    """Return the (k,) bool of points that a bound left out may hold."""
     return np.isin(outcome, _AT_BOUNDS) & bool(np.isfinite(structure.free_bound).any())
 
 
@@ -263,8 +264,9 @@ def _within_bounds(
     """Solve again points to which bounds of passive joints' own motion matter.
 
     Returns:
-        Which are solved now, with all bounds as cones, in which joints, and their rows
-        in these; what both have is written into ``rows`` too.
+        Row numbers of the points solved now, with all bounds as cones; their virtual
+        joints; their rows in these.  Results of equal shape are written into ``rows``
+        too.
     """
     held = np.flatnonzero(matter)
     T, sets, off, acting = (
@@ -286,7 +288,7 @@ def _within_bounds(
 def _checked(
     posture: Posture, errors: NDArray | None
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Transforms, sets of errors and closure errors, of each point or one for all."""
+    """Return transforms, sets of errors and closure errors, per point or for all."""
     n = len(posture.robot.frames)
     given = posture.robot.errors if errors is None else errors
     T = posture.transforms.reshape(-1, *posture.transforms.shape[-3:])
@@ -304,7 +306,7 @@ def _checked(
             f"is larger than {LARGEST_LENGTH:g} [rad, m]"
         )
     off = np.broadcast_to(np.asarray(posture.mismatch, dtype=float), (len(T),))
-    # writable and in C order, whatever comes: the kernels are compiled for one kind
+    # the kernels are compiled for writable arrays in C order
     T, sets, off = (
         np.require(array, dtype=float, requirements=["C", "W"])
         for array in (T, sets, off)
@@ -316,7 +318,7 @@ def _compiled(
     joints: VirtualJoints, structure: Structure, T: NDArray, errors: NDArray,
     mismatch: NDArray, loads: NDArray | None, method: Method = "compiled",
 ) -> _Rows:  # fmt: skip
-    """Rows of k points, by the compiled method, or left to the reference."""
+    """Return the rows of k points, compiled; mark those for the reference."""
     count = len(errors) if len(T) == 1 else len(T)
     rows = _empty(joints, count)
     given = structure, T, errors, mismatch
@@ -324,7 +326,7 @@ def _compiled(
         rows["outcome"][:] = _LEFT
     elif loads is None:
         _fill(given, rows, None)
-    else:  # points that no load acts on have the bits of those without
+    else:  # points without load have the results of an unloaded call, bit for bit
         loaded = np.any(loads, axis=(1, 2, 3))
         for some, acting in ((loaded, loads), (~loaded, None)):
             if some.all():
@@ -335,7 +337,7 @@ def _compiled(
 
 
 def _empty(joints: VirtualJoints, count: int) -> _Rows:
-    """Rows of k points to fill, in the kernel's order."""
+    """Return empty rows of k points, in the kernel's order."""
     return {
         "outcome": np.zeros(count, dtype=np.int64),
         "energy": np.zeros(count),
@@ -352,14 +354,14 @@ def _empty(joints: VirtualJoints, count: int) -> _Rows:
 
 
 def _unsaid(count: int) -> _Rows:
-    """What the kernel does not fill of k points: method, status, proof."""
-    texts = {"method": "compiled", "status": "ok", "reason": ""}
+    """Return rows of k points that the kernel does not fill: method, status, proof."""
+    texts = {"method": "compiled", "status": OK, "reason": ""}
     rows = {name: np.full(count, text, dtype=object) for name, text in texts.items()}
     return rows | {name: np.zeros(count) for name in ("gap", "potential", "least")}
 
 
 def _certify(rows: _Rows, points: Assembly) -> None:
-    """The gap, the potential and its least possible value, of energies and bounds."""
+    """Fill in the gap, the potential and its lower bound from energies and bounds."""
     energy, bound, loads = rows["energy"], rows["bound"], points.frame_loads
     rows["gap"][:] = np.maximum(0.0, energy - bound)
     on_errors = loads.body @ points.posture.robot.errors.ravel()
@@ -370,7 +372,7 @@ def _certify(rows: _Rows, points: Assembly) -> None:
 
 
 def _fill(given: tuple[Any, ...], rows: _Rows, loads: NDArray | None) -> None:
-    """Every point; zeros are the answer where nothing has to move."""
+    """Solve every point; the zeros stay where no error and no load acts."""
     if loads is not None or np.count_nonzero(given[2][:1]) or given[2].any():
         structure, T, errors, mismatch = given
         assemble_side_by_side(structure, T, errors, mismatch, loads, rows)
@@ -379,7 +381,7 @@ def _fill(given: tuple[Any, ...], rows: _Rows, loads: NDArray | None) -> None:
 def _fill_some(
     some: NDArray, given: tuple[Any, ...], rows: _Rows, loads: NDArray | None
 ) -> None:
-    """Fill the rows of some of the points."""
+    """Solve the selected points, and fill in their rows."""
     structure, *points = given
     part = {name: values[some] for name, values in rows.items()}
     own = (array[some] if len(array) > 1 else array for array in points)
@@ -392,7 +394,7 @@ def _of_rows(
     posture: Posture, joints: VirtualJoints, rows: _Rows, load: NDArray,
     loads: FrameLoads, errors: NDArray | None,
 ) -> Assembly:  # fmt: skip
-    """Many assemblies; they see what is written into the rows later."""
+    """Return many assemblies as views of the rows, which may be filled later."""
     known = {"_gap": "gap", "_residual": "residual", "_excess": "excess"}
     known |= {"bound": "least"}
     known |= {k: k for k in ("energy", "work", "platform_screw", "potential")}
@@ -406,10 +408,10 @@ def _of_rows(
     return with_known(points, {name: rows[key] for name, key in known.items()})
 
 
-def _by_reference(where: Assembly, compliant: Compliant) -> Assembly | Exception:
-    """One point solved by the reference, or why there is no solution."""
+def _by_reference(where: Assembly, own_axes_free: bool) -> Assembly | Exception:
+    """Return one point solved by the reference, or the exception raised."""
     try:
-        return least_energy(where.posture, where.load, where.frame_loads, compliant)
+        return least_energy(where.posture, where.load, where.frame_loads, own_axes_free)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         return error
 
@@ -418,7 +420,7 @@ def _record(
     rows: _Rows, apart: dict[int, Assembly | Exception], i: int,
     found: Assembly | Exception,
 ) -> None:  # fmt: skip
-    """Row i of a point solved by itself; kept where its columns are others."""
+    """Write a point solved separately into row i; keep it if its columns differ."""
     rows["method"][i] = "reference"
     if isinstance(found, Exception):
         for name in (*_NUMBERS, "platform_screw", *_VECTORS):
@@ -449,12 +451,12 @@ def _drop_rounding(rows: _Rows, residual: NDArray, loaded: NDArray) -> None:
     """Set to zero, in place, energies, wrenches and springs that are only rounding."""
     multipliers = rows["multipliers"]
     drop_zeros(rows["energy"], rows["bound"], multipliers, residual, loaded)
-    # without loads no wrenches mean no deformation but rounding
+    # without loads and wrenches, deformations are rounding
     rows["elastic"][~(loaded | multipliers.any(axis=1))] = 0.0
 
 
 def _excess_of(clearances: NDArray, starts: NDArray) -> NDArray:
-    """(k,) [-] by how much the worst of clearances (k, nu) leaves its cone."""
+    """Return the (k,) [-] largest excess of clearances (k, nu) over their cones."""
     if not clearances.shape[1]:
         return np.zeros(len(clearances))
     squares = np.add.reduceat(clearances.T**2, starts[:-1], axis=0)

@@ -1,9 +1,9 @@
-"""Problems (22), (21), (27) and K_C of several postures side by side, compiled.
+"""Problems (22), (21), (27) and K_C of several postures in parallel, compiled.
 
-One posture, or one search of (27), in each lane of the processor's vector registers,
-from the frames' poses to the certificate.  No lane depends on another: a point solved
-alone, in a batch or in another order has the same answer to the last bit.  What is not
-covered, or not proved, is left to the reference, and marked.
+Each lane of the processor's vector registers takes one posture, or one search of (27),
+from the frames' poses to the certificate.  No lane depends on another: answers are
+bit-identical for a point alone, in a batch or in another order.  Points that are not
+covered, or not proved, are marked for the reference.
 """
 
 from collections.abc import Mapping
@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from assembly.kernels.choice import kernels
 from assembly.linear.robot_structure import Structure
 
-# outcomes of (21), (27) and K_C: proved, or left to the reference
+# outcomes of (21), (27) and K_C: proved, or for the reference
 COMPILED, REFERENCE = range(2)
-_KEPT = 64  # robots that are known to C++
+_KEPT = 64  # robots whose C++ data are kept
 _known: dict[int, tuple[Structure, Any]] = {}
 
 
@@ -25,16 +25,16 @@ def assemble_side_by_side(
     structure: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
     loads: NDArray | None, out: Mapping[str, NDArray],
 ) -> None:  # fmt: skip
-    """Solve every point.
+    """Solve problem (22) at every point.
 
     Args:
         structure: the robot.
-        T: (k, n, 4, 4) frames; of these and what follows one row serves all.
+        T: (k, n, 4, 4) frames; here and below one row may serve all points.
         errors: (k, n, 6) [rad, m].
-        mismatch: [rad, m] nominal closure errors of the frames, as many.
+        mismatch: (k,) [rad, m] nominal closure errors of the frames.
         loads: (k, 2, n, 6) [N m, N] on bodies and on joints in the frames' axes.
-        out: to fill, in this order: (k,) outcomes, energies [J], certified lower bounds
-            of them, energies without clearance, work of the loads on all but the
+        out: arrays to fill, in this order: (k,) outcomes, energies [J], certified lower
+            bounds of them, energies without clearance, work of the loads on all but the
             errors; (k, 6) [rad, m] platform screws, (k, nu) clearances, (k, nq) free
             motions, (k, 6 closures) multipliers; (k,) closures' residuals; (k, ny)
             [sqrt(2 J)] deformations of the springs.
@@ -49,18 +49,19 @@ def margins_side_by_side(
     structure: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
     out: tuple[NDArray, NDArray, NDArray, NDArray],
 ) -> None:  # fmt: skip
-    """Margins of all points, with their lower bounds.
+    """Compute the margins of all points, with their lower bounds.
 
     Args:
         structure: the robot, without springs.
-        T: (k, n, 4, 4) frames; of these and what follows one row serves all.
+        T: (k, n, 4, 4) frames; here and below one row may serve all points.
         errors: (k, n, 6) [rad, m].
-        mismatch: [rad, m] nominal closure errors of the frames, as many.
-        out: to fill: (k,) margins, their bounds, (k, nu) forces on the clearances that
-            prove these, sizes on all cones adding up to 1, and (k,) outcomes.
+        mismatch: (k,) [rad, m] nominal closure errors of the frames.
+        out: arrays to fill: (k,) margins, their bounds, (k, nu) forces on the
+            clearances that prove these, with sizes on all cones that add up to 1, and
+            (k,) outcomes.
 
     Raises:
-        ValueError: as above.
+        ValueError: an array has another shape, type or order of its numbers.
     """
     kernels.all_margins(_robot(structure), T, errors, mismatch, *out)
 
@@ -70,7 +71,7 @@ def bounds_side_by_side(
     held: Structure, loads: tuple[NDArray, ...], asked: tuple[NDArray, NDArray],
     out: tuple[NDArray, ...],
 ) -> None:  # fmt: skip
-    """Bounds of the largest pose errors of the points whose outcome is COMPILED.
+    """Bound the largest pose errors of the points whose outcome is COMPILED.
 
     Args:
         structure: the robot, without springs.
@@ -78,21 +79,21 @@ def bounds_side_by_side(
         mismatch: (k,) [rad, m] nominal closure error of the frames.
         centres: the solution of (22): (k, 6) [rad, m] screws of the platform at its
             origin, (k, nu) clearances in the cones of ``structure``, and (k, nq)
-            [rad, m] motions where they have a bound, else anything.
-        held: the robot of the solution of (22) that says which clearances are held.
+            [rad, m] motions; only those that have a bound are read.
+        held: the robot in whose solution of (22) the loaded clearances are found.
         loads: that solution: (k, 6 closures) multipliers of the scaled closures,
             (k, nu) clearances in the cones of ``held``, (k,) [J] energies, and those
             with every clearance at zero; and (cones,) the cone of ``held`` of each of
             ``structure``.
-        asked: (3,) [m] from the platform's origin to the point whose error is meant;
-            (2,) [rad, m] asked of upper minus lower bounds.
-        out: to fill: (k, 2) [rad] lower and upper bounds of the rotation and [m] of the
-            translation, (k, 6) [rad, m] screws that attain the lower of each, (k,)
-            support functions computed, and (k,) outcomes, where what is not solved
-            becomes REFERENCE.
+        asked: (3,) [m] from the platform's origin to the point whose error is bounded;
+            (2,) [rad, m] required difference of upper and lower bounds.
+        out: arrays to fill: (k, 2) [rad] lower and upper bounds of the rotation and [m]
+            of the translation, (k, 6) [rad, m] screws that attain each lower bound,
+            (k,) number of support functions computed, and (k,) outcomes; an unsolved
+            point becomes REFERENCE.
 
     Raises:
-        ValueError: as above.
+        ValueError: an array has another shape, type or order of its numbers.
     """
     none = np.zeros((1, T.shape[1], 6))
     kernels.bound_all(
@@ -105,25 +106,25 @@ def compliances_side_by_side(
     structure: Structure, T: NDArray, mismatch: NDArray, springs: NDArray,
     status: NDArray,
 ) -> None:  # fmt: skip
-    """Deformations of all springs under unit wrenches on the platform, at all points.
+    """Compute deformations of all springs under unit wrenches on the platform.
 
     Args:
         structure: the robot.
         T: (k, n, 4, 4) frames.
         mismatch: (k,) [rad, m] nominal closure error of the frames.
-        springs: (k, 6, ny) [sqrt(2 J) per N m and N] to fill, translations and forces
-            scaled by the reference length.
-        status: (k,) to fill: COMPILED, or why there is none.
+        springs: (k, 6, ny) [sqrt(2 J) per N m and N] array to fill; translations and
+            forces are scaled by the reference length.
+        status: (k,) array to fill: COMPILED, or the reason without a result.
 
     Raises:
-        ValueError: as above.
+        ValueError: an array has another shape, type or order of its numbers.
     """
     none = np.zeros((1, T.shape[1], 6))
     kernels.comply_all(_robot(structure), T, none, mismatch, springs, status)
 
 
 def _robot(structure: Structure) -> Any:
-    """What C++ keeps of a structure, checked once."""
+    """Return the C++ object of a structure, checked once."""
     known = _known.get(id(structure))
     if known is None:
         if len(_known) >= _KEPT:

@@ -1,8 +1,8 @@
 """Loads on a robot: on its platform, on its bodies, and weights.
 
 A dead load does work on every small screw between it and the base.  A load on the body
-of frame j acts before j's joint: the body's own error and deformation count, the
-joint's clearance and spring do not.  A load on what j's joint carries acts after it.
+of frame j acts before j's joint: it works on the body's own error and deformation, but
+not on the joint's clearance and spring.  A load ``carried`` by j's joint acts after it.
 
 The weight of a beam is spread over its length.  Its equivalent at the two ends is half
 the weight at each, and the moments of a beam clamped at both, -+ r x W / 12: the tip
@@ -40,8 +40,8 @@ class FrameLoads:
     Attributes:
         body: (..., 6n) [N m, N] on errors and deformations of bodies.
         joint: (..., 6n) [N m, N] on clearances, springs and motions of joints.
-        distributed: (..., 6n) [N m, N] the part of ``body`` that acts along the links,
-            as it counts at their tips; or zero.
+        distributed: (..., 6n) [N m, N] part of ``body`` that acts along the links,
+            as it acts at their tips; or zero.
     """
 
     body: NDArray
@@ -49,11 +49,11 @@ class FrameLoads:
     distributed: NDArray = field(default_factory=lambda: np.zeros(()))
 
     def __bool__(self) -> bool:
-        # counted, which takes a fifth of the time of any()
+        # count_nonzero takes a fifth of the time of any()
         return bool(np.count_nonzero(self.body) or np.count_nonzero(self.joint))
 
     def __getitem__(self, rows: Any) -> "FrameLoads":
-        """Of one point, or of some; those that serve all stay."""
+        """Return the loads of one point or of a selection."""
         parts = (self.body, self.joint, self.distributed)
         return FrameLoads(*(part[rows] if part.ndim > 1 else part for part in parts))
 
@@ -64,10 +64,11 @@ class FrameLoads:
         return full.reshape(*full.shape[:-1], -1, 6)
 
     def rows(self) -> NDArray:
-        """The loads as compiled functions read them.
+        """Return the loads as compiled functions read them.
 
         Returns:
-            (k, 2, n, 6) [N m, N] on bodies and on joints; one row where it serves all.
+            (k, 2, n, 6) [N m, N] on bodies and on joints; a single row serves all
+            points.
         """
         rows = np.stack([self.body, self.joint], axis=-2)
         return rows.reshape(-1, 2, rows.shape[-1] // 6, 6)
@@ -94,14 +95,14 @@ def loads_on_frames(
     bodies: ArrayLike | None = None,
     carried: ArrayLike | None = None,
 ) -> FrameLoads:
-    """Loads on all small screws of a robot.
+    """Return the loads on all small screws of a robot.
 
     Args:
-        posture: where it stands, of n frames; or many postures.  Leading dimensions, of
+        posture: configuration of a robot of n frames; or many.  Leading dimensions, of
             its transforms (..., n, 4, 4) and of all shapes here, are broadcast.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         bodies: (n, 6) [N m, N] on each frame's body, at its origin, base axes.
-        carried: (n, 6) [N m, N] on what each frame's joint carries, likewise.
+        carried: (n, 6) [N m, N] on the part that each frame's joint carries, there.
 
     Returns:
         The loads; all zero where nothing is given.
@@ -130,9 +131,10 @@ def loads_on_frames(
         own[..., robot.index(robot.platform), :] += np.asarray(load, dtype=float)
     acting = np.flatnonzero(given.reshape(-1, n, 6).any(axis=(0, 2)))
     if acting.size:
-        # all read at the platform's origin, then summed over what each frame carries
+        # all wrenches are read at the platform's origin, then summed over the frames
+        # carried
         arms = (T[..., :3, 3] - posture.platform[..., None, :3, 3])[..., None, :, :]
-        if acting.tolist() != [robot.index(robot.platform)]:  # which is there
+        if acting.tolist() != [robot.index(robot.platform)]:  # the platform itself
             given[..., acting, :] = _moved(given[..., acting, :], arms[..., acting, :])
         after += _beyond(robot)[:, acting] @ (own + after)[..., acting, :]
         own += after
@@ -145,8 +147,8 @@ def loads_on_frames(
 def _with_leading(
     lead: tuple[int, ...], whose: str, shape: tuple[int, ...], own: tuple[int, ...]
 ) -> tuple[int, ...]:
-    """Leading dimensions together with those of an array; ``own`` are its last."""
-    if shape == own:  # as nearly always
+    """Return the common leading dimensions; ``own`` are the last ones of the array."""
+    if shape == own:  # the usual case
         return lead
     try:
         if shape[-len(own) :] != own:
@@ -162,12 +164,12 @@ def _with_leading(
 
 @lru_cache(maxsize=16)
 def _beyond(robot: Robot) -> NDArray:
-    """(n, n) 1 where a frame, the column, is carried by another, the row."""
+    """Return an (n, n) array: 1 where the row's frame carries the column's frame."""
     return (robot.on_path & ~np.eye(len(robot.frames), dtype=bool)).T.astype(float)
 
 
 def _moved(wrenches: NDArray, arms: NDArray) -> NDArray:
-    """(..., n, 6) wrenches that act at arms (..., n, 3), read at the origin."""
+    """Return (..., n, 6) wrenches that act at arms (..., n, 3), read at the origin."""
     read = wrenches.copy()
     x, y, z = (arms[..., a] for a in range(3))
     fx, fy, fz = (wrenches[..., a] for a in range(3, 6))
@@ -178,10 +180,10 @@ def _moved(wrenches: NDArray, arms: NDArray) -> NDArray:
 
 
 def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
-    """Weight of all links with a density and of all bodies with a mass.
+    """Return the weights of all links with a density and of all bodies with a mass.
 
     Args:
-        posture: where the robot stands, of n frames; or many postures, as above.
+        posture: the robot's configuration, of n frames; or many postures, as above.
         gravity: (..., 3) [m/s^2] base axes, such as (0, 0, -9.81).
 
     Returns:
@@ -207,22 +209,22 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
             clamp[..., :3] = np.cross(along, W) / 12
             bodies[..., i, :] += _at(np.zeros(3), W / 2) - clamp
             parent = robot.parents[i]
-            if parent >= 0:  # else the base carries it
-                # the beam starts where it starts, be that the parent's origin or not
+            if parent >= 0:  # otherwise the base carries it
+                # the beam may start off the parent's origin
                 arm = T[..., i, :3, 3] - along - T[..., parent, :3, 3]
                 carried[..., parent, :] += _at(arm, W / 2) + clamp
     return bodies, carried
 
 
 def massless(robot: Robot, gravity: ArrayLike | None) -> list[str]:
-    """A remark on gravity that acts on nothing, or not on a link given by a mesh.
+    """Return a remark if gravity acts on nothing, or not on a link given by a mesh.
 
     Args:
-        robot: any.
+        robot: any robot.
         gravity: (3,) [m/s^2] or None.
 
     Returns:
-        One sentence, or none.
+        A list of one sentence, or empty.
     """
     if gravity is None or not np.any(gravity):
         return []
@@ -245,10 +247,10 @@ def massless(robot: Robot, gravity: ArrayLike | None) -> list[str]:
 
 
 def weights_at_tips(posture: Posture, gravity: ArrayLike) -> NDArray:
-    """The part of :func:`weights` that acts along the links and counts at their tips.
+    """Return the part of :func:`weights` along the links, as it acts at their tips.
 
     Args:
-        posture: where the robot stands, of n frames; or many postures, as above.
+        posture: the robot's configuration, of n frames; or many postures, as above.
         gravity: (..., 3) [m/s^2] base axes.
 
     Returns:
@@ -263,16 +265,16 @@ def weights_at_tips(posture: Posture, gravity: ArrayLike) -> NDArray:
 
 
 def wrenches_at_starts(robot: Robot, tips: NDArray, distributed: NDArray) -> NDArray:
-    """What links under their own weight transmit where they start.
+    """Return the wrenches at the starts of links under their own weight.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         tips: (..., n, 6) [N m, N] through each link's section at its tip.
         distributed: (..., n, 6) [N m, N] of :func:`weights_at_tips`.
 
     Returns:
-        (..., n, 6) [N m, N] at the link's start, in its frame's axes; NaN where it has
-        no weight of its own.
+        (..., n, 6) [N m, N] at the link's start, in its frame's axes; NaN for a link
+        without a weight of its own.
     """
     table = _masses(robot)
     weight, span = 2 * distributed[..., 3:], table[:, 5:]
@@ -283,7 +285,7 @@ def wrenches_at_starts(robot: Robot, tips: NDArray, distributed: NDArray) -> NDA
 
 @lru_cache(maxsize=16)
 def _masses(robot: Robot) -> NDArray:
-    """(n, 8) of every body its mass and centre, of its beam the mass and the beam."""
+    """Return (n, 8): mass and centre of each body, mass and vector of its beam."""
     table = np.zeros((len(robot.frames), 8))
     for row, frame in zip(table, robot.frames, strict=True):
         row[0], row[1:4] = frame.mass, frame.centre_of_mass
@@ -297,7 +299,7 @@ def _masses(robot: Robot) -> NDArray:
 
 
 def loads_with_weight(postures: Posture, load: NDArray, gravity: NDArray) -> FrameLoads:
-    """Loads of a platform load and of weight, at one posture or at many.
+    """Return the loads of a platform load and of weight, at one posture or at many.
 
     Args:
         postures: one, or R of them in one.
@@ -305,8 +307,8 @@ def loads_with_weight(postures: Posture, load: NDArray, gravity: NDArray) -> Fra
         gravity: (3,) or (R, 3) [m/s^2] base axes.
 
     Returns:
-        Loads (6n,) or (R, 6n) on all small screws, not to be written to: robots that
-        differ in errors, springs and clearances alone share them.
+        Loads (6n,) or (R, 6n) on all small screws, read-only: robots that differ in
+        errors, springs and clearances alone share them.
     """
     robot = postures.robot
     arrays = load, gravity, _masses(robot)
@@ -330,11 +332,11 @@ def _loads_with_weight(content: Content) -> FrameLoads:
 def with_distributed(
     loads: FrameLoads, posture: Posture, gravity: ArrayLike
 ) -> FrameLoads:
-    """Loads that know which part of them is the links' own weight.
+    """Return the loads with the links' own weight recorded in ``distributed``.
 
     Args:
-        loads: with :func:`weights` among them.
-        posture: where the robot stands, one or many.
+        loads: loads with :func:`weights` among them.
+        posture: the robot's configuration, one or many.
         gravity: (..., 3) [m/s^2] base axes.
 
     Returns:
@@ -345,7 +347,7 @@ def with_distributed(
 
 
 def _check(whose: str, given: ArrayLike | None, largest: float, unit: str) -> None:
-    """Refuse numbers that are not finite or too large."""
+    """Reject numbers that are not finite or too large."""
     if given is None:
         return
     values = np.asarray(given, dtype=float)
@@ -358,5 +360,5 @@ def _check(whose: str, given: ArrayLike | None, largest: float, unit: str) -> No
 
 
 def _at(arm: NDArray, force: NDArray) -> NDArray:
-    """(..., 6) ``[arm x f, f]`` of a force (..., 3) that acts at (..., 3)."""
+    """Return the (..., 6) wrench ``[arm x f, f]`` of a force (..., 3) at an arm."""
     return np.concatenate([np.cross(arm, force), force], axis=-1)

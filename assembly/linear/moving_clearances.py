@@ -1,4 +1,4 @@
-"""Problem (27) as the compiled search reads it, and its call."""
+"""The compiled search of problem (27): its arguments and its call."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -12,21 +12,21 @@ from assembly.linear.energy import with_free_own_axes
 from assembly.linear.lanes import COMPILED, REFERENCE, bounds_side_by_side
 from assembly.linear.reference.pose_error import ASSUMPTIONS
 from assembly.linear.robot_structure import Structure, structure_of
-from assembly.model.clearance import Compliant
 from assembly.model.robot import Robot
+from assembly.model.statuses import OK
 from assembly.solvers.method import Method, check_method
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked about the largest pose error.
+    """Required bounds of the largest pose error.
 
     Attributes:
         assumption: see the head of :mod:`assembly.linear.pose_error`.
         energy_budget: eta of ``budget``.
-        tolerance_rotation: [rad] asked of upper minus lower bound.
-        tolerance_translation: [m] likewise.
-        offset: (3,) [m] from the platform's origin to the point whose error is meant.
+        tolerance_rotation: [rad] required difference of upper and lower bound.
+        tolerance_translation: [m] the same for the translation.
+        offset: (3,) [m] from the platform's origin to the point whose error is bounded.
         method: ``"compiled"`` or ``"reference"``.
     """
 
@@ -46,17 +46,18 @@ class Asked:
 
 
 def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], NDArray]:
-    """Bounds of k points by the compiled search.
+    """Return the bounds of k points by the compiled search.
 
     Args:
-        assembly: of k points.
-        asked: assumption, widths and point.
+        assembly: assembly of k points.
+        asked: assumption, required widths and point.
 
     Returns:
         ``rotation_error`` (k, 2) [rad] and ``translation_error`` (k, 2) [m], lower and
         upper; ``rotation_screw`` and ``translation_screw`` (k, 6) [rad, m] that attain
-        the lower; ``supports`` (k,) computed.  And (k,) bool, rows that are left to
-        numpy, or have no solution of (22); NaN there.
+        the lower bound; ``supports`` (k,) number of support functions computed.  And
+        (k,) bool, rows left to numpy or without a solution of (22); their numbers are
+        NaN.
     """
     count, robot = len(assembly), assembly.posture.robot
     rows = {
@@ -67,7 +68,7 @@ def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], N
         "supports": np.zeros(count, np.int64),
     }
     outcome = np.full(count, COMPILED, np.int64)
-    left = assembly.status != "ok"
+    left = assembly.status != OK
     if assembly.frame_loads:
         left |= assembly.loaded
     left[list(assembly.apart)] = True
@@ -77,8 +78,8 @@ def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], N
         return rows, np.ones(count, dtype=bool)
     solution = assembly
     if asked.assumption == "free":
-        # turning about the own axis costs nothing here: a clearance is held only if it
-        # stays loaded without those soft springs
+        # here the own axis turns without energy: a clearance is held only if it stays
+        # loaded without those soft springs
         solution = with_free_own_axes(assembly)
         outcome[~np.isfinite(solution.clearances).all(axis=1)] = REFERENCE
     places = _places_of(robot, asked.assumption)
@@ -107,15 +108,15 @@ def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], N
 
 
 class _Places(NamedTuple):
-    """What an assumption lets move, and where that is in (22).
+    """Columns that may move under an assumption, and their indices in (22).
 
     Attributes:
-        moving: what may move.
-        loaded: the robot of the solution of (22) that says which clearances are held.
+        moving: the robot whose columns may move.
+        loaded: the robot in whose solution of (22) the loaded clearances are found.
         columns: (nu,) columns in (22) of the clearances that move.
-        cone_of: (cones,) cones of ``loaded`` likewise.
+        cone_of: (cones,) cones of ``loaded`` of the clearances that move.
         bounded: free motions that have a bound.
-        motions: their places in (22).
+        motions: their indices in (22).
     """
 
     moving: Structure
@@ -128,10 +129,11 @@ class _Places(NamedTuple):
 
 @lru_cache(maxsize=32)
 def _places_of(robot: Robot, assumption: str) -> _Places:
-    """Places of one assumption, once for each robot."""
-    rigid: Compliant = "free" if assumption == "free" else "rigid"
-    moving, all_of = structure_of(robot, rigid)[1], structure_of(robot)[1]
-    loaded = structure_of(robot, "hinged")[1] if assumption == "free" else all_of
+    """Return the columns that may move under one assumption, cached for each robot."""
+    own_axes_free = assumption == "free"
+    moving = structure_of(robot, False, own_axes_free)[1]
+    all_of = structure_of(robot)[1]
+    loaded = structure_of(robot, True, True)[1] if own_axes_free else all_of
     own = _columns(moving.cone_frame, moving.cone_axis)
     in_loaded = _indices(own, _columns(loaded.cone_frame, loaded.cone_axis))
     cone_of = np.searchsorted(loaded.starts, in_loaded, side="right") - 1
@@ -148,10 +150,10 @@ def _places_of(robot: Robot, assumption: str) -> _Places:
 
 
 def _columns(frames: NDArray, axes: NDArray) -> list[tuple[int, int]]:
-    """Frame and axis of every column."""
+    """Return the frame and axis of every column."""
     return list(zip(frames.tolist(), axes.tolist(), strict=True))
 
 
 def _indices(some: list[tuple[int, int]], among: list[tuple[int, int]]) -> NDArray:
-    """Where the same frames and axes are by another assumption."""
+    """Return the indices of these frames and axes in another list of columns."""
     return np.array([among.index(one) for one in some], dtype=np.int64)

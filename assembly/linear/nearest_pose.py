@@ -1,13 +1,13 @@
 """Of all assemblies of least energy, the one whose platform is nearest to nominal.
 
 Springs and loaded clearances are the same in all of them
-(:mod:`assembly.linear.reference.pose_error`, ``frozen``); unloaded clearances
-may be anywhere in their cones as long as the closures hold.  The nearest pose is a
-second-order cone programme again,
+(:mod:`assembly.linear.reference.pose_error`, ``frozen``).  Unloaded clearances may be
+anywhere in their cones as long as the closures hold.  The nearest pose is another
+second-order cone programme,
 
     minimise  |x + X (v - u)|^2    subject to  H (v - u) = 0,  |v_k| <= 1,
 
-x the deviation at the solution u, X its derivative by the unloaded clearances.
+where x is the deviation at the solution u, X its derivative by the unloaded clearances.
 
 Sources:
     Public format, section 5, item 15: the pose of least energy and, among those, of
@@ -47,13 +47,13 @@ def nearest_pose(
     offset: ArrayLike = (0.0, 0.0, 0.0),
     method: Method = "compiled",
 ) -> tuple[Assembly, bool]:
-    """The assembly of the same energy whose pose deviates least.
+    """Return the assembly of the same energy whose pose deviates least.
 
     Args:
-        assembly: of least energy.
-        offset: (3,) [m] from the platform's origin to the point whose deviation counts,
-            base axes.
-        method: of :func:`assembly.solvers.conic.minimise_energy`.
+        assembly: assembly of least energy.
+        offset: (3,) [m] from the platform's origin to the point whose deviation is
+            minimised, base axes.
+        method: method of :func:`assembly.solvers.conic.minimise_energy`.
 
     Returns:
         The assembly, its deviation (rotation vector [rad] and shift of the point [m])
@@ -92,11 +92,11 @@ class _FreeClearances:
     """Unloaded clearances, and how the platform follows them.
 
     Attributes:
-        unloaded: (nu,) bool, which columns of the cones these k are.
+        unloaded: (nu,) bool, the k columns of the cones that are unloaded.
         deviation: (6,) [rad, m] of the point, at the solution.
-        map: (6, k) [rad, m] how it follows them, free motions following suit.
+        map: (6, k) [rad, m] its derivative by the clearances, with free motions.
         rows: (p, k) orthonormal rows of the closures.
-        start: (k,) where the solution has them.
+        start: (k,) their values at the solution.
         group: (k,) cone of each.
     """
 
@@ -109,7 +109,7 @@ class _FreeClearances:
 
 
 def _free_clearances(assembly: Assembly, offset: ArrayLike) -> _FreeClearances | None:
-    """What may still move at least energy; None if nothing may."""
+    """Return the clearances that may move at least energy; None if there are none."""
     joints, lin = assembly.joints, assembly.linearisation
     unloaded = ~loaded_cones(assembly, joints)
     columns = joints.cones[:, unloaded]
@@ -133,7 +133,7 @@ def _free_clearances(assembly: Assembly, offset: ArrayLike) -> _FreeClearances |
 
 
 def _with_clearances(assembly: Assembly, free: _FreeClearances, v: NDArray) -> Assembly:
-    """The assembly with other unloaded clearances, free motions following suit."""
+    """Return the assembly with other unloaded clearances; free motions follow."""
     joints, lin = assembly.joints, assembly.linearisation
     u = assembly.clearances.copy()
     u[free.unloaded] = v
@@ -144,7 +144,7 @@ def _with_clearances(assembly: Assembly, free: _FreeClearances, v: NDArray) -> A
 
 
 def _moves(free: _FreeClearances, method: Method) -> bool:
-    """Whether the closures leave the platform free to move."""
+    """Return whether the closures leave the platform free to move."""
     projected = free.map - free.map @ free.rows.T @ free.rows
     U, S, _ = np.linalg.svd(projected, full_matrices=False)
     directions = U.T[S > _STILL]
@@ -154,7 +154,7 @@ def _moves(free: _FreeClearances, method: Method) -> bool:
 def _heights(
     free: _FreeClearances, direction: NDArray, method: Method
 ) -> Iterator[float]:
-    """[rad, m] how far the platform goes both ways along a direction."""
+    """Yield the platform's range [rad, m] in both senses of a direction."""
     gradient = free.map.T @ direction
     size = float(np.linalg.norm(gradient))
     none, right = np.zeros((0, len(gradient))), free.rows @ free.start

@@ -2,7 +2,7 @@
 
 As printed, (27) is degenerate: with the deformations frozen at the solution of (22),
 complementary slackness fixes every loaded clearance.  So there are three assumptions on
-what may still move:
+the screws that may still move:
 
 ======== =================================================================
 frozen   all deformations stay; only unloaded clearances move (the paper)
@@ -11,17 +11,19 @@ budget   everything that closes with at most (1 + eta) times the least energy
 ======== =================================================================
 
 Passive joints keep within the bounds of their own motion.  Rotation and translation are
-bounded each by itself: a tool on a bearing turns freely, and its point still has a
-largest error.
+bounded separately: a tool on a bearing turns freely, and its point still has a largest
+error.
 
-The set of platform screws (:mod:`assembly.linear.reference.pose_error`) is convex.  By
-the method ``"compiled"`` its farthest one is bracketed by
-:func:`assembly.solvers.one_problem.farthest`, which asks Clarabel for single supports
-in doubt; by ``"reference"`` by :func:`assembly.solvers.outer_cuts.farthest`, in numpy,
-and Clarabel for every support.  The first two assumptions are compiled whole
-(:mod:`assembly.linear.moving_clearances`): some tenths of a millisecond a point.  For
-``budget``, and a point that this does not cover, the set is set up in numpy, one by
-one.
+The set of platform screws (:mod:`assembly.linear.reference.pose_error`) is convex.
+With ``"compiled"``, :func:`assembly.solvers.one_problem.farthest` brackets its farthest
+screw and calls Clarabel for single supports in doubt.  With ``"reference"``,
+:func:`assembly.solvers.outer_cuts.farthest` does so in numpy, and Clarabel computes
+every support.
+
+The first two assumptions are compiled from end to end
+(:mod:`assembly.linear.moving_clearances`) and take some tenths of a millisecond a
+point.  For ``budget``, and for points that this does not cover, the set is set up in
+numpy, point by point.
 """
 
 from collections.abc import Callable
@@ -41,11 +43,11 @@ from assembly.linear.reference.pose_error import reachable_screws
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.robot_structure import structure_of
 from assembly.model.point_results import Numbers, PointResults
-from assembly.model.statuses import SOLVER_FAILED
+from assembly.model.statuses import OK, SOLVER_FAILED
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method
-from forcefit.inputs.display import Figures, bracket, short_repr
 from forcefit.inputs.renamed import renamed_keywords, warn_renamed
+from forcefit.results.display import Figures, bracket, short_repr
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,19 +56,19 @@ class PoseError(PointResults):
 
     Attributes:
         assumption: ``"frozen"``, ``"free"`` or ``"budget"``.
-        rotation_error: (..., 2) [rad] lower and upper bound; of many NaN without a
+        rotation_error: (..., 2) [rad] lower and upper bound; NaN at a point without a
             solution of (22).
-        translation_error: (..., 2) [m] likewise.
+        translation_error: (..., 2) [m] lower and upper bound.
         rotation_screw: (..., 6) [rad, m] attains the lower bound of the rotation.
         translation_screw: (..., 6) [rad, m] attains that of the translation.
-        supports: (...) support functions computed.
-        method: (...) which searched: ``"compiled"``, or ``"reference"``, numpy and
+        supports: (...) number of support functions computed.
+        method: (...) of the search: ``"compiled"``, or ``"reference"``, numpy and
             Clarabel.
-        one_by_one: (...) bool, whose set of screws was set up in numpy.
-        status: (...) ``"ok"``; of many also ``"cannot assemble"``, or ``"solver
-            failed"`` where there is no solution or its certificate falls short.
+        one_by_one: (...) bool, True if the set of screws was set up in numpy.
+        status: (...) ``"ok"``; for many points also ``"cannot assemble"``, or
+            ``"solver failed"`` if there is no solution or its certificate falls short.
         reason: (...) message where the status is not ok.
-        proof: says what of one point is not proved.
+        proof: function that returns what is not proved of one point.
     """
 
     assumption: str
@@ -77,7 +79,7 @@ class PoseError(PointResults):
     supports: Numbers
     method: Any
     one_by_one: Any
-    status: Any = "ok"
+    status: Any = OK
     reason: Any = ""
     proof: Callable[[], str] = str
 
@@ -105,19 +107,19 @@ class PoseError(PointResults):
 
     @cached_property
     def unproved(self) -> Any:
-        """(...) what of the solution of (22), or of the width asked, is not proved.
+        """(...) part of the solution of (22), or of the width, that is not proved.
 
-        Empty if nothing; of one point only found out when asked, it takes longer than
-        the bounds.
+        Empty if all is proved.  For one point it is computed on first use, because it
+        takes longer than the bounds.
         """
         return self.reason if self.of_many else self.reason or self.proof()
 
     def _figures(self) -> Figures:
-        """What ``forcefit assembly error`` prints of it."""
+        """Return the numbers that ``forcefit assembly error`` prints."""
         figures = {"assumption": self.assumption}
         rotation, translation = self.rotation_error, self.translation_error
         if self.of_many:
-            known = self.status == "ok"
+            known = self.status == OK
             figures["points"] = f"{len(self)}, {np.count_nonzero(known)} bounded"
             rotation, translation = (
                 one[known].max(axis=0, initial=0.0) for one in (rotation, translation)
@@ -142,21 +144,21 @@ def bound_pose_error(
     """Bracket the largest rotation and translation error of the platform.
 
     Args:
-        assembly: of least energy, one or many, without a load for ``budget``.
+        assembly: assembly of least energy, one or many, without a load for ``budget``.
         assumption: see the head of this module.
         energy_budget: eta of ``budget``.
-        tolerance_rotation: [rad] asked of upper minus lower bound.
-        tolerance_translation: [m] likewise.
-        offset: (3,) [m] from the platform's origin to the point whose error is meant,
+        tolerance_rotation: [rad] required difference of upper and lower bound.
+        tolerance_translation: [m] the same for the translation.
+        offset: (3,) [m] from the platform's origin to the point whose error is bounded,
             base axes.
-        method: ``"compiled"``; or ``"reference"``, numpy and Clarabel alone: tenths of
-            a second.
+        method: ``"compiled"``; or ``"reference"``, numpy and Clarabel alone, which
+            takes tenths of a second.
 
     Returns:
-        Bounds; wider than asked only if 400 supports did not suffice, which
-        ``unproved`` then says; infinite where the platform can turn, or its point
-        move, without bound.  Of many assemblies all of them, where a point without
-        bounds says so and raises nothing.
+        Bounds.  They are wider than required only if 400 supports did not suffice;
+        ``unproved`` then says so.  They are infinite where the platform can turn, or
+        its point move, without bound.  For many assemblies, one object with all points;
+        a point without bounds raises nothing and has its reason in ``reason``.
 
     Raises:
         ValueError: assumption or method is unknown, or ``budget`` has a load.
@@ -183,10 +185,10 @@ def bound_pose_error(
 
 
 def _bounds_of_many(assembly: Assembly, asked: Asked) -> PoseError:
-    """Compiled bounds; one by one what that leaves of what has a solution."""
+    """Return the compiled bounds; others are computed point by point."""
     rows, left = compiled_bounds(assembly, asked)
     status, reason = assembly.status.copy(), assembly.reason.copy()
-    left &= status == "ok"
+    left &= status == OK
     for i in np.flatnonzero(left).tolist():
         try:
             one = _bounds_of_one(assembly[i], asked)
@@ -203,7 +205,7 @@ def _bounds_of_many(assembly: Assembly, asked: Asked) -> PoseError:
 
 
 def _bounds_of_one(assembly: Assembly, asked: Asked) -> PoseError:
-    """The bounds of a set that is set up in numpy."""
+    """Return the bounds of a set that is set up in numpy."""
     reachable = reachable_screws(assembly, asked.assumption, asked.energy_budget)
     reachable = reachable.at_point(asked.offset)
     rotation, rotation_screw, supports = reachable.farthest(
@@ -237,7 +239,7 @@ def _bounds_of_one(assembly: Assembly, asked: Asked) -> PoseError:
 def _too_wide(
     part: str, bounds: tuple[float, float], tolerance: float, unit: str
 ) -> str:
-    """That bounds are farther apart than asked, if they are."""
+    """Return a message if bounds are farther apart than required, else an empty one."""
     low, high = bounds
     # both infinite: the platform can move without bound
     if high - low <= tolerance or low == high:

@@ -13,7 +13,7 @@ from assembly.linear.closure import (
     closure_signs,
     virtual_joints,
 )
-from assembly.model.clearance import Compliant, clearance_bounds, component_bounds
+from assembly.model.clearance import clearance_bounds, component_bounds
 from assembly.model.robot import Robot
 from assembly.solvers.cones import cone_starts
 
@@ -24,22 +24,22 @@ class Structure(NamedTuple):
     Attributes:
         size: [m] reference length.
         platform: row of its frame.
-        on_path: (n,) 1 on the way to the platform.
+        on_path: (n,) 1 if on the path to the platform.
         patterns: (np, closures) signs with which frames enter the closures.
         pattern_of: (n,) row of ``patterns``.
         springs: (ny, 6) spring columns in their frame's axes, sorted by group; those
             in no closure last.
-        spring_frame: (ny,) whose they are.
-        spring_order: (ny,) their places among the virtual joints' columns.
-        of_joint: (ny,) 1 a joint's spring, 0 a link's.
+        spring_frame: (ny,) frame of each spring.
+        spring_order: (ny,) indices of the springs among the virtual joints' columns.
+        of_joint: (ny,) 1 for a joint's spring, 0 for a link's.
         groups: (ng + 1,) first spring of each group, and of those in no closure.
         group_pattern: (ng,) row of ``patterns``.
-        group_on_path: (ng,) 1 on the way to the platform.
-        cone_frame: (nu,) whose a clearance is.
+        group_on_path: (ng,) 1 if on the path to the platform.
+        cone_frame: (nu,) frame of each clearance.
         cone_axis: (nu,) component of its screw.
         cone_size: (nu,) [rad or m].
         starts: (cones + 1,) first clearance of each cone, and nu.
-        free_frame: (nq,) whose a free motion is.
+        free_frame: (nq,) frame of each free motion.
         free_axis: (nq,) component of its screw.
         free_bound: (nq,) [rad or m] bound that was left out, inf where there is none.
     """
@@ -67,27 +67,29 @@ class Structure(NamedTuple):
 
 @lru_cache(maxsize=32)
 def structure_of(
-    robot: Robot, compliant: Compliant = "elastic", bounded_motion: bool = False
-) -> tuple[VirtualJoints, Structure]:
-    """What may move, as columns and as arrays.
+    robot: Robot, springs: bool = True, own_axes_free: bool = False,
+    bounded_motion: bool = False,
+) -> tuple[VirtualJoints, Structure]:  # fmt: skip
+    """Return the screws that may move, as columns and as arrays.
 
     Args:
-        robot: any.
-        compliant: as for :func:`assembly.linear.closure.virtual_joints`.
-        bounded_motion: likewise.
+        robot: any robot.
+        springs: as for :func:`assembly.linear.closure.virtual_joints`.
+        own_axes_free: as for the same function.
+        bounded_motion: as for the same function.
 
     Returns:
-        The columns; the same as arrays.
+        The columns; the same data as arrays.
     """
-    joints = virtual_joints(robot, compliant, bounded_motion)
+    joints = virtual_joints(robot, springs, own_axes_free, bounded_motion)
     rows = tuple((robot.index(a), robot.index(b)) for a, b in robot.closures)
     tree = _Tree(robot.index(robot.platform), rows, robot)
-    return joints, _structure(joints, tree, compliant)
+    return joints, _structure(joints, tree, own_axes_free)
 
 
 @dataclass(frozen=True)
 class _Tree:
-    """What of a robot, beside its virtual joints, a structure depends on."""
+    """Data of a robot, besides its virtual joints, on which a structure depends."""
 
     platform: int
     closures: tuple[tuple[int, int], ...]
@@ -95,13 +97,13 @@ class _Tree:
 
 
 @lru_cache(maxsize=32)
-def _structure(joints: VirtualJoints, tree: _Tree, compliant: Compliant) -> Structure:
-    """The arrays, once for all robots that differ in their errors alone."""
+def _structure(joints: VirtualJoints, tree: _Tree, own_axes_free: bool) -> Structure:
+    """Return the arrays, cached for robots that differ in their errors alone."""
     robot = tree.robot
     on_path = robot.on_path[tree.platform]
     signs = closure_signs(robot).T.astype(float)
     patterns, pattern_of = np.unique(signs, axis=0, return_inverse=True)
-    # springs that enter the same closures, and the platform's path, act as one
+    # springs in the same closures, and alike on the platform's path, act as one group
     spring_frame, springs = _by_frame(joints.elastic)
     acting = np.any(signs[spring_frame] != 0.0, axis=1)
     key = 2 * pattern_of[spring_frame] + on_path[spring_frame]
@@ -112,7 +114,7 @@ def _structure(joints: VirtualJoints, tree: _Tree, compliant: Compliant) -> Stru
     order = np.append(order, alone)
     cone_frame, cones = _by_frame(joints.cones)
     free_frame, free = _by_frame(joints.free)
-    bounds = component_bounds(clearance_bounds(robot, compliant))
+    bounds = component_bounds(clearance_bounds(robot, own_axes_free))
     free_axis = np.abs(free).argmax(axis=1) if len(free) else np.zeros(0, dtype=int)
     cone_axis = np.abs(cones).argmax(axis=1) if len(cones) else np.zeros(0, dtype=int)
     return Structure(
@@ -139,7 +141,7 @@ def _structure(joints: VirtualJoints, tree: _Tree, compliant: Compliant) -> Stru
 
 
 def _by_frame(columns: NDArray) -> tuple[NDArray, NDArray]:
-    """Frame of each column, which has only one, and (count, 6) screw in its axes."""
+    """Return the one frame of each column, and its (count, 6) screw in its axes."""
     blocks = columns.T.reshape(columns.shape[1], len(columns) // 6, 6)
     frame = np.abs(blocks).max(axis=2).argmax(axis=1) if len(blocks) else np.zeros(0)
     frame = frame.astype(np.int64)

@@ -1,7 +1,7 @@
-"""Rounding: energies that cannot be told from zero, and ill-conditioned stiffnesses.
+"""Rounding: energies indistinguishable from zero, and ill-conditioned stiffnesses.
 
-Closures are sums of screws that cancel.  In floating point they stay open by some units
-in the last place of their terms, and the wrenches' work on that means nothing.
+Closures are sums of screws that cancel.  In floating point a residual of some units in
+the last place of their terms remains.  The work of wrenches on it is no energy.
 """
 
 from functools import lru_cache
@@ -11,16 +11,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.linear.closure import VirtualJoints, in_reference_lengths
 
-ROUNDING = 8 * float(np.finfo(float).eps)  # of sums of some tens of terms
-SPREAD = 1e13  # of stiffnesses: rounding of the stiffest is 1e-3 of the softest
+ROUNDING = 8 * float(np.finfo(float).eps)  # relative, of sums of some tens of terms
+SPREAD = 1e13  # ratio of stiffnesses: rounding of the stiffest is 1e-3 of the softest
 
 
 def closure_rounding(errors: NDArray, joints: VirtualJoints, size: float) -> NDArray:
-    """(...,) [rad, lengths] what rounding may leave open in a closure.
+    """Return the bound (...,) [rad, lengths] of closure errors that rounding can cause.
 
     Args:
         errors: (..., n, 6) [rad, m] geometric errors.
-        joints: what may move.
+        joints: the virtual joints.
         size: [m] reference length.
 
     Returns:
@@ -32,7 +32,7 @@ def closure_rounding(errors: NDArray, joints: VirtualJoints, size: float) -> NDA
 
 @lru_cache(maxsize=64)
 def _clearance_sum(joints: VirtualJoints, size: float) -> float:
-    """[rad, lengths] all clearances together."""
+    """Return the sum [rad, lengths] of all clearances."""
     clearances = np.abs(joints.cones[:, joints.scaled]).sum(axis=1).reshape(-1, 6)
     return float((clearances @ in_reference_lengths(size)).sum())
 
@@ -40,10 +40,10 @@ def _clearance_sum(joints: VirtualJoints, size: float) -> float:
 def differs_from_zero(
     energy: ArrayLike, gap: ArrayLike, multipliers: NDArray, residual: ArrayLike
 ) -> NDArray:
-    """Whether least energies differ from zero by more than their certificate can tell.
+    """Return whether least energies exceed their certified uncertainty.
 
-    Springs are known to sqrt(2 gap), so an energy up to the gap may be zero; and the
-    wrenches' work on the closures' rounding means nothing.
+    Springs are known to sqrt(2 gap), so an energy up to the gap may be zero.  The
+    wrenches' work on the closures' rounding counts as uncertainty too.
 
     Args:
         energy: (...,) [J].
@@ -67,13 +67,13 @@ def drop_zeros(
     Args:
         energy: (k,) [J].
         bound: (k,) [J] certified lower bound.
-        multipliers: (k, 6 closures) of the scaled closures; zero where, without loads,
-            they are no more than rounding.
+        multipliers: (k, 6 closures) of the scaled closures; set to zero where, without
+            loads, they are rounding.
         residual: (k,) [rad, lengths] open in the closures, rounding included.
         loaded: (k,) bool, points under loads.
     """
     zero = ~differs_from_zero(energy, energy - bound, multipliers, residual)
-    if not np.count_nonzero(zero):  # nor is any no more than rounding
+    if not np.count_nonzero(zero):  # then no multiplier is rounding either
         return
     rounding = ~differs_from_zero(energy, 0.0, multipliers, residual) & ~np.array(
         loaded
@@ -84,7 +84,7 @@ def drop_zeros(
 
 @lru_cache(maxsize=64)
 def stiffness_spread(joints: VirtualJoints, size: float) -> float:
-    """[-] stiffest over softest spring, turns counted at the reference length."""
+    """Return stiffest over softest spring [-], rotations at the reference length."""
     weights = np.tile(in_reference_lengths(size), len(joints.elastic) // 6)
     compliance = ((joints.elastic * weights[:, None]) ** 2).sum(axis=0)
     return float(compliance.max(initial=1e-300) / compliance.min(initial=np.inf))

@@ -1,6 +1,6 @@
-"""The numbers of a least energy, of one point or of many, taken together or apart.
+"""The numbers of a least energy, of one point or of many, and their selection.
 
-What follows from them is :class:`assembly.linear.assembled.Assembly`.
+:class:`assembly.linear.assembled.Assembly` adds the quantities computed from them.
 """
 
 from collections.abc import Mapping
@@ -14,9 +14,10 @@ from assembly.kinematics.posture import Posture, together
 from assembly.linear.closure import Linearisation, VirtualJoints
 from assembly.linear.load import FrameLoads
 from assembly.model.point_results import N, PointResults, plain
+from assembly.model.statuses import OK
 
 _VECTORS = ("elastic", "clearances", "motions", "multipliers")
-# what may be known besides the fields: properties, and parts of its certificate
+# values that may be known in addition to the fields: properties, parts of a certificate
 KNOWN = (
     "energy", "platform_screw", "work", "potential", "bound", "_gap", "_residual",
     "_excess",
@@ -28,26 +29,27 @@ class Solution(PointResults, Generic[N]):
     """The numbers of a manipulator at least energy; or many, with a leading axis.
 
     Attributes:
-        linearisation: the assembly constraints it satisfies; where it stands.
-        joints: what was allowed to move.
+        linearisation: the assembly constraints it satisfies, with the posture.
+        joints: the virtual joints that could move.
         load: (..., 6) [N m, N] on the platform at its origin, base axes.
         frame_loads: all loads, this one among them, on every small screw.
         elastic: (..., ny) [sqrt(2 J)] scaled deformation of the springs.
-        clearances: (..., nu) clearances in units of their cones; of many NaN where the
-            bound of a passive joint's own motion is active, and ``[i]`` has more.
-        motions: (..., nq) [rad, m] free motions; NaN likewise.
+        clearances: (..., nu) clearances in units of their cones; NaN at points of many
+            where the bound of a passive joint's own motion is active (see ``[i]``).
+        motions: (..., nq) [rad, m] free motions; NaN at the same points.
         multipliers: (..., 6 closures) of the scaled closure rows.
         energy_without_clearance: (...) [J] least energy with all clearances at zero.
-        method: (...) which gave it: ``"compiled"``, or ``"reference"``, numpy and
+        method: (...) that solved it: ``"compiled"``, or ``"reference"``, numpy and
             Clarabel.
         errors: (..., n, 6) [rad, m] geometric errors; the robot's if absent.
-        status: (...) ``"ok"``; of many also ``"cannot assemble"``, ``"no equilibrium"``
-            or ``"solver failed"``, also where its certificate falls short.
+        status: (...) ``"ok"``; for many points also ``"cannot assemble"``,
+            ``"no equilibrium"`` or ``"solver failed"``, also if its certificate falls
+            short.
         reason: (...) message where the status is not ok.
-        apart: of many those with other columns than ``joints``, or why there is none,
-            by their row.
-        held: of many the rows of those that bounds of passive joints' own motion hold,
-            in order, and these with all such bounds as cones.
+        apart: by row, points with other columns than ``joints``, or the exception of a
+            point without a solution.
+        held: rows, in order, of the points that bounds of passive joints' own motion
+            hold, and these points with all such bounds as cones.
     """
 
     linearisation: Linearisation
@@ -61,7 +63,7 @@ class Solution(PointResults, Generic[N]):
     energy_without_clearance: N
     method: Any
     errors: Any = None
-    status: Any = "ok"
+    status: Any = OK
     reason: Any = ""
     apart: dict[int, Any] = field(default_factory=dict)
     held: Any = None
@@ -84,11 +86,11 @@ class Solution(PointResults, Generic[N]):
 
     @property
     def posture(self) -> Posture:
-        """Where the robot stands nominally."""
+        """Nominal configuration of the robot."""
         return self.linearisation.posture
 
     def __getitem__(self, rows: Any) -> Self:
-        """One of many, by a whole number, or why it has no solution; or some."""
+        """Return one point, by its number, or raise its exception; or a selection."""
         if not isinstance(rows, (int, np.integer)):
             return self._taken(np.arange(len(self))[rows])
         i = range(len(self))[rows]
@@ -103,7 +105,7 @@ class Solution(PointResults, Generic[N]):
         lin, robot = self.linearisation, self.posture.robot
         if self.posture.transforms.ndim > 3:
             lin = replace(lin, posture=self.posture[i])
-        # one robot for all where the errors are its own: its columns are cached
+        # the robot itself where the errors are its own: its columns are cached
         if one.errors is not None and not np.array_equal(one.errors, robot.errors):
             robot = robot.with_errors(one.errors)
             lin = replace(lin, posture=replace(lin.posture, robot=robot))
@@ -115,7 +117,7 @@ class Solution(PointResults, Generic[N]):
         return with_known(alone, known)
 
     def _taken(self, rows: NDArray) -> Self:
-        """Some of many, perhaps more than once."""
+        """Return a selection of points, perhaps with repetitions."""
         lin, held = self.linearisation, self.held
         if self.posture.transforms.ndim > 3:
             lin = replace(lin, posture=self.posture[rows])
@@ -133,10 +135,10 @@ class Solution(PointResults, Generic[N]):
         return with_known(taken, known)
 
     def in_columns(self, joints: VirtualJoints) -> Self:
-        """Many with the columns of other virtual joints.
+        """Return many points with the columns of other virtual joints.
 
         Args:
-            joints: those of some of the points apart.
+            joints: virtual joints of some points in ``apart``.
 
         Returns:
             The same points; NaN for clearances and motions of all others.
@@ -162,12 +164,12 @@ class Solution(PointResults, Generic[N]):
     def with_held(
         self, rows: NDArray, joints: VirtualJoints, parts: Mapping[str, NDArray]
     ) -> Self:
-        """Many of which bounds of passive joints' own motion hold some.
+        """Return many points, some of which bounds of passive joints' own motion hold.
 
         Args:
-            rows: of those, in order.
-            joints: with all such bounds as cones.
-            parts: their ``clearances`` and ``motions`` in these.
+            rows: numbers of these points, in order.
+            joints: joints with all such bounds as cones.
+            parts: their ``clearances`` and ``motions`` in the columns of ``joints``.
 
         Returns:
             The same points.
@@ -182,7 +184,7 @@ class Solution(PointResults, Generic[N]):
 
     @property
     def as_many(self) -> Self:
-        """One point with a leading axis."""
+        """The point with a leading axis."""
         lin = self.linearisation
         rows: dict[str, Any] = {
             name: np.asarray(getattr(self, name))[None]
@@ -201,10 +203,10 @@ One = TypeVar("One", bound=Solution)
 
 
 def with_known(solution: One, known: Mapping[str, Any]) -> One:
-    """What is known already, and so not computed again when somebody asks.
+    """Store values that are known already, so that they are not computed again.
 
     Args:
-        solution: of one point or of many.
+        solution: solution of one point or of many.
         known: values by :data:`KNOWN`; others are ignored.
 
     Returns:

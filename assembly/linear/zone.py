@@ -1,7 +1,7 @@
 """The assembly zone, problem (21), as a margin on the clearances.
 
 The margin t is the factor on all clearances at which the manipulator just assembles
-with every link and joint rigid: it is assemblable where t <= 1.  The margin varies
+with every link and joint rigid.  It is assemblable where t <= 1.  The margin varies
 continuously, unlike a yes or no, and its inverse is the factor on the errors.
 
 As printed, (21) makes compliant joints rigid in every direction (``"rigid"``);
@@ -10,7 +10,7 @@ As printed, (21) makes compliant joints rigid in every direction (``"rigid"``);
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Generic, overload
+from typing import Any, ClassVar, Generic, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,17 +20,17 @@ from assembly.linear.closure import checked_size
 from assembly.linear.lanes import COMPILED, REFERENCE, margins_side_by_side
 from assembly.linear.reference.zone import least_margin
 from assembly.linear.robot_structure import structure_of
-from assembly.model.clearance import Compliant
 from assembly.model.point_results import N, PointResults
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method, check_method
-from forcefit.inputs.display import Figures
+from forcefit.results.display import Figures
 
-MARGIN_GAP = 1e-8  # of a margin, accepted above its bound ..
-_GAP_ABSOLUTE = 1e-12  # .. plus this
-# what compliant joints do about their own axis, by the names of the two margins
+MARGIN_GAP = 1e-8  # accepted distance of a margin above its bound, relative ..
+_GAP_ABSOLUTE = 1e-12  # .. plus this, absolute [-]
+# name of each margin -> behaviour of compliant joints about their own axis
+Compliant = Literal["rigid", "free"]
 MARGINS: dict[str, Compliant] = {"margin": "rigid", "margin_free": "free"}
-ASSEMBLABLE = 1.0 + 1e-6  # a margin within rounding of 1 counts as inside
+ASSEMBLABLE = 1.0 + 1e-6  # largest margin that counts as assemblable: 1 and rounding
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -39,14 +39,15 @@ class Zone(PointResults, Generic[N]):
 
     Attributes:
         margin: (...) factor on the clearances at which it just assembles; inf where no
-            factor does, NaN where the solver failed, which of one posture is raised.
-        bound: (...) certified lower bound of it, within 1e-8 of the margin where the
-            compiled method solved.
-        method: (...) which gave it: ``"compiled"``, or ``"reference"``, numpy and
+            factor does, NaN where the solver failed; a single posture raises instead.
+        bound: (...) certified lower bound of it, within 1e-8 of the margin if the
+            compiled method solved it.
+        method: (...) that solved it: ``"compiled"``, or ``"reference"``, numpy and
             Clarabel.
-        forces: (..., nu) on the clearances, in units that each cone's size works: what
-            proves the bound, sizes of all cones adding up to 1; zero where no clearance
-            is needed, NaN where the reference solved.
+        forces: (..., nu) on the clearances, times the cones' sizes, that prove the
+            bound;
+            the sizes on all cones add up to 1; zero where no clearance is needed, NaN
+            where the reference solved it.
         reason: (...) message where the solver failed; else empty.
     """
 
@@ -65,7 +66,7 @@ class Zone(PointResults, Generic[N]):
     }
 
     def _figures(self) -> Figures:
-        """The margin, or the largest there is."""
+        """Return the margin; of many points the largest."""
         if not self.of_many:
             margin, bound = f"{self.margin:.6g}", f"{self.bound:.6g}"
             return {"margin": margin, "bound": bound, "method": self.method}
@@ -76,7 +77,7 @@ class Zone(PointResults, Generic[N]):
         return {"points": points, "margin": f"at most {largest:.6g} where there is one"}
 
     def __getitem__(self, rows: Any) -> "Zone":
-        """One point, which raises where the solver failed; or some of them."""
+        """Return one point, which raises if the solver failed; or a selection."""
         taken = super().__getitem__(rows)
         if not taken.of_many and np.isnan(taken.margin):
             raise SolverFailed("least factor on the clearances", taken.reason)
@@ -89,10 +90,10 @@ class Zone(PointResults, Generic[N]):
 
     @property
     def unproved(self) -> Any:
-        """(...) why there is no margin, or what of it is not proved; else empty."""
+        """(...) reason why there is no margin, or why it is not proved; else empty."""
         margin, bound = np.atleast_1d(self.margin, self.bound)
         with np.errstate(invalid="ignore"):
-            # written so that NaN is not proved
+            # written so that NaN counts as not proved
             proved = margin - bound <= MARGIN_GAP * margin + _GAP_ABSOLUTE
         text = np.array(self.reason, dtype=object, ndmin=1)
         for i in np.flatnonzero(~proved & (margin != bound) & (text == "")):
@@ -126,19 +127,20 @@ def zone_margin(
     posture: Posture | Sequence[Posture], compliant: Compliant = "rigid",
     errors: ArrayLike | None = None, method: Method = "compiled",
 ) -> Zone:  # fmt: skip
-    """Factor on all clearances at which a rigid manipulator just assembles.
+    """Return the factor on all clearances at which a rigid manipulator just assembles.
 
     Args:
-        posture: where the robot stands; or many postures of one robot.
-        compliant: ``"rigid"`` or ``"free"``: passive joints with stiffness, see above.
+        posture: the robot's configuration; or many postures of one robot.
+        compliant: ``"rigid"`` or ``"free"``: passive joints with stiffness; see the
+            module.
         errors: (n, 6) [rad, m] geometric errors in place of the robot's; or (k, n, 6),
             a set for each of k postures, or k sets at one.
-        method: ``"compiled"``, and the reference where that does not prove its answer;
-            or ``"reference"``, numpy and Clarabel alone.  The answer's ``method`` says
-            which gave it.
+        method: ``"compiled"``, with the reference for points whose answer it does not
+            prove; or ``"reference"``, numpy and Clarabel alone.  The answer's
+            ``method`` says which of them solved each point.
 
     Returns:
-        The margin with a certified lower bound; of many postures or sets all of them.
+        The margin with a certified lower bound; for many postures or sets, one object.
 
     Raises:
         ValueError: ``compliant`` or ``method`` is something else.
@@ -156,14 +158,16 @@ def zone_margin(
     if posture.transforms.ndim == 3 and own.ndim == 2:
         if not left[0]:
             return Zone(float(margin[0]), float(bound[0]), "compiled", forces[0], "")
-        found = least_margin(_erring(posture, own, 0), compliant)
+        found = least_margin(_erring(posture, own, 0), compliant == "free")
         return Zone(*found, "reference", np.full(len(forces[0]), np.nan), "")
     forces[left] = np.nan
     reason = np.full(len(margin), "", dtype=object)
     for i in np.flatnonzero(left).tolist():
         margin[i] = bound[i] = np.nan
         try:
-            margin[i], bound[i] = least_margin(_erring(posture, own, i), compliant)
+            margin[i], bound[i] = least_margin(
+                _erring(posture, own, i), compliant == "free"
+            )
         except SolverFailed as error:
             reason[i] = str(error)
     gave = np.where(left, "reference", "compiled").astype(object)
@@ -171,7 +175,7 @@ def zone_margin(
 
 
 def _erring(posture: Posture, errors: NDArray, i: int) -> Posture:
-    """Point i, with its own errors."""
+    """Return the posture of point i with its errors."""
     if posture.transforms.ndim > 3:
         posture = posture[i if len(posture.transforms) > 1 else 0]
     own = errors if errors.ndim == 2 else errors[i]
@@ -183,10 +187,10 @@ def _erring(posture: Posture, errors: NDArray, i: int) -> Posture:
 def _compiled(
     posture: Posture, compliant: Compliant, own: NDArray, method: Method
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Margins, their bounds and forces, and whether each is left to the reference."""
+    """Return margins, bounds, forces, and whether each is for the reference."""
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
-    joints, structure = structure_of(posture.robot, compliant)
+    joints, structure = structure_of(posture.robot, False, compliant == "free")
     T = posture.transforms if posture.transforms.ndim > 3 else posture.transforms[None]
     count = len(own) if len(T) == 1 and own.ndim == 3 else len(T)
     forces = np.zeros((count, joints.cones.shape[1]))
@@ -197,7 +201,7 @@ def _compiled(
     if not own.any():  # no clearance is needed
         return *np.zeros((2, count)), forces, np.zeros(count, dtype=bool)
     if joints.scaled.all():
-        # writable and in C order, whatever comes: the kernels are compiled for one kind
+        # the kernels are compiled for writable arrays in C order
         points = (
             np.require(T, requirements=["C", "W"]),
             np.require(own.reshape(-1, *own.shape[-2:]), requirements=["C", "W"]),

@@ -1,6 +1,6 @@
-"""Conditions under which a robot was, or will be, measured.
+"""Conditions of measurements of a robot, past or planned.
 
-What the model of a robot lacks is an *effect* (:mod:`assembly.effects`).  An effect
+An *effect* (:mod:`assembly.effects`) is a property that the model of a robot lacks.  It
 changes one or more of the fields below and nothing else.  So any number of effects can
 be combined, and :func:`assembly.measurement.predict.predict` needs to know none.
 
@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.kinematics.posture import Posture
 from assembly.measurement.history import History
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 
 COVARIATES = ("temperature", "time", "approach")
 
@@ -32,10 +32,10 @@ COVARIATES = ("temperature", "time", "approach")
 class ContactLaw:
     """A spring in series with a joint, of the law load = coefficient |deflection|^n.
 
-    Along (about) the joint's own z, as stiff in both directions.
+    Along (about) the joint's own z, equally stiff in both directions.
 
     Attributes:
-        frame: the joint's.
+        frame: the joint's name.
         coefficient: [N/m^n or N m/rad^n] > 0.
         exponent: [-] n > 1; 1.5 is Hertz's for two spheres.
     """
@@ -47,14 +47,15 @@ class ContactLaw:
 
 @dataclass(frozen=True, eq=False)
 class Yield:
-    """A place that gives under what goes through it, by a law of its own.
+    """A compliant place: a deflection that follows from wrenches by a given law.
 
     Attributes:
-        frame: where.
-        component: row of the screw there that it changes, in the frame's axes.
-        through: frames and rows of the wrenches that its law reads.
-        inputs: (R, k) what else the law depends on, row by row.
-        law: [rad or m] of the inputs (R, k) and wrenches (R, s); by row, smooth.
+        frame: name of the frame.
+        component: row of the frame's screw that it changes, in the frame's axes.
+        through: frames and rows of the wrenches in its law.
+        inputs: (R, k) other inputs of the law, row by row.
+        law: [rad or m] function of the inputs (R, k) and wrenches (R, s); by row,
+            smooth.
         linear: whether it is a spring: a compliance times one wrench, at its place.
     """
 
@@ -71,7 +72,8 @@ class Conditions:
     """R rows of conditions of one robot; without effects, as its file declares it.
 
     Attributes:
-        robot: of n frames; its links, springs and clearances are those of all rows.
+        robot: robot of n frames; its links, springs and clearances are those of all
+            rows.
         coordinates: (R, n) [rad or m] commanded, of every joint.
         transforms: (R, n, 4, 4) frames seen from the base, without imperfections.
         mismatch: (R,) [rad, m] nominal closure error left.
@@ -84,13 +86,13 @@ class Conditions:
         approach: (R,) -1 or 1; NaN where not known.
         covariates: (R,) each, further ones by name.
         session: (R,) names of the sessions; None where not known.
-        history: rows of a campaign in the order measured, these among them; None where
-            they have no past.
-        row: (R,) which rows of the history these are.
+        history: rows of a campaign in the order of measurement, including these; None
+            without a past.
+        row: (R,) indices of these rows in the history.
         target: (R, 3) [m] the point measured, platform axes; None for the reference
             point.
         laws: contact springs in series with joints.
-        yields: places that give by laws of their own.
+        yields: compliant places with laws of their own.
         exact: finite motions instead of the linear model.
         second_order: (R, 6) [rad, m] exact minus linear platform screw without load;
             see :func:`assembly.measurement.predict.with_second_order`.
@@ -100,7 +102,7 @@ class Conditions:
             on the left.
         tool: (3,) or (R, 3) [m] from the reference point to the one measured, platform
             axes.
-        reading: (R, 6) [rad, m] added to the reading.
+        reading: (R, 6) [rad, m] to be added to the reading.
     """
 
     robot: Robot
@@ -140,11 +142,11 @@ class Conditions:
 
     @property
     def postures(self) -> Posture:
-        """All nominal postures in one, its arrays with R rows."""
+        """All nominal postures as one object, its arrays with R rows."""
         return Posture(self.robot, self.coordinates, self.transforms, self.mismatch)
 
     def posture(self, row: int) -> Posture:
-        """One row's posture, the robot with that row's errors."""
+        """Return the posture of one row, of the robot with that row's errors."""
         return Posture(
             self.robot.with_errors(self.errors[row]), self.coordinates[row],
             self.transforms[row], float(self.mismatch[row]),
@@ -152,7 +154,7 @@ class Conditions:
 
     @property
     def measured_points(self) -> NDArray:
-        """(R, 3) [m] nominal places of the points measured, base axes."""
+        """(R, 3) [m] nominal positions of the points measured, base axes."""
         T = self.postures.platform
         return T[:, :3, 3] + self.measured_arms
 
@@ -165,7 +167,7 @@ class Conditions:
         return (self.postures.platform[:, :3, :3] @ at[..., None])[..., 0]
 
     def load_at_origin(self) -> NDArray:
-        """(R, 6) [N m, N] the load read at the platform's origin, base axes."""
+        """Return the (R, 6) [N m, N] load read at the platform's origin, base axes."""
         moved = self.load.copy()
         if self.point.any():
             arm = self.postures.platform[:, :3, :3] @ self.point
@@ -173,7 +175,7 @@ class Conditions:
         return moved
 
     def take(self, rows: ArrayLike) -> "Conditions":
-        """Some of the rows.
+        """Return a selection of the rows.
 
         Args:
             rows: indices or a mask.
@@ -211,7 +213,7 @@ def as_declared(
     covariates: Mapping[str, ArrayLike] | None = None,
     target: ArrayLike | None = None,
 ) -> Conditions:
-    """Conditions of a robot as its file declares it.
+    """Return the conditions of a robot as its file declares it.
 
     Args:
         postures: one, or many with arrays of R rows.

@@ -11,14 +11,14 @@ from assembly.linear.energy import Assembly
 from assembly.measurement.conditions import Conditions, ContactLaw
 from assembly.model.links import in_series, own_screw
 
-ITERATIONS = 100  # at most
-CONVERGED = 1e-11  # relative change of a contact's deflection
+ITERATIONS = 100  # largest number of iterations
+CONVERGED = 1e-11  # relative change of a contact's deflection at convergence
 
 
 def softened(
     posture: Posture, laws: tuple[ContactLaw, ...], compliances: NDArray
 ) -> Posture:
-    """The posture with linear springs of the laws' secant compliance in series."""
+    """Return the posture with springs of the laws' secant compliance in series."""
     if not compliances.any():
         return posture
     frames = list(posture.robot.frames)
@@ -33,7 +33,7 @@ def softened(
 def secants(
     assembly: Assembly | ExactAssembly, laws: tuple[ContactLaw, ...]
 ) -> NDArray:
-    """[rad/(N m), m/N] deflection over load of every law at the load it carries."""
+    """Return the secant compliance [rad/(N m), m/N] of every law at its load."""
     robot = assembly.posture.robot
     compliances = []
     for law in laws:
@@ -44,17 +44,17 @@ def secants(
 
 
 def _deflection(law: ContactLaw, load: float) -> float:
-    """[rad or m] under a load >= 0."""
+    """Return the deflection [rad or m] under a load >= 0."""
     return float((load / law.coefficient) ** (1 / law.exponent))
 
 
 def wrenches_through(assembly: Assembly | ExactAssembly) -> NDArray:
-    """(n, 6) [N m, N] through every joint, in the frames' axes."""
+    """Return the (n, 6) [N m, N] through every joint, in the frames' axes."""
     return assembly.joint_wrenches
 
 
 def contact_columns(conditions: Conditions) -> NDArray:
-    """(6n, s) unit screws of the joints with a contact law."""
+    """Return the (6n, s) unit screws of the joints with a contact law."""
     columns = np.zeros((6 * len(conditions.robot.frames), len(conditions.laws)))
     for k, law in enumerate(conditions.laws):
         i = conditions.robot.index(law.frame)
@@ -65,7 +65,7 @@ def contact_columns(conditions: Conditions) -> NDArray:
 def contact_deflections(
     laws: tuple[ContactLaw, ...], w: NDArray, A: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Deflections d of contacts, c |d|^n sign(d) = w + A d.
+    """Return the deflections d of contacts, c |d|^n sign(d) = w + A d.
 
     They minimise a strictly convex function (A is negative semidefinite): Newton's
     method, each step halved until the gradient decreases.

@@ -1,10 +1,10 @@
-r"""The exact equilibrium of a robot without clearances, for many rows at once.
+r"""The exact equilibrium of a robot without clearances, for many rows together.
 
 The equations are those of :mod:`assembly.exact.exact`: closures hold on SE(3), every
 body and spring deforms by its compliance times its wrench, free motions carry no load.
 All rows are iterated together with the inverse of the linear model at the nominal
 posture (:mod:`assembly.measurement.without_clearance`).  The first iterate is the
-linear solution; each further one reduces the error by a factor of the size of the
+linear solution.  Each further one reduces the error by a factor of the size of the
 motions (a chord method).  Rows that do not converge are left to
 :func:`assembly.exact.exact.solve_exact`.
 
@@ -27,20 +27,20 @@ from assembly.measurement.without_clearance import (
     flexibility,
 )
 
-_MOST_ITERATIONS = 60  # at most; 5 to 12 are usual
+_MOST_ITERATIONS = 60  # largest number of iterations; 5 to 12 are usual
 _CONVERGED = 1e-12  # [rad, reference lengths] largest change of a screw at the end
 _CLOSURE_TOLERANCE = 1e-11  # [rad, reference lengths] largest closure residual
-_FREE_FORCE = 1e-5  # of the largest wrench: largest force along a free motion
-_ZERO_LOAD = 1e-9  # [rad, reference lengths] of deformation: wrenches below are zero
+_FREE_FORCE = 1e-5  # relative to the largest wrench: largest force along a free motion
+_ZERO_LOAD = 1e-9  # [rad, reference lengths] of deformation: zero wrench below
 _CONTRACTION = 0.8  # largest ratio of two successive changes, after the first few
 _TRANSIENT = 3  # iterations in which changes may grow
-_BATCH = 100  # rows, so that memory stays small
+_BATCH = 100  # number of rows solved together, which limits the memory
 
 
 def solve_rows(
     conditions: Conditions, linear_deflections: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Platform screws of finite motions under every row's loads.
+    """Return the platform screws of finite motions under every row's loads.
 
     Args:
         conditions: R rows of a robot without clearances, solved as if ``exact``.
@@ -48,7 +48,7 @@ def solve_rows(
 
     Returns:
         (R, 6) [rad, m] rotation vector of R R_nominal^T and shift of the origin, base
-        axes, and (R,) whether they converged; the other rows are not to be used.
+        axes, and (R,) whether they converged; other rows are invalid.
     """
     conditions = _in_pieces(conditions)
     screws, converged = (
@@ -62,7 +62,10 @@ def solve_rows(
     ]
     moved = np.flatnonzero(flexible.free.any(axis=1))
     if not np.isin(moved, own_axes).all():
-        return screws, converged  # a fixed joint that is free to move: one by one
+        return (
+            screws,
+            converged,
+        )  # a fixed joint with a free motion
     for begin in range(0, len(conditions), _BATCH):
         rows = slice(begin, begin + _BATCH)
         some = conditions.take(np.arange(len(conditions))[rows])
@@ -72,7 +75,7 @@ def solve_rows(
 
 
 def _solve(rows: Rows) -> tuple[NDArray, NDArray]:
-    """(R, 6) platform screws, and (R,) whether they converged."""
+    """Return the (R, 6) platform screws, and (R,) whether they converged."""
     flexible, count = rows.flexible, len(rows.conditions)
     n, K = len(rows.conditions.robot.frames), 6 * len(rows.conditions.robot.closures)
     q = flexible.free.shape[1]
@@ -103,7 +106,7 @@ def _solve(rows: Rows) -> tuple[NDArray, NDArray]:
     converged &= np.abs(state.residual).max(axis=1, initial=0.0) <= _CLOSURE_TOLERANCE
     converged &= np.all(np.abs(state.motions) <= flexible.limit, axis=1)
     _, free_forces, _ = state.imbalance()
-    zero_load = _ZERO_LOAD / flexible.softness  # without load there is but rounding
+    zero_load = _ZERO_LOAD / flexible.softness  # without load wrenches are rounding
     largest = np.abs(state.total_wrenches / rows.scale).max(
         axis=(0, 2, 3), initial=zero_load
     )
@@ -115,13 +118,13 @@ def _solve(rows: Rows) -> tuple[NDArray, NDArray]:
 
 
 def _lever_arms(rows: Rows) -> NDArray:
-    """(q,) [1 or m] factors from forces along free motions to moments."""
+    """Return the (q,) [1 or m] factors from forces along free motions to moments."""
     free = rows.flexible.free
     return np.abs(free).T @ np.tile(1 / rows.scale, len(free) // 6)
 
 
 def _correction(state: RowState, first: bool) -> tuple[NDArray, NDArray, NDArray]:
-    """Changes of screws, motions and multipliers by the linear model's inverse."""
+    """Return changes of the unknowns by the linear model's inverse."""
     rows, flexible = state.rows, state.rows.flexible
     screw_residual, free, w = state.imbalance()
     count, shape = len(rows.conditions), (len(rows.conditions), -1, 6)
@@ -149,7 +152,7 @@ def _correction(state: RowState, first: bool) -> tuple[NDArray, NDArray, NDArray
 
 
 def _in_pieces(conditions: Conditions) -> Conditions:
-    """The same conditions with a frame for every piece of a beam."""
+    """Return the same conditions with a frame for every piece of a beam."""
     cut = cut_beams(conditions.robot)
     if cut.robot is conditions.robot:
         return conditions

@@ -1,9 +1,9 @@
-"""What happened to a machine before a row was measured: rows in the order measured.
+"""History of a machine: the rows of a campaign in the order of measurement.
 
-Some effects remember: what warms slowly lags behind the temperature, clearance is taken
-up on the side from which a joint came.  They depend on the rows before, those that a
-fit sets aside among them.  The value of a row is taken to have been there since the row
-before, or since time 0.
+Some effects have memory: slow warming lags behind the temperature, and clearance is
+taken up on the side from which a joint came.  They depend on the earlier rows,
+including those that a fit sets aside.  The value of a row is taken to hold since the
+row before, or since time 0.
 
 Sources:
     Ljung, System Identification, section 2 (sampling of a first-order lag).
@@ -16,12 +16,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-STILL = 1e-9  # [rad, m] a command that changes by less has not moved
+STILL = 1e-9  # [rad, m] smaller changes of a command count as no motion
 
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """H rows, session after session, each in the order measured.
+    """H rows, session after session, each in the order of measurement.
 
     Attributes:
         values: (H,) each, by the public name of a variable; NaN where not known.
@@ -32,14 +32,14 @@ class History:
     first: NDArray
 
     def direction(self, name: str) -> NDArray:
-        """From which side a variable came: -1, 1, or 0 where nothing tells.
+        """Return the side from which a variable came: -1, 1, or 0 if unknown.
 
         Args:
-            name: of the variable; ``"approach"`` is that column itself.
+            name: name of the variable; ``"approach"`` is that column itself.
 
         Returns:
-            (H,) signs.  A variable that stands still keeps its last direction; before
-            its first motion the column ``approach`` tells, if there is one.
+            (H,) signs.  A variable at rest keeps its last direction.  Before its first
+            motion the column ``approach`` is used, if there is one.
         """
         given = np.nan_to_num(self.values["approach"])
         if name == "approach":
@@ -53,16 +53,16 @@ class History:
         return np.where(known, np.sign(step[last]), given)
 
     def slip(self, name: str, depth: float) -> NDArray:
-        """Where what slips after a variable stands between its two ends.
+        """Return the position of a friction element that slips after a variable.
 
         Args:
-            name: of the variable.
+            name: name of the variable.
             depth: > 0 change of the variable, from the middle to an end.
 
         Returns:
-            (H,) from -1 to 1: it follows the variable until it stands at an end, and
-            stays there until the variable turns.  A session begins at the end from
-            which ``approach`` says that it came, or in the middle.
+            (H,) from -1 to 1: it follows the variable until it reaches an end, and
+            stays there until the variable reverses.  A session begins at the end given
+            by ``approach``, or in the middle.
 
         Sources:
             Krasnosel'skii, Pokrovskii, Systems with Hysteresis, section 2 (stop).
@@ -77,13 +77,13 @@ class History:
         return stands
 
     def lagged(self, name: str, time_constant: float, *, held: bool = False) -> NDArray:
-        """A variable behind a first-order lag that starts from zero at time 0.
+        """Return a variable with a first-order lag that starts from zero at time 0.
 
         Args:
-            name: of the variable.
+            name: name of the variable.
             time_constant: [s] > 0.
-            held: whether a value begins at once when the row before is measured, as a
-                load's; otherwise it changes evenly between rows, as a temperature.
+            held: whether a value applies from the time of the row before, like a
+                load's; otherwise it changes linearly between rows, like a temperature.
 
         Returns:
             (H,) in the unit of the variable.
@@ -91,7 +91,7 @@ class History:
         u, state = self.values[name], 0.0
         past = self._elapsed / time_constant
         decay = np.exp(-past)
-        # share of the change that comes late: (1 - e^-r) / r, 1 where no time passed
+        # share of the change that lags: (1 - e^-r) / r, 1 if no time passed
         share = np.where(
             past > 0, -np.expm1(-past) / np.where(past > 0, past, 1.0), 1.0
         )
@@ -108,7 +108,7 @@ class History:
         return response
 
     def fading(self, time_constant: float) -> NDArray:
-        """(H,) exp(-time / time constant): what is left of a state at time 0."""
+        """Return (H,) exp(-time / time constant): the decay of a state at time 0."""
         return np.exp(-self.values["time"] / time_constant)
 
     @cached_property
@@ -121,15 +121,15 @@ class History:
 def in_order(
     values: Mapping[str, NDArray], session: NDArray | None
 ) -> tuple[History, NDArray]:
-    """Rows of a table in the order measured.
+    """Return the rows of a table in the order measured.
 
     Args:
-        values: (H,) each, by the public name of a variable, ``time`` among them; rows
-            without a time are taken in the order given.
-        session: (H,) names; None where there is but one.
+        values: (H,) each, by the public name of a variable, including ``time``; rows
+            without a time keep the given order.
+        session: (H,) names; None if there is only one.
 
     Returns:
-        The history, and (H,) which of its rows each given row is.
+        The history, and (H,) the index of each given row in it.
     """
     time = np.nan_to_num(values["time"])
     names = np.zeros(len(time)) if session is None else session

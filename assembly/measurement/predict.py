@@ -48,20 +48,20 @@ from assembly.measurement.yields import Yields, settle_yields, with_springs
 from assembly.solvers.conic import SolverFailed
 from stiffness.screws import rotation_matrix, rotation_vector
 
-_MOST_ONE_BY_ONE = 40  # configurations corrected to second order one by one
-_CONVERGED_FINITE = 1e-5  # as CONVERGED, from the solution of the linear model
+_MOST_ONE_BY_ONE = 40  # configurations corrected to second order one by one, at most
+_CONVERGED_FINITE = 1e-5  # as CONVERGED, for a start at the linear model's solution
 
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """What R measurements should read.
+    """Predicted readings of R measurements.
 
     Attributes:
         deviation: (R, 6) [rad, m] rx ry rz tx ty tz, base axes; NaN without a solution.
-        reason: (R,) why there is none, else empty.
-        undetermined: (R,) bool, clearances leave the pose undetermined.  The pose given
-            is, in a closed chain, the nearest to nominal; in an open one, that of
-            centred clearances.
+        reason: (R,) reason without a solution, else empty.
+        undetermined: (R,) bool, whether clearances leave the pose undetermined.  In a
+            closed chain the given pose is then the one nearest to nominal, in an open
+            chain that of centred clearances.
     """
 
     deviation: NDArray
@@ -70,7 +70,7 @@ class Prediction:
 
 
 def predict(conditions: Conditions) -> Prediction:
-    """The platform's deviation from its nominal pose at the reference point.
+    """Return the platform's deviation from its nominal pose at the reference point.
 
     Args:
         conditions: R rows.
@@ -83,8 +83,8 @@ def predict(conditions: Conditions) -> Prediction:
     one_by_one = None
     if has_clearance and conditions.rest is not None:
         conditions = with_clearances_at_rest(conditions)
-        # clearances held at rest that finite motions cannot close: no solution either
-        # way
+        # clearances held at rest that finite motions cannot close have no solution in
+        # either model
         one_by_one = 0 if conditions.exact else None
     elif has_clearance and not conditions.robot.closures and not conditions.exact:
         conditions, undetermined = with_clearances_taken_up(conditions)
@@ -104,11 +104,11 @@ def predict(conditions: Conditions) -> Prediction:
 def _platform_screws(
     conditions: Conditions, one_by_one: int | None = None
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Platform screws, some rows one by one.
+    """Return the platform screws, some rows one by one.
 
     Returns:
-        (R, 6) screws, (R,) why there is none, (R,) whether clearances leave the screw
-        undetermined.
+        (R, 6) screws, (R,) reasons without a solution, (R,) whether clearances leave
+        the screw undetermined.
     """
     screws, undetermined = (
         np.full((len(conditions), 6), np.nan),
@@ -135,7 +135,7 @@ def _platform_screws(
 def _nearest_assembly(
     conditions: Conditions, row: int
 ) -> tuple[Assembly | ExactAssembly, bool]:
-    """One row's assembly, of the possible ones that with the pose nearest to nominal.
+    """Return one row's assembly, with the possible pose nearest to nominal.
 
     With finite motions this holds for the linear solution from which they start.
 
@@ -160,18 +160,18 @@ def _nearest_assembly(
 
 
 def with_second_order(conditions: Conditions) -> Conditions:
-    """Conditions with the second-order part of the declared errors added.
+    """Return the conditions with the second-order part of the declared errors added.
 
-    Near a singularity a robot's own geometric errors move it so far that the linear
-    model is wrong by more than a device's noise, whatever the load.  The difference of
-    the exact and the linear platform screw without load is computed once for each
-    configuration; effects of load stay linear.
+    Near a singularity a robot's own geometric errors move it far.  The linear model's
+    error then exceeds a device's noise, whatever the load.  The difference of the exact
+    and the linear platform screw without load is computed once for each configuration;
+    effects of load stay linear.
 
     Args:
         conditions: R rows, as declared.
 
     Returns:
-        The same, ``second_order`` given.
+        The same, with ``second_order``.
     """
     if virtual_joints(conditions.robot).cones.shape[1]:
         return conditions  # the rest position without load is undetermined
@@ -186,24 +186,24 @@ def with_second_order(conditions: Conditions) -> Conditions:
 
 
 def with_finite_motions(conditions: Conditions) -> Conditions:
-    """Conditions with all added that finite motions change in the linear model.
+    """Return the conditions with the changes of the linear model by finite motions.
 
-    As :func:`with_second_order`, but row by row and under each row's loads: the
+    As :func:`with_second_order`, but row by row and under each row's loads.  The
     declared model is then exact, and effects are added to first order.
 
     Args:
         conditions: R rows, as declared.
 
     Returns:
-        The same, ``second_order`` given, and no longer ``exact`` if they were.
+        The same, with ``second_order``, and no longer ``exact``.
     """
     return replace(conditions, exact=False, second_order=_finite_part(conditions))
 
 
 def _finite_part(conditions: Conditions, one_by_one: int | None = None) -> NDArray:
-    """(R, 6) exact minus linear platform screws; zero where one has no solution.
+    """Return (R, 6) exact minus linear platform screws; zero without both solutions.
 
-    Places that give by laws of their own are left to the linear model.
+    Compliant places with laws of their own are solved by the linear model.
 
     Returns:
         The difference.
@@ -217,16 +217,16 @@ def _finite_part(conditions: Conditions, one_by_one: int | None = None) -> NDArr
 
 
 def with_rest_positions(conditions: Conditions) -> Conditions:
-    """Conditions with the rest positions of the clearances, by the least energy.
+    """Return the conditions with the rest positions of clearances at least energy.
 
-    Effects may then be tried at the cost of a robot without clearances, correct to
-    first order as long as the points of contact stay the same.
+    Effects can then be tried at the cost of a robot without clearances.  This is
+    correct to first order as long as the contact points stay the same.
 
     Args:
         conditions: R rows.
 
     Returns:
-        The same, ``rest`` given; centred in rows without a solution.
+        The same, with ``rest``; centred in rows without a solution.
     """
     rest = np.zeros_like(conditions.errors)
     for row in range(len(conditions)):
@@ -239,7 +239,7 @@ def with_rest_positions(conditions: Conditions) -> Conditions:
 
 
 def read(conditions: Conditions, screws: NDArray) -> NDArray:
-    """The device's readings of platform screws.
+    """Return the device's readings of platform screws.
 
     Args:
         conditions: R rows.
@@ -257,7 +257,8 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
     lever = _turned(turn - np.eye(3), arm + tool)
     shift = screws[:, 3:] + lever + tool
     base = rotation_matrix(conditions.base[..., :3])
-    # the device's rotation acts on the position itself; without one, no rounding
+    # the device's rotation acts on the position itself; without one there is no
+    # rounding
     translation = _turned(base - np.eye(3), p + arm) + _turned(base, shift)
     translation += conditions.base[..., 3:]
     turns = conditions.base[..., :3].any()
@@ -266,21 +267,21 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
 
 
 def _turned(R: NDArray, vectors: NDArray) -> NDArray:
-    """(R, 3) vectors turned by one matrix, or each by its own."""
+    """Return the (R, 3) vectors rotated by one matrix, or each by its own."""
     if R.ndim == 2:
         return vectors @ R.T
     return np.einsum("rij,...j->ri" if vectors.ndim == 1 else "rij,rj->ri", R, vectors)
 
 
 def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
-    """One row in full: every screw and wrench of the robot.
+    """Solve one row completely: every screw and wrench of the robot.
 
     Args:
-        conditions: of all rows.
-        row: index of one.
+        conditions: conditions of all rows.
+        row: index of the row.
 
     Returns:
-        The linear or the exact assembly, as the conditions ask.
+        The linear or the exact assembly, according to the conditions.
 
     Raises:
         CannotAssemble: a closure cannot be closed.
@@ -293,7 +294,7 @@ def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
     load = conditions.load_at_origin()[row]
     gravity = conditions.gravity[row] if conditions.gravity[row].any() else None
     compliances = np.zeros(len(conditions.laws))
-    if conditions.exact and conditions.laws:  # close to converged by the linear model
+    if conditions.exact and conditions.laws:  # nearly converged by the linear model
         linear = assemble_row(replace(conditions, exact=False), row)
         compliances = secants(linear, conditions.laws)
     assembly: Assembly | ExactAssembly
@@ -313,7 +314,7 @@ def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
 
 
 def _assemble_yielding(row: Conditions) -> Assembly | ExactAssembly:
-    """One row whose places give by laws of their own."""
+    """Solve one row with compliant places of laws of their own."""
 
     def solve(held: Conditions) -> tuple[Assembly | ExactAssembly, NDArray]:
         assembly = assemble_row(held, 0)
@@ -327,7 +328,7 @@ def _assemble_yielding(row: Conditions) -> Assembly | ExactAssembly:
 
 
 def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
-    """(R, 6) platform screws of a robot without clearances, (R,) whether solved."""
+    """Return (R, 6) platform screws of a robot without clearances, and (R,) solved."""
     if not conditions.yields:
         screws, _, solved = _linear(conditions)
         return screws, solved
@@ -336,7 +337,7 @@ def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
         np.zeros(len(conditions), dtype=bool),
     )
     if conditions.exact:
-        return unsolved  # row by row, under the wrenches of finite motions
+        return unsolved  # one by one, under the wrenches of finite motions
     distinct, which = conditions.postures.distinct
 
     def solve(held: Conditions) -> tuple[tuple[NDArray, NDArray], NDArray]:
@@ -354,7 +355,7 @@ def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
 
 
 def _linear(conditions: Conditions) -> tuple[NDArray, NDArray, NDArray]:
-    """Robots without clearances and yields.
+    """Solve robots without clearances and compliant places.
 
     Returns:
         (R, 6) platform screws, (R, 6n) joint wrenches of the linear model, and (R,)

@@ -36,17 +36,17 @@ from assembly.measurement.without_clearance import (
 )
 from stiffness.screws import rotation_matrix, rotation_vector, transform
 
-_LINEAR_BELOW = 1e-9  # [rad or m] deflections of a contact below which it is linear
+_LINEAR_BELOW = 1e-9  # [rad or m] below it the law of a contact is linear
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Rows to be solved, and what is constant during the iteration.
+    """Rows to be solved, and the quantities that are constant during the iteration.
 
     Attributes:
         conditions: R rows.
         flexible: the linear model at the distinct postures.
-        posture_of_row: (R,) index of each row's posture among these.
+        posture_of_row: (R,) index of each row's posture among the distinct ones.
         linear_deflections: (R, s) [rad or m] of contacts in the linear model.
     """
 
@@ -63,7 +63,7 @@ class Rows:
 
     @cached_property
     def elastic_frames(self) -> tuple[NDArray, NDArray]:
-        """Frames whose bodies, and whose joints, are elastic."""
+        """Frames with elastic bodies, and frames with elastic joints."""
         with_contact = [
             self.conditions.robot.index(law.frame) for law in self.conditions.laws
         ]
@@ -110,7 +110,7 @@ class Rows:
         )
 
     def tangent_deflection(self, w: NDArray) -> NDArray:
-        """(R, s) [rad or m] deflections under loads w, by the tangent of the law."""
+        """Return (R, s) [rad or m] deflections under loads w, by the law's tangent."""
         c, n = self.law_constants
         load = (
             c
@@ -120,7 +120,7 @@ class Rows:
         return self.linear_deflections + self.contact_compliance * (w - load)
 
     def deflection(self, w: NDArray) -> NDArray:
-        """(R, s) [rad or m] of the contacts under loads w."""
+        """Return the (R, s) [rad or m] deflections of the contacts under loads w."""
         c, n = self.law_constants
         least = c * _LINEAR_BELOW**n
         large = np.maximum(np.abs(w), least)
@@ -128,11 +128,11 @@ class Rows:
 
     @cached_property
     def times(self) -> Callable[[NDArray, NDArray], NDArray]:
-        """Product of the postures' matrices and the rows' vectors."""
+        """Function that multiplies the postures' matrices with the rows' vectors."""
         return at_postures(self.posture_of_row)
 
     def corrected(self, right_side: NDArray) -> NDArray:
-        """(R, m) solution of the linear model for right sides (R, m)."""
+        """Return the (R, m) solution of the linear model for right sides (R, m)."""
         if not self.conditions.laws:
             return self.times(self.flexible.inverse, right_side)
         return np.einsum("rij,rj->ri", self._with_contacts, right_side)
@@ -154,7 +154,7 @@ class Rows:
 
     @cached_property
     def bodies(self) -> NDArray:
-        """(R, n, 4, 4) bodies with their errors, seen from after the parent."""
+        """(R, n, 4, 4) bodies with their errors, seen from their parent frame."""
         errors = self.conditions.errors
         error_motion = transform(errors[..., 3:], rotation_matrix(errors[..., :3]))
         return self.conditions.robot.fixed_transforms @ error_motion
@@ -171,7 +171,7 @@ class Rows:
 
     @cached_property
     def closure_frames(self) -> NDArray:
-        """(2, K) frames that closures join."""
+        """(2, K) frames that closures connect."""
         robot = self.conditions.robot
         pairs = [[robot.index(a), robot.index(b)] for a, b in robot.closures]
         return np.array(pairs, dtype=int).reshape(-1, 2).T
@@ -208,7 +208,7 @@ class RowState:
 
     @cached_property
     def poses(self) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-        """(R, n, 4, 4) before a body's deformation, after it, after joints', all."""
+        """(R, n, 4, 4) poses: before and after bodies deform, after joints, final."""
         rows = self.rows
         partial = [rows.bodies]
         for frames, screws in zip(rows.elastic_frames, self.screws, strict=True):
@@ -279,7 +279,7 @@ class RowState:
         return total
 
     def wrenches(self, total: NDArray, poses: NDArray, frames: NDArray) -> NDArray:
-        """(R, k, 6) wrenches at the platform's origin, read at some frames' poses."""
+        """Return (R, k, 6) wrenches at the platform's origin, read at frames' poses."""
         origin = self.rows.conditions.postures.platform[:, None, :3, 3]
         T, w = poses[:, frames], total[:, frames]
         moment = w[..., :3] - np.cross(T[..., :3, 3] - origin, w[..., 3:])
@@ -287,10 +287,10 @@ class RowState:
         return parts.reshape(w.shape)
 
     def imbalance(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Residuals of the constitutive laws and of the equilibrium.
+        """Return the residuals of the constitutive laws and of the equilibrium.
 
         Returns:
-            (2, R, n, 6) screws that compliances give less those of the iterate, (R, q)
+            (2, R, n, 6) screws by the compliances less those of the iterate, (R, q)
             forces along free motions, (R, s) loads of contacts.
         """
         rows, flexible = self.rows, self.rows.flexible

@@ -2,8 +2,8 @@
 
 A joint that transmits the wrench w rests at the point of its clearance cones farthest
 along w.  In a robot without closures the wrenches follow from the loads alone, and this
-is the exact minimum of (22); with closures it is its limit for small clearances, by the
-envelope theorem: dE/d(bound) = -|w| in the cone's directions.
+is the exact minimum of (22).  With closures it is the limit for small clearances, by
+the envelope theorem: dE/d(bound) = -|w| in the cone's directions.
 """
 
 from dataclasses import replace
@@ -22,18 +22,19 @@ from assembly.model.clearance import (
 )
 from assembly.model.robot import Clearance, Frame, Robot
 
-_UNLOADED = 1e-9  # of the largest wrench of its kind: less is no load
+# relative to the largest wrench of its kind: smaller ones count as zero
+_UNLOADED = 1e-9
 
 
 def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArray]:
-    """Conditions with clearances replaced by their screws under the load.
+    """Return the conditions with clearances replaced by their screws under the load.
 
     Args:
         conditions: R rows of a robot with clearances.
 
     Returns:
-        The same rows of the robot without clearances, their screws among its errors,
-        and (R,) whether some joint with a clearance transmits no load, so that its rest
+        The same rows of the robot without clearances, their screws added to its errors.
+        And (R,) whether a joint with clearance transmits no load, so that its rest
         position is undetermined; it is then centred.
     """
     tight = replace(conditions, robot=without_joint_clearances(conditions.robot))
@@ -62,13 +63,13 @@ def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArra
 
 
 def with_clearances_at_rest(conditions: Conditions) -> Conditions:
-    """Conditions with clearances replaced by their screws at the rest positions.
+    """Return the conditions with clearances replaced by their screws at rest.
 
     Args:
-        conditions: R rows of a robot with clearances, ``rest`` given.
+        conditions: R rows of a robot with clearances, and with ``rest``.
 
     Returns:
-        The same rows of the robot without clearances, their screws among its errors.
+        The same rows of the robot without clearances, their screws added to its errors.
 
     Raises:
         ValueError: no ``rest`` is given.
@@ -83,16 +84,16 @@ def with_clearances_at_rest(conditions: Conditions) -> Conditions:
 
 
 def _component_bounds(robot: Robot) -> NDArray:
-    """(n, 6) bound of every component of a clearance screw; 0 without clearance."""
+    """Return the (n, 6) bound of each component of a clearance screw; 0 without one."""
     bounds = np.where(scales_with_margin(robot), clearance_bounds(robot), 0.0)
     return component_bounds(bounds)
 
 
 def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
-    """Clearance screws in units of their bounds.
+    """Return the clearance screws in units of their bounds.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         clearance_screws: (n, 6) [rad, m].
 
     Returns:
@@ -106,10 +107,10 @@ def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
 
 
 def without_joint_clearances(robot: Robot) -> Robot:
-    """The robot with tight joints; bounds of passive joints' own motion stay.
+    """Return the robot without clearance; bounds of passive joints' motion stay.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
         A robot without clearance cones.

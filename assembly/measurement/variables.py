@@ -1,6 +1,6 @@
-"""What effects may depend on, by public name: ``q.drive``, ``load.fz``, ``time`` ..
+"""Variables of effects, by public name: ``q.drive``, ``load.fz``, ``time`` ..
 
-Wrenches (``wrench.drive.mz``) are not among them: the equilibrium alone gives them.
+Wrenches (``wrench.drive.mz``) are not among them: only the equilibrium has them.
 """
 
 from collections.abc import Iterable
@@ -18,14 +18,14 @@ LOADS = tuple(name.lower() for name in WRENCH)
 
 
 def variable(conditions: Conditions, name: str) -> NDArray:
-    """A variable in every row.
+    """Return a variable in every row.
 
     Args:
         conditions: R rows.
-        name: public, of no wrench.
+        name: public name, except of a wrench.
 
     Returns:
-        (R,) NaN where it is not known.
+        (R,), NaN where not known.
     """
     kind, _, rest = name.partition(".")
     if kind == "q":
@@ -44,15 +44,15 @@ def variable(conditions: Conditions, name: str) -> NDArray:
 
 
 def past(conditions: Conditions, names: Iterable[str]) -> tuple[History, NDArray]:
-    """The rows that conditions come after.
+    """Return the history of the conditions' rows.
 
     Args:
         conditions: R rows.
-        names: variables asked for.
+        names: names of the variables needed.
 
     Returns:
-        Their history, and (R,) which of its rows they are; rows without a past
-        are the first rows of sessions of their own.
+        Their history, and (R,) the rows' indices in it; rows without a past are the
+        first rows of separate sessions.
     """
     if conditions.history is not None and conditions.row is not None:
         return conditions.history, conditions.row
@@ -64,13 +64,13 @@ def past(conditions: Conditions, names: Iterable[str]) -> tuple[History, NDArray
 
 
 def with_history(conditions: Conditions) -> Conditions:
-    """Conditions whose rows were measured one after the other, as a campaign's.
+    """Return the conditions as rows measured in sequence, as in a campaign.
 
     Args:
         conditions: R rows, as declared.
 
     Returns:
-        The same; parts that :meth:`Conditions.take` takes remember all of them.
+        The same; selections by :meth:`Conditions.take` keep the whole history.
     """
     names = [f"q.{frame.name}" for frame in conditions.robot.frames]
     names += [f"load.{name}" for name in LOADS]

@@ -1,13 +1,13 @@
 """Least energy (22) of a robot without clearances, at many postures and loads.
 
-Without clearances nothing in (22) has a bound: it is a linear system in the closures'
-multipliers and the free motions,
+Without clearances no unknown of (22) has a bound.  Its conditions are a linear system
+in the closures' multipliers and the free motions,
 
     [ J C J'   J F ] [lambda]      [ J (dl + C f) ]
     [ F' J'     0  ] [  q   ]  = - [    F' f      ]
 
-with C the compliances of bodies and joints, f the loads on them, J the closures.
-One factorisation serves every row at a posture.
+with C the compliances of bodies and joints, f the loads on them, J the closures.  One
+factorisation serves all rows at a posture.
 
 ======  ====================  ===========  ===========================================
 symbol  code                  shape        meaning
@@ -38,11 +38,11 @@ from assembly.linear.load import FrameLoads
 from assembly.model.clearance import clearance_bounds, component_bounds
 from assembly.model.links import joint_compliances, link_compliances
 
-# relative size of an eigenvalue that is rounding; up to RANK the rank is ambiguous
+# relative size below which an eigenvalue is rounding; up to RANK the rank is ambiguous
 _ROUNDING = 1e-13
-_PADDING = 4  # most padding, in numbers of rows; beyond it each row by itself
-_CLOSED = 1e-9  # relative residual of a system that was solved
-_CLOSED_ABSOLUTE = 1e-12  # [rad, reference lengths] that counts as rounding
+_PADDING = 4  # largest padding, in numbers of rows; beyond it one by one
+_CLOSED = 1e-9  # relative residual of a solved system
+_CLOSED_ABSOLUTE = 1e-12  # [rad, reference lengths] residual that counts as rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,13 +53,13 @@ class Flexibility:
         rows: (c, 6K, 6n) scaled closures.
         platform: (c, 6, 6n) screws to the platform screw.
         body_compliances: (n, 6, 6) in the frames' axes.
-        joint_compliances: (n, 6, 6) likewise.
+        joint_compliances: (n, 6, 6) in the frames' axes.
         free: (6n, q) unit columns of the free motions.
         limit: (q,) [rad, m] bounds of the free motions, inf where there are none.
         inverse: (c, m, m) of the scaled system, m = 6K + q.
         system: (c, m, m) the scaled system.
-        softness: by which compliances were divided to make the system of order one.
-        ambiguous: (c,) bool, where its numerical rank is ambiguous.
+        softness: divisor of the compliances that makes the system of order one.
+        ambiguous: (c,) bool, whether its numerical rank is ambiguous.
     """
 
     rows: NDArray
@@ -84,12 +84,13 @@ class Flexibility:
         """Close the robot under R conditions.
 
         Args:
-            posture: (R,) which of the c postures each row has.
-            errors: (R, 6n) [rad, m] screws that come without stress.
+            posture: (R,) index of each row's posture.
+            errors: (R, 6n) [rad, m] stress-free screws.
             loads: on every small screw, (R, 6n).
 
         Returns:
-            The assemblies; rows where :attr:`FlexibleAssembly.solved` is false are not.
+            The assemblies; invalid in rows where :attr:`FlexibleAssembly.solved` is
+            false.
         """
         under_load = _under_load(self, loads)
         unclosed = errors if under_load is None else errors + under_load
@@ -121,15 +122,15 @@ class Flexibility:
         )
 
     def self_stress(self, columns: NDArray, read: NDArray | None = None) -> NDArray:
-        """Generalised forces by which the closed structure resists stress-free screws.
+        """Return the forces by which the closed structure resists stress-free screws.
 
         Args:
             columns: (6n, s) screws at the frames.
-            read: (6n, t) screws on which the forces are asked for; the same if absent.
+            read: (6n, t) screws along which the forces are read; the same if absent.
 
         Returns:
-            (c, t, s) generalised force on each per unit of each; of the same, negative
-            semidefinite.
+            (c, t, s) generalised force along each per unit of each; for the same
+            screws, negative semidefinite.
         """
         through = self.rows @ columns
         met = through if read is None else self.rows @ read
@@ -138,7 +139,7 @@ class Flexibility:
         return -(met.mT @ (inner @ through))
 
     def platform_of(self, columns: NDArray) -> NDArray:
-        """Platform screw that stress-free screws at the frames cause.
+        """Return the platform screw that stress-free screws at the frames cause.
 
         Args:
             columns: (6n, s) screws at the frames.
@@ -161,15 +162,15 @@ class Flexibility:
 def responses_to(
     flexible: Flexibility, columns: bytes, shape: tuple[int, int]
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """What stress-free screws at the frames cause, once for the same ones.
+    """Return the responses to stress-free screws at the frames, cached.
 
     Args:
         flexible: at c postures.
-        columns: of (6n, s) screws, as bytes.
+        columns: columns of (6n, s) screws, as bytes.
         shape: (6n, s).
 
     Returns:
-        (c, 6, s) platform screws, (c, s, s) generalised forces that resist on each, and
+        (c, 6, s) platform screws, (c, s, s) generalised reaction forces along each, and
         (c, 6n, s) wrenches at every joint, per unit of each.
     """
     screws = np.frombuffer(columns).reshape(shape)
@@ -185,7 +186,7 @@ class FlexibleAssembly:
         platform_screw: (R, 6) [rad, m] at the platform's origin, base axes.
         joint_wrenches: (R, 6n) [N m, N] through every joint, in the frames' axes.
         multipliers: (R, 6K) of the scaled closures.
-        solved: (R,) bool; elsewhere nothing is claimed.
+        solved: (R,) bool; rows where it is False are invalid.
     """
 
     platform_screw: NDArray
@@ -196,7 +197,7 @@ class FlexibleAssembly:
 
 @lru_cache(maxsize=4)
 def _under_load(flexible: Flexibility, loads: FrameLoads) -> NDArray | None:
-    """(R, 6n) screws of bodies and joints under loads alone, nothing closed."""
+    """Return (R, 6n) screws of bodies and joints under loads alone, closures open."""
     # the same for all conditions that differ in errors alone
     if not loads:
         return None
@@ -206,26 +207,26 @@ def _under_load(flexible: Flexibility, loads: FrameLoads) -> NDArray | None:
 
 
 def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
-    """Product of the matrices of postures with vectors of rows at these postures.
+    """Return a product of the postures' matrices with the rows' vectors.
 
     Rows at one posture are multiplied together: no matrix is copied for every row.
 
     Args:
-        posture: (R,) which of c postures each row has.
+        posture: (R,) index of each row's posture.
 
     Returns:
-        A function of matrices (c, a, b) and vectors (R, b) that gives (R, a).
+        A function of matrices (c, a, b) and vectors (R, b) that returns (R, a).
     """
     return _at_postures(Unchanged(posture))
 
 
 @lru_cache(maxsize=8)
 def _at_postures(unchanged: Unchanged) -> Callable[[NDArray, NDArray], NDArray]:
-    """The same, once for the same rows."""
+    """Return the function of :func:`at_postures`, cached."""
     posture = unchanged.numbers
     names, own, count = np.unique(posture, return_inverse=True, return_counts=True)
     order = np.argsort(own, kind="stable")
-    place = np.empty_like(order)  # of a row among those of its posture
+    place = np.empty_like(order)  # index of a row among the rows of its posture
     place[order] = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
     most = int(count.max(initial=0))
 
@@ -251,7 +252,7 @@ def flexibility(postures: Posture) -> Flexibility:
         postures: c of them, transforms (c, n, 4, 4).
 
     Returns:
-        What solves any conditions at these postures.
+        The factorised model at these postures.
 
     Raises:
         ValueError: the robot has clearances.
@@ -264,7 +265,7 @@ def flexibility(postures: Posture) -> Flexibility:
 
 @lru_cache(maxsize=4)
 def _factorise(content: Content) -> Flexibility:
-    """The system of every posture, and its inverse."""
+    """Return the system of every posture, and its inverse."""
     postures, (C_body, C_joint, _) = content.postures, content.arrays
     robot = postures.robot
     joints = virtual_joints(robot)
@@ -300,12 +301,12 @@ def _factorise(content: Content) -> Flexibility:
 
 
 def pseudo_inverse(M: NDArray) -> tuple[NDArray, NDArray]:
-    """(c, m, m) inverses on the range, and (c,) where the rank is ambiguous."""
+    """Return (c, m, m) inverses on the range, and (c,) where the rank is ambiguous."""
     if not M.size:
         return M, np.zeros(len(M), dtype=bool)
     values, vectors = np.linalg.eigh(M)
     size = np.abs(values)
-    largest = size.max(axis=1, keepdims=True)  # zero where nothing holds a free motion
+    largest = size.max(axis=1, keepdims=True)  # zero for a free motion
     kept = size > RANK * largest
     ambiguous = np.any((size > _ROUNDING * largest) & ~kept, axis=1)
     inverted = np.divide(1.0, values, out=np.zeros_like(values), where=kept)
@@ -313,13 +314,13 @@ def pseudo_inverse(M: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _limits(postures: Posture, free: NDArray) -> NDArray:
-    """(q,) bounds of the free motions."""
+    """Return the (q,) bounds of the free motions."""
     bounds = component_bounds(clearance_bounds(postures.robot)).ravel()
     return bounds[np.abs(free).argmax(axis=0)]
 
 
 def _each(matrices: NDArray, screws: NDArray) -> NDArray:
-    """(R, 6n) every frame's own (6, 6) times its screw or wrench."""
+    """Return (R, 6n): each frame's (6, 6) matrix times its screw or wrench."""
     blocks = np.swapaxes(screws.reshape(len(screws), -1, 6), 0, 1)
     products = blocks @ matrices.mT
     return np.swapaxes(products, 0, 1).reshape(screws.shape)

@@ -1,8 +1,9 @@
-"""Places that give under what goes through them, by laws of their own.
+"""Compliant places whose deflection follows from wrenches by laws of their own.
 
 Their deflections e are stress-free screws that depend on the wrenches w, which depend
-on them: e = g(w), w = w0 + A e with A the self-stress.  Newton's method on e - g(w),
-all rows at once; in a robot without closures A is zero and the first answer is right.
+on e in turn: e = g(w), w = w0 + A e with A the self-stress.  Newton's method solves e -
+g(w) = 0 for all rows together.  In a robot without closures A is zero, and the first
+iterate is exact.
 
 ======  ===========  ===========  ====================================================
 symbol  code         shape        meaning
@@ -26,14 +27,14 @@ from assembly.model.links import in_series
 from assembly.solvers.conic import SolverFailed
 
 T = TypeVar("T")
-_STEP = 1e-6  # of a wrench's size, for the slope of a law
-_SETTLED = 1e-10  # of the largest deflection: what may be left
+_STEP = 1e-6  # relative to a wrench's size: step for the slope of a law
+_SETTLED = 1e-10  # relative to the largest deflection: accepted residual
 _STEPS = 40
 
 
 @dataclass(frozen=True, eq=False)
 class Yields:
-    """The yields of conditions, as columns of small screws.
+    """The compliant places of conditions, as columns of small screws.
 
     Attributes:
         conditions: R rows of a robot of n frames.
@@ -43,7 +44,7 @@ class Yields:
 
     @cached_property
     def places(self) -> NDArray:
-        """(6n, m) unit screws that the yields change."""
+        """(6n, m) unit screws that the places change."""
         return self._units([(y.frame, y.component) for y in self.conditions.yields])
 
     @cached_property
@@ -63,7 +64,7 @@ class Yields:
         return columns
 
     def deflections(self, through: NDArray) -> NDArray:
-        """(R, m) of the yields under wrenches (R, t)."""
+        """Return the (R, m) deflections of the places under wrenches (R, t)."""
         columns = []
         for one in self.conditions.yields:
             chosen = [self._pairs.index(pair) for pair in one.through]
@@ -71,7 +72,7 @@ class Yields:
         return np.column_stack(columns)
 
     def slope(self, through: NDArray) -> NDArray:
-        """(R, m, t) derivative of the deflections, by central differences."""
+        """Return (R, m, t) derivative of the deflections, by central differences."""
         slopes = np.zeros((len(through), len(self.conditions.yields), through.shape[1]))
         for k in range(through.shape[1]):
             step = _STEP * max(float(np.abs(through[:, k]).max(initial=0.0)), 1e-9)
@@ -83,18 +84,18 @@ class Yields:
         return slopes
 
     def correction(self, give: NDArray, through: NDArray, A: NDArray) -> NDArray:
-        """What deflections lack, carried over to what their own stress makes of it.
+        """Return the Newton correction of the deflections.
 
         Args:
-            give: (R, m) that are there.
-            through: (R, t) wrenches that they meet.
-            A: (R, t, m) wrenches per unit of them.
+            give: (R, m) present deflections.
+            through: (R, t) wrenches at these deflections.
+            A: (R, t, m) derivative of the wrenches by the deflections.
 
         Returns:
-            (R, m) to be added; zero where they are settled.
+            (R, m) to be added; zero in converged rows.
 
         Raises:
-            SolverFailed: nothing holds them back.
+            SolverFailed: the deflections are without bound.
         """
         lack = self.deflections(through) - give
         size = np.abs(give).max(axis=1, initial=0.0) + np.abs(lack).max(axis=1)
@@ -111,15 +112,15 @@ class Yields:
 def with_deflections(
     conditions: Conditions, places: NDArray, give: NDArray
 ) -> Conditions:
-    """Conditions whose yields are held where they are: stress-free screws, no laws.
+    """Return conditions with deflections held as stress-free screws, without laws.
 
     Args:
         conditions: R rows.
-        places: (6n, m) unit screws of the yields.
+        places: (6n, m) unit screws of the compliant places.
         give: (R, m) [rad or m].
 
     Returns:
-        The same, without yields.
+        The same, without compliant places.
     """
     screws = (give @ places.T).reshape(conditions.errors.shape)
     return replace(conditions, errors=conditions.errors + screws, yields=())
@@ -130,18 +131,19 @@ def settle_yields(
     solve: Callable[[Conditions], tuple[T, NDArray]],
     A: Callable[[Yields], NDArray],
 ) -> T:
-    """Answers in which every yield gives by its law under what goes through it.
+    """Solve conditions whose compliant places deflect by their laws.
 
     Args:
         conditions: R rows.
-        solve: answers and (R, 6n) joint wrenches of rows without yields.
-        A: (R, t, m) wrenches that the laws read per unit of the yields, to first order.
+        solve: function that returns solutions and (R, 6n) joint wrenches without laws.
+        A: (R, t, m) derivative of the laws' wrenches by the deflections, to first
+            order.
 
     Returns:
-        The answers.
+        The solutions.
 
     Raises:
-        SolverFailed: the deflections do not settle.
+        SolverFailed: the deflections do not converge.
     """
     yields = Yields(conditions)
     give = np.zeros((len(conditions), len(conditions.yields)))
@@ -156,14 +158,14 @@ def settle_yields(
 
 
 def with_springs(conditions: Conditions, row: int) -> Conditions:
-    """One row, its yields that are springs put in series with their joints.
+    """Return one row with its linear compliant places in series with their joints.
 
     Args:
-        conditions: of all rows.
-        row: which.
+        conditions: conditions of all rows.
+        row: its index.
 
     Returns:
-        That one; yields that are no springs, or whose compliance is not positive, stay.
+        The row; places that are no springs, or have no positive compliance, stay.
     """
     one, left = conditions.take([row]), []
     frames = list(conditions.robot.frames)

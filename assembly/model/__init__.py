@@ -1,4 +1,4 @@
-"""What a robot is: frames, joints with clearance, elastic links, geometric errors.
+"""Data of a robot: frames, joints with clearance, elastic links, geometric errors.
 
 Begin at ``robot.py``.
 """

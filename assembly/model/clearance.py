@@ -6,33 +6,28 @@ symbol  code                  shape    meaning
 c-bar   ``clearance_bounds``  (n, 4)   [RXY RZ TXY TZ], 0 rigid, inf free
 ======  ====================  =======  ==========================================
 
-The free motion of a passive joint is one of these directions without a bound (or with
-the bound the file gives for it), so a joint's own motion needs no special place.
+The free motion of a passive joint is one of these directions without a bound, or with
+the bound in the file.  So a joint's own motion needs no separate treatment.
 """
-
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.robot import Clearance, Frame, Robot
 
-# what passive joints with stiffness do, see assembly.linear.closure.virtual_joints
-Compliant = Literal["elastic", "hinged", "rigid", "free"]
 CONES = ((0, 1), (2,), (3, 4), (5,))  # components of the screw that each bound limits
 BOUND_OF_COMPONENT = (0, 0, 1, 2, 2, 3)  # the bound that limits each component
 _KEYS = ("tilt", "spin", "radial", "axial")
 
 
-def clearance_bounds(robot: Robot, compliant: Compliant = "elastic") -> NDArray:
-    """Bounds of every joint's clearance.
+def clearance_bounds(robot: Robot, own_axes_free: bool = False) -> NDArray:
+    """Return the bounds of every joint's clearance.
 
     Args:
         robot: of n frames.
-        compliant: what a passive joint with stiffness does about or along its own z:
-            ``"elastic"``, only its spring moves (and ``spin``, if given, is a clearance
-            in series); ``"free"``, it moves freely: the second margin of problem (21);
-            ``"rigid"`` bounds are the elastic ones, ``"hinged"`` the free ones.
+        own_axes_free: whether passive joints with stiffness move freely about or along
+            their own z; else only the spring moves there (and ``spin``, if given, is a
+            clearance in series).
 
     Returns:
         (n, 4) [rad, rad, m, m] for [RXY RZ TXY TZ]: 0 is rigid, inf is free.
@@ -45,25 +40,25 @@ def clearance_bounds(robot: Robot, compliant: Compliant = "elastic") -> NDArray:
         if own is not None:
             given = getattr(clearance, _KEYS[own])
             bounds[i, own] = np.inf if given is None else given
-        elif frame.compliant and compliant in {"free", "hinged"}:
+        elif frame.compliant and own_axes_free:
             bounds[i, 3 if frame.joint == "prismatic" else 1] = np.inf
     return bounds
 
 
 def component_bounds(bounds: NDArray) -> NDArray:
-    """(n, 6) the bound of each component of a screw, from bounds (n, 4)."""
+    """Return the (n, 6) bound of each component of a screw, from bounds (n, 4)."""
     return bounds[:, list(BOUND_OF_COMPONENT)]
 
 
 def own_cone(frame: Frame) -> int | None:
-    """Which bound limits a passive joint's own motion; None where a spring does."""
+    """Return the bound that limits a passive joint's own motion; None for a spring."""
     if not frame.passive or frame.compliant:
         return None
     return 3 if frame.joint == "prismatic" else 1
 
 
 def scales_with_margin(robot: Robot) -> NDArray:
-    """(n, 4) bool: bounds of clearances, not the range of a passive joint's motion."""
+    """Return (n, 4) bool: bounds of clearances, not the range of a passive joint."""
     scaled = np.ones((len(robot.frames), 4), dtype=bool)
     for i, frame in enumerate(robot.frames):
         own = own_cone(frame)
@@ -73,13 +68,13 @@ def scales_with_margin(robot: Robot) -> NDArray:
 
 
 def has_bounded_motion(robot: Robot) -> bool:
-    """Whether some passive joint's own motion has a bound."""
+    """Return whether a passive joint's own motion has a bound."""
     own = ~scales_with_margin(robot)
     return bool(np.isfinite(clearance_bounds(robot)[own]).any())
 
 
 def clearance_excess(screws: NDArray, bounds: NDArray) -> NDArray:
-    """By how much the worst clearance screw leaves its cone, eqs (2)-(5).
+    """Return the largest excess of a clearance screw over its cone, eqs (2)-(5).
 
     Args:
         screws: (..., n, 6) [rad, m].
@@ -95,7 +90,7 @@ def clearance_excess(screws: NDArray, bounds: NDArray) -> NDArray:
     limited = np.isfinite(bounds)
     where_rigid = np.where(limited & (bounds == 0.0), sizes, 0.0)
     limited = np.broadcast_to(limited & (bounds > 0.0), sizes.shape)
-    with np.errstate(over="ignore"):  # of a bound next to nothing
+    with np.errstate(over="ignore"):  # by a very small bound
         excess = np.divide(sizes, bounds, where=limited, out=np.ones_like(sizes)) - 1.0
     worst = np.maximum(excess, where_rigid).max(axis=(-2, -1))
     return np.maximum(0.0, worst)

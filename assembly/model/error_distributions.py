@@ -1,6 +1,6 @@
 """Distributions of the geometric errors, and draws that any process can repeat.
 
-Each source is one component of one frame's delta l and reads ``centre + scale s``:
+Each source is one component of one frame's delta l, equal to ``centre + scale s``:
 
 =========== ======================================================================
 uniform     s between -1 and 1; sizes from ``least`` to ``most`` with random signs,
@@ -9,8 +9,9 @@ normal      s ~ N(0, 1), scale the standard deviation
 truncated   the same, cut where abs(s) exceeds ``limit`` standard deviations
 =========== ======================================================================
 
-Draw number i takes its numbers from one place of a counter-based generator, whichever
-draws came before: a run may be interrupted, resumed or distributed in any way.
+Draw number i takes its numbers from one position of a counter-based generator,
+independent of earlier draws.  So a run may be interrupted, resumed or distributed in
+any way.
 
 Sources:
     Salmon, Moraes, Dror, Shaw (2011), Parallel random numbers: as easy as 1, 2, 3
@@ -26,17 +27,17 @@ from scipy.special import ndtr, ndtri
 
 from assembly.model.random_errors import SIGNS, frames_named
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
+from forcefit.results.display import html_table, short_repr
 from stiffness.screws import SCREW
 
 KINDS = ("uniform", "normal", "truncated")
-_LARGEST = 1e3  # [rad, m] beyond any error
+_LARGEST = 1e3  # [rad, m] larger than any error
 # columns of the rows of _rows
 _COLUMNS = (
     "frame", "component", "kind", "centre", "scale", "least", "limit", "signed",
 )  # fmt: skip
-_WORDS = 4  # numbers that one step of Philox gives
+_WORDS = 4  # random numbers of one step of Philox
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +45,7 @@ class ErrorSources:
     """Independent random components of the geometric errors; m of them.
 
     Attributes:
-        robot: whose frames these are.
+        robot: the robot of these frames.
         frame: (m,) row of the frame.
         component: (m,) component of its screw.
         kind: (m,) index into :data:`KINDS`.
@@ -53,8 +54,8 @@ class ErrorSources:
         least: (m,) smallest size of s, uniform sources only; below 1.
         limit: (m,) largest size of s, truncated sources only.
         signed: (m,) bool: s takes both signs.
-        fixed: (n, 6) [rad, m] errors of the frames that every draw has, such as what
-            closures leave open; zero if None.
+        fixed: (n, 6) [rad, m] errors that every draw has, such as the closures'
+            mismatch; zero if None.
     """
 
     robot: Robot
@@ -82,7 +83,7 @@ class ErrorSources:
         return len(self.frame)
 
     def standard(self, uniform: NDArray) -> NDArray:
-        """(..., m) the values s that go with numbers uniform between 0 and 1."""
+        """Return the (..., m) values s of numbers uniform between 0 and 1."""
         v = 2.0 * uniform - 1.0
         size = self.least + (1.0 - self.least) * np.where(self.signed, abs(v), uniform)
         uniform_values = np.where(self.signed, np.copysign(size, v), size)
@@ -94,20 +95,20 @@ class ErrorSources:
         return np.where(self.kind == 0, uniform_values, normal_values)
 
     def values(self, standard: NDArray) -> NDArray:
-        """(..., m) [rad or m] errors that go with values s."""
+        """Return the (..., m) [rad or m] errors for values s."""
         return self.centre + self.scale * standard
 
     def uniforms(self, first: int, count: int, seed: int, stream: int = 0) -> NDArray:
-        """(count, m) numbers in [0, 1) of the draws ``first`` ..
+        """Return the (count, m) numbers in [0, 1) of the draws ``first`` ..
 
         Args:
             first: number of the first draw.
-            count: how many.
-            seed: of all draws, below 2^64.
-            stream: another one is independent of this one.
+            count: number of draws.
+            seed: seed of all draws, below 2^64.
+            stream: number of the stream; streams are independent.
 
         Returns:
-            The numbers; a draw's do not depend on ``first`` or ``count``.
+            The numbers; those of a draw do not depend on ``first`` or ``count``.
         """
         steps = -(-max(1, len(self)) // _WORDS)
         philox = np.random.Philox(key=np.array([seed, stream], dtype=np.uint64))
@@ -116,11 +117,11 @@ class ErrorSources:
         return uniform[:, : len(self)]
 
     def draw(self, first: int, count: int, seed: int, stream: int = 0) -> NDArray:
-        """(count, m) [rad or m] the errors of some draws; see :meth:`uniforms`."""
+        """Return the (count, m) [rad or m] errors of draws; see :meth:`uniforms`."""
         return self.values(self.standard(self.uniforms(first, count, seed, stream)))
 
     def errors(self, values: NDArray) -> NDArray:
-        """(..., n, 6) [rad, m] delta l of every frame from values (..., m)."""
+        """Return (..., n, 6) [rad, m] delta l of every frame from values (..., m)."""
         full = np.zeros((*values.shape[:-1], len(self.robot.frames), 6))
         full[..., self.frame, self.component] = values
         return full if self.fixed is None else full + self.fixed
@@ -143,15 +144,15 @@ class ErrorSources:
         return self.scale**2 * np.where(self.kind == 0, uniform, normal)
 
     def scaled(self, scale: NDArray) -> "ErrorSources":
-        """The same sources with other scales (m,) [rad or m]."""
+        """Return the same sources with other scales (m,) [rad or m]."""
         return replace(self, scale=np.asarray(scale, dtype=float))
 
 
 def draw_generator(seed: int, draw: int, stream: int) -> np.random.Generator:
-    """Generator of the random numbers of one draw.
+    """Return the generator of the random numbers of one draw.
 
     Args:
-        seed: of all draws, below 2^64.
+        seed: seed of all draws, below 2^64.
         draw: its number.
         stream: other than those of :meth:`ErrorSources.uniforms`.
 
@@ -169,15 +170,16 @@ def tolerance_sources(
     robot: Robot, tolerances: NDArray, frames: tuple[str, ...] | None = None,
     distribution: str = "uniform", deviations: float = 3.0,
 ) -> ErrorSources:  # fmt: skip
-    """Sources within symmetric tolerances.
+    """Return the sources within symmetric tolerances.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         tolerances: (6,) [rad, m] half widths by component, 0 for none.
-        frames: which frames; all whose body the robot has errors or a link at if None.
-        distribution: ``"uniform"`` over the tolerance, or ``"truncated"``: normal with
-            the tolerance at so many standard deviations, and cut there.
-        deviations: see above.
+        frames: names of the frames; if None, all at whose body the robot has errors or
+            a link.
+        distribution: ``"uniform"`` over the tolerance, or ``"truncated"``: normal, cut
+            at the tolerance.
+        deviations: number of standard deviations in the tolerance.
 
     Returns:
         The sources, frame by frame.
@@ -211,11 +213,11 @@ def tolerance_sources(
 def read_sources(
     path: Path | str, robot: Robot, fixed: NDArray | None = None
 ) -> ErrorSources:
-    """Error sources of a file; see ``docs/statistics.md``.
+    """Return the error sources of a file; see ``docs/statistics.md``.
 
     Args:
         path: TOML file with ``[[errors]]`` tables.
-        robot: whose frames they name.
+        robot: the robot with the frames named in the file.
         fixed: (n, 6) [rad, m] errors that every draw has.
 
     Returns:
@@ -245,7 +247,7 @@ def read_sources(
 
 
 def _rows(table: Table, robot: Robot) -> list[tuple]:
-    """The sources of one ``[[errors]]`` table: a row each, and the table."""
+    """Return the sources of one ``[[errors]]`` table: a row each, and the table."""
     names = table.require("frames", "a list of frame names")
     if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
         raise table.bad("frames", "expected a list of frame names")

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.model.link_kinds import BeamLink, Link
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, quoted
+from forcefit.results.display import html_table, short_repr
 from stiffness.screws import rotation_matrix
 
 JOINTS = ("fixed", "revolute", "prismatic")
@@ -29,7 +29,7 @@ LOCKED = (
 class Clearance:
     """Bounds of a joint's clearance, the paper's c-bar of eqs. (1)-(5).
 
-    ``None`` is "not given": no clearance, except along the free motion of a passive
+    ``None`` means "not given": no clearance, except along the free motion of a passive
     joint, where it means unbounded.
 
     Attributes:
@@ -53,19 +53,20 @@ class Frame:
         name: unique; dots group by leg.
         parent: name of the parent frame, or ``"base"``.
         translation: (3,) [m] origin seen from the parent's frame after its joint.
-        rotation: (3,) [rad] rotation vector of the axes, likewise.
+        rotation: (3,) [rad] rotation vector of the axes, seen from there too.
         joint: ``"fixed"``, ``"revolute"`` or ``"prismatic"``, about or along own z.
-        actuated: a locked, commanded joint; otherwise its motion is free.
+        actuated: whether the joint is locked at a command; otherwise its motion is
+            free.
         position: [rad or m] joint coordinate in the home pose.
         limits: [rad or m] least and largest coordinate that may be commanded, or None.
         geometric_error: (6,) [rad, m] delta l.
-        tolerance: (6,) [rad, m] standard deviations of delta l about the value given,
-            0 where it is exact; None where they are not known.
-        clearance: of the joint, None if it has none.
+        tolerance: (6,) [rad, m] standard deviations of delta l about the given value, 0
+            where it is exact; None if unknown.
+        clearance: clearance of the joint; None if it has none.
         joint_stiffness: (6, 6) K_B with ``inf`` on the diagonal where rigid, or None;
             0 along a passive joint's own motion (its row and column) leaves it free.
         link: elasticity of the body, None if rigid.
-        mass: [kg] of the body beside its link's own.
+        mass: [kg] of the body in addition to its link's own.
         centre_of_mass: (3,) [m] of that mass, in the frame's axes.
     """
 
@@ -99,17 +100,17 @@ class Frame:
 
     @property
     def passive(self) -> bool:
-        """Whether the joint moves by itself: a mobile joint that is not driven."""
+        """Whether the joint is passive: mobile but not driven."""
         return self.joint != "fixed" and not self.actuated
 
     @property
     def compliant(self) -> bool:
-        """Whether the joint is passive and its motion is a spring's."""
+        """Whether the joint is passive and its motion has a spring."""
         return self.passive and bool(self.own_stiffness)
 
     @property
     def resistance(self) -> NDArray | None:
-        """(6, 6) its K_B, None if rigid: a passive joint is free along its motion."""
+        """(6, 6) joint's K_B, None if rigid; free along a passive joint's motion."""
         if self.joint_stiffness is not None or not self.passive:
             return self.joint_stiffness
         K = np.full(6, np.inf)
@@ -118,18 +119,18 @@ class Frame:
 
     @property
     def own_axis(self) -> int:
-        """Row of the screw along which the joint moves: RZ, or TZ if prismatic."""
+        """Index of the joint's own component of a screw: RZ, or TZ if prismatic."""
         return 5 if self.joint == "prismatic" else 2
 
     @property
     def own_stiffness(self) -> float | None:
-        """[N m/rad or N/m] of K_B along the joint's motion, None without K_B."""
+        """[N m/rad or N/m] K_B along the joint's motion, None without K_B."""
         K = self.joint_stiffness
         return None if K is None else float(K[self.own_axis, self.own_axis])
 
     @property
     def springs(self) -> NDArray | None:
-        """(6, 6) K_B of what deforms: ``inf`` also along a motion that is free."""
+        """(6, 6) K_B of the springs: ``inf`` also along a free motion."""
         K = self.joint_stiffness
         if K is None or self.compliant or not self.passive:
             return K
@@ -149,18 +150,18 @@ _SHAPES = {
 
 
 def locked(value: ArrayLike, shape: tuple[int, ...], whose: str) -> NDArray:
-    """A read-only copy of an array.
+    """Return a read-only copy of an array.
 
     Args:
-        value: anything that makes an array.
-        shape: that it must have.
-        whose: beginning of a message.
+        value: the array, or a list that makes one.
+        shape: the required shape.
+        whose: beginning of the message.
 
     Returns:
-        The floats.
+        The array of floats.
 
     Raises:
-        ValueError: the shape is another, or a number is NaN.
+        ValueError: the shape differs, or a number is NaN.
     """
     array = np.array(value, dtype=float)
     if array.shape != shape:
@@ -172,12 +173,12 @@ def locked(value: ArrayLike, shape: tuple[int, ...], whose: str) -> NDArray:
 
 
 def between_origins(frame: Frame) -> NDArray:
-    """(3,) [m] from the parent's origin to the frame's, in the frame's axes."""
+    """Return (3,) [m] vector from the parent's origin to the frame's, in its axes."""
     return np.asarray(rotation_matrix(frame.rotation).T @ frame.translation)
 
 
 def beam_axis(frame: Frame) -> tuple[float, NDArray]:
-    """Length and direction of a frame's beam.
+    """Return the length and direction of a frame's beam.
 
     Args:
         frame: one with a :class:`BeamLink`.
@@ -193,7 +194,7 @@ def beam_axis(frame: Frame) -> tuple[float, NDArray]:
     if frame.link.length is not None and frame.link.axis is not None:
         axis = np.array(frame.link.axis)
         return frame.link.length, axis / np.linalg.norm(axis)
-    # a revolute parent turns the beam about its start, which changes neither
+    # a revolute parent rotates the beam about its start, which changes neither
     along = between_origins(frame)
     length = math.sqrt(along @ along)
     if length == 0.0:

@@ -1,14 +1,14 @@
-"""A general effect: a small screw, or a compliance, as a function of what is known.
+"""A general effect: a small screw, or a compliance, as a function of variables.
 
-What its numbers mean is said in :mod:`assembly.effects.forms`; how it acts, in
-:mod:`assembly.effects.functions`.
+:mod:`assembly.effects.forms` defines its numbers; :mod:`assembly.effects.functions`
+applies it.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 KINDS = ("screw", "compliance")
-PLACES = ("base", "reading", "load")  # beside the frames of the robot
+PLACES = ("base", "reading", "load")  # in addition to the frames of the robot
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class Function:
             the kind; with several components a name may begin with one of them.
         kind: ``"screw"`` [rad, m], or ``"compliance"`` [rad/(N m), m/N]: times the
             wrench component at the same place.
-        label: for people.
+        label: text for reports.
         formula: with ``form = "formula"``.
-        session: the only one in which it acts; None in all.
+        session: the only session in which it acts; None for all.
         std: standard deviations of some parameters, in their units.
     """
 
@@ -44,6 +44,6 @@ class Function:
 
     @property
     def title(self) -> str:
-        """The label, or where it acts and what it depends on."""
+        """The label, or the place and the variables."""
         acts = f"{self.where} {', '.join(self.components)}"
         return self.label or f"{acts} of {', '.join(self.variables)}"

@@ -1,4 +1,4 @@
-"""What the elasticity of a body is given by: a beam, a matrix, a mesh or a library."""
+"""The kinds of elasticity of a body: a beam, a matrix, a mesh or a library."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,10 +21,11 @@ class BeamLink:
         density: [kg/m^3] or None if the link has no declared mass.
         theory: ``"timoshenko"`` or ``"euler"``.
         length: [m] if it is not the distance of the origins, else None.
-        axis: unit vector from base to tip in the frame's axes, together with length.
+        axis: unit vector from base to tip in the frame's axes, given together with
+            length.
         up: direction of the section's height in the frame's axes, or None.
-        pieces: springs in a row that it is for finite motions; for small ones it is one
-            whatever their number.
+        pieces: number of springs in series for finite motions; the number does not
+            matter for small ones.
     """
 
     section: dict[str, float]
@@ -55,7 +56,7 @@ class MeshSolution:
 
     Attributes:
         solved: stiffness and fields on the finest mesh.
-        young: [Pa] modulus with which they were solved.
+        young: [Pa] modulus used in the solution.
         digest: SHA-256 of the surface file.
         mass: (12, 12) [kg m^2 .. kg] consistent mass for screws of base and tip, each
             read at its end; zero without a density.
@@ -79,13 +80,15 @@ class MeshLink:
         poisson: [-] Poisson's ratio.
         density: [kg/m^3] or None.
         unit: length unit of the surface file.
-        up: with ``frame_up`` fixes the roll: a direction in the mesh's axes.
+        up: with ``frame_up`` fixes the rotation about the axis: a direction in the
+            mesh's axes.
         frame_up: the same direction in the frame's axes.
         axis: direction from base to tip in the frame's axes; None from the parent's
             origin to the frame's.
         interface: ``"rigid"`` or ``"distributing"``.
-        parts: of another material, as :func:`stiffness.fem.part_text.parse_part` reads.
-        solution: of its finite elements, None until
+        parts: parts of another material, as read by
+            :func:`stiffness.fem.part_text.parse_part`.
+        solution: solution of its finite elements, None until
             :func:`assembly.files.solved_links.solve_links`; it is not pickled.
     """
 
@@ -104,7 +107,7 @@ class MeshLink:
     solution: MeshSolution | None = field(default=None, compare=False, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:
-        # tens of megabytes, which a worker finds from the same files
+        # tens of megabytes, which a worker computes from the same files
         return {**vars(self), "solution": None}
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "MeshLink":

@@ -1,4 +1,4 @@
-"""From a parent's origin to a frame's: the lengths of links that do not state one."""
+"""Lengths of links that do not state one: from a parent's origin to a frame's."""
 
 from dataclasses import replace
 
@@ -10,21 +10,21 @@ from forcefit.inputs.table import BadInput, quoted
 from stiffness.beam.beam import section_axes
 from stiffness.screws import rotation_matrix
 
-_SAME_POINT = 1e-9  # [m] two origins nearer than this are one
+_SAME_POINT = 1e-9  # [m] two origins nearer than this coincide
 
 
 def with_spans(robot: Robot, home: NDArray) -> Robot:
-    """The robot with every link's length known and sound.
+    """Return the robot with every link's length known and checked.
 
-    A beam runs between the two origins at home.  Below a prismatic joint that is not
-    at zero there, the frame's translation is not that span: it is written out.
+    A beam connects the two origins at home.  After a prismatic joint that is not at
+    zero there, this differs from the frame's translation, and the length is stored.
 
     Args:
-        robot: as read.
+        robot: robot as read.
         home: (n,) [rad or m] joint coordinates in the home pose.
 
     Returns:
-        The robot, some of its beams with ``length`` and ``axis``.
+        The robot; some of its beams have ``length`` and ``axis``.
 
     Raises:
         BadInput: two origins coincide, or a direction lies along its beam.
@@ -43,7 +43,7 @@ def with_spans(robot: Robot, home: NDArray) -> Robot:
 
 
 def _with_span(frame: Frame, link: BeamLink, shift: float) -> BeamLink:
-    """A beam of known length, its ``up`` checked."""
+    """Return a beam of known length, with its ``up`` checked."""
     if link.length is None or link.axis is None:
         axis = _span(frame, shift)
         length = float(np.linalg.norm(axis))
@@ -60,7 +60,7 @@ def _with_span(frame: Frame, link: BeamLink, shift: float) -> BeamLink:
 
 
 def _check_mesh(frame: Frame, link: MeshLink, shift: float) -> None:
-    """A mesh has a direction, and its roll is fixed by another one."""
+    """Check that a mesh has a direction, and that another one fixes its rotation."""
     if link.axis is None and shift:
         raise BadInput(
             f"frame {quoted(frame.name)}.link.mesh: found it below a prismatic joint "
@@ -75,7 +75,7 @@ def _check_mesh(frame: Frame, link: MeshLink, shift: float) -> None:
 
 
 def _span(frame: Frame, shift: float) -> NDArray:
-    """(3,) [m] from the parent's origin to the frame's, in the frame's axes."""
+    """Return (3,) [m] vector from the parent's origin to the frame's, in its axes."""
     span = rotation_matrix(frame.rotation).T @ (frame.translation + [0.0, 0.0, shift])
     if np.linalg.norm(span) < _SAME_POINT:
         mesh = isinstance(frame.link, MeshLink)

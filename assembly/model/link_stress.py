@@ -1,11 +1,11 @@
 """The largest stress in every link, from the wrench it transmits.
 
-A link is held at its base and loaded by its frame's wrench at the tip, a beam with a
-density by its own weight between them too.  Beams follow the formulas of
-:mod:`stiffness.beam.beam_stress`.  Links given by a surface follow the
-stress influence of unit wrenches, by finite elements (:mod:`stiffness.fem.stress`); it
-leaves out points nearer than an interface's radius to a clamped, singular edge.  The
-stress of a link given by its stiffness alone is not known.
+A link is held at its base and loaded by its frame's wrench at the tip; a beam with a
+density is also loaded by its own weight.  The formulas for beams are in
+:mod:`stiffness.beam.beam_stress`.  Links given by a surface use the stress of unit
+wrenches by finite elements (:mod:`stiffness.fem.stress`), without the points nearer
+than an interface's radius to a clamped, singular edge.  The stress of a link given by
+its stiffness alone is unknown.
 """
 
 from collections.abc import Callable
@@ -21,21 +21,21 @@ from stiffness.beam.beam import section_axes
 from stiffness.beam.beam_stress import peak_beam_stress
 
 WEIGHTLESS = np.zeros(6)  # [N m, N]
-_CHUNK = 64  # wrenches at a time: 64 x 20000 nodes x 6 numbers are 61 MB
+_CHUNK = 64  # number of wrenches together: 64 x 20000 nodes x 6 numbers are 61 MB
 
 
 @dataclass(frozen=True, eq=False)
 class LinkStress:
-    """How a link's peak stress follows from its wrench.
+    """Peak stress of a link as a function of its wrench.
 
     Attributes:
-        frame: name of the frame whose body it is.
-        row: of that frame.
-        method: ``"beam"`` or ``"finite elements"``, with what was left out.
-        peak: (k, 6) [N m, N] wrenches of the link's spring and, if it has a weight of
-            its own, (k, 6) or (6,) of these the part that it is, at the frame in its
-            axes, to (k,) [Pa].
-        relative_error: [1] estimated, of the mesh; 0 for a beam's formulas.
+        frame: name of the frame of the body.
+        row: index of that frame.
+        method: ``"beam"`` or ``"finite elements"``, with the points left out.
+        peak: function of (k, 6) [N m, N] wrenches of the link's spring and, if it has
+            its own weight, (k, 6) or (6,) the part of them due to it, at the frame in
+            its axes; it returns (k,) [Pa].
+        relative_error: [-] estimated error of the mesh; 0 for a beam's formulas.
     """
 
     frame: str
@@ -47,10 +47,10 @@ class LinkStress:
 
 @lru_cache(maxsize=16)
 def stressed_links(robot: Robot) -> tuple[LinkStress, ...]:
-    """Links whose stress can be computed, in the robot's order of frames.
+    """Return the links whose stress can be computed, in the robot's order of frames.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
         Beams of a declared shape and links given by a surface.
@@ -67,7 +67,7 @@ def stressed_links(robot: Robot) -> tuple[LinkStress, ...]:
 
 
 def stressed_names(robot: Robot) -> tuple[str, ...]:
-    """Frames of :func:`stressed_links`, without solving any."""
+    """Return the frames of :func:`stressed_links`, without solving any link."""
     return tuple(
         frame.name for frame in robot.frames
         if isinstance(frame.link, MeshLink)
@@ -78,14 +78,14 @@ def stressed_names(robot: Robot) -> tuple[str, ...]:
 def peak_stresses(
     robot: Robot, wrenches: ArrayLike, at_tips: ArrayLike = 0.0
 ) -> NDArray:
-    """Largest von Mises stress in every link of known stress.
+    """Return the largest von Mises stress in every link of known stress.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         wrenches: (..., n, 6) [N m, N] of every link's spring, at its frame in its axes,
             as :attr:`assembly.linear.assembled.Assembly.wrenches`.
-        at_tips: likewise, of these the part that is the links' own weight, as
-            :attr:`assembly.linear.load.FrameLoads.at_tips`.
+        at_tips: (..., n, 6) [N m, N] part of the wrenches due to the links' own weight,
+            as :attr:`assembly.linear.load.FrameLoads.at_tips`.
 
     Returns:
         (..., links) [Pa] in the order of :func:`stressed_links`.
@@ -110,7 +110,7 @@ def peak_stresses(
 
 
 def _of_beam(frame: Frame) -> Callable[..., NDArray]:
-    """Peak stress of a beam."""
+    """Return the peak stress of a beam."""
     assert isinstance(frame.link, BeamLink)
     length, axis = beam_axis(frame)
     section, R = frame.link.section, section_axes(axis, frame.link.up)
@@ -118,14 +118,14 @@ def _of_beam(frame: Frame) -> Callable[..., NDArray]:
     def peak(wrench: NDArray, at_tip: NDArray = WEIGHTLESS) -> NDArray:
         tip = wrench - at_tip
         in_section_axes = np.hstack([tip[:, :3] @ R, tip[:, 3:] @ R])
-        weight = 2 * at_tip[..., 3:] @ R  # half of it counts at the tip
+        weight = 2 * at_tip[..., 3:] @ R  # half of it acts at the tip
         return peak_beam_stress(section, length, in_section_axes, weight)[0]
 
     return peak
 
 
 def _of_mesh(frame: Frame, row: int) -> LinkStress:
-    """Peak stress of a link given by its surface."""
+    """Return the peak stress of a link given by its surface."""
     from stiffness.fem.stress import stress_influence, von_mises
 
     solved = mesh_solution(frame).solved

@@ -20,10 +20,10 @@ from stiffness.beam.sections import declared_section
 
 
 def link_compliances(robot: Robot) -> NDArray:
-    """Compliance of every body, K_E^-1 of eq. (6).
+    """Return the compliance of every body, K_E^-1 of eq. (6).
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
 
     Returns:
         (n, 6, 6) [rad/(N m) .. m/N] at each frame, in its axes; zero where rigid.
@@ -40,7 +40,7 @@ def link_compliances(robot: Robot) -> NDArray:
 
 @lru_cache(maxsize=4096)  # a robot that is changed in one frame keeps its others
 def link_compliance(frame: Frame) -> NDArray:
-    """(6, 6) compliance of a frame's own body, at the frame in its axes; read-only."""
+    """Return the (6, 6) compliance of a frame's body in its axes, a read-only array."""
     C = _compliance(frame)
     C.setflags(write=False)
     return C
@@ -66,10 +66,10 @@ def _compliance(frame: Frame) -> NDArray:
 
 
 def joint_compliances(robot: Robot) -> NDArray:
-    """Compliance of every joint, K_B^-1; zero where rigid, free or not given.
+    """Return compliance of every joint, K_B^-1; zero where rigid, free or not given.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
 
     Returns:
         (n, 6, 6) [rad/(N m) .. m/N] at each frame, in its axes.
@@ -84,7 +84,7 @@ def joint_compliances(robot: Robot) -> NDArray:
 
 
 def compliance_factor(C: NDArray) -> NDArray:
-    """Factor L of a compliance, C = L L^T, so that screw = L y stores energy y^2/2.
+    """Return a factor L of a compliance, C = L L^T: screw = L y stores energy y^2/2.
 
     Args:
         C: (6, 6) symmetric positive semidefinite, mixed units.
@@ -94,7 +94,7 @@ def compliance_factor(C: NDArray) -> NDArray:
     """
     size = np.sqrt(np.diag(C))
     soft = np.flatnonzero(size > 0)
-    # scaled to a unit diagonal first: rad and m differ by many powers of ten
+    # scaled to a unit diagonal first: rad and m differ by many orders of magnitude
     scaled = C[np.ix_(soft, soft)] / np.outer(size[soft], size[soft])
     L = np.zeros((6, len(soft)))
     L[soft] = size[soft, None] * np.linalg.cholesky(scaled)
@@ -102,23 +102,23 @@ def compliance_factor(C: NDArray) -> NDArray:
 
 
 def own_screw(frame: Frame) -> NDArray:
-    """(6,) unit screw of a joint's own motion."""
+    """Return the (6,) unit screw of a joint's own motion."""
     return np.eye(6)[frame.own_axis]
 
 
 def in_series(stiffness: NDArray | None, row: int, compliance: float) -> NDArray:
-    """K_B with a spring put in series in one direction of its own axes.
+    """Return K_B with a spring in series in one direction of its own axes.
 
     Args:
         stiffness: (6, 6) declared, None if rigid.
-        row: which direction.
+        row: index of the direction.
         compliance: [rad/(N m) or m/N] of the spring added.
 
     Returns:
         (6, 6) with ``inf`` on the diagonal where rigid.
     """
     K = np.diag(np.full(6, np.inf)) if stiffness is None else np.array(stiffness)
-    free = np.diag(K) == 0.0  # in series with what resists nothing, nothing resists
+    free = np.diag(K) == 0.0  # a spring in series with a free motion leaves it free
     K[free, free] = np.inf
     soft = np.isfinite(np.diag(K))
     C = np.zeros((6, 6))

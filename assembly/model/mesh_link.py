@@ -1,4 +1,4 @@
-"""A mesh link's finite elements in its frame's axes; nothing is solved here.
+"""The stored finite-element solution of a mesh link, in its frame's axes.
 
 :func:`assembly.files.solved_links.solve_links` solves them when a robot is loaded.
 """
@@ -18,7 +18,7 @@ from stiffness.screws import rotation_matrix
 
 
 def mesh_solution(frame: Frame) -> MeshSolution:
-    """The finite elements of a frame's mesh link, as they were solved at loading.
+    """Return the finite-element solution of a frame's mesh link.
 
     Args:
         frame: one with a :class:`assembly.model.robot.MeshLink`.
@@ -28,7 +28,7 @@ def mesh_solution(frame: Frame) -> MeshSolution:
         :func:`modulus_factor`.
 
     Raises:
-        BadInput: it was not solved when the robot was loaded.
+        BadInput: the link was not solved when the robot was loaded.
     """
     solution = _mesh(frame).solution
     if solution is None:
@@ -37,7 +37,7 @@ def mesh_solution(frame: Frame) -> MeshSolution:
 
 
 def refuse_unsolved(frame: Frame) -> NoReturn:
-    """Refuse a link whose stiffness was not found when the robot was loaded."""
+    """Reject a link whose stiffness was not computed when the robot was loaded."""
     kind = "library" if isinstance(frame.link, LibraryLink) else "mesh"
     raise BadInput(
         f"frame {quoted(frame.name)}.link.{kind}: found no stiffness, expected a robot "
@@ -46,12 +46,12 @@ def refuse_unsolved(frame: Frame) -> NoReturn:
 
 
 def modulus_factor(frame: Frame) -> float:
-    """Young's modulus of a mesh link over that with which it was solved: K's factor."""
+    """Return the ratio of a mesh link's modulus to that of its solution."""
     return _mesh(frame).young / mesh_solution(frame).young
 
 
 def mesh_link_stiffness(frame: Frame) -> LinkStiffness:
-    """Stiffness of a frame's mesh link by finite elements, in the frame's axes.
+    """Return the stiffness of a frame's mesh link by finite elements, in its axes.
 
     Args:
         frame: one with a :class:`assembly.model.robot.MeshLink`.
@@ -60,7 +60,7 @@ def mesh_link_stiffness(frame: Frame) -> LinkStiffness:
         The link, read at the tip interface's centre, which is the frame's origin.
 
     Raises:
-        BadInput: it was not solved when the robot was loaded.
+        BadInput: the link was not solved when the robot was loaded.
     """
     link, factor = mesh_solution(frame).solved.link, modulus_factor(frame)
     if factor != 1.0:
@@ -72,7 +72,7 @@ def mesh_link_stiffness(frame: Frame) -> LinkStiffness:
 
 
 def mesh_link_mass(frame: Frame) -> tuple[NDArray, NDArray]:
-    """Consistent mass of a frame's mesh link, by the finite elements of its K_E.
+    """Return the consistent mass of a frame's mesh link, by finite elements.
 
     Args:
         frame: one with a :class:`assembly.model.robot.MeshLink` that has a density.
@@ -82,7 +82,7 @@ def mesh_link_mass(frame: Frame) -> tuple[NDArray, NDArray]:
         frame's axes; and (3,) [m] from base to tip, in the frame's axes.
 
     Raises:
-        BadInput: it was not solved when the robot was loaded.
+        BadInput: the link was not solved when the robot was loaded.
     """
     solution = mesh_solution(frame)
     span = solution.solved.centers[1] - solution.solved.centers[0]
@@ -92,15 +92,15 @@ def mesh_link_mass(frame: Frame) -> tuple[NDArray, NDArray]:
 
 
 def mesh_turn(frame: Frame, mesh_span: NDArray) -> NDArray:
-    """Rotation from a frame's mesh's axes to the frame's.
+    """Return the rotation from a frame's mesh's axes to the frame's.
 
     Args:
         frame: one with a :class:`assembly.model.robot.MeshLink`.
         mesh_span: (3,) [m] from base to tip in the mesh's axes.
 
     Returns:
-        (3, 3) it lays the span along the link's ``axis``, or along the line from the
-        parent's origin to the frame's if it has none.
+        (3, 3) rotation that lays the span along the link's ``axis``, or along the line
+        from the parent's origin to the frame's if it has none.
     """
     link = _mesh(frame)
     span = between_origins(frame) if link.axis is None else np.array(link.axis)
@@ -113,16 +113,16 @@ def mesh_rotation(
     up: tuple[float, float, float] | None = None,
     frame_up: tuple[float, float, float] | None = None,
 ) -> NDArray:
-    """Rotation from mesh axes to frame axes that lays one span along the other.
+    """Return the rotation from mesh to frame axes that lays one span along the other.
 
     Args:
         mesh_span: (3,) [m] base to tip in the mesh's axes.
         span: (3,) its direction in the frame's axes.
-        up: a direction in the mesh's axes that fixes the roll, with ``frame_up``.
+        up: a direction in the mesh's axes that fixes the rotation about the span, with
         frame_up: the same direction in the frame's axes.
 
     Returns:
-        (3, 3) the rotation; the smallest one if no roll is given.
+        (3, 3) the rotation; the smallest one if ``up`` is not given.
     """
     a, b = mesh_span / np.linalg.norm(mesh_span), span / np.linalg.norm(span)
     if up is not None and frame_up is not None:
@@ -132,21 +132,21 @@ def mesh_rotation(
     if sine < 1e-15:
         if cosine > 0:
             return np.eye(3)
-        # half a turn: about any axis across, the one nearest to a coordinate axis
+        # half a turn: the axis across that is nearest to a coordinate axis
         axis = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
         return rotation_matrix(np.pi * axis / np.linalg.norm(axis))
     return rotation_matrix(np.arctan2(sine, cosine) * axis / sine)
 
 
 def _triad(along: NDArray, up: NDArray) -> NDArray:
-    """Right-handed axes: first along, third as near to up as possible."""
+    """Return right-handed axes: first along, third as near to up as possible."""
     side = np.cross(up, along)
     side = side / np.linalg.norm(side)
     return np.column_stack([along, side, np.cross(along, side)])
 
 
 def _mesh(frame: Frame) -> MeshLink:
-    """The mesh link of a frame that has one."""
+    """Return the mesh link of a frame that has one."""
     if not isinstance(frame.link, MeshLink):
         raise ValueError(f"frame '{frame.name}' has no mesh link")
     return frame.link

@@ -1,4 +1,4 @@
-"""Frames given by their home poses, seen from the base."""
+"""Frames given by their home poses in base axes."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -13,15 +13,14 @@ PlacedFrame = tuple[Frame, NDArray]  # a frame and its (4, 4) home pose
 
 
 def place_frames(placed: Iterable[PlacedFrame]) -> tuple[Frame, ...]:
-    """Frames with the translation and rotation of their home poses.
+    """Return the frames with the translation and rotation of their home poses.
 
     Args:
-        placed: frames, parents first, each with its (4, 4) transform seen from the base
-            at home, before its own joint's motion; every joint is at its ``position``
-            there.
+        placed: frames, parents first.  Each has its (4, 4) home pose in base axes
+            without its own joint's motion, with every other joint at its ``position``.
 
     Returns:
-        The same frames, placed in their parents.
+        The same frames, relative to their parents.
     """
     after = {BASE: np.eye(4)}
     frames = []
@@ -34,7 +33,7 @@ def place_frames(placed: Iterable[PlacedFrame]) -> tuple[Frame, ...]:
 
 
 def _own_motion(frame: Frame) -> NDArray:
-    """(4, 4) of the joint at its home position, about or along z."""
+    """Return (4, 4) motion of the joint at its home position, about or along z."""
     along = np.array([0.0, 0.0, frame.position])
     if frame.joint == "prismatic":
         return transform(along, np.eye(3))

@@ -7,23 +7,23 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 
 if TYPE_CHECKING:
     import pandas
     import xarray
 
 Numbers = Any  # a number of one point, or an array (k,) of many
-N = TypeVar("N", float, NDArray)  # the same, where it is known which of them
+N = TypeVar("N", float, NDArray)  # the same, if it is known which of them
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PointResults:
-    """A result whose arrays have a leading axis where it is of many points.
+    """A result of one point, or of many points with a leading axis in its arrays.
 
     Attributes:
-        AXES: the fields that have one, and how many axes each has of one point; an
-            array with no more serves all points.
+        AXES: the fields that have this axis, and their number of axes for one point; an
+            array with no more axes holds for all points.
         VARIABLES: the array of each variable of the table of many points, by the names
             of :mod:`assembly.model.tables`.
     """
@@ -48,7 +48,7 @@ class PointResults:
         return True
 
     def __getitem__(self, rows: Any) -> Self:
-        """One point, by a whole number; or some, by a slice, numbers or a mask."""
+        """Return one point by its number, or a selection by slice, numbers or mask."""
         taken = {}
         for name, axes in self.AXES.items():
             values = getattr(self, name)
@@ -60,21 +60,21 @@ class PointResults:
         return (self[i] for i in range(len(self)))
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Over ``point``; see :mod:`assembly.model.tables`."""
+        """Return a data set over ``point``; see :mod:`assembly.model.tables`."""
         from assembly.model.tables import points_dataset
 
         arrays = {name: getattr(self, own) for name, own in self.VARIABLES.items()}
         return points_dataset(arrays)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """A row for each point, columns (variable, component)."""
+        """Return a row for each point, columns (variable, component)."""
         from assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point")
 
 
 def plain(values: Any) -> Any:
-    """Arrays as they are; of one point the number itself."""
+    """Return arrays unchanged; for one point the number itself."""
     if isinstance(values, np.ndarray):
         return values if values.ndim else values.item()
     return values.item() if isinstance(values, np.generic) else values

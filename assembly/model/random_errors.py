@@ -1,4 +1,4 @@
-"""Geometric errors drawn at random, the paper's section IV: reproducible by a seed."""
+"""Geometric errors drawn at random as in the paper's section IV, with a seed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,16 +13,16 @@ SIGNS = ("literal", "signed")
 
 @dataclass(frozen=True)
 class ErrorDraw:
-    """How to draw geometric errors delta l.
+    """Parameters of a draw of geometric errors delta l.
 
     Attributes:
         frames: names of the frames that get an error, in the order of drawing.
         least: (6,) [rad, m] smallest size of each component.
         most: (6,) [rad, m] largest size.
-        seed: of the random numbers.
+        seed: seed of the random numbers.
         signs: ``"literal"``, all positive as the paper's interval reads, or
-            ``"signed"``, the same sizes with random signs: the paper does not say, and
-            the median energy differs five-fold.
+            ``"signed"``, the same sizes with random signs.  The paper does not state
+            which; the median energy differs five-fold.
     """
 
     frames: tuple[str, ...]
@@ -33,17 +33,17 @@ class ErrorDraw:
 
 
 def draw_errors(robot: Robot, draw: ErrorDraw) -> NDArray:
-    """Errors of one draw.
+    """Return the errors of one draw.
 
-    Sizes are uniform between ``least`` and ``most``, frame by frame; the signs come
-    from the same generator afterwards, so both conventions share their sizes.
+    Sizes are uniform between ``least`` and ``most``, frame by frame.  The signs come
+    from the same generator afterwards, so both conventions have equal sizes.
 
     Args:
-        robot: of n frames.
-        draw: which frames, how large, which seed and signs.
+        robot: robot of n frames.
+        draw: frames, sizes, seed and signs.
 
     Returns:
-        (n, 6) [rad, m]; zero where no error was asked for.
+        (n, 6) [rad, m]; zero for frames without a drawn error.
 
     Raises:
         BadInput: a frame is not the robot's.
@@ -62,17 +62,17 @@ def draw_errors(robot: Robot, draw: ErrorDraw) -> NDArray:
 
 
 def frames_named(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
-    """Frames by full name, or by the part after a leg's dot in every leg.
+    """Return frames by full name, or by the part after a leg's dot in every leg.
 
     Args:
-        robot: any.
-        names: such as ``["leg1.link_a"]``, or ``["link_a"]`` for all legs.
+        robot: any robot.
+        names: names such as ``["leg1.link_a"]``, or ``["link_a"]`` for all legs.
 
     Returns:
         Full names in the robot's order.
 
     Raises:
-        BadInput: a name fits no frame.
+        BadInput: a name matches no frame.
     """
     known = [f.name for f in robot.frames]
     chosen = set()

@@ -1,7 +1,7 @@
 """A manipulator as data: a tree of frames, and the closures that hold it together.
 
-What a frame is: :mod:`assembly.model.frame`; what a link is:
-:mod:`assembly.model.link_kinds`.  Their names may be imported from here.
+:mod:`assembly.model.frame` defines a frame, :mod:`assembly.model.link_kinds` a link.
+Their names may be imported from here.
 """
 
 from collections.abc import Iterable, Mapping
@@ -29,8 +29,8 @@ from assembly.model.link_kinds import (
     MatrixLink,
     MeshLink,
 )
-from forcefit.inputs.display import Figures, html_table, largest, short_repr
 from forcefit.inputs.table import BadInput, nearest, quoted
+from forcefit.results.display import Figures, html_table, largest, short_repr
 from stiffness.screws import rotation_matrix, transform
 
 __all__ = [
@@ -43,24 +43,25 @@ __all__ = [
 class Robot:
     """A manipulator.
 
-    Frames are kept parents first.  Rows of every array below are frames in that order.
+    Frames are stored parents first.  Rows of every array below are frames in that
+    order.
 
     Attributes:
-        name: of the robot.
-        platform: name of the frame whose pose error is asked for.
+        name: name of the robot.
+        platform: name of the frame whose pose error is computed.
         frames: all frames.
         closures: pairs of frames that must coincide once assembled.
         description: one line.
-        effects: parameters of the effects that the machine is known to have, by name;
-            see :mod:`assembly.effects`.
-        session_effects: likewise those of one session alone, by session.
-        functions: general effects that it is known to have.
-        learned_range: least and largest value of what varied where its effects were
-            learned, by public name.
+        effects: parameters of the known effects of the machine, by name; see
+            :mod:`assembly.effects`.
+        session_effects: effects of one session alone, by session.
+        functions: known general effects of the machine.
+        learned_range: least and largest value of each variable in the data from which
+            the effects were identified, by public name.
         reference_point: (3,) [m] the point at which it was identified, platform axes;
-            None where it never was.
-        diagnosis: what the file says of the diagnosis that made it: verdict, rows
-            fitted, hold-out error, digest of the campaign, path of the covariance.
+            None if it was not identified.
+        diagnosis: information in the file on its diagnosis: verdict, rows fitted,
+            hold-out error, digest of the campaign, path of the covariance.
         remarks: defaults of its file that are easily overlooked.
     """
 
@@ -82,7 +83,7 @@ class Robot:
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
     def _figures(self) -> Figures:
-        """The summary that is printed."""
+        """Return the summary that is printed."""
         kinds = ("actuated", "passive")
         count = [f"{sum(getattr(f, k) for f in self.frames)} {k}" for k in kinds]
         titles = [function.title for function in self.functions]
@@ -103,7 +104,7 @@ class Robot:
             self.index(name)
 
     def index(self, name: str) -> int:
-        """Row of a frame.
+        """Return the row of a frame.
 
         Args:
             name: the frame's name.
@@ -112,7 +113,7 @@ class Robot:
             Its row in every array of this robot.
 
         Raises:
-            BadInput: there is no such frame; the nearest name is given.
+            BadInput: there is no such frame; the message has the nearest name.
         """
         try:
             return self._rows[name]
@@ -121,7 +122,7 @@ class Robot:
             raise BadInput(f"{self.name}: no frame {quoted(name)}{hint}") from None
 
     def frame(self, name: str) -> Frame:
-        """The frame of a name; see :meth:`index` for the error."""
+        """Return the frame of a name; see :meth:`index` for the error."""
         return self.frames[self.index(name)]
 
     @cached_property
@@ -162,23 +163,23 @@ class Robot:
 
     @property
     def has_effects(self) -> bool:
-        """Whether the machine is known to have any."""
+        """Whether the machine has known effects."""
         return bool(self.effects or self.session_effects or self.functions)
 
     @property
     def sessions(self) -> tuple[str, ...]:
-        """Names of the sessions to which some effect belongs."""
+        """Names of the sessions that have effects of their own."""
         named = [f.session for f in self.functions if f.session is not None]
         return tuple(dict.fromkeys([*self.session_effects, *named]))
 
     def without_effects(self) -> "Robot":
-        """The same robot with nothing but what its frames and closures declare."""
+        """Return the robot with only the declared frames and closures."""
         if not self.has_effects:
             return self
         return replace(self, effects={}, session_effects={}, functions=())
 
     def with_errors(self, errors: ArrayLike) -> "Robot":
-        """The same robot with other geometric errors.
+        """Return the same robot with other geometric errors.
 
         Args:
             errors: (n, 6) [rad, m] delta l of every frame.
@@ -193,7 +194,7 @@ class Robot:
         )
 
     def with_links(self, links: dict[str, Link]) -> "Robot":
-        """The same robot with other links at the frames named."""
+        """Return the same robot with other links at the frames named."""
         for name in links:
             self.index(name)
         frames = (replace(f, link=links.get(f.name, f.link)) for f in self.frames)
@@ -201,15 +202,15 @@ class Robot:
 
 
 def _has_clearance(frame: Frame) -> bool:
-    """Whether a clearance was given."""
+    """Return whether a clearance is given."""
     return frame.clearance is not None
 
 
 def parents_first(frames: Iterable[Frame]) -> tuple[Frame, ...]:
-    """Frames sorted so that parents precede children, otherwise in the order given.
+    """Sort frames so that parents precede children, otherwise in the given order.
 
     Args:
-        frames: of one robot.
+        frames: frames of one robot.
 
     Returns:
         The same frames.
@@ -255,7 +256,7 @@ def parents_first(frames: Iterable[Frame]) -> tuple[Frame, ...]:
 
 
 def _stable(frames: tuple[Frame, ...], depth: dict[str, int]) -> tuple[Frame, ...]:
-    """The given order if parents already come first, else by depth."""
+    """Return the given order if parents already come first, else by depth."""
     seen = {BASE}
     for frame in frames:
         if frame.parent not in seen:

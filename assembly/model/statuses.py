@@ -1,6 +1,6 @@
-"""Statuses of points and verdicts of comparisons: every word, once, with its meaning.
+"""Statuses of points and verdicts of comparisons, with their meanings.
 
-A status says whether a point has an answer; a verdict, what an answer is worth.
+A status says whether a point has a result; a verdict says how good a result is.
 """
 
 OK = "ok"
@@ -32,18 +32,24 @@ MEANINGS = {
     UNSTABLE: "the equilibrium has a direction of negative stiffness",
     NOT_PROVED: "an answer whose certificate is not good enough",
 }
-# of the points of a sweep; a file stores the place in this list
+# statuses of the points of a sweep; a file stores the index in this list
 OF_POINTS = (
     OK, OUT_OF_REACH, CANNOT_ASSEMBLE, SOLVER_FAILED, INVALID_ROBOT, NO_EQUILIBRIUM,
     SINGULAR, BEYOND_LIMITS, BEYOND_SINGULARITY,
 )  # fmt: skip
-# of points at which nothing is computed
+# statuses of points at which no quantity is computed
 UNUSABLE = {OUT_OF_REACH, INVALID_ROBOT, SINGULAR, BEYOND_LIMITS}
 
-# verdicts on one value that is compared: OK, or
+# verdicts on one value that is compared: OK, or one of these
 FAILS = "fails"
 UNDECIDED = "undecided"
 NO_SIGNAL = "no signal"
+# .. and on a whole comparison: NO_SIGNAL, or
+PASSED = "passed"
+FAILED = "failed"
+NOT_DECIDED = "not decided"
+NOT_RUN = "not run"
+NO_ANSWER = "no answer"
 
 # verdicts of a diagnosis
 NONE_NEEDED = "none_needed"

@@ -1,8 +1,8 @@
 """Results as labelled arrays (xarray) and tables (pandas).
 
 Names, dimensions and units are those of a sweep's NetCDF file: ``units`` and
-``long_name`` are attributes of every variable.  Neither package is imported before it
-is asked for.
+``long_name`` are attributes of every variable.  Both packages are imported on first
+use.
 """
 
 import math
@@ -14,44 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.robot import Robot
-from stiffness.screws import SCREW, WRENCH
+from forcefit.results.quantities import LABELS, QUANTITIES
 
 if TYPE_CHECKING:
     import pandas
     import xarray
 
-_LABELS = {
-    "screw": SCREW, "wrench_component": WRENCH, "bound": ("lower", "upper")
+# variables whose quantity has another name in the table
+_RENAMED = {
+    "clearance_screw": "clearance", "link_screw": "link", "joint_screw": "joint"
 }  # fmt: skip
-_SCREW, _WRENCH = ("rad, m", ("screw",)), ("N m, N", ("wrench_component",))
-# name: unit, dimensions beside those of the points or frames, meaning
-_OF_FRAMES = {
-    "geometric_error": (*_SCREW, "delta l"),
-    "clearance_screw": (*_SCREW, "clearance, and small motions of passive joints"),
-    "link_screw": (*_SCREW, "deformation of the body"),
-    "joint_screw": (*_SCREW, "deformation of the joint"),
-    "wrench": (*_WRENCH, "what the outer part exerts on the inner, at the frame"),
-    "joint_wrench": (*_WRENCH, "the same through the joint"),
-}
-_OF_POINTS = {
-    "energy": ("J", (), "least elastic energy that closes it, eq. (22)"),
-    "potential": ("J", (), "energy minus the work of the loads"),
-    "platform_screw": (*_SCREW, "pose error at the platform's origin, base axes"),
-    "load": (*_WRENCH, "on the platform at its origin, base axes"),
-    "duality_gap": ("J", (), "certified: energy is at most this too high"),
-    "closure_residual": ("1", (), "largest closure error left"),
-    "clearance_excess": ("1", (), "by how much a clearance is exceeded"),
-    "energy_without_clearance": ("J", (), "what closing would cost without clearances"),
-    "margin": ("1", (), "factor on all clearances at which it just assembles"),
-    "margin_bound": ("1", (), "certified: the margin is at least this"),
-    "rotation_error": ("rad", ("bound",), "bounds of the largest rotation error, (27)"),
-    "translation_error": ("m", ("bound",), "bounds of the largest translation error"),
-    "rotation_screw": (*_SCREW, "attains the lower bound of the rotation"),
-    "translation_screw": (*_SCREW, "attains the lower bound of the translation"),
-    "method": ("", (), "which gave it: compiled, or reference, numpy and Clarabel"),
-    "status": ("", (), "ok, or why there is no result"),
-    "reason": ("", (), "message where the status is not ok"),
-}
 
 
 class PlacedRobot(Protocol):
@@ -62,7 +34,7 @@ class PlacedRobot(Protocol):
         """The manipulator."""
 
     def pose(self) -> dict[str, float]:
-        """Nominal platform pose by component."""
+        """Return the nominal platform pose by component."""
 
 
 class ForcedAssembly(Protocol):
@@ -70,7 +42,7 @@ class ForcedAssembly(Protocol):
 
     @property
     def posture(self) -> PlacedRobot:
-        """Where the robot stands nominally."""
+        """Nominal configuration of the robot."""
 
     @property
     def clearance_screws(self) -> NDArray:
@@ -98,10 +70,10 @@ class ForcedAssembly(Protocol):
 
 
 def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
-    """An assembly over its frames and closures, with the platform's error.
+    """Return an assembly over its frames and closures, with the platform's error.
 
     Args:
-        assembly: by the linear model or with finite motions.
+        assembly: assembly by the linear model or with finite motions.
 
     Returns:
         Data set with dimensions ``frame``, ``screw``, ``wrench_component`` and
@@ -120,22 +92,22 @@ def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
         name: getattr(assembly, name)
         for name in ("energy", "potential", "platform_screw", "load")
     }
-    data = _dataset(frames, _OF_FRAMES, "frame", [f.name for f in robot.frames])
+    data = _dataset(frames, "frame", [f.name for f in robot.frames])
     pose = {
         name: ((), value, {"units": "m" if name[0] == "t" else "rad"})
         for name, value in assembly.posture.pose().items()
     }
-    data = data.merge(_dataset(single, _OF_POINTS)).assign_coords(pose)
-    about = {"units": "N m, N", "long_name": "second chain on first, at the platform"}
+    data = data.merge(_dataset(single)).assign_coords(pose)
+    about = QUANTITIES["closure_wrench"]
     data["closure_wrench"] = (
-        ("closure", "wrench_component"), assembly.closure_wrenches, about
+        ("closure", *about.dims), assembly.closure_wrenches, about.attributes
     )  # fmt: skip
     data = data.assign_coords(closure=[" - ".join(pair) for pair in robot.closures])
     return data.assign_attrs(robot=robot.name)
 
 
 def points_dataset(values: Mapping[str, NDArray]) -> "xarray.Dataset":
-    """Results of many points over ``point``.
+    """Return the results of many points over ``point``.
 
     Args:
         values: (k, ...) by the names of a sweep's variables.
@@ -144,15 +116,14 @@ def points_dataset(values: Mapping[str, NDArray]) -> "xarray.Dataset":
         Data set with their units.
     """
     count = len(next(iter(values.values())))
-    return _dataset(values, _OF_POINTS, "point", np.arange(count))
+    return _dataset(values, "point", np.arange(count))
 
 
 def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
-    """The variables over some dimensions as a table, a column for each component.
+    """Return variables over some dimensions as a table, a column for each component.
 
     Args:
-        data: any, such as of this module; variables that lack one of the dimensions
-            are left out.
+        data: any data set; variables that lack one of the dimensions are left out.
         rows: the dimensions that become the index, a row for each of their points.
 
     Returns:
@@ -194,15 +165,15 @@ def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
 
 
 def component_unit(unit: str, component: str) -> str:
-    """Unit of one component of a variable that mixes angles and lengths.
+    """Return the unit of one component of a variable that mixes angles and lengths.
 
     Args:
-        unit: of the variable, such as ``"rad, m"``.
-        component: as in :func:`frame_table`; its labels begin with R or T, M or F, or
+        unit: unit of the variable, such as ``"rad, m"``.
+        component: see :func:`frame_table`; its labels begin with R or T, M or F, or
             are rotation and translation.
 
     Returns:
-        The unit of that component; the variable's where that is one already.
+        The unit of that component; the variable's if it has only one.
     """
     kinds = [label[:1].upper() for label in component.split(".")]
     if unit.count(", ") == 1:
@@ -213,18 +184,15 @@ def component_unit(unit: str, component: str) -> str:
     return unit
 
 
-def _dataset(
-    values: Mapping[str, Any], known: Mapping[str, tuple], *points: Any
-) -> "xarray.Dataset":
+def _dataset(values: Mapping[str, Any], *points: Any) -> "xarray.Dataset":
     """Values with units and meaning; ``points`` names their first axis and labels."""
     import xarray
 
     first = points[:1]
-    data, used = {}, set()
+    data: dict[str, Any] = {}
+    labels = dict([points] if points else [])
     for name, value in values.items():
-        unit, dims, meaning = known[name]
-        attributes = {"units": unit, "long_name": meaning}
-        data[name] = ((*first, *dims), np.asarray(value), attributes)
-        used |= {*dims}
-    labels: dict[str, Any] = {dim: list(_LABELS[dim]) for dim in _LABELS if dim in used}
-    return xarray.Dataset(data, labels | dict([points] if points else []))
+        known = QUANTITIES[_RENAMED.get(name, name)]
+        data[name] = ((*first, *known.dims), np.asarray(value), known.attributes)
+        labels |= {dim: list(LABELS[dim]) for dim in known.dims}
+    return xarray.Dataset(data, labels)

@@ -1,4 +1,4 @@
-"""How stiff the platform is, in which direction, and which part gives way: K_C.
+"""Stiffness K_C of the platform by direction, and the shares of the parts in it.
 
-Begin at ``platform_stiffness.py``; ``matrices.py`` is what they return.
+Begin at ``platform_stiffness.py``; ``matrices.py`` holds its result.
 """

@@ -1,14 +1,15 @@
-r"""An equilibrium whose pressed clearances are known, solved to rounding.
+r"""Newton's method for an equilibrium whose pressed clearances are known.
 
-Cone programmes are solved to a certified gap: clearances stand within 1e-6 of the
-bounds that they press, and their forces are as good.  With the pressed ones known, the
-conditions of an equilibrium are equations,
+Cone programmes are solved to a certified gap: clearances are within 1e-6 of the bounds
+that they press, and their forces have the same accuracy.  Once the pressed clearances
+are known, the conditions of an equilibrium are equations,
 
     [ H   A'  N ] [ dx       ]     [ g ]      g = H_y y - loads - A' lambda + N f
     [ A   0   0 ] [ -dlambda ] = - [ r ],     r = A x + misfit
     [ N'  0   0 ] [ df       ]     [ c ]      c = (|u_k|^2 - 1) / 2
 
-and Newton's method solves them; N = the normals u_k of the pressed bounds.
+and Newton's method solves them to rounding; N holds the normals u_k of the pressed
+bounds.
 
 Sources:
     Nocedal, Wright (2006), Numerical Optimization, sections 16.2 and 18.1.
@@ -26,22 +27,23 @@ from assembly.linear.closure import Linearisation, VirtualJoints
 from assembly.linear.load import FrameLoads
 from assembly.solvers.cones import cone_sizes
 
-AT_BOUND = 1e-6  # [-] within which a clearance counts as at its bound
-_NEAR_BOUND = 1e-3  # [-] within which one may still be pressed, see ``contacts``
-_PRESSED = 1e-8  # of the largest force: smaller ones press nothing
-_ROUNDING = 1e-12  # nor does what is this small beside the energy without clearance
+AT_BOUND = 1e-6  # [-] distance within which a clearance counts as at its bound
+_NEAR_BOUND = 1e-3  # [-] distance within which it may be pressed, see ``contacts``
+_PRESSED = 1e-8  # relative to the largest force: a smaller one counts as zero
+# relative to the energy without clearance: a smaller force counts as zero
+_ROUNDING = 1e-12
 _RANK = 1e-10  # relative size below which a singular value counts as zero
-_FLAT = 1e-12  # of the largest curvature: what less counts as none
-_STEPS = 4  # of Newton's method; two are usual
-_SETTLED = 1e-14  # [-] beyond the bounds
-_GUESSES = 3  # of what is pressed
+_FLAT = 1e-12  # relative to the largest curvature: smaller ones count as zero
+_STEPS = 4  # largest number of Newton steps; two are usual
+_SETTLED = 1e-14  # [-] accepted excess over the bounds
+_GUESSES = 3  # largest number of guesses of the pressed clearances
 
 
 def contacts(assembly: Assembly) -> tuple[NDArray, NDArray]:
-    """Clearances that carry a force, and those that touch their bound without one.
+    """Return the clearances with a force, and those at their bound without one.
 
-    A cone solver leaves a gap times a force that is the same for all: of a clearance
-    near its bound the larger of the two, the force by the energy, says which it is.
+    A cone solver leaves a product of gap and force that is the same for all clearances.
+    Near a bound, the larger of gap and force (over the energy) decides.
 
     Args:
         assembly: the manipulator at least energy.
@@ -61,20 +63,20 @@ def contacts(assembly: Assembly) -> tuple[NDArray, NDArray]:
 
 
 def bound_forces(assembly: Assembly) -> NDArray:
-    """(cones,) [J] force on each clearance times its bound."""
+    """Return the (cones,) [J] force on each clearance times its bound."""
     forces = assembly.joints.cones.T @ assembly.joint_wrenches.ravel()
     return cone_sizes(forces, assembly.joints.group)
 
 
 def settle(assembly: Assembly) -> Assembly:
-    """The same equilibrium of (22) to rounding, pressed clearances at their bounds.
+    """Refine an equilibrium of (22) to rounding, pressed clearances at their bounds.
 
     Args:
-        assembly: the manipulator at least energy, as a cone solver found it.
+        assembly: the manipulator at least energy, as computed by a cone solver.
 
     Returns:
-        What Newton's method makes of it; the assembly itself if nothing is pressed, or
-        if it cannot be told what is.
+        The result of Newton's method; the assembly itself if no clearance is pressed,
+        or if the pressed ones cannot be identified.
     """
     pressed, _ = contacts(assembly)
     for _ in range(_GUESSES):
@@ -84,7 +86,7 @@ def settle(assembly: Assembly) -> Assembly:
         size = cone_sizes(settled.clearances, settled.joints.group)
         if np.array_equal(contacts(settled)[0], pressed) and np.all(size <= 1 + 1e-9):
             return settled
-        # a small force was taken for none, and its clearance leaves its bound
+        # a small force was taken for zero, and its clearance leaves its bound
         beyond = size > 1.0 + 1e-9
         if not (beyond & ~pressed).any():
             break
@@ -93,7 +95,7 @@ def settle(assembly: Assembly) -> Assembly:
 
 
 def _settled(assembly: Assembly, pressed: NDArray) -> Assembly:
-    """The equilibrium with these clearances at their bounds."""
+    """Return the equilibrium with these clearances at their bounds."""
     joints, group = assembly.joints, assembly.joints.group
     x, multipliers = unknowns(assembly), assembly.multipliers
     bounded = bounded_unknowns(joints)
@@ -119,24 +121,24 @@ def _settled(assembly: Assembly, pressed: NDArray) -> Assembly:
 
 
 def unknowns(assembly: Assembly) -> NDArray:
-    """(N,) springs, clearances and free motions."""
+    """Return the (N,) unknowns: springs, clearances and free motions."""
     parts = (assembly.elastic, assembly.clearances, assembly.motions)
     return np.concatenate(parts)
 
 
 def bounded_unknowns(joints: VirtualJoints) -> slice:
-    """Where the clearances are among them."""
+    """Return the slice of the clearances among the unknowns."""
     springs = joints.elastic.shape[1]
     return slice(springs, springs + len(joints.group))
 
 
 def closure_rows(lin: Linearisation, joints: VirtualJoints) -> NDArray:
-    """(6 closures, N) closures in all unknowns."""
+    """Return the (6 closures, N) closure rows in all unknowns."""
     return lin.rows @ np.hstack([joints.elastic, joints.cones, joints.free])
 
 
 def work_of_loads(loads: FrameLoads, joints: VirtualJoints) -> NDArray:
-    """(N,) [J] of every unknown."""
+    """Return the (N,) [J] work of the loads on every unknown."""
     of_links, of_joints = (joints.elastic.T @ w for w in (loads.body, loads.joint))
     springs = np.where(joints.links, of_links, of_joints)
     others = (columns.T @ loads.joint for columns in (joints.cones, joints.free))
@@ -144,25 +146,25 @@ def work_of_loads(loads: FrameLoads, joints: VirtualJoints) -> NDArray:
 
 
 def curvature(joints: VirtualJoints, force: NDArray) -> NDArray:
-    """(N, N) [J] of springs, and of the round bounds that forces press."""
+    """Return (N, N) [J] curvature of springs and of the round bounds under force."""
     diagonal = [np.ones(joints.elastic.shape[1]), force[joints.group]]
     return np.diag(np.concatenate([*diagonal, np.zeros(joints.free.shape[1])]))
 
 
 def _normals(joints: VirtualJoints, u: NDArray, pressed: NDArray) -> NDArray:
-    """(N, pressed) normals of the pressed bounds in all unknowns."""
+    """Return the (N, pressed) normals of the pressed bounds in all unknowns."""
     normals = np.zeros((_count(joints), int(pressed.sum())))
     normals[bounded_unknowns(joints)] = boundary_normals(u, pressed, joints.group)
     return normals
 
 
 def _count(joints: VirtualJoints) -> int:
-    """Number of unknowns."""
+    """Return the number of unknowns."""
     return bounded_unknowns(joints).stop + joints.free.shape[1]
 
 
 def held_rows(assembly: Assembly, pressed: NDArray) -> NDArray:
-    """(6 closures + pressed, N) closures, then the bounds that are pressed."""
+    """Return the (6 closures + pressed, N) rows of closures and of pressed bounds."""
     normals = _normals(assembly.joints, assembly.clearances, pressed)
     return np.vstack([closure_rows(assembly.linearisation, assembly.joints), normals.T])
 
@@ -170,17 +172,17 @@ def held_rows(assembly: Assembly, pressed: NDArray) -> NDArray:
 def newton_step(
     H: NDArray, held: NDArray, left: NDArray, gradient: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """The change that meets the conditions at the head of this module.
+    """Solve for the Newton step of the equations in the module's docstring.
 
     Args:
         H: (N, N) [J] second derivative of the Lagrangian.
-        held: (m, N) derivatives of what must hold: closures, and bounds.
-        left: (m,) by how much it does not.
+        held: (m, N) derivatives of the constraints: closures, and bounds.
+        left: (m,) their residuals.
         gradient: (N,) [J] of the Lagrangian.
 
     Returns:
-        (N,) change of the unknowns, of least size where nothing resists, and (m,) of
-        the multipliers, the least where they are not determined.
+        (N,) change of the unknowns, of least size if not unique, and (m,) that of the
+        multipliers, the least if not unique.
     """
     closing = -np.linalg.lstsq(held, left, rcond=_RANK)[0]
     Z = null_space(held, rcond=_RANK) if len(held) else np.eye(len(H))

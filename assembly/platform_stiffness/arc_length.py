@@ -1,21 +1,21 @@
-r"""The load-deflection path of a tight robot past its limit points, by arc length.
+r"""The load-deflection path past its limit points by arc length, without clearance.
 
-Where a load has a largest value the path of equilibria turns back, and no larger load
-has one near by.  The load is then an unknown too: the path (x, lambda) is followed in
-steps of given length, each predicted along the tangent and corrected by Newton's
+At a maximum of the load the path of equilibria turns back, and no larger load has an
+equilibrium nearby.  The load is then an unknown too.  The path (x, lambda) is followed
+in steps of given length: a prediction along the tangent, and corrections by Newton's
 method across it,
 
-    [ Z'HZ   -Z'q ] [ t       ]     [ what is out of balance ]
-    [ tau_x   tau ] [ dlambda ] = - [ what the step is long of ],
+        [ Z'HZ   -Z'q ] [ t       ]     [ unbalanced force       ]
+        [ tau_x   tau ] [ dlambda ] = - [ error of step's length ],
 
 with Z the motions that keep the closures, H the true second derivative of the
-potential, q the work of a unit load, tau the direction of the step.  Stable or not,
-every equilibrium of the path is met.  Clearances are held at zero.
+potential, q the work of a unit load, tau the direction of the step.  Every equilibrium
+of the path is found, stable or not.  Clearances are held at zero.
 
-Where an eigenvalue of Z'HZ changes its sign the load is critical: at a limit point it
-turns there, else another path branches off, as a buckled column's, which is named and
-not followed.  Motions that nothing resists and no load drives, as a rod's spin between
-two ball joints, have no second derivative; they are left out of Z.
+Where an eigenvalue of Z'HZ changes its sign the load is critical.  At a limit point the
+load turns there.  Otherwise another path branches off, as at a buckled column; it is
+reported and not followed.  Motions without stiffness and load, such as a rod's spin
+between two ball joints, have no second derivative; they are left out of Z.
 
 Sources:
     Riks (1979), An incremental approach to the solution of snapping and buckling
@@ -49,11 +49,11 @@ from assembly.platform_stiffness.exact_tangent import (
 from assembly.platform_stiffness.matrices import Part
 from assembly.solvers.method import Method, check_method
 
-_STEPS = 400  # of the path at most
-_CORRECTIONS = 8  # of a step
-_CLOSED = 1e-10  # [-] size of a last correction, of a step
-_SMALLEST = 1e-6  # of the first step
-_HALVINGS = 20  # of a step, to bracket a critical load in it
+_STEPS = 400  # largest number of steps of a path
+_CORRECTIONS = 8  # largest number of corrections of a step
+_CLOSED = 1e-10  # [-] size of the last correction, relative to the step
+_SMALLEST = 1e-6  # smallest step, relative to the first
+_HALVINGS = 20  # bisections that bracket a critical load in a step
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,11 +63,11 @@ class _Place:
     Attributes:
         load: [N or N m].
         local: the expansion there.
-        motion: (N,) along the path, per unit of arc.
-        rise: [N or N m] of the load per unit of arc.
+        motion: (N,) derivative of the unknowns by arc length.
+        rise: [N or N m] derivative of the load by arc length.
         curvatures: (k,) second derivatives of the potential along its modes, lowest
-            first; their signs count.
-        modes: (N, k) along which.
+            first; only their signs are used.
+        modes: (N, k) the modes.
     """
 
     load: float
@@ -79,23 +79,24 @@ class _Place:
 
     @property
     def unstable(self) -> int:
-        """How many modes the potential falls along."""
+        """Number of modes along which the potential decreases."""
         return int((self.curvatures < 0).sum())
 
 
 @dataclass(frozen=True, eq=False)
 class _Path:
-    """What is followed, and what length means on it.
+    """A path to be followed, and the definition of length on it.
 
     Attributes:
-        posture: of the tight robot, its beams cut.
-        component: of the load.
-        rest: (6,) [N m, N] the rest of the load.
+        posture: posture of the robot without clearance, its beams cut.
+        component: component of the load that changes.
+        rest: (6,) [N m, N] the other components of the load.
         gravity: (3,) [m/s^2] or None.
-        weight: of squared motions, in squared parts of the largest load.
+        weight: weight of squared motions, relative to squared loads over the largest
+            load.
         range: [N or N m] the largest load.
-        parts: whose springs they are.
-        idle: motions that nothing resists; no load drives them.
+        parts: owner of each spring.
+        idle: number of motions without stiffness and load.
     """
 
     posture: Posture
@@ -108,7 +109,7 @@ class _Path:
     idle: int = 0
 
     def expand(self, x: NDArray, load: float, model: Expansion) -> Expansion:
-        """The problem near a placement, under a load."""
+        """Expand the problem at a placement, under a load."""
         wrench = self.rest.copy()
         wrench[self.component] = load
         placement = place(model.placement.model, x)
@@ -116,16 +117,16 @@ class _Path:
         return expand(placement, loads, np.zeros(len(placement.residual)))
 
     def reference_load(self, local: Expansion) -> NDArray:
-        """(N,) work of a unit load per unit of each unknown."""
+        """Return the (N,) work of a unit load per unit of each unknown."""
         unit = dead_loads(self.posture, np.eye(6)[self.component])
         return work_gradient(local.placement, unit)
 
     def covector(self, local: Expansion, motion: NDArray) -> NDArray:
-        """(N,) product with a motion, as lengths on the path count."""
+        """Return the (N,) inner product with a motion, in the arc-length metric."""
         return self.weight * motion / local.placement.model.units**2
 
     def modes(self, local: Expansion) -> tuple[NDArray, NDArray]:
-        """Second derivatives of the potential, lowest first, and their motions Z."""
+        """Return potential's second derivatives, lowest first, and their motions Z."""
         B, units = local.basis, local.placement.model.units
         values, motions = curvature_modes(B, B.T @ local.hessian @ B, units)
         kept = np.sort(np.argsort(np.abs(values))[self.idle :])
@@ -146,16 +147,17 @@ def follow_load(
     """Follow the path of equilibria until the load leaves a range.
 
     Args:
-        posture: where the robot stands; its errors count, its clearances are held.
-        component: of the load that changes, 0 to 5.
+        posture: the robot's configuration, with its errors; its clearances are held at
+            zero.
+        component: component of the load that changes, 0 to 5.
         first: [N m or N] load at which the path begins.
-        last: [N m or N] load beyond which it ends, on its own side.
-        load: (6,) [N m, N] the rest of the load.
+        last: [N m or N] load at which it ends.
+        load: (6,) [N m, N] the other components of the load.
         gravity: (3,) [m/s^2] base axes.
-        count: of steps of the first one's length from first to last load; steps grow
-            to twice that where the path is straight.
-        progress: called with the points found and how many there may be.
-        method: of the first equilibrium; the path from it is followed in numpy.
+        count: number of steps of the first one's length from first to last load; steps
+            grow to twice that where the path is straight.
+        progress: function called with the points found and their largest number.
+        method: method of the first equilibrium; the path from it is followed in numpy.
 
     Returns:
         The curve; its events are ``"critical"`` loads, with the mode.
@@ -173,7 +175,7 @@ def follow_load(
     rest = np.zeros(6) if load is None else np.array(load, dtype=float)
     rest[component] = first
     start = solve_exact(tight, rest, gravity=gravity, method=method)
-    # a motion that the load would drive is named before it is followed
+    # refuse a free motion that the load drives, before following the path
     solve_assembly(tight, np.eye(6)[component], method=method)
     span = abs(last - first)
     cut = start.cut.cut(tight)
@@ -202,7 +204,7 @@ def follow_load(
 def _begin(
     path: _Path, start: ExactAssembly, first: float, last: float
 ) -> tuple[_Place, _Path]:
-    """The first equilibrium, its tangent, and the weight that balances both lengths."""
+    """Return the first equilibrium with its tangent, and the path with its weight."""
     local = start.expansion
     values, _ = path.modes(local)
     flat = np.abs(values) <= FLAT * np.abs(values).max(initial=0.0)
@@ -210,15 +212,15 @@ def _begin(
     values, Z = path.modes(local)
     motion = Z @ ((Z.T @ path.reference_load(local)) / values)
     size = np.linalg.norm(motion / local.placement.model.units) * path.range
-    weight = 1.0 / (size or 1.0) ** 2  # nothing gives way along a rigid bar
-    # half of the length is the load's
+    weight = 1.0 / (size or 1.0) ** 2  # a rigid bar does not deform
+    # the load is half of the length
     rise = path.range / np.sqrt(2.0) * np.sign(last - first)
     place = _Place(first, local, motion * rise, float(rise), values, Z)
     return place, replace(path, weight=float(weight))
 
 
 def _advance(path: _Path, place: _Place, step: float) -> tuple[_Place | None, int]:
-    """The next equilibrium, and the corrections taken; None if they do not settle."""
+    """Return the next equilibrium, None if not converged, and the corrections made."""
     x0, load = place.local.placement.x, place.load
     x = x0 + step * place.motion
     load = load + step * place.rise
@@ -252,7 +254,7 @@ def _solve(
     path: _Path, local: Expansion, modes: tuple[NDArray, NDArray], tangent: NDArray,
     left: NDArray,
 ) -> NDArray | None:  # fmt: skip
-    """Motion along the modes and load that put right what is left."""
+    """Return the motion along the modes and the load that remove a residual."""
     values, Z = modes
     M = np.zeros((len(left), len(left)))
     M[:-1, :-1] = np.diag(values)
@@ -267,7 +269,7 @@ def _solve(
 def _oriented(
     path: _Path, local: Expansion, load: float, normal_to: NDArray, rise: float
 ) -> _Place | None:
-    """An equilibrium with its tangent, of unit length, the way the path went."""
+    """Return an equilibrium with its unit tangent in the direction of travel."""
     values, Z = path.modes(local)
     left = np.zeros(len(values) + 1)
     left[-1] = -1.0
@@ -283,7 +285,7 @@ def _oriented(
 
 
 def _critical(path: _Path, low: _Place, high: _Place, step: float) -> Event:
-    """Where between two places an eigenvalue passes zero, and its mode."""
+    """Return the critical load between two points, with its mode."""
     start, short, long_ = low, 0.0, step
     for _ in range(_HALVINGS):
         middle, _ = _advance(path, start, (short + long_) / 2)
@@ -294,7 +296,7 @@ def _critical(path: _Path, low: _Place, high: _Place, step: float) -> Event:
         else:
             high, long_ = middle, (short + long_) / 2
     turns = low.rise * high.rise < 0
-    # the mode that changes: the last of the falling ones on the side with more of them
+    # the mode that changes: the last negative one on the side with more of them
     more = high if high.unstable > low.unstable else low
     soft = more.unstable - 1
     bent = more.modes[:, soft]
@@ -312,7 +314,7 @@ def _curve(
     path: _Path, posture: Posture, places: list[_Place], events: list[Event],
     method: Method,
 ) -> DeflectionCurve:  # fmt: skip
-    """What was met."""
+    """Return the points and events as a curve."""
     screws = np.array([p.local.placement.platform_screw for p in places])
     moved = [p.local.placement.platform_rows[path.component] @ p.motion for p in places]
     with np.errstate(divide="ignore"):

@@ -1,18 +1,20 @@
 """Load against deflection: clearances, contacts, elasticity, and buckling.
 
-One component of the load goes through a list of values while the rest stays.  At each
-the equilibrium is found, of problem (22) or with finite motions, the latter from the
-one before, so that a path is followed, forwards or back.  Where the set of pressed
-clearances changes, the curve has a kink; where the least second derivative of the
-potential passes zero, the equilibrium is lost or branches: a critical load; where it is
-lost, the platform jumps to another.  These loads are bracketed by bisection.
+One component of the load takes a list of values while the others are constant.  At each
+value the equilibrium is computed, by problem (22) or with finite motions.  With finite
+motions it starts from the one before, so that a path is followed forwards or back.  The
+curve has a kink where the set of pressed clearances changes.  Where the least second
+derivative of the potential passes zero the load is critical: the equilibrium branches,
+or is lost and the platform jumps to another.  Bisection brackets these loads.
 
-The load is what is prescribed: of a path that turns back, only what is stable from one
-side is met, and the jump past the rest is named.  :mod:`.arc_length` follows the rest.
+The load is prescribed.  Of a path that turns back, only the part that is stable from
+one side is found, and the jump over the other part is reported; :mod:`.arc_length`
+follows that part.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,29 +35,39 @@ from assembly.platform_stiffness.matrices import (
 )
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method, check_method
-from forcefit.inputs.display import html_table, largest_row, numbers, short_repr
 from forcefit.inputs.errors import BadInput
+from forcefit.inputs.renamed import renamed_keywords
+from forcefit.results.display import html_table, largest_row, numbers, short_repr
 
-_HALVINGS = 14  # of a step of the load, to bracket what happens in it: 6e-5 of it
-_CARRIES = 1e-6  # of the largest force, work along its bound: what is pressed
-# contacts followed within a step of the load: symmetric robots have some that carry
-# rounding alone, and change with it
+_HALVINGS = 14  # bisections that locate an event to 6e-5 of a load step
+_CARRIES = 1e-6  # relative to the largest force times bound: smaller ones count as zero
+# largest number of contact changes followed within a load step: in symmetric robots
+# some contacts carry rounding alone, and change with it
 _CHANGES = 8
-_STAYS = 1e-6  # of the largest motion in a mode: rounding of a platform that stays
-_STILL = 1e-12  # [characteristic lengths] motions that are rounding
-_JUMP = 5.0  # times what the tangents on both sides explain
-_BOUNDS = ("tilt", "tilt", "spin", "radial", "radial", "axial")  # by row of a screw
-_NO_LOAD = 1e-9  # of the largest load: where clearances may leave the pose open
+# relative to the largest motion in a mode: below it the platform counts as fixed
+_STAYS = 1e-6
+_STILL = 1e-12  # [characteristic lengths] size below which motions are rounding
+_JUMP = 5.0  # times the motion predicted by the tangents on both sides
+_BOUNDS = (
+    "tilt",
+    "tilt",
+    "spin",
+    "radial",
+    "radial",
+    "axial",
+)  # by row of a screw
+# relative to the largest load: below it clearances may leave the pose open
+_NO_LOAD = 1e-9
 
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happens on the way.
+    """An event on the curve.
 
     Attributes:
-        load: [N or N m] at which, or right after which.
+        load: [N or N m] at the event, or directly after it.
         kind: ``"contact"``, ``"release"``, ``"critical"`` or ``"jump"``.
-        what: in words: which clearances, which mode, how far.
+        what: description: the clearances, the mode or the distance.
         deflection: [rad or m] of the platform there, along the load's component.
     """
 
@@ -67,19 +79,20 @@ class Event:
 
 @dataclass(frozen=True, eq=False)
 class DeflectionCurve:
-    """How the platform follows one component of the load.
+    """Motion of the platform under one changing component of the load.
 
     Attributes:
-        posture: where the robot stands nominally.
-        component: of the wrench and of the screw, 0 to 5.
-        loads: (k,) [N m or N] that component, in the order in which it was followed.
+        posture: the robot's nominal configuration.
+        component: component of the wrench and of the screw, 0 to 5.
+        loads: (k,) [N m or N] values of that component, in the order of application.
         screws: (k, 6) [rad, m] of the platform at its origin, base axes.
         energies: (k,) [J] elastic.
         stiffness: (k,) tangent along the component, the others free.
         pressed: (k,) names of the clearances that carry a force.
-        open_: (k,) bool, where clearances leave the pose undetermined.
-        events: in the order met.
-        method: of all equilibria, as asked: ``"compiled"`` or ``"reference"``.
+        open_: (k,) bool, True where clearances leave the pose undetermined.
+        events: in the order of the curve.
+        method: method of all equilibria, as requested: ``"compiled"`` or
+            ``"reference"``.
     """
 
     posture: Posture
@@ -115,28 +128,29 @@ Progress = Callable[[str, int, int], None]
 _Solver = Callable[[float, _Point | None], _Point]
 
 
+@renamed_keywords(exact=("state", {True: "exact", False: "contact"}))
 def deflection_curve(
     posture: Posture,
     component: int,
     loads: Sequence[float],
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
-    exact: bool = False,
+    state: Literal["contact", "exact"] = "contact",
     progress: Progress = lambda what, done, most: None,
     method: Method = "compiled",
 ) -> DeflectionCurve:
-    """Follow the platform while one component of the load changes.
+    """Compute the platform's motion while one component of the load changes.
 
     Args:
-        posture: where the robot stands; its errors and clearances count.
-        component: which of ``[mx my mz fx fy fz]``, 0 to 5.
-        loads: [N m or N] its values, in the order in which they act.
-        load: (6,) [N m, N] the rest of the load, at the platform's origin, base axes.
+        posture: the robot's configuration, with its errors and clearances.
+        component: index in ``[mx my mz fx fy fz]``, 0 to 5.
+        loads: [N m or N] its values, in the order of application.
+        load: (6,) [N m, N] the other components, at the platform's origin, base axes.
         gravity: (3,) [m/s^2] base axes.
-        exact: whether with finite motions, else by problem (22).
-        progress: called at each load with the steps taken there and how many there
-            may be.
-        method: of :func:`assembly.linear.energy.solve_assembly` or
+        state: ``"contact"``, by problem (22); ``"exact"``, with finite motions.
+        progress: function called at each load with the steps taken there and their
+            largest number.
+        method: method of :func:`assembly.linear.energy.solve_assembly` or
             :func:`assembly.exact.exact.solve_exact`.
 
     Returns:
@@ -145,11 +159,13 @@ def deflection_curve(
     Raises:
         CannotAssemble: the errors cannot be closed.
         FreeMotion: the load drives a motion that nothing resists.
-        SolverFailed: no equilibrium was found; the load at which is in the message.
+        SolverFailed: no equilibrium was found; the message has the load.
         BadInput: no such component, no loads, or not numbers.
-        ValueError: no such method.
+        ValueError: no such state or method.
     """
     check_method(method)
+    if state not in {"contact", "exact"}:
+        raise ValueError(f"deflection_curve: no state {state!r}")
     if component not in range(6) or not len(loads):
         raise BadInput(
             f"deflection_curve: found component {component} and {len(loads)} loads, "
@@ -164,7 +180,7 @@ def deflection_curve(
         wrench[component] = value
         what = f"steps at load {value:.6g}"
         return _solve(
-            posture, value, wrench, gravity, exact, near,
+            posture, value, wrench, gravity, state == "exact", near,
             lambda done, most: progress(what, done, most), method,
         )  # fmt: skip
 
@@ -199,7 +215,7 @@ def _solve(
     exact: bool, near: _Point | None, progress: Callable[[int, int], None],
     method: Method,
 ) -> _Point:  # fmt: skip
-    """The equilibrium under one load."""
+    """Return the equilibrium under one load."""
     progress(0, 1)
     if not exact:
         linear = solve_assembly(posture, wrench, gravity=gravity, method=method)
@@ -222,7 +238,7 @@ def _solve(
             posture, wrench, gravity=gravity, progress=progress, method=method
         )
     active, force = active_clearances(equilibrium.expansion)
-    # what carries rounding alone changes with it
+    # contacts that carry rounding alone change with it
     active &= force > _CARRIES * force.max(initial=0.0)
     names = clearance_names(equilibrium.expansion.placement.model.joints, active)
     return _Point(value, equilibrium, exact_tangent(equilibrium, "letting go"), names)
@@ -232,7 +248,10 @@ def _settled(
     point: _Point, largest: float, rest: NDArray, gravity: ArrayLike | None,
     method: Method,
 ) -> tuple[NDArray, bool]:  # fmt: skip
-    """Platform screw, where clearances leave it open the one nearest to nominal."""
+    """Return the platform screw.
+
+    If clearances leave it open, the one nearest to nominal.
+    """
     equilibrium = point.equilibrium
     idle = not rest.any() and gravity is None and abs(point.load) <= _NO_LOAD * largest
     if idle and isinstance(equilibrium, Assembly):
@@ -242,11 +261,11 @@ def _settled(
 
 
 def clearance_names(joints: VirtualJoints, marked: NDArray) -> frozenset[str]:
-    """Names such as ``"leg1.elbow radial"`` of the clearances marked.
+    """Return the names, such as ``"leg1.elbow radial"``, of selected clearances.
 
     Args:
-        joints: whose clearances they are.
-        marked: (cones,) bool.
+        joints: the virtual joints with these clearances.
+        marked: (cones,) bool, the selection.
 
     Returns:
         The names.
@@ -262,7 +281,7 @@ def clearance_names(joints: VirtualJoints, marked: NDArray) -> frozenset[str]:
 def _events(
     before: _Point, after: _Point, at: _Solver, component: int, most: int = _CHANGES
 ) -> list[Event]:
-    """What changed between two neighbouring loads, and at which load."""
+    """Return the events between two neighbouring loads."""
     events = []
     if before.pressed != after.pressed:
         low, high = _bracket(before, after, at, lambda p: p.pressed == before.pressed)
@@ -286,7 +305,7 @@ def _events(
         low, high = _bracket(
             before, after, at, lambda p: _apart(before, p) < _apart(p, after)
         )
-        if _jumps(low, high, component):  # else it was but soft on the way
+        if _jumps(low, high, component):  # otherwise it was only soft in between
             way = numbers(
                 high.equilibrium.platform_screw - low.equilibrium.platform_screw
             )
@@ -295,7 +314,7 @@ def _events(
 
 
 def _event(point: _Point, kind: str, what: str, component: int) -> Event:
-    """What happens at a point."""
+    """Return an event at a point."""
     moved = float(point.equilibrium.platform_screw[component])
     return Event(point.load, kind, what, moved)
 
@@ -303,24 +322,24 @@ def _event(point: _Point, kind: str, what: str, component: int) -> Event:
 def _bracket(
     low: _Point, high: _Point, at: _Solver, same: Callable[[_Point], bool]
 ) -> tuple[_Point, _Point]:
-    """Neighbouring loads between which something changes for the first time."""
+    """Return neighbouring loads between which a property changes for the first time."""
     for _ in range(_HALVINGS):
         try:
             middle = at((low.load + high.load) / 2, low)
         except SolverFailed:
-            break  # as between free motion and the least load: that near it is known
+            break  # as between free motion and the least load: known to this accuracy
         low, high = (middle, high) if same(middle) else (low, middle)
     return low, high
 
 
 def _apart(one: _Point, other: _Point) -> float:
-    """[m] between the platforms of two equilibria, rotations times the length."""
+    """Return the distance [m] of two platforms, rotations times the length."""
     change = other.equilibrium.platform_screw - one.equilibrium.platform_screw
     return float(np.linalg.norm(change * np.repeat([one.tangent.length, 1.0], 3)))
 
 
 def _jumps(before: _Point, after: _Point, component: int) -> bool:
-    """Whether the platform moves much farther than either tangent says."""
+    """Return whether the platform moves much farther than both tangents predict."""
     scale = np.repeat([before.tangent.length, 1.0], 3)
     farthest = max(
         float(np.linalg.norm(scale * p.tangent.compliance[component]))
@@ -329,11 +348,11 @@ def _jumps(before: _Point, after: _Point, component: int) -> bool:
     step = abs(after.load - before.load)
     apart = _apart(before, after)
     moved = apart > _STILL * before.tangent.length
-    return moved and apart > _JUMP * step * farthest  # never if one is free
+    return moved and apart > _JUMP * step * farthest  # never if the platform is free
 
 
 def _mode(point: _Point) -> str:
-    """The motion of negative stiffness, by the platform and the part that bends."""
+    """Return mode of negative stiffness, by the platform and the part that bends."""
     tangent = point.tangent
     soft = int(np.flatnonzero(tangent.signs < 0)[0])
     return "buckles: " + mode_text(
@@ -344,17 +363,17 @@ def _mode(point: _Point) -> str:
 def mode_text(
     screws: NDArray, mode: int, springs: NDArray, parts: Sequence[Part], length: float
 ) -> str:
-    """A mode in words: how the platform moves, and what bends most.
+    """Describe a mode in words: the platform's motion, and the part that bends most.
 
     Args:
         screws: (6, k) [rad, m] of the platform in all modes, of any common size.
-        mode: which of them it is.
-        springs: (m,) [sqrt(2 J)] their deformation in it.
-        parts: (m,) whose springs they are.
-        length: [m] by which rotations are multiplied to be compared.
+        mode: index of the mode.
+        springs: (m,) [sqrt(2 J)] deformations of the springs in it.
+        parts: (m,) owner of each spring.
+        length: [m] factor of rotations that makes them comparable.
 
     Returns:
-        The screw of unit size, or that the platform stays, and the part.
+        The screw of unit size, or that the platform does not move, and the part.
     """
     part = parts[largest_row(np.square(springs))]
     scale, screw = np.repeat([length, 1.0], 3), screws[:, mode]

@@ -1,17 +1,18 @@
 r"""The tangent of the exact equilibrium on SE(3), geometric stiffness included.
 
-Near an equilibrium the unknowns move by Z t along closures and along the bounds that
-are pressed, and the total potential (energy minus the work of loads) by t.Z'HZt / 2,
-H the true second derivative of the Lagrangian: springs, and the forces of assembly and
-load on parts that turn.  A small wrench w more works w.(V Z t), V the platform's small
-motion in base axes from where it stands; its response is C = V Z (Z'HZ)^-1 Z'V'.
+Near an equilibrium the unknowns move by Z t along closures and along pressed bounds.
+The total potential (energy minus the work of loads) changes by t.Z'HZt / 2, with H the
+true second derivative of the Lagrangian: springs, and the forces of assembly and load
+on parts that rotate.  A small additional wrench w does the work w.(V Z t), where V is
+the platform's small motion in base axes from its present pose.  The response is C = V Z
+(Z'HZ)^-1 Z'V'.
 
 The potential is stationary there, so its second derivative depends on no chart of
-SE(3): C and K are symmetric, whatever coordinates the platform is given.  What they do
-depend on is the law by which the load already there follows the motion.  Here its force
-is dead, and its moment m works m . theta, theta the rotation vector from the nominal
-posture.  A moment constant in base axes has no potential: near theta = 0 it adds
-skew(m) / 2, antisymmetric, to the rotational block of K.
+SE(3): C and K are symmetric in any coordinates of the platform.  They depend on the way
+in which the existing load follows the motion.  Here its force is dead, and the work of
+its moment m is m . theta, with theta the rotation vector from the nominal posture.  A
+moment constant in base axes has no potential: near theta = 0 it adds skew(m) / 2,
+antisymmetric, to the rotational block of K.
 
 Sources:
     Zefran, Kumar (2002), A geometrical approach to the study of the Cartesian stiffness
@@ -32,21 +33,21 @@ from assembly.platform_stiffness.matrices import (
     unit_screws,
 )
 
-FLAT = 1e-12  # of the largest curvature: what less counts as none
+FLAT = 1e-12  # relative to the largest curvature: smaller ones count as zero
 
 
 def exact_tangent(
     equilibrium: ExactAssembly, side: Side = "holding"
 ) -> PlatformStiffness:
-    """How stiff the platform is at an exact equilibrium.
+    """Return the stiffness of the platform at an exact equilibrium.
 
     Args:
         equilibrium: the manipulator assembled with finite motions, under its loads.
-        side: what clearances do that just touch their bound without a force.
+        side: state of clearances at their bound without a force.
 
     Returns:
-        The stiffness at the platform's origin where it stands there, base axes; modes
-        of negative curvature have the sign -1.
+        The stiffness at the platform's displaced origin, base axes; modes of negative
+        curvature have the sign -1.
     """
     local = equilibrium.expansion
     model, at = local.placement.model, local.placement
@@ -70,7 +71,7 @@ def exact_tangent(
 
 
 def part_owners(equilibrium: ExactAssembly) -> tuple[Part, ...]:
-    """Whose springs they are; pieces belong to their beam."""
+    """Return the owner of each spring; pieces belong to their beam."""
     cut, frames = equilibrium.cut, equilibrium.posture.robot.frames
     parts = owners(equilibrium.expansion.placement.model.joints)
     rows = [cut.owner[cut.robot.index(part.frame)] for part in parts]
@@ -80,7 +81,7 @@ def part_owners(equilibrium: ExactAssembly) -> tuple[Part, ...]:
 
 
 def platform_moves(local: Expansion) -> NDArray:
-    """(6, N) small motion of the platform at its present origin, base axes."""
+    """Return (6, N) small motion of the platform at its present origin, base axes."""
     rows = local.placement.platform_rows.copy()
     rows[:3] = turn_jacobian(local.placement.platform_screw[:3]) @ rows[:3]
     return rows

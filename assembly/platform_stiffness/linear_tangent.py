@@ -1,4 +1,4 @@
-r"""Modes of the linear virtual-joint model: what closures let springs and joints do.
+r"""Modes of the linear virtual-joint model: motions that the closures allow.
 
 Without loads the small motions of springs y and free joints q keep the closures,
 
@@ -6,12 +6,12 @@ Without loads the small motions of springs y and free joints q keep the closures
 
 Rows orthogonal to A_q leave Z'A_y y = 0, whose solutions y = W t, W orthonormal, are
 the modes: their energy is t.t / 2, and C = L L' with L the platform's screws.  No
-compliances are added up, so that stiff and soft ones keep their digits.
+compliances are added, so that stiff and soft ones keep their digits.
 
-A clearance is held at zero (the classical model), or as problem (22) found it: free
-within its bound; pressed against it, it holds across the bound and gives way along a
-round one, whose curvature turns the force f [J, per unit of the bound] that presses:
-a spring of stiffness f there.
+A clearance is either held at zero (the classical model), or has the state of problem
+(22): free within its bound, or pressed against it.  A pressed clearance is rigid normal
+to its bound.  Along a round bound it is compliant: the curvature turns the force f [J,
+per unit of the bound] and so acts as a spring of stiffness f.
 
 Sources:
     Pashkevich, Chablat, Wenger (2009), Stiffness analysis of overconstrained parallel
@@ -38,14 +38,14 @@ from assembly.solvers.method import Method
 
 Side = Literal["holding", "letting go"]
 _RANK = 1e-10  # relative size below which a singular value counts as zero
-_NOISE = 1e-12  # of a column before a projection that removes it whole
+_NOISE = 1e-12  # of a column before a projection that removes it
 
 
 def without_clearance(posture: Posture) -> PlatformStiffness:
-    """The classical virtual-joint model: every clearance is held at zero.
+    """Return the classical virtual-joint model: every clearance is held at zero.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
 
     Returns:
         The stiffness at the platform's origin.
@@ -56,25 +56,25 @@ def without_clearance(posture: Posture) -> PlatformStiffness:
 
 
 def in_contact(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
-    """The tangent of problem (22): clearances are free, or pressed, as they are there.
+    """Return the tangent of problem (22), with clearances free or pressed as there.
 
     Args:
         assembly: the manipulator at least energy under its loads.
-        side: what clearances do that just touch their bound without a force.
+        side: state of clearances at their bound without a force.
 
     Returns:
-        The stiffness at the platform's origin, second derivative of the least
+        The stiffness at the platform's origin, from the second derivative of the least
         potential.
     """
     return active_tangent(settle(assembly), side)
 
 
 def active_tangent(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
-    """The same of an assembly as it is, or of one a small step from equilibrium.
+    """Return the tangent of an assembly as it is, even a small step off equilibrium.
 
     Args:
-        assembly: its clearances to rounding.
-        side: what clearances do that just touch their bound without a force.
+        assembly: assembly with clearances known to rounding.
+        side: state of clearances at their bound without a force.
 
     Returns:
         The stiffness at the platform's origin.
@@ -101,13 +101,13 @@ def active_tangent(assembly: Assembly, side: Side = "holding") -> PlatformStiffn
 
 
 def _frame(joints: VirtualJoints, column: int) -> str:
-    """Whose clearance it is."""
+    """Return the name of the frame of a clearance."""
     row = int(np.abs(joints.cones[:, column]).argmax()) // 6
     return joints.robot.frames[row].name
 
 
 def owners(joints: VirtualJoints) -> list[Part]:
-    """Whose springs the columns of ``joints.elastic`` are."""
+    """Return the owner of each column of ``joints.elastic``."""
     rows = np.abs(joints.elastic).argmax(axis=0) // 6 if joints.elastic.size else ()
     return [
         Part(joints.robot.frames[row].name, "link" if link else "joint")
@@ -119,7 +119,7 @@ def _stiffness(
     lin: Linearisation, state: str, springs: NDArray, parts: list[Part], free: NDArray,
     method: Method,
 ) -> PlatformStiffness:  # fmt: skip
-    """Springs and free motions to modes; see the head of this module."""
+    """Reduce springs and free motions to modes; see the module's docstring."""
     free = free / _sizes(free, lin.size)
     A_q, A_y = lin.rows @ free, lin.rows @ springs
     tolerance = _RANK + 30.0 * lin.posture.mismatch
@@ -147,13 +147,13 @@ def _stiffness(
 
 
 def _sizes(columns: NDArray, length: float) -> NDArray:
-    """Size of screws, rotations in rad and translations in reference lengths."""
+    """Return the sizes of screws, in rad and reference lengths."""
     weights = np.tile(in_reference_lengths(length), len(columns) // 6)
     return np.linalg.norm(columns * weights[:, None], axis=0)
 
 
 def _svd(A: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """All singular vectors, also of a matrix without rows or columns."""
+    """Return all singular vectors, also of a matrix without rows or columns."""
     if A.size:
         return np.linalg.svd(A)
     return np.eye(A.shape[0]), np.zeros(0), np.eye(A.shape[1])

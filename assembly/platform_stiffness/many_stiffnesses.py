@@ -1,4 +1,4 @@
-"""The stiffness of the platform at many postures at once, with its shares."""
+"""The stiffness of the platform at many postures, with the parts' shares."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,32 +14,32 @@ from assembly.linear.robot_structure import structure_of
 from assembly.platform_stiffness.linear_tangent import owners, without_clearance
 from assembly.platform_stiffness.matrices import Part, PlatformStiffness
 from assembly.solvers.method import Method
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 from stiffness.screws import screw_map
 
-_RANK = 1e-10  # relative size of a compliance's root that counts as rigid
+_RANK = 1e-10  # relative size below which a compliance's root counts as rigid
 
 
 @dataclass(frozen=True, eq=False)
 class Stiffnesses:
-    """How stiff the platform is at k postures; ``[i]`` is one of them.
+    """Stiffness of the platform at k postures; ``[i]`` is one of them.
 
-    A class of its own, because postures differ in the numbers of modes, free motions
-    and rigid directions that :class:`PlatformStiffness` consists of.  Its arrays are
-    what has the same shape everywhere: compliances, eigen-stiffnesses, shares.
+    A separate class, because the arrays of :class:`PlatformStiffness` have sizes that
+    differ between postures (modes, free motions, rigid directions).  Here only arrays
+    of constant shape are kept: compliances, eigen-stiffnesses, shares.
 
     Attributes:
-        posture: where the robot stands nominally, k postures.
-        state: as of :class:`PlatformStiffness`.
-        point: (k, 3) [m] where screws and wrenches are read, base axes.
+        posture: the robot's nominal configuration, k postures.
+        state: state, see :class:`PlatformStiffness`.
+        point: (k, 3) [m] at which screws and wrenches are read, base axes.
         length: [m] characteristic length.
         springs: (k, ny, 6) [sqrt(2 J) per N m and N] deformation of every spring under
-            unit wrenches at that point, base axes; NaN at those apart.
-        parts: (ny,) whose springs they are.
-        method: (k,) which gave it, or the equilibrium it belongs to: ``"compiled"`` or
+            unit wrenches at that point, base axes; NaN for postures in ``apart``.
+        parts: (ny,) owner of each spring.
+        method: (k,) of the solution or of its equilibrium: ``"compiled"`` or
             ``"reference"``.
-        apart: by their row those whose own modes are kept: where a motion of the
-            platform is free, and all in other states than ``"nominal"``.
+        apart: by row, postures whose own modes are kept: those with a free motion of
+            the platform, and all in other states than ``"nominal"``.
     """
 
     posture: Posture
@@ -57,7 +57,7 @@ class Stiffnesses:
         return len(self.springs)
 
     def __getitem__(self, i: int) -> PlatformStiffness:
-        """Posture i; its modes are combinations of the springs, six at most."""
+        """Return posture i; its modes are at most six combinations of the springs."""
         i = range(len(self))[i]
         if i in self.apart:
             return self.apart[i]
@@ -76,7 +76,7 @@ class Stiffnesses:
         )
 
     def at(self, points: NDArray) -> "Stiffnesses":
-        """The same platforms read at others of their points.
+        """Return the stiffnesses read at other points of the platforms.
 
         Args:
             points: (k, 3) [m] base axes.
@@ -90,7 +90,7 @@ class Stiffnesses:
 
     @cached_property
     def compliance(self) -> NDArray:
-        """(k, 6, 6) [rad/(N m) .. m/N]; NaN in what a free motion touches."""
+        """(k, 6, 6) [rad/(N m) .. m/N]; NaN in components that a free motion has."""
         compliance = np.swapaxes(self.springs, 1, 2) @ self.springs
         for row, one in self.apart.items():
             compliance[row] = one.compliance
@@ -100,7 +100,7 @@ class Stiffnesses:
     def _roots(self) -> tuple[NDArray, NDArray]:
         """Singular values (k, 6) and vectors (k, 6, 6) of the scaled roots."""
         scale = np.repeat([self.length, 1.0], 3)
-        # a triangle of six rows first: there may be many springs
+        # first a triangular factor of six rows: there may be many springs
         known = np.isfinite(self.springs).all(axis=(1, 2))
         values = np.full((len(self.springs), 6), np.nan)
         vectors = np.full((len(self.springs), 6, 6), np.nan)
@@ -116,7 +116,7 @@ class Stiffnesses:
     def eigen_stiffnesses(self) -> NDArray:
         """(k, 6) [N/m] softest first, rotations times the length.
 
-        inf where rigid, 0 where a motion is free.
+        inf if rigid, 0 for a free motion.
         """
         values, _ = self._roots
         rigid = values <= _RANK * values[:, :1]
@@ -128,7 +128,7 @@ class Stiffnesses:
 
     @cached_property
     def eigen_screws(self) -> NDArray:
-        """(k, 6, 6) [rad, m] their screws in columns."""
+        """(k, 6, 6) [rad, m] screws of the eigen-stiffnesses, in columns."""
         screws = self._roots[1] / np.repeat([self.length, 1.0], 3)[:, None]
         for row, one in self.apart.items():
             screws[row] = one.eigen.screws
@@ -141,18 +141,18 @@ class Stiffnesses:
             return self.eigen_stiffnesses[:, -1] / self.eigen_stiffnesses[:, 0]
 
     def along(self, direction: ArrayLike) -> NDArray:
-        """(k,) [N m/rad or N/m] stiffness along a direction, the others free.
+        """Return (k,) [N m/rad or N/m] stiffness along a direction, the others free.
 
         Args:
             direction: (6,) unit, of a wrench.
 
         Returns:
-            1 / (d . C d); inf where nothing gives way, 0 along a free motion.
+            1 / (d . C d); inf if rigid, 0 along a free motion.
         """
         d, scale = np.asarray(direction), np.repeat([self.length, 1.0], 3)
         compliance = np.sum((self.springs @ d) ** 2, axis=1)
         largest = np.sum((self.springs * scale) ** 2, axis=(1, 2))
-        # rounding of a motion that nothing makes
+        # rounding of a motion that no part makes
         still = compliance <= _RANK**2 * largest * np.sum((d / scale) ** 2)
         with np.errstate(divide="ignore"):
             K = 1.0 / np.where(still, 0.0, compliance)
@@ -161,14 +161,14 @@ class Stiffnesses:
         return K
 
     def shares(self, direction: ArrayLike) -> dict[Part, NDArray]:
-        """(k,) share of every link and joint in the compliance along a direction.
+        """Return the (k,) share of each part in the compliance along a direction.
 
         Args:
             direction: (6,) of a wrench.
 
         Returns:
-            By part; together they are 1, or NaN at postures with a free motion.  Of
-            clearances and forces as of :meth:`PlatformStiffness.shares`.
+            By part; the sum is 1, or NaN at postures with a free motion.  Clearances
+            and forces are treated as in :meth:`PlatformStiffness.shares`.
         """
         energies = (self.springs @ np.asarray(direction)) ** 2
         with np.errstate(invalid="ignore"):
@@ -184,11 +184,11 @@ class Stiffnesses:
 
 
 def many_without_clearance(posture: Posture, method: Method) -> Stiffnesses:
-    """The classical virtual-joint model, every clearance held at zero.
+    """Return the classical virtual-joint model, every clearance held at zero.
 
     Args:
         posture: k postures.
-        method: ``"compiled"``, and the reference where that does not cover a posture;
+        method: ``"compiled"``, with the reference for postures that it does not cover;
             or ``"reference"``, numpy, one by one.
 
     Returns:
@@ -226,7 +226,7 @@ def many_without_clearance(posture: Posture, method: Method) -> Stiffnesses:
 
 
 def many_of_each(posture: Posture, each: Sequence[PlatformStiffness]) -> Stiffnesses:
-    """Stiffnesses that are known already.
+    """Collect stiffnesses that are known already.
 
     Args:
         posture: k postures.

@@ -1,7 +1,7 @@
-r"""The platform's stiffness and compliance at a point, and what follows from them.
+r"""The platform's stiffness and compliance at a point, and derived quantities.
 
-A small wrench added to the platform moves it by s = C w, and K w is what holds it.
-Both come from the modes of the manipulator: combinations of all motions that its
+A small wrench w on the platform moves it by s = C w; to hold it at s takes K s.  Both
+matrices come from the modes of the manipulator: combinations of all motions that its
 closures allow, each with an energy of sigma / 2 per unit squared, sigma = +-1.
 
 ======  ==============  ========  ====================================================
@@ -10,12 +10,12 @@ symbol  code            shape     meaning
 L       ``root``        (6, k)    platform screw of each mode: C = L diag(sigma) L^T
 sigma   ``signs``       (k,)      -1 only where an equilibrium is unstable
 Y       ``springs``     (m, k)    scaled deformation of the springs in each mode
-F       ``free``        (6, f)    unit screws of the platform that nothing resists
+F       ``free``        (6, f)    unit screws of the platform without resistance
 l       ``length``      m         makes rotations lengths: eigenvalues need one unit
 ======  ==============  ========  ====================================================
 
-A free motion makes compliances infinite, a rigid direction stiffnesses: such entries
-are NaN, and no other entry is touched by them.
+A free motion makes compliances infinite, a rigid direction makes stiffnesses infinite.
+Such entries are NaN; the others are not affected.
 
 Sources:
     Salisbury (1980), Active stiffness control of a manipulator in Cartesian
@@ -35,17 +35,17 @@ from scipy.linalg import null_space
 
 from assembly.kinematics.posture import Posture
 from assembly.solvers.method import Method
-from forcefit.inputs.display import Figures, html_table, numbers, short_repr
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.number_arrays import find_fault
+from forcefit.results.display import Figures, html_table, numbers, short_repr
 from stiffness.screws import screw_map
 
-_RANK = 1e-10  # relative size of a motion that counts as none
-_UNTOUCHED = 1e-9  # component of a unit screw that counts as none
+_RANK = 1e-10  # relative size below which a motion counts as zero
+_UNTOUCHED = 1e-9  # component of a unit screw below which it counts as zero
 
 
 class Part(NamedTuple):
-    """Whose deformation it is: a frame's ``link``, ``joint`` or ``clearance``."""
+    """Owner of a deformation: a frame's ``link``, ``joint`` or ``clearance``."""
 
     frame: str
     kind: str
@@ -58,7 +58,7 @@ class EigenStiffnesses:
     Attributes:
         values: (6,) [N/m], 0 along free motions, inf where rigid.
         screws: (6, 6) in columns, [rad, m], of unit size with rotations times length.
-        length: [m] the length chosen.
+        length: [m] the characteristic length.
     """
 
     values: NDArray
@@ -69,7 +69,7 @@ class EigenStiffnesses:
 
     @property
     def condition(self) -> float:
-        """[-] stiffest over softest; inf if the platform is free or rigid somewhere."""
+        """[-] stiffest over softest; inf if a motion is free or rigid."""
         least, most = self.values[0], self.values[-1]
         return float(most / least) if least > 0.0 and np.isfinite(most) else np.inf
 
@@ -86,19 +86,19 @@ class EigenStiffnesses:
 
 @dataclass(frozen=True, eq=False)
 class PlatformStiffness:
-    """How stiff the platform is at one point; see the head of this module.
+    """Stiffness of the platform at one point; see the module's docstring.
 
     Attributes:
-        posture: where the robot stands nominally.
+        posture: the robot's nominal configuration.
         state: ``"nominal"``, ``"contact"`` or ``"exact"``.
-        point: (3,) [m] where screws and wrenches are read, base axes.
+        point: (3,) [m] at which screws and wrenches are read, base axes.
         length: [m] characteristic length.
         root: (6, k) [rad, m] per sqrt(2 J).
         signs: (k,) 1 or -1.
         springs: (m, k) [sqrt(2 J)].
-        parts: (m,) whose springs they are.
+        parts: (m,) owner of each spring.
         free: (6, f) [rad, m].
-        method: which gave it, or the equilibrium it belongs to: ``"compiled"``, or
+        method: method of the solution or of its equilibrium: ``"compiled"``, or
             ``"reference"``, numpy and Clarabel.
     """
 
@@ -116,7 +116,7 @@ class PlatformStiffness:
     __repr__, _repr_html_ = short_repr, html_table
 
     def _figures(self) -> Figures:
-        """What ``forcefit assembly stiffness`` prints first."""
+        """Return the numbers that ``forcefit assembly stiffness`` prints first."""
         eigen = self.eigen
         return {
             "state": self.state,
@@ -127,7 +127,7 @@ class PlatformStiffness:
         }
 
     def at(self, point: ArrayLike, length: float | None = None) -> "PlatformStiffness":
-        """The same platform read at another of its points.
+        """Return the stiffness read at another point of the platform.
 
         Args:
             point: (3,) [m] base axes.
@@ -145,7 +145,7 @@ class PlatformStiffness:
 
     @cached_property
     def compliance(self) -> NDArray:
-        """(6, 6) [rad/(N m) .. m/N] symmetric; NaN where a free motion acts."""
+        """(6, 6) [rad/(N m) .. m/N] symmetric; NaN in components of a free motion."""
         return _blank((self.root * self.signs) @ self.root.T, self.free)
 
     @cached_property
@@ -157,13 +157,13 @@ class PlatformStiffness:
 
     @property
     def free_text(self) -> str:
-        """Which motions nothing resists, in words; empty if all are resisted."""
+        """Motions without resistance, in words; empty if there are none."""
         screws = ", ".join(numbers(screw) for screw in self.free.T)
         return f"nothing resists the platform's motion {screws} [rad, m]" * bool(screws)
 
     @property
     def rigid(self) -> NDArray:
-        """(6, r) [N m, N] unit wrenches that move nothing."""
+        """(6, r) [N m, N] unit wrenches that cause no motion."""
         return self._resisted[2]
 
     @property
@@ -210,7 +210,7 @@ class PlatformStiffness:
         return EigenStiffnesses(values[order], screws[:, order] / scale, self.length)
 
     def along(self, direction: ArrayLike) -> tuple[float, float]:
-        """Stiffness along one direction, the others free or blocked.
+        """Return the stiffness along one direction, the others free or blocked.
 
         Args:
             direction: (6,) of a wrench and of a screw, such as ``[0, 0, 0, 0, 0, 1]``.
@@ -229,17 +229,17 @@ class PlatformStiffness:
         return free, blocked
 
     def _compliance_along(self, d: NDArray) -> float:
-        """D . C d, infinite along free motions."""
+        """Return d . C d, infinite along free motions."""
         if _touches(self.free, d):
             return np.inf
         screws = self.root.T @ d
         largest = np.linalg.norm(self._scale[:, None] * self.root)
         if np.linalg.norm(screws) <= _RANK * largest * np.linalg.norm(d / self._scale):
-            return 0.0  # rounding of a motion that nothing makes
+            return 0.0  # rounding of a motion that no part makes
         return float(self.signs @ screws**2)
 
     def _held(self, d: NDArray) -> float:
-        """D . K d."""
+        """Return d . K d."""
         way, core, _ = self._resisted
         return float(d @ way @ core @ way.T @ d)
 
@@ -260,13 +260,13 @@ class PlatformStiffness:
         return self.point + np.linalg.solve(spread, axial)
 
     def contributions(self) -> dict[Part, NDArray]:
-        """What every part adds to the compliance.
+        """Return the contribution of every part to the compliance.
 
         Returns:
-            (6, 6) by part [rad/(N m) .. m/N].  Their sum is :attr:`compliance`, but for
-            what forces on turning parts add in the state ``"exact"``.  In the others
-            each is also the derivative of the compliance by the logarithm of the
-            part's own (Castigliano).
+            (6, 6) by part [rad/(N m) .. m/N].  Their sum is :attr:`compliance`; in the
+            state ``"exact"`` the effect of forces on rotating parts is missing in it.
+            In the other states each is also the derivative of the compliance by the
+            logarithm of the part's own (Castigliano).
         """
         response = self.springs @ (self.signs[:, None] * self.root.T)
         shares: dict[Part, NDArray] = {}
@@ -275,15 +275,15 @@ class PlatformStiffness:
         return {part: _blank(C, self.free) for part, C in shares.items()}
 
     def shares(self, direction: ArrayLike) -> dict[Part, float]:
-        """Which part gives way: shares of the compliance along a direction.
+        """Return the share of each part in the compliance along a direction.
 
         Args:
             direction: (6,) of a wrench, such as ``[0, 0, 0, 0, 0, 1]``.
 
         Returns:
-            [-] by part, largest first.  What the forces already there add by turning
-            with their parts is the part ``("", "forces")``, which may be negative; all
-            together are 1.  NaN where the compliance is infinite, or none.
+            [-] by part, largest first.  The effect of existing forces on rotating parts
+            is the part ``("", "forces")``, which may be negative.  The sum is 1.  NaN
+            where the compliance is infinite or zero.
 
         Raises:
             BadInput: the direction is zero, or no direction.
@@ -303,16 +303,15 @@ class PlatformStiffness:
 
 
 def unit_screws(screws: NDArray, length: float) -> NDArray:
-    """Independent unit screws that span the same motions.
+    """Return the independent unit screws that span the same motions.
 
     Args:
-        screws: (6, k) [rad, m], in units of about 1 rad or length; those much smaller
+        screws: (6, k) [rad, m], in units of about 1 rad or length; much smaller ones
             count as rounding.
         length: [m] by which rotations are multiplied.
 
     Returns:
-        (6, f) of 1 rad, or of 1 m if they do not turn; pure translations, and along
-        the axes, where there are such.
+        (6, f) of 1 rad, or of 1 m if they do not rotate; along the axes where possible.
     """
     scale = np.array([*[length] * 3, 1.0, 1.0, 1.0])[:, None]
     U, S, _ = np.linalg.svd(scale * screws, full_matrices=False)
@@ -335,19 +334,19 @@ def unit_screws(screws: NDArray, length: float) -> NDArray:
 
 
 def numbers_of(name: str, value: ArrayLike, count: int, unit: str) -> NDArray:
-    """So many finite numbers.
+    """Return a given number of finite numbers from an argument.
 
     Args:
-        name: of the argument, for the message.
-        value: what was given.
-        count: how many are expected.
-        unit: of them, for the message.
+        name: name of the argument, for error messages.
+        value: the argument.
+        count: the expected number of entries.
+        unit: their unit, for the message.
 
     Returns:
         (count,).
 
     Raises:
-        BadInput: it is something else.
+        BadInput: the argument is something else.
     """
     fault = find_fault(np.asarray(value).tolist(), (count,))
     if fault:
@@ -356,7 +355,7 @@ def numbers_of(name: str, value: ArrayLike, count: int, unit: str) -> NDArray:
 
 
 def _direction(direction: ArrayLike) -> NDArray:
-    """(6,) of unit size."""
+    """Return the (6,) direction scaled to unit size."""
     d = numbers_of("direction", direction, 6, "N m, N")
     if not d.any():
         raise BadInput("direction: found 0 in all, expected 6 numbers, not all 0")
@@ -364,12 +363,12 @@ def _direction(direction: ArrayLike) -> NDArray:
 
 
 def _touches(vectors: NDArray, d: NDArray) -> bool:
-    """Whether a direction has a part along any of these."""
+    """Return whether a direction has a component along any of the vectors."""
     return bool(np.abs(vectors.T @ d).max(initial=0.0) > _UNTOUCHED)
 
 
 def _blank(matrix: NDArray, unbounded: NDArray) -> NDArray:
-    """NaN in rows and columns where any of the directions has a component."""
+    """Return the matrix, NaN in rows and columns where a direction has a component."""
     touched = np.abs(unbounded).max(axis=1, initial=0.0) > _UNTOUCHED
     matrix = np.where(touched[:, None] | touched, np.nan, matrix)
     matrix.setflags(write=False)

@@ -1,4 +1,4 @@
-"""The platform's stiffness matrix K_C at a posture, in the state that is asked for."""
+"""The platform's stiffness matrix K_C at a posture, in the requested state."""
 
 from collections.abc import Sequence
 from typing import Literal, cast, get_args, overload
@@ -54,10 +54,10 @@ def platform_stiffness(
     side: Side = "holding",
     method: Method = "compiled",
 ) -> PlatformStiffness | Stiffnesses:
-    """How stiff the platform is: the tangent of its small motion under a small wrench.
+    """Return the platform's stiffness: the tangent of its motion under a small wrench.
 
     Args:
-        posture: where the robot stands; or many postures of one robot.
+        posture: the robot's configuration; or many postures of one robot.
         state: ``"nominal"``, the classical virtual-joint model of the nominal
             robot, every clearance held at zero; ``"contact"``, the tangent of
             problem (22) with the robot's errors, clearances and loads; ``"exact"``, the
@@ -65,27 +65,28 @@ def platform_stiffness(
             and loads add.
         load: (6,) [N m, N] on the platform at its origin, base axes; without effect on
             the classical model.
-        gravity: (3,) [m/s^2] base axes; likewise.
-        at: (3,) [m] of the platform, in its axes: where screws and wrenches are read.
-        side: of a change of contact, where a clearance touches its bound without a
+        gravity: (3,) [m/s^2] base axes; without effect on the classical model.
+        at: (3,) [m] point of the platform, in its axes, at which screws and wrenches
+            are read.
+        side: side of a change of contact, where a clearance touches its bound without a
             force: ``"holding"`` or ``"letting go"``.
-        method: ``"compiled"``, and the reference where that does not do; or
-            ``"reference"``, numpy and Clarabel alone.  Of the state ``"contact"`` it
-            is that of :func:`assembly.linear.energy.solve_assembly`, of ``"exact"`` of
-            :func:`assembly.exact.exact.solve_exact`.  The classical model of one
-            posture is numpy by either, which its ``method`` says; that of many is
-            compiled, side by side.
+        method: ``"compiled"``, with the reference where that does not suffice; or
+            ``"reference"``, numpy and Clarabel alone.  In the state ``"contact"`` it is
+            the method of :func:`assembly.linear.energy.solve_assembly`, in ``"exact"``
+            that of :func:`assembly.exact.exact.solve_exact`.  The classical model of
+            one posture always uses numpy, and its ``method`` says so; many postures are
+            compiled, in parallel.
 
     Returns:
-        Stiffness, compliance, free motions and shares at that point, base axes; of
-        many postures, also of a :class:`Posture` of many, all of them, a
+        Stiffness, compliance, free motions and shares at that point, base axes; for
+        many postures, or a :class:`Posture` of many, one
         :class:`~assembly.platform_stiffness.many_stiffnesses.Stiffnesses`.
 
     Raises:
         CannotAssemble: the errors cannot be closed.
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: no equilibrium was found.
-        BadInput: a point or a load that is no number.
+        BadInput: a point or a load is no number.
         ValueError: no such state, side or method.
     """
     check_method(method)
@@ -115,7 +116,7 @@ def _of_one(
     posture: Posture, state: State, load: ArrayLike | None, gravity: ArrayLike | None,
     offset: NDArray, side: Side, method: Method,
 ) -> PlatformStiffness:  # fmt: skip
-    """The same of one posture."""
+    """Return the stiffness at one posture."""
     platform = posture.platform
     if state == "nominal":
         tangent = without_clearance(posture)

@@ -1,20 +1,20 @@
-r"""How a tangent answers to a number of the robot: its equilibrium moves with it.
+r"""Derivatives of the platform's stiffness by a number of the robot.
 
-The stiffness at an equilibrium depends on a number p itself, and on where the
-equilibrium (x, lambda, f) stands, unknowns, closures' multipliers and forces of the
-pressed clearances.  That moves by the derivative of its own conditions,
+The stiffness at an equilibrium depends on a number p directly, and through the
+equilibrium (x, lambda, f): unknowns, closures' multipliers and forces of the pressed
+clearances.  The equilibrium moves by the derivative of its conditions,
 
     [ H   A'  N ] [ dx       ]     [ dg/dp ]
     [ A   0   0 ] [ -dlambda ] = - [ dr/dp ] dp
     [ N'  0   0 ] [ df       ]     [   0   ]
 
-(:mod:`.active_set`), g the gradient of the Lagrangian and r the closures at x, both in
-closed form for any p, N the normals of the pressed bounds: nothing is solved again.
-The tangent is then evaluated a step ahead and back along (p, x, lambda): central
-differences of what is known in closed form, with an error of the square of the step.
+(:mod:`.active_set`), with g the gradient of the Lagrangian and r the closures at x,
+both in closed form for any p, and N the normals of the pressed bounds.  So no problem
+is solved again.  The tangent is then evaluated a step ahead and back along (p, x,
+lambda): central differences of a closed form, with an error of the square of the step.
 
-The clearances that are pressed stay so.  Where one is at a change of contact, the
-tangent has a derivative on neither side, and it is NaN.
+Pressed clearances stay pressed.  At a change of contact the tangent has no derivative,
+and it is NaN.
 
 Sources:
     Haftka, Adelman (1989), Recent developments in structural sensitivity analysis
@@ -65,14 +65,16 @@ from assembly.platform_stiffness.platform_stiffness import State
 
 @dataclass(frozen=True)
 class TangentState:
-    """Of which tangent, and where it is read; see ``platform_stiffness``.
+    """State of the tangent, and the point at which it is read.
+
+    See ``platform_stiffness``.
 
     Attributes:
         state: ``"nominal"``, ``"contact"`` or ``"exact"``.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         at: (3,) [m] of the platform, in its axes.
-        side: of a change of contact.
+        side: side of a change of contact.
     """
 
     state: State = "nominal"
@@ -88,14 +90,14 @@ _Moved = Callable[[Posture, float], tuple[PlatformStiffness, NDArray]]
 def compliance_slope(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> NDArray:
-    """Derivative of the platform's compliance by a number of its robot.
+    """Return the derivative of the platform's compliance by a number of its robot.
 
     Args:
-        posture: where the robot stands.
-        ahead: where it stands with the number a step larger.
-        back: a step smaller.
-        step: of the number.
-        asked: of which tangent, and where it is read.
+        posture: the robot's configuration.
+        ahead: the configuration with the number a step larger.
+        back: the configuration with the number a step smaller.
+        step: step of the number.
+        asked: state of the tangent, and its point.
 
     Returns:
         (6, 6) [rad/(N m) .. m/N per unit of the number], base axes; NaN where a motion
@@ -105,7 +107,7 @@ def compliance_slope(
         CannotAssemble: the errors cannot be closed.
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: no equilibrium was found.
-        BadInput: a point or a load that is no number.
+        BadInput: a point or a load is no number.
     """
     offset = numbers_of("at", asked.at, 3, "m")
     moved = _STATES[asked.state](posture, ahead, back, step, asked)
@@ -120,14 +122,14 @@ def compliance_slope(
 def _classical(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> _Moved:
-    """Without loads and clearances the equilibrium is the nominal posture."""
+    """Return neighbouring tangents of the classical model, at the nominal posture."""
     return lambda there, by: (without_clearance(there), there.platform)
 
 
 def _linear(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> _Moved:
-    """Of problem (22), with the clearances that are pressed."""
+    """Return the neighbouring tangents of problem (22), pressed clearances kept."""
     start = settle(solve_assembly(posture, asked.load, gravity=asked.gravity))
     pressed, touching = contacts(start)
     x, multipliers = unknowns(start), start.multipliers
@@ -163,14 +165,14 @@ def _linear(
 
 
 def _like(joints: VirtualJoints, there: Posture) -> VirtualJoints:
-    """The virtual joints of a neighbouring robot."""
+    """Return the virtual joints of a neighbouring robot."""
     return virtual_joints(there.robot, bounded_motion=joints.bounded_motion)
 
 
 def _exact(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> _Moved:
-    """Of the exact equilibrium, geometric stiffness included."""
+    """Return the neighbouring tangents of the exact equilibrium."""
     start = solve_exact(posture, asked.load, gravity=asked.gravity)
     local = start.expansion
     at, model = local.placement, local.placement.model
@@ -218,11 +220,11 @@ def _difference(
     conditions: Callable[[Posture], tuple[NDArray, NDArray]],
     ahead: Posture, back: Posture, step: float,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Derivatives of closures and gradient by the number, unknowns kept."""
+    """Return derivatives of closures and gradient by the number, at fixed unknowns."""
     there, behind = conditions(ahead), conditions(back)
     return (there[0] - behind[0]) / (2 * step), (there[1] - behind[1]) / (2 * step)
 
 
 def _unknown(tangent: PlatformStiffness) -> PlatformStiffness:
-    """A tangent at a change of contact: no derivative of it exists."""
+    """Return a tangent of NaN: at a change of contact no derivative exists."""
     return replace(tangent, root=np.full_like(tangent.root, np.nan))

@@ -1,15 +1,15 @@
 r"""Natural frequencies and modes at a posture, drives held.
 
 The stiffness is the tangent of the equilibrium, Z'HZ of
-:mod:`assembly.platform_stiffness.exact_tangent`; the mass is that of all bodies whose
-motion follows: masses at their centres, and beams with a density by their consistent
-mass, the motion between the ends being the cubic that these clamp.
+:mod:`assembly.platform_stiffness.exact_tangent`.  The mass is that of all moving
+bodies: masses at their centres, and beams with a density by their consistent mass, with
+a cubic motion between their clamped ends.
 
     (Z'HZ - omega^2 Z'MZ) t = 0
 
-A beam is as good as its cubic: the first frequency of a cantilever in n pieces is too
-high by 0.5 % for n = 1 and 0.01 % for 2.  A mass beside a beam has no inertia of its
-own about its centre; links given by a matrix, a mesh or a library have no mass.
+The first frequency of a cantilever in n pieces is too high by 0.5 % for n = 1 and 0.01
+% for 2, because of the cubic.  A mass in addition to a beam has no inertia about its
+own centre.  Links given by a matrix, a mesh or a library have no mass.
 
 Sources:
     Przemieniecki (1968), Theory of Matrix Structural Analysis, section 11.3 (consistent
@@ -31,29 +31,29 @@ from assembly.model.robot import BeamLink, Frame, MeshLink, Robot, beam_axis
 from assembly.platform_stiffness.exact_tangent import part_owners, platform_moves
 from assembly.platform_stiffness.matrices import Part
 from assembly.solvers.method import Method
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.renamed import renamed_keywords
 from forcefit.inputs.table import BadInput
+from forcefit.results.display import html_table, short_repr
 from stiffness.beam.beam import section_axes
 from stiffness.beam.sections import declared_section
 from stiffness.screws import screw_map
 
-_NULL = 1e-12  # of the largest: neither mass nor stiffness
+_NULL = 1e-12  # relative to the largest eigenvalue: below it neither mass nor stiffness
 
 
 @dataclass(frozen=True, eq=False)
 class NaturalModes:
-    """The lowest modes, slowest first.
+    """The lowest natural modes, slowest first.
 
     Attributes:
-        posture: where the robot stands nominally.
-        frequencies: (k,) [Hz]; 0 of motions that nothing resists, NaN if unstable.
+        posture: the robot's nominal configuration.
+        frequencies: (k,) [Hz]; 0 for motions without resistance, NaN if unstable.
         platform_screws: (6, k) [rad, m] platform's motion, of modal mass 1 kg.
         shares: for each mode the share of every part in its elastic energy, largest
-            first; empty where there is none.
-        idle: how many motions nothing resists that leave the platform where it is, as
-            a rod's spin between two ball joints; they are not among the modes.
-        method: of the equilibrium they belong to: ``"compiled"`` or ``"reference"``.
+            first; empty without elastic energy.
+        idle: number of motions without resistance that leave the platform fixed, such
+            as a rod's spin between two ball joints; they are not among the modes.
+        method: method of their equilibrium: ``"compiled"`` or ``"reference"``.
     """
 
     posture: Posture
@@ -75,17 +75,17 @@ def natural_modes(
     state: Literal["nominal", "exact"] = "nominal",
     method: Method = "compiled",
 ) -> NaturalModes:
-    """Natural frequencies and modes of a robot, its drives held.
+    """Return the natural frequencies and modes of a robot, its drives held.
 
     Args:
-        posture: where the robot stands.
-        count: how many modes at most.
-        load: (6,) [N m, N] on the platform, in the state ``"exact"`` alone; it has no
+        posture: the robot's configuration.
+        count: largest number of modes.
+        load: (6,) [N m, N] on the platform, only in the state ``"exact"``; it has no
             mass.
-        gravity: (3,) [m/s^2] likewise.
+        gravity: (3,) [m/s^2], only in the state ``"exact"``.
         state: ``"nominal"``, of the nominal robot with clearances held at zero;
             ``"exact"``, around the equilibrium with errors, clearances and loads.
-        method: of :func:`assembly.exact.exact.solve_exact`.
+        method: method of :func:`assembly.exact.exact.solve_exact`.
 
     Returns:
         The modes.
@@ -124,10 +124,10 @@ def natural_modes(
 
 
 def check_masses(robot: Robot) -> None:
-    """Refuse a robot none of whose bodies has a mass.
+    """Reject a robot without any mass.
 
     Raises:
-        BadInput: it has none.
+        BadInput: no body has a mass.
     """
     shapes = (f.link for f in robot.frames if isinstance(f.link, BeamLink | MeshLink))
     if not any(f.mass for f in robot.frames) and not any(s.density for s in shapes):
@@ -135,7 +135,7 @@ def check_masses(robot: Robot) -> None:
 
 
 def _no_mass(robot: Robot) -> str:
-    """What a robot without masses is refused with."""
+    """Return the message for a robot without masses."""
     return (
         f'{robot.name}: found no mass that moves; expected "density" of beams or '
         'meshes, or "mass" of frames'
@@ -145,7 +145,7 @@ def _no_mass(robot: Robot) -> str:
 def _without_idle(
     squares: NDArray, modes: NDArray, moves: NDArray
 ) -> tuple[NDArray, NDArray, int]:
-    """Free motions turned so that some leave the platform alone, and these left out."""
+    """Separate free motions that leave the platform fixed, and leave them out."""
     free = squares == 0.0
     if not free.any():
         return squares, modes, 0
@@ -159,10 +159,10 @@ def _without_idle(
 
 
 def _modes(K: NDArray, M: NDArray) -> tuple[NDArray, NDArray]:
-    """Squares of angular frequencies, lowest first, and modes of modal mass 1."""
-    shift = np.trace(K) / np.trace(M) or 1.0  # where nothing is elastic
+    """Return squared angular frequencies, lowest first, and modes of modal mass 1."""
+    shift = np.trace(K) / np.trace(M) or 1.0  # 1 if no part is elastic
     values, vectors = np.linalg.eigh(K + shift * M)
-    kept = values > _NULL * values.max()  # what has neither mass nor spring is no mode
+    kept = values > _NULL * values.max()  # no mode without mass and spring
     basis = vectors[:, kept] / np.sqrt(values[kept])
     inertia, turned = np.linalg.eigh(basis.T @ M @ basis)
     heavy = inertia > _NULL * inertia.max()
@@ -173,7 +173,7 @@ def _modes(K: NDArray, M: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _shares(parts: tuple[Part, ...], springs: NDArray) -> dict[Part, float]:
-    """Shares of the elastic energy of a mode, largest first."""
+    """Return the shares of the elastic energy of a mode, largest first."""
     energies: dict[Part, float] = {}
     for part, y in zip(parts, springs, strict=True):
         energies[part] = energies.get(part, 0.0) + float(y) ** 2
@@ -185,7 +185,7 @@ def _shares(parts: tuple[Part, ...], springs: NDArray) -> dict[Part, float]:
 
 
 def mass_matrix(equilibrium: ExactAssembly) -> NDArray:
-    """(N, N) [kg m^2 per squared unit] mass of all bodies in the unknowns there.
+    """Return the (N, N) [kg m^2 per squared unit] mass matrix in the unknowns.
 
     Args:
         equilibrium: an equilibrium.
@@ -216,7 +216,7 @@ def mass_matrix(equilibrium: ExactAssembly) -> NDArray:
 
 
 def _body_motion(equilibrium: ExactAssembly, i: int) -> NDArray:
-    """(6, N) small motion of the body of frame i, at the platform's nominal origin."""
+    """Return the (6, N) small motion of body i, at the platform's nominal origin."""
     model = equilibrium.placement.model
     above = equilibrium.cut.robot.on_path[i].copy()
     above[i] = False
@@ -227,17 +227,17 @@ def _body_motion(equilibrium: ExactAssembly, i: int) -> NDArray:
 def _ends(
     equilibrium: ExactAssembly, i: int, tip: NDArray, span: NDArray, axes: NDArray
 ) -> NDArray:
-    """(12, N) motion of a link's base and tip, each at its place.
+    """Return the (12, N) motion of a link's base and tip, each at its own position.
 
     Args:
         equilibrium: an equilibrium.
         i: the link's frame.
         tip: (6, N) of the body's end, at the platform's nominal origin.
         span: (3,) [m] from base to tip, in the frame's axes.
-        axes: (3, 3) in which motions are read, seen from the frame.
+        axes: (3, 3) axes in which motions are read, seen from the frame.
 
     Returns:
-        Turns and shifts of the base, then of the tip.
+        Rotations and translations of the base, then of the tip.
     """
     placement, robot = equilibrium.placement, equilibrium.cut.robot
     above = robot.on_path[i].copy()
@@ -255,7 +255,7 @@ def _ends(
 
 
 def _beam_mass(frame: Frame) -> NDArray:
-    """(12, 12) consistent mass: base and tip, turns and shifts in section axes."""
+    """Return (12, 12) consistent mass: rotations and translations of base and tip."""
     link = frame.link
     assert isinstance(link, BeamLink)
     assert link.density is not None
@@ -270,7 +270,7 @@ def _beam_mass(frame: Frame) -> NDArray:
     e, f, g = 3 * length, 4 * length**2, length**2
     bends = ((4, 2, 10, 8), 1, section.I_z), ((5, 1, 11, 7), -1, section.I_y)
     for plane, sign, second in bends:
-        # a turn about y lowers what lies ahead along x
+        # a rotation about y lowers points ahead along x
         s = np.array([1, sign, 1, sign])
         shift = np.array([
             [156, a, 54, -b], [a, c, b, -d], [54, b, 156, -a], [-b, -d, -a, c]

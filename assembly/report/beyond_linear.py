@@ -34,5 +34,5 @@ def far_from_linear(assembly: ExactAssembly) -> list[str]:
         return []
     return [
         f"far from the linear model, by {100 * off / moved:.0f} % of the motion: this "
-        "may lie beyond a critical load (assembly deflection --exact or --follow)"
+        "may lie beyond a critical load (assembly deflection --state exact or --follow)"
     ]

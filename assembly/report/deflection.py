@@ -1,7 +1,7 @@
 """A load-deflection curve for machines and for people."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,8 +16,9 @@ from assembly.platform_stiffness.deflection import (
     deflection_curve,
 )
 from assembly.solvers.conic import SolverFailed
-from forcefit.inputs.display import numbers, rounded
 from forcefit.inputs.errors import plot_label
+from forcefit.results.display import rounded
+from forcefit.results.text import lines_of, listing, table_lines
 from stiffness.screws import SCREW, WRENCH
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def deflection_of(
     loads: Sequence[float],
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
-    exact: bool = False,
+    state: Literal["contact", "exact"] = "contact",
     follow: bool = False,
     progress: Progress = lambda what, done, most: None,
 ) -> dict[str, Any]:
@@ -44,7 +45,7 @@ def deflection_of(
         loads: [N m or N] its values in the order in which they act.
         load: (6,) [N m, N] the rest of the load.
         gravity: (3,) [m/s^2] base axes.
-        exact: whether with finite motions.
+        state: ``"exact"`` with finite motions.
         follow: whether past limit points, by arc length, from the first to the last
             load; finite motions, clearances held at zero.
         progress: called with what is done, how often, and how often at most.
@@ -54,7 +55,7 @@ def deflection_of(
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
-        "along": WRENCH[component].lower(), "exact": exact or follow,
+        "along": WRENCH[component].lower(), "state": "exact" if follow else state,
         "followed": follow,
     }  # fmt: skip
     try:
@@ -65,7 +66,7 @@ def deflection_of(
             )  # fmt: skip
         else:
             curve = deflection_curve(
-                posture, component, loads, load, gravity, exact, progress
+                posture, component, loads, load, gravity, state, progress
             )
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         return results | {"status": failure_status(error), "reason": str(error)}
@@ -88,25 +89,27 @@ def _curve_values(curve: DeflectionCurve) -> dict[str, Any]:
 
 def deflection_text(results: dict[str, Any]) -> str:
     """A curve for people: a table and what happens on the way."""
-    lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
-    if results["status"] != "ok":
-        return "\n".join([*lines, f"{results['status']}: {results['reason']}"])
+    head = listing(results["robot"], lines_of(results, "pose status reason state"))
+    if "loads" not in results:
+        return head
     component = [name.lower() for name in WRENCH].index(results["along"])
     turns = component < 3
     units = ("N m", "mrad", "N m/rad") if turns else ("N", "mm", "N/m")
-    head = (
+    columns = (
         f"{results['along']} [{units[0]}]", f"{SCREW[component]} [{units[1]}]",
-        f"stiffness [{units[2]}]", "contacts",
+        f"stiffness [{units[2]}]", "contacts", "",
     )  # fmt: skip
-    lines.append("".join(f"{text:>20s}" for text in head))
     count = len(results["loads"])
-    for i in sorted({round(k) for k in np.linspace(0, count - 1, min(count, _ROWS))}):
-        moved = rounded(1e3 * results["deflection"][i])
-        lines.append(
-            f"{results['loads'][i]:20.6g}{moved:20.6g}{results['stiffness'][i]:20.6g}"
-            f"{len(results['contacts'][i]):20d}"
-            + ("  within clearances" if results["free_in_clearances"][i] else "")
+    chosen = sorted({round(k) for k in np.linspace(0, count - 1, min(count, _ROWS))})
+    rows = {
+        str(i): (
+            results["loads"][i], rounded(1e3 * results["deflection"][i]),
+            results["stiffness"][i], len(results["contacts"][i]),
+            "within clearances" if results["free_in_clearances"][i] else "",
         )
+        for i in chosen
+    }  # fmt: skip
+    lines = [head, *table_lines(("step", *columns), rows, digits=6)]
     for event in results["events"]:
         at = f"{event['load']:.6g} {units[0]}"
         lines.append(f"{event['kind']} at {at}: {event['what']}")

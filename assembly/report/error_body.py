@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from assembly.linear.reference.pose_error import ReachableSet
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 
 PARTS = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 

@@ -13,7 +13,7 @@ from assembly.linear.energy import Assembly, CannotAssemble, failure_status
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.statuses import BEYOND_LIMITS, SINGULAR
 from assembly.solvers.conic import SolverFailed
-from forcefit.inputs.display import rounded, screw_text
+from forcefit.results.display import rounded, screw_text
 
 # of the energy: where finite motions change more of it, its first order says nothing
 MOST_ENERGY = 0.5

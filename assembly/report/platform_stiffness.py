@@ -21,9 +21,10 @@ from assembly.platform_stiffness.matrices import PlatformStiffness
 from assembly.platform_stiffness.platform_stiffness import State
 from assembly.report.beyond_linear import far_from_linear
 from assembly.solvers.conic import SolverFailed
-from forcefit.inputs.display import numbers, rounded
 from forcefit.inputs.errors import plot_label
-from stiffness.screws import SCREW
+from forcefit.results.display import numbers, rounded
+from forcefit.results.text import lines_of, listing, table_lines
+from stiffness.screws import SCREW, WRENCH
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -218,72 +219,59 @@ def share_rows(shares: dict[str, dict[str, Any]]) -> dict[str, list[float]]:
 
 
 def stiffness_text(results: dict[str, Any]) -> str:
-    """A stiffness for people: matrix, eigen-stiffnesses, and the parts to blame."""
-    lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
+    """A stiffness for people: matrix, eigenstiffnesses, and the compliant parts."""
+    about = lines_of(results, "pose status reason")
+    lines = [listing(results["robot"], about, results.get("remarks", ()))]
     if "compliance" not in results:
-        return "\n".join([*lines, f"{results['status']}: {results['reason']}"])
-    if results["status"] == UNSTABLE:
-        lines.append("unstable: this equilibrium has a direction of negative stiffness")
-    lines += _state_lines(results)
-    lines += _share_lines(results["shares"])
+        return lines[0]
+    lines += [*_state_lines(results), *_share_lines(results["shares"])]
     if "direction" in results:
         lines += _direction_lines(results["direction"])
     for side in results.get("contact", ()):
-        lines += ["", f"with clearances, {side['contacts']} pressed, {side['side']}:"]
-        lines += _state_lines(side)
+        closed = f"{side['contacts']} closed clearances, {side['side']}:"
+        lines += ["", closed, *_state_lines(side)]
     if results.get("letting_go"):
-        lines += ["", "clearances that touch their bound without a force let go:"]
+        lines += ["", "unloading of clearances that touch their bound without a force:"]
         lines += _state_lines(results["letting_go"])
-    lines += results.get("remarks", [])
     return "\n".join(lines)
 
 
 def _state_lines(values: dict[str, Any]) -> list[str]:
-    """One state: K, what moves freely, eigen-stiffnesses, centre."""
-    lines = [f"stiffness {values['state']}, read at {numbers(values['point'])} m, "
-             "base axes [N m/rad, N/rad, N m/m, N/m]"]  # fmt: skip
+    """One state: K, what moves freely, eigenstiffnesses, centre."""
     K = np.asarray(values["stiffness"])
     size = np.sqrt(np.abs(np.nan_to_num(np.diag(K))))
     K = np.where(np.abs(K) < 1e-10 * np.outer(size, size), 0.0, K)
-    lines += [
-        f"  {name}" + "".join(_cell(value) for value in row)
-        for name, row in zip(SCREW, K, strict=True)
-    ]
-    lines += [f"free motion: {numbers(screw)}" for screw in values["free_motions"]]
-    lines += [f"rigid along: {numbers(w)}" for w in values["rigid_wrenches"]]
-    shown = " ".join(f"{one['stiffness']:.4g}" for one in values["eigen"])
-    length = values["characteristic_length"]
-    lines.append(f"eigen-stiffnesses: {shown} N/m, angles times {length:.4g} m")
-    centre = values["centre"]
-    if np.isfinite(centre).all():
-        lines.append(f"centre of stiffness: {numbers(centre)} m, base axes")
-    return lines
-
-
-def _cell(value: float) -> str:
-    """A number of the matrix; rigid where it has none."""
-    return f"{value:13.5g}" if np.isfinite(value) else f"{'rigid':>13s}"
+    rows = dict(zip(WRENCH, np.where(np.isfinite(K), K, np.nan).tolist(), strict=True))
+    eigen = " ".join(f"{one['stiffness']:.4g}" for one in values["eigen"])
+    about = lines_of(values, "state point") | {
+        f"free motion {k}": numbers(screw)
+        for k, screw in enumerate(values["free_motions"], 1)
+    } | {
+        f"rigid wrench {k}": numbers(wrench)
+        for k, wrench in enumerate(values["rigid_wrenches"], 1)
+    }  # fmt: skip
+    about["eigenstiffnesses"] = (
+        f"{eigen} N/m, angles times {values['characteristic_length']:.4g} m"
+    )
+    if np.isfinite(values["centre"]).all():
+        about |= lines_of(values, "centre")
+    units = "[N m/rad, N/rad, N m/m, N/m]; rigid where -"
+    details = listing("", about).split("\n")[1:]
+    return [f"stiffness K_C {units}", *table_lines(("", *SCREW), rows), *details]
 
 
 def _share_lines(shares: dict[str, dict[str, Any]]) -> list[str]:
-    """The table of who gives way, in per cent of the compliance."""
-    rows = share_rows(shares)
-    table = largest_rows(rows)
-    width = max(map(len, (*table, "part")))
-    head = "".join(f"{name:>9s}" for name in DIRECTIONS)
-    lines = ["", "shares in the compliance along each direction, per cent",
-             f"{'part':{width}s}{head}"]  # fmt: skip
-    for name, row in table.items():
-        cells = (
-            f"{rounded(100 * value):9.3g}" if np.isfinite(value) else f"{'-':>9s}"
-            for value in row
-        )
-        lines.append(f"{name:{width}s}" + "".join(cells))
-    return lines
+    """The parts' shares in the compliance, in per cent."""
+    rows = {
+        name: [rounded(100 * value) for value in row]
+        for name, row in largest_rows(share_rows(shares)).items()
+    }
+    head = "shares in the compliance along each direction [%]"
+    return ["", head, *table_lines(("part", *DIRECTIONS), rows, digits=3)]
 
 
 def _direction_lines(along: dict[str, Any]) -> list[str]:
-    """Stiffness along a direction, and the parts that give way most."""
+    """Stiffness along a direction, and the parts that deform most."""
     parts = sorted(
         (-share, f"{frame} {kind}")
         for kind, word in _KINDS.items()
@@ -292,8 +280,8 @@ def _direction_lines(along: dict[str, Any]) -> list[str]:
     most = ", ".join(f"{name} {-100 * share:.3g} %" for share, name in parts[:3])
     unit = "N m/rad" if np.any(along["direction"][:3]) else "N/m"
     return [
-        f"along {numbers(along['direction'])}: {along['free']:.5g} {unit}, all else "
-        f"held {along['blocked']:.5g} {unit}; {most}"
+        f"along {numbers(along['direction'])}: {along['free']:.5g} {unit}, all other "
+        f"directions held {along['blocked']:.5g} {unit}; {most}"
     ]
 
 

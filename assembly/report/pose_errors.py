@@ -17,10 +17,10 @@ from assembly.linear.pose_error import PoseError, bound_pose_error
 from assembly.linear.reference.pose_error import ASSUMPTIONS, reachable_screws
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.report.first_order import singular_status
-from assembly.report.results import proof_status, status_line
+from assembly.report.results import proof_status
 from assembly.solvers.conic import SolverFailed
-from forcefit.inputs.display import bracket, numbers
 from forcefit.inputs.table import BadInput
+from forcefit.results.text import lines_of, listing, value_text
 
 
 def pose_error_of(
@@ -126,23 +126,23 @@ def _bracket(bounds: Sequence[float] | NDArray, screw: NDArray) -> dict[str, Any
 
 def pose_error_text(results: dict[str, Any]) -> str:
     """Bounds for people: a line for each assumption."""
-    lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
-    if results["status"] != "ok":
-        lines.append(status_line(results))
+    lines = lines_of(results, "pose status reason")
     for assumption, bounds in (results["error"] or {}).items():
         if "reason" in bounds:
-            lines.append(f"{assumption:7s} no answer: {bounds['reason']}")
+            lines[assumption] = f"no answer: {bounds['reason']}"
             continue
-        lines.append(
-            f"{assumption:7s} rotation {_bounds_text(bounds['rotation'], 'mrad')}, "
-            f"translation {_bounds_text(bounds['translation'], 'mm')}"
+        lines[f"{assumption}, rotation"] = _bounds_text("rotation", bounds["rotation"])
+        lines[f"{assumption}, translation"] = _bounds_text(
+            "translation", bounds["translation"]
         )
         if "along" in bounds:
-            unit = "mm" if np.any(results["direction"][3:]) else "mrad"
-            lines.append(f"        along it {_bounds_text(bounds['along'], unit)}")
-    return "\n".join(lines)
+            turns = np.any(results["direction"][:3])
+            part = "rotation" if turns else "translation"
+            lines[f"{assumption}, along it"] = _bounds_text(part, bounds["along"])
+    return listing(results["robot"], lines, results.get("remarks", ()))
 
 
-def _bounds_text(bounds: dict[str, Any], unit: str) -> str:
-    """Two bounds, in thousandths of rad or m."""
-    return bracket((bounds["lower"], bounds["upper"]), unit)
+def _bounds_text(part: str, bounds: dict[str, Any]) -> str:
+    """Two bounds of a rotation or translation."""
+    low, high = bounds["lower"], bounds["upper"]
+    return value_text(f"{part}_error", (low, high) if np.isfinite(high) else high)

@@ -32,8 +32,10 @@ from assembly.report.beyond_linear import far_from_linear
 from assembly.report.first_order import first_order_status, linearisation_of
 from assembly.report.wrench_table import wrench_lines
 from assembly.solvers.conic import SolverFailed
-from forcefit.inputs.display import numbers, rounded, screw_text
+from forcefit.results.text import lines_of, listing, value_text
 
+# numbers of a certificate, relative ones and the gap in J
+_PROOF = "closure_residual clearance_excess duality_gap stationarity iterations"
 _UNSTABLE = "the potential falls along a motion, as beyond a critical load"
 
 
@@ -58,12 +60,8 @@ def _finite(value: float) -> float | None:
 
 
 def zone_text(zone: dict[str, Any]) -> str:
-    """Margins for people: one line, and a second where they are not proved."""
-    line = (
-        f"zone margin: {_factor(zone['margin'])} compliant joints rigid, "
-        f"{_factor(zone['margin_free'])} free (assembles rigidly up to 1)"
-    )
-    return f"{line}\n{status_line(zone)}" if zone.get("reason") else line
+    """Margins for people; up to 1 it assembles by clearances alone."""
+    return listing("zone, eq. (21)", lines_of(zone, "margin margin_free status reason"))
 
 
 def solution_of(
@@ -184,7 +182,7 @@ def exact_of(
     gravity: ArrayLike | None = None,
     progress: Callable[[int, int], None] = lambda done, most: None,
 ) -> dict[str, Any]:
-    """Results of ``assembly exact`` as plain values.
+    """Results of ``assembly solve --state exact`` as plain values.
 
     Args:
         posture: of the robot.
@@ -227,40 +225,18 @@ def exact_of(
 
 
 def exact_text(results: dict[str, Any]) -> str:
-    """An exact solution for people: a few lines."""
-    lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
-    if results["status"] != "ok":
-        lines.append(status_line(results))
-    if "certificate" not in results:
-        return "\n".join(lines)
-    certificate = results["certificate"]
-    return "\n".join([
-        *lines,
-        f"energy: {results['energy']:.6g} J with finite motions",
-        f"platform error: {screw_text(results['platform_screw'])}",
-        _linearisation_text(results["linearisation_error"]),
-        f"closures hold to {certificate['closure_residual']:.1e}, balance to "
-        f"{certificate['stationarity']:.1e}; {certificate['iterations']} steps",
-        *results["remarks"],
-    ])  # fmt: skip
-
-
-def _linearisation_text(error: dict[str, Any]) -> str:
-    """The linearisation error for people."""
-    if error.get("status", "ok") != "ok":
-        return f"linearisation error: unknown, {error['status']}"
-    rotation, translation = (
-        rounded(scale * float(np.linalg.norm(error[part])))
-        for part, scale in (("rotation", 1e3), ("translation", 1e6))
-    )
-    return (
-        f"linearisation error: {rotation:.3g} mrad, {translation:.3g} um, energy "
-        f"{rounded(100 * error['relative_energy']):+.3g} %"
+    """An exact solution for people."""
+    return listing(
+        results["robot"],
+        lines_of(results, "pose status reason energy platform_screw")
+        | _linearisation_lines(results)
+        | lines_of(results.get("certificate", {}), _PROOF),
+        results.get("remarks", ()),
     )
 
 
 def solution_text(results: dict[str, Any]) -> str:
-    """A solution for people: a few lines.
+    """A solution for people.
 
     Args:
         results: of :func:`solution_of`.
@@ -268,27 +244,46 @@ def solution_text(results: dict[str, Any]) -> str:
     Returns:
         Text without colours.
     """
-    lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
-    lines += remark_lines(results["remarks"])
-    if "zone" in results:
-        lines.append(zone_text(results["zone"]))
-    if results["status"] != "ok":
-        lines.append(status_line(results))
-    if results["energy"] is None:
-        return "\n".join(lines)
-    certificate = results["certificate"]
-    lines += [
-        f"energy: {results['energy']:.6g} J",
-        f"platform error: {screw_text(results['platform_screw'])}",
-        _linearisation_text(results["linearisation_error"]),
-        f"certificate: closure residual {certificate['closure_residual']:.1e}, "
-        f"clearance excess {certificate['clearance_excess']:.1e}, "
-        f"gap {certificate['duality_gap']:.1e} J "
-        f"({certificate['relative_gap']:.1e} relative)",
-        _screw_bound_text(certificate, results["worst_error"]),
-        *wrench_lines(results["frames"], results["closures"]),
-    ]
-    return "\n".join(lines)
+    solved = results["energy"] is not None
+    lines = lines_of(results, "pose zone.margin zone.margin_free status reason")
+    if solved:
+        lines |= lines_of(results, "energy platform_screw reading")
+        lines |= _linearisation_lines(results) | _bound_lines(results)
+        lines |= lines_of(results["certificate"], _PROOF)
+    text = listing(results["robot"], lines, results["remarks"])
+    if not solved:
+        return text
+    return "\n".join([text, *wrench_lines(results["frames"], results["closures"])])
+
+
+def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:
+    """The linearisation error, linear minus exact, as lines of text."""
+    error = results.get("linearisation_error", {})
+    if "rotation" not in error:
+        words = "linearisation error"
+        return {words: f"unknown, {error['status']}"} if "status" in error else {}
+    sizes = {
+        f"linearisation_{part}": float(np.linalg.norm(error[part]))
+        for part in ("rotation", "translation")
+    } | {"linearisation_energy": error["relative_energy"]}
+    return lines_of(sizes, " ".join(sizes))
+
+
+def _bound_lines(results: dict[str, Any]) -> dict[str, str]:
+    """How well the platform's screw is known, and what clearances leave open."""
+    bound, largest = results["certificate"], results["worst_error"]
+    lines = lines_of(bound, "screw_rotation_error screw_translation_error")
+    if (
+        max(bound["screw_rotation_open"], 1e3 * bound["screw_translation_open"])
+        <= 1e-12
+    ):
+        return lines
+    lines |= lines_of(bound, "screw_rotation_open screw_translation_open")
+    if largest is None:
+        return lines | {"certified largest error": "without bound"}
+    sizes = ("rotation", "translation")
+    known = ", ".join(value_text(size, largest[size]) for size in sizes)
+    return lines | {"certified largest error": f"{known}, assumption frozen of (27)"}
 
 
 def status_line(results: dict[str, Any]) -> str:
@@ -320,25 +315,3 @@ def worst(assembly: Assembly) -> dict[str, Any] | None:
         "assumption": "frozen", "rotation": float(bound.rotation_error[1]),
         "translation": float(bound.translation_error[1]),
     }  # fmt: skip
-
-
-def _screw_bound_text(bound: dict[str, Any], largest: dict[str, Any] | None) -> str:
-    """How well the screw is known, and the certified largest error with clearances."""
-    turn, shift = 1e3 * bound["screw_rotation_error"], bound["screw_translation_error"]
-    text = f"platform error proved to {turn:.1e} mrad, {1e6 * shift:.1e} um"
-    loose = 1e3 * bound["screw_rotation_open"], 1e6 * bound["screw_translation_open"]
-    if max(loose) <= 1e-9:
-        return text
-    text += "; at the same energy clearances leave it open: "
-    if largest is None or not np.isfinite(largest["rotation"] + largest["translation"]):
-        return text + "without bound"
-    turn, shift = largest["rotation"], largest["translation"]
-    return (
-        f"{text}at most {1e3 * turn:.3g} mrad, {1e6 * shift:.4g} um from nominal "
-        "(certified, assumption frozen of assembly error)"
-    )
-
-
-def _factor(value: float | None) -> str:
-    """A margin, or that there is none."""
-    return "none" if value is None else f"{value:.4g}"

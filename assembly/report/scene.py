@@ -10,7 +10,7 @@ from assembly.linear.energy import Assembly
 from assembly.report.error_body import ErrorBody
 from assembly.report.plot import DisplacedBodies, displaced_bodies, readable_factor
 from forcefit.page.charts import scene
-from forcefit.page.units import shown_in
+from forcefit.results.units import shown_in
 from stiffness.screws import skew
 
 _SAMPLES = 9  # points along a body, enough for the cubic of a bent beam

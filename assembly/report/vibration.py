@@ -11,7 +11,8 @@ from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.statuses import FREE_MOTION, UNSTABLE
 from assembly.platform_stiffness.vibration import natural_modes
 from assembly.solvers.conic import SolverFailed
-from forcefit.inputs.display import numbers
+from forcefit.results.display import numbers
+from forcefit.results.text import lines_of, listing
 
 _NOMINAL = (
     "load and gravity are left out: these are the frequencies of the nominal robot; "
@@ -75,19 +76,12 @@ def vibration_of(
 
 def vibration_text(results: dict[str, Any]) -> str:
     """Frequencies for people, with the parts that bend most."""
-    lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
-    lines += [f"note: {remark}" for remark in results.get("remarks", ())]
-    if "modes" not in results:
-        return "\n".join([*lines, f"{results['status']}: {results['reason']}"])
-    for mode in results["modes"]:
+    about = lines_of(results, "pose status reason state idle_motions")
+    lines = [listing(results["robot"], about, results["remarks"])]
+    for mode in results.get("modes", ()):
         most = list(mode["shares"].items())[:_NAMED]
         shares = ", ".join(f"{name} {100 * share:.3g} %" for name, share in most)
         lines.append(f"{mode['frequency']:12.6g} Hz  {shares or _free(mode)}")
-    if results["idle_motions"]:
-        lines.append(
-            f"{results['idle_motions']} motions that nothing resists leave the "
-            "platform where it is"
-        )
     return "\n".join(lines)
 
 

@@ -4,10 +4,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from assembly.linear.assembled import without_rounding
+from forcefit.results.text import table_lines
 from stiffness.screws import WRENCH
+
+_HEAD = tuple(f"{name} [{'N m' if name[0] == 'M' else 'N'}]" for name in WRENCH)
 
 
 def wrench_lines(frames: Mapping[str, Any], closures: Sequence[Any]) -> list[str]:
@@ -20,26 +22,18 @@ def wrench_lines(frames: Mapping[str, Any], closures: Sequence[Any]) -> list[str
     Returns:
         Lines of one table for each.
     """
-    rows = {name: frame["wrench"] for name, frame in frames.items()}
-    starts = {name: frame["start_wrench"] for name, frame in frames.items()
-              if "start_wrench" in frame}  # fmt: skip
-    shut = {" - ".join(pair["frames"]): pair["wrench"] for pair in closures}
-    width = max(map(len, (*rows, *shut, "closure")))
-    units = [f"{name} [{'N m' if name[0] == 'M' else 'N'}]" for name in WRENCH]
-
-    def table(head: str, wrenches: dict[str, NDArray]) -> list[str]:
-        lines = [f"{head:{width}s}" + "".join(f"{unit:>13s}" for unit in units)]
-        shown = without_rounding(np.reshape(list(wrenches.values()), (-1, 6)))
-        for name, wrench in zip(wrenches, shown.tolist(), strict=True):
-            lines.append(f"{name:{width}s}" + "".join(f"{w:13.5g}" for w in wrench))
-        return lines
-
-    lines = ["", "wrenches through the bodies, at each frame's origin in its axes"]
-    lines += table("frame", rows)
-    if starts:
-        lines += ["", "the same where links under their own weight start"]
-        lines += table("frame", starts)
-    if shut:
-        lines += ["", "wrenches of the closures, at the platform's origin, base axes"]
-        lines += table("closure", shut)
+    starts = {k: f["start_wrench"] for k, f in frames.items() if "start_wrench" in f}
+    tables = {
+        "wrenches through the bodies, at each frame's origin in its axes":
+            ("frame", {name: frame["wrench"] for name, frame in frames.items()}),
+        "the same where links under their own weight start": ("frame", starts),
+        "wrenches of the closures, at the platform's origin, base axes":
+            ("closure", {" - ".join(c["frames"]): c["wrench"] for c in closures}),
+    }  # fmt: skip
+    lines = []
+    for title, (first, wrenches) in tables.items():
+        if wrenches:
+            shown = without_rounding(np.reshape(list(wrenches.values()), (-1, 6)))
+            rows = dict(zip(wrenches, shown.tolist(), strict=True))
+            lines += ["", title, *table_lines((first, *_HEAD), rows)]
     return lines

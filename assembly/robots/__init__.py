@@ -1,6 +1,6 @@
-"""Built-in robots; each is a table of numbers in a file of its own.
+"""Built-in robots; each file is a table of one robot's numbers.
 
-Begin at ``five_bar.py``, a short one; ``placing.py`` makes frames of home poses.
+Begin with ``five_bar.py``, a short one; ``placing.py`` makes frames of home poses.
 """
 
 import os
@@ -32,19 +32,20 @@ BUILT_IN: dict[str, Callable[[], Robot]] = {
 
 
 def load_robot(name: str | Path, close: Closing | None = None) -> Robot:
-    """A built-in robot by its name, or the robot of a file.
+    """Return a built-in robot by its name, or the robot of a file.
 
     Args:
-        name: such as ``"irsbot2"``, or the path of a robot file.
-        close: makes of the robot as declared one whose closures hold, as
-            :mod:`assembly.kinematics.closing` does; none if absent.
+        name: name such as ``"irsbot2"``, or the path of a robot file.
+        close: function that makes the closures of the declared robot hold, from
+            :mod:`assembly.kinematics.closing`; by default they are not changed.
 
     Returns:
-        The robot.  Meshes and libraries of its links are not read:
-        :func:`assembly.exchange.robot_files.load_robot` does.
+        The robot.  Meshes and libraries of its links are read only by
+        :func:`assembly.exchange.robot_files.load_robot`.
 
     Raises:
-        BadInput: neither a built-in name nor a file, or the file breaks a rule.
+        BadInput: the name is neither a built-in one nor a file, or the file breaks a
+            rule.
     """
     if str(name) in BUILT_IN:
         robot = BUILT_IN[str(name)]()

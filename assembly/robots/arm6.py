@@ -1,8 +1,8 @@
 """A serial arm of six axes: the PUMA 560.
 
-It has no closure, so no internal forces: errors and clearances add up along the arm.  A
-load moves its flange by J K^-1 J^T of the drives, and by the bending of its two long
-bodies.
+The arm has no closure, so it has no internal forces: errors and clearances add up along
+the arm.  A load moves its flange by J K^-1 J^T of the drives and by the bending of its
+two long bodies.
 
 Sources:
     Corke, Armstrong-Helouvry (1994), A search for consensus among model parameters
@@ -38,7 +38,7 @@ HOME = (0.0, math.pi / 4, math.pi, 0.0, math.pi / 4, 0.0)  # [rad]
 
 @dataclass(frozen=True)
 class Arm6Parameters:
-    """Parameters of the arm; aluminium shells as tubes, preloaded bearings."""
+    """Parameters of the arm: aluminium tubes and preloaded bearings."""
 
     joints: tuple[tuple[float, ...], ...] = JOINTS
     home: tuple[float, ...] = HOME
@@ -48,14 +48,14 @@ class Arm6Parameters:
 
 
 def arm6(parameters: Arm6Parameters | None = None) -> Robot:
-    """The arm at its home posture.
+    """Return the arm at its home posture.
 
     Args:
-        parameters: of the arm, those above if absent.
+        parameters: parameters of the arm; by default those above.
 
     Returns:
-        7 frames, no closure; platform ``flange``, a joint's coordinate is its
-        Denavit-Hartenberg angle.
+        The arm with 7 frames and no closure; platform ``flange``.  A joint's coordinate
+        is its Denavit-Hartenberg angle.
     """
     P = parameters or Arm6Parameters()
     parent, step = "base", np.eye(4)
@@ -79,5 +79,5 @@ def arm6(parameters: Arm6Parameters | None = None) -> Robot:
 
 
 def after_joint(d: float, a: float, alpha: float) -> NDArray:
-    """(4, 4) from one joint to the next, Denavit and Hartenberg's angle left out."""
+    """Return (4, 4) transform from one joint to the next at joint angle zero."""
     return transform([a, 0.0, d], rotation_matrix([alpha, 0.0, 0.0]))

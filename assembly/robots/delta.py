@@ -1,7 +1,7 @@
-"""Clavel's Delta, R-(SS)2: each driven arm carries two parallel rods, the platform.
+"""Clavel's Delta, R-(SS)2: each of three driven arms moves the platform by two rods.
 
 The rods between ball joints can spin about their own axes, and each spin is a degree of
-freedom: 9 in all, 3 of the platform and 6 of the rods.  The six rods constrain the
+freedom: there are 9, 3 of the platform and 6 of the rods.  The six rods constrain the
 platform exactly, so geometric errors move it without elastic energy.
 
 Sources:
@@ -22,18 +22,19 @@ from assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots.placing import at, ball_joint, drive_stiffness
 from forcefit.inputs.table import BadInput
 
-AZIMUTHS = (-math.pi / 2, math.pi / 6, 5 * math.pi / 6)  # [rad] of the legs
+AZIMUTHS = (-math.pi / 2, math.pi / 6, 5 * math.pi / 6)  # [rad] directions of the legs
 
 
 @dataclass(frozen=True)
 class DeltaParameters:
-    """Numbers of the robot [m, N m/rad]; carbon fibre tubes."""
+    """Parameters of the robot [m, N m/rad]; the rods are carbon fibre tubes."""
 
-    base_side: float = 0.567  # of the triangle whose sides the drives halve
-    platform_side: float = 0.076  # of the triangle whose corners carry the rods
+    # side of the triangle with the drives at the middles of its sides
+    base_side: float = 0.567
+    platform_side: float = 0.076  # side of the triangle with the rods at its corners
     arm: float = 0.524
     rod: float = 1.244
-    rod_distance: float = 0.131  # of the two rods of a leg
+    rod_distance: float = 0.131  # between the two rods of a leg
     home: float = -0.9  # height of the platform
     drive: float = 2e4
     arm_link: BeamLink = BeamLink(
@@ -46,27 +47,27 @@ class DeltaParameters:
 
     @property
     def base_radius(self) -> float:
-        """[m] from the centre to the drives."""
+        """[m] distance from the centre to the drives."""
         return self.base_side * math.sqrt(3) / 6
 
     @property
     def platform_radius(self) -> float:
-        """[m] from the platform's centre to the middle of a pair of rods."""
+        """[m] distance from the platform's centre to the middle of a pair of rods."""
         return self.platform_side * math.sqrt(3) / 3
 
 
 def delta(parameters: DeltaParameters | None = None) -> Robot:
-    """The robot at its home pose, on its axis.
+    """Return the robot at its home pose, on its vertical axis.
 
     Args:
-        parameters: of the robot, those above if absent.
+        parameters: parameters of the robot; by default those above.
 
     Returns:
-        48 frames, 5 closures; platform ``leg1.a_tip``.  A drive's coordinate is its
-        arm's angle below the base's plane.
+        The robot with 48 frames and 5 closures; platform ``leg1.a_tip``.  A drive's
+        coordinate is its arm's angle below the base's plane.
 
     Raises:
-        BadInput: the home pose is out of reach.
+        BadInput: the robot does not reach the home pose.
     """
     P = parameters or DeltaParameters()
     angle = drive_angle(P, AZIMUTHS[0], np.array([0.0, 0.0, P.home]))
@@ -82,22 +83,22 @@ def delta(parameters: DeltaParameters | None = None) -> Robot:
 def drive_angle(
     parameters: DeltaParameters, azimuth: float, position: NDArray
 ) -> float:
-    """Angle of one arm below the base's plane, elbow outward.
+    """Return the angle of one arm below the base's plane, elbow outward.
 
     Args:
-        parameters: of the robot.
-        azimuth: [rad] of the leg.
-        position: (3,) [m] of the platform.
+        parameters: parameters of the robot.
+        azimuth: [rad] direction of the leg.
+        position: (3,) [m] position of the platform.
 
     Returns:
         [rad] the drive's coordinate.
 
     Raises:
-        BadInput: out of reach.
+        BadInput: the leg does not reach the position.
     """
     P = parameters
     out, across = _radial(azimuth)
-    # in the leg's plane, from the drive to where its rods meet the platform
+    # vector in the leg's plane, from the drive to the platform's end of the rods
     x = position @ out + P.platform_radius - P.base_radius
     z = -position[2]
     reach = math.hypot(x, z)
@@ -112,7 +113,7 @@ def drive_angle(
 
 
 def _radial(azimuth: float) -> tuple[NDArray, NDArray]:
-    """Unit vectors outward and across, in the base's plane."""
+    """Return the unit vectors outward and across, in the base's plane."""
     c, s = math.cos(azimuth), math.sin(azimuth)
     return np.array([c, s, 0.0]), np.array([-s, c, 0.0])
 
@@ -120,7 +121,7 @@ def _radial(azimuth: float) -> tuple[NDArray, NDArray]:
 def _leg(
     name: str, azimuth: float, angle: float, P: DeltaParameters
 ) -> list[PlacedFrame]:
-    """A driven arm and its two rods."""
+    """Return a driven arm and its two rods."""
     out, across = _radial(azimuth)
     foot = P.base_radius * out
     arm = math.cos(angle) * out - math.sin(angle) * np.array([0.0, 0.0, 1.0])
@@ -149,7 +150,7 @@ def _rod(
     across: NDArray,
     P: DeltaParameters,
 ) -> list[PlacedFrame]:
-    """A rod between ball joints; their axes next to it are its own, so it can spin."""
+    """Return a rod between ball joints, whose axes let it spin about itself."""
     along = (far - near) / np.linalg.norm(far - near)
     third = np.cross(along, across)
     high = ball_joint(f"{name}_high", parent, near, across, third, P.ball)

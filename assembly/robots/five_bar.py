@@ -1,7 +1,7 @@
-"""A planar five-bar robot, 5R: two driven arms and two that meet in a pin.
+"""A planar five-bar robot, 5R: two driven arms, and two arms joined by a pin.
 
 Sources:
-    Round numbers, of the size of DexTAR, whose four arms are equal too: Campos,
+    Round numbers, of the size of DexTAR, whose four arms are also equal: Campos,
     Bourbonnais, Bonev, Bigras (2010), Development of a five-bar parallel robot with
     large workspace, ASME IDETC.  Sections and clearances are typical.
 """
@@ -18,9 +18,9 @@ from assembly.robots.planar import PlanarLeg, arm_angle, in_plane, two_arms
 
 @dataclass(frozen=True)
 class FiveBarParameters:
-    """Numbers of the robot [m]; aluminium arms, small ball bearings."""
+    """Parameters of the robot [m]; aluminium arms and small ball bearings."""
 
-    base: float = 0.120  # between the drives, on the x axis
+    base: float = 0.120  # distance of the drives, on the x axis
     home: tuple[float, float] = (0.0, 0.140)
     leg: PlanarLeg = PlanarLeg(
         near=0.090,
@@ -32,17 +32,18 @@ class FiveBarParameters:
 
 
 def five_bar(parameters: FiveBarParameters | None = None) -> Robot:
-    """The robot at its home pose, both elbows outward.
+    """Return the robot at its home pose, both elbows outward.
 
     Args:
-        parameters: of the robot, those above if absent.
+        parameters: parameters of the robot; by default those above.
 
     Returns:
-        9 frames, 1 closure; the platform ``left.tip`` sits on the right leg's second
-        arm, past the pin.  A drive's coordinate is its arm's angle to the x axis.
+        The robot with 9 frames and 1 closure.  The platform ``left.tip`` is on the
+        right leg's second arm, beyond the pin.  A drive's coordinate is its arm's angle
+        to the x axis.
 
     Raises:
-        BadInput: the home pose is out of reach.
+        BadInput: the robot does not reach the home pose.
     """
     P = parameters or FiveBarParameters()
     tip = np.array(P.home)

@@ -1,14 +1,14 @@
-"""A planar four-bar linkage that draws a straight line: Hoeken's.
+"""Hoeken's linkage: a planar four-bar linkage that draws a straight line.
 
-In units of the crank: ground 2, coupler 2.5, rocker 2.5, and the tracing point as far
-beyond the coupler's pin as the coupler is long.  Crank pin, rocker's foot and tracing
-point then lie on a circle about the coupler's middle pin (Thales), so the foot sees the
-other two at a right angle, and in closed form
+In units of the crank, ground and coupler and rocker have lengths 2, 2.5 and 2.5.  The
+tracing point is as far beyond the coupler's pin as the coupler is long.  Crank pin,
+rocker's foot and tracing point are on a circle about the coupler's middle pin (Thales),
+so the lines from the foot to the other two are perpendicular, and
 
     P = [2, 0] + 2 sqrt((5 + cos t) / (5 - 4 cos t)) [sin t, 2 - cos t],
 
-t being the crank's angle to the ground link.  It passes through height 4 exactly at
-t = 90, 180 and 270 degrees.
+where t is the crank's angle to the ground link.  The point is exactly at height 4 for t
+= 90, 180 and 270 degrees.
 
 Sources:
     Norton, Design of Machinery, chapter 3, Hoeken's linkage: the proportions.  Size,
@@ -29,7 +29,7 @@ from assembly.robots.planar import direction, in_plane
 
 @dataclass(frozen=True)
 class FourBarParameters:
-    """Numbers of the linkage [m, rad, N m/rad]; aluminium bars, plain bearings."""
+    """Parameters of the linkage [m, rad, N m/rad]; aluminium bars, plain bearings."""
 
     crank: float = 0.1
     home: float = math.pi
@@ -41,14 +41,14 @@ class FourBarParameters:
 
 
 def four_bar(parameters: FourBarParameters | None = None) -> Robot:
-    """The linkage at its home angle.
+    """Return the linkage at its home angle.
 
     Args:
-        parameters: of the linkage, those above if absent.
+        parameters: parameters of the linkage; by default those above.
 
     Returns:
-        8 frames, 1 closure; the platform ``point`` is the tracing point, ``crank`` is
-        driven and its coordinate is the angle to the ground link.
+        The linkage with 8 frames and 1 closure; the platform ``point`` is the tracing
+        point. ``crank`` is driven; its coordinate is the angle to the ground link.
     """
     P = parameters or FourBarParameters()
     foot, tip, middle, point = (P.crank * p for p in corners(P.home))
@@ -72,17 +72,17 @@ def four_bar(parameters: FourBarParameters | None = None) -> Robot:
 
 
 def corners(angle: float) -> tuple[NDArray, ...]:
-    """Positions of the linkage at a crank angle, in units of the crank.
+    """Return the positions of the linkage at a crank angle, in units of the crank.
 
     Args:
-        angle: [rad] of the crank to the ground link.
+        angle: [rad] angle of the crank to the ground link.
 
     Returns:
-        Rocker's foot, crank pin, middle pin, tracing point, (2,) each.
+        Rocker's foot, crank pin, middle pin and tracing point, (2,) each.
     """
     foot, tip = np.array([2.0, 0.0]), direction(angle)
     to_pin = tip - foot
-    # Thales: at a right angle to it, at a distance of 5 from the crank pin
+    # Thales: perpendicular to it, at a distance of 5 from the crank pin
     across = np.array([to_pin[1], -to_pin[0]]) / np.linalg.norm(to_pin)
     point = foot + np.sqrt(25.0 - to_pin @ to_pin) * across
     return foot, tip, (tip + point) / 2, point

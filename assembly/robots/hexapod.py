@@ -1,9 +1,9 @@
 """A Gough-Stewart platform, 6-UPS: six driven struts between cardan and ball joints.
 
-A strut between a cardan and a ball joint carries an axial force only, whatever its
-section: the platform's stiffness is the sum over struts of k w w^T, with w the unit
-wrench of the strut's line.  Six struts constrain the platform exactly, so geometric
-errors move it without elastic energy.
+A strut between a cardan and a ball joint transmits only an axial force.  The platform's
+stiffness is therefore the sum over struts of k w w^T, with w the unit wrench of the
+strut's line.  Six struts constrain the platform exactly, so geometric errors move it
+without elastic energy.
 
 Sources:
     Merlet, Parallel Robots (2nd edition, 2006), the prototype called left hand: the
@@ -32,7 +32,7 @@ PLATFORM_POINTS = (
 
 @dataclass(frozen=True)
 class HexapodParameters:
-    """Numbers of the robot [m, N/m, Pa]; steel tubes, screws with preloaded nuts."""
+    """Parameters of the robot [m, N/m, Pa]; steel tubes, screws with preloaded nuts."""
 
     height: float = 0.530
     drive: float = 1.5e7
@@ -46,14 +46,14 @@ class HexapodParameters:
 
 
 def hexapod(parameters: HexapodParameters | None = None) -> Robot:
-    """The robot at its home pose, the platform parallel to the base.
+    """Return the robot at its home pose, with the platform parallel to the base.
 
     Args:
-        parameters: of the robot, those above if absent.
+        parameters: parameters of the robot; by default those above.
 
     Returns:
-        42 frames, 5 closures; platform ``leg1.tip``.  The coordinate of ``legK.strut``
-        is the distance of its joints' centres.
+        The robot with 42 frames and 5 closures; platform ``leg1.tip``.  The coordinate
+        of ``legK.strut`` is the distance of its joints' centres.
     """
     P = parameters or HexapodParameters()
     placed: list[PlacedFrame] = []
@@ -65,13 +65,13 @@ def hexapod(parameters: HexapodParameters | None = None) -> Robot:
 
 
 def points() -> tuple[NDArray, NDArray]:
-    """(6, 3) [m] centres of the joints in base axes and in platform axes."""
+    """Return the (6, 3) [m] centres of the joints in base axes and in platform axes."""
     flat = np.zeros((6, 1))
     return np.hstack([BASE_POINTS, flat]), np.hstack([PLATFORM_POINTS, flat])
 
 
 def _leg(name: str, a: NDArray, b: NDArray, P: HexapodParameters) -> list[PlacedFrame]:
-    """A strut from a to b, where its ball joint holds the platform."""
+    """Return a strut from a to b, with the ball joint to the platform at b."""
     length = float(np.linalg.norm(b - a))
     along = (b - a) / length
     first = np.cross([0.0, 0.0, 1.0], along)
@@ -93,6 +93,6 @@ def _leg(name: str, a: NDArray, b: NDArray, P: HexapodParameters) -> list[Placed
 
 
 def _in_axes(T: NDArray, vector: NDArray) -> tuple[float, float, float]:
-    """A direction in base axes, in a frame's axes."""
+    """Return a direction, given in base axes, in a frame's axes."""
     x, y, z = (T[:3, :3].T @ vector).tolist()
     return x, y, z

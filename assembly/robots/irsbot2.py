@@ -1,13 +1,12 @@
-"""The IRSBot-2 of the paper's section IV, a reconstruction.
+"""The IRSBot-2 of the paper's section IV, reconstructed.
 
-Two legs on the x axis, leg 2 being leg 1 turned by pi about z0.  Each is a
-parallelogram (proximal module) that carries an elbow body of constant orientation, and
-two parallel links between universal joints (distal module) that carry the platform.
-The figures that define the axes of the universal joints are not public.  This
-interpretation has the paper's mobility everywhere in the workspace; others tried do
-not.
+The two legs are on the x axis; leg 2 is leg 1 turned by pi about z0.  In each leg a
+parallelogram (proximal module) carries an elbow body of constant orientation. Two
+parallel links between universal joints (distal module) carry the platform.  The figures
+that define the axes of the universal joints are not public.  The axes used here give
+the paper's mobility everywhere in the workspace; other axes that were tried do not.
 
-Frames carry names; the paper's index is their place in :data:`NAMES`, counted from 1.
+Frames have names; the paper's index is their position in :data:`NAMES`, from 1.
 Errors act at the paper's frames :data:`ERROR_FRAMES`.
 
 ======  ===========================================================================
@@ -86,18 +85,19 @@ class IRSBot2Parameters:
 def irsbot2(
     parameters: IRSBot2Parameters | None = None, x: float = 0.0, z: float = -0.5
 ) -> Robot:
-    """The robot with all its joints at zero in one home pose.
+    """Return the robot with all its joints at zero in one home pose.
 
     Args:
-        parameters: the paper's if absent.
+        parameters: parameters of the robot; by default the paper's.
         x: [m] platform position in the home pose.
-        z: [m] likewise.
+        z: [m] platform position in the home pose.
 
     Returns:
-        42 frames, 5 closures; platform ``leg1.tip``, parallel to the base.
+        The robot with 42 frames and 5 closures; platform ``leg1.tip``, parallel to the
+        base.
 
     Raises:
-        BadInput: the home pose is out of reach.
+        BadInput: the robot does not reach the home pose.
     """
     parameters = parameters or IRSBot2Parameters()
     turned = transform(np.zeros(3), np.diag([-1.0, -1.0, 1.0]))
@@ -119,18 +119,18 @@ def irsbot2(
 
 
 def drive_angle(parameters: IRSBot2Parameters, x: float, z: float) -> float:
-    """Angle of leg 1's moving sides to the x axis, elbow outward.
+    """Return the angle of leg 1's moving sides to the x axis, elbow outward.
 
     Args:
-        parameters: of the robot.
-        x: [m] platform position; minus it for leg 2.
+        parameters: parameters of the robot.
+        x: [m] platform position; for leg 2 its negative.
         z: [m] platform position.
 
     Returns:
         [rad] the angle q.
 
     Raises:
-        BadInput: out of reach.
+        BadInput: the leg does not reach the position.
     """
     P = parameters
     along = np.array([x - (P.b + P.f - P.p), z - P.e])
@@ -146,19 +146,19 @@ def drive_angle(parameters: IRSBot2Parameters, x: float, z: float) -> float:
 
 
 def _planar_length(P: IRSBot2Parameters) -> float:
-    """[m] the distal links seen along y."""
+    """Return [m] length of the distal links projected along y."""
     return math.sqrt(P.L2**2 - (P.g - P.a) ** 2)
 
 
 def _leg(P: IRSBot2Parameters, x: float, z: float) -> dict[str, NDArray]:
-    """Frames of leg 1 seen from the base at a platform position."""
+    """Return the frames of leg 1 seen from the base at a platform position."""
     q = drive_angle(P, x, z)
     arm = np.array([math.cos(q), 0.0, math.sin(q)])
     side = P.d * np.array([math.cos(P.alpha), 0.0, math.sin(P.alpha)])
     A = np.array([P.b, 0.0, 0.0])
     C = A + P.L1 * arm
     platform = np.array([x, 0.0, z])
-    # revolute axes perpendicular to the x-z plane, x along the moving side
+    # revolute axes perpendicular to the x-z plane; x axes along the moving side
     swing = _axes(arm, np.array([0.0, -1.0, 0.0]))
     placed = {
         "drive": transform(A, swing), "elbow": transform(C, swing),
@@ -179,11 +179,11 @@ def _leg(P: IRSBot2Parameters, x: float, z: float) -> dict[str, NDArray]:
 def _link(
     P: IRSBot2Parameters, which: str, y: float, near: NDArray, far: NDArray
 ) -> dict[str, NDArray]:
-    """Frames of one distal link and its two universal joints."""
+    """Return the frames of one distal link and its two universal joints."""
     along = (far - near) / np.linalg.norm(far - near)
     level, rise = math.cos(P.alpha_d), math.sin(P.alpha_d)
     fixed = np.array([level * math.cos(P.beta), y * level * math.sin(P.beta), -rise])
-    own = y * np.cross(fixed, along)  # link B mirrors link A in y = 0
+    own = y * np.cross(fixed, along)  # link B is the mirror image of link A in y = 0
     own /= np.linalg.norm(own)
     up = np.array([0.0, 0.0, 1.0])
     end = "platform_a" if which == "a" else "link_b_tip"
@@ -198,13 +198,13 @@ def _link(
 
 
 def _axes(x: NDArray, z: NDArray) -> NDArray:
-    """Rotation matrix with given x (scaled to 1) and z axes."""
+    """Return the rotation matrix with given x (scaled to 1) and z axes."""
     x = x / np.linalg.norm(x)
     return np.column_stack([x, np.cross(z, x), z])
 
 
 def _frames(leg: str, placed: dict[str, NDArray], P: IRSBot2Parameters) -> list[Frame]:
-    """A leg's frames with their joints and links."""
+    """Return a leg's frames with their joints and links."""
     frames = []
     for name in NAMES:
         above = _PARENTS[name]
@@ -222,7 +222,7 @@ def _frames(leg: str, placed: dict[str, NDArray], P: IRSBot2Parameters) -> list[
 
 
 def _joint(name: str, P: IRSBot2Parameters) -> dict:
-    """Joint, clearance and link of a frame."""
+    """Return the joint, clearance and link of a frame."""
     part: dict = {}
     if name in _REVOLUTE or name.endswith(("_first", "_second", "link_a", "link_b")):
         part = {"joint": "revolute", "actuated": name == "drive"}

@@ -1,9 +1,10 @@
-"""The Orthoglide: three linear drives at right angles, parallelograms, 3 translations.
+"""The Orthoglide: three perpendicular linear drives with parallelograms; it translates.
 
 Each leg is a slide, a hinge, a parallelogram and a second hinge parallel to the first:
-PRPaR.  It prevents rotation of the platform about two axes: six constraints by three
-legs where three suffice.  Each planar parallelogram adds three redundant constraints.
-So the robot is overconstrained twelve times, and errors cause internal forces.
+PRPaR.  It prevents rotation of the platform about two axes: the three legs give six
+constraints where three suffice.  Each planar parallelogram adds three redundant
+constraints.  So the robot is overconstrained twelve times, and errors cause internal
+forces.
 
 With the coordinates r of the slides and the position p of the platform, each leg of
 length L keeps (p_x - r_x)^2 + p_y^2 + p_z^2 = L^2, and so on.  At home, p = 0 and
@@ -30,10 +31,10 @@ from assembly.robots.placing import at, drive_stiffness, pin
 
 @dataclass(frozen=True)
 class OrthoglideParameters:
-    """Numbers of the robot [m, N/m]; aluminium bars, preloaded ball bearings."""
+    """Parameters of the robot [m, N/m]; aluminium bars, preloaded ball bearings."""
 
     leg: float = 0.310
-    width: float = 0.080  # of the parallelograms
+    width: float = 0.080  # width of the parallelograms
     platform: float = 0.030  # from the platform's centre to the legs' ends
     drive: float = 5e7
     link: BeamLink = BeamLink(
@@ -43,14 +44,14 @@ class OrthoglideParameters:
 
 
 def orthoglide(parameters: OrthoglideParameters | None = None) -> Robot:
-    """The robot at its isotropic point.
+    """Return the robot at its isotropic point.
 
     Args:
-        parameters: of the robot, those above if absent.
+        parameters: parameters of the robot; by default those above.
 
     Returns:
-        30 frames, 5 closures; platform ``x.tip``.  The coordinate of ``x.slide`` is r_x
-        above.
+        The robot with 30 frames and 5 closures; platform ``x.tip``.  The coordinate of
+        ``x.slide`` is r_x above.
     """
     P = parameters or OrthoglideParameters()
     axes = np.eye(3)
@@ -68,7 +69,7 @@ def orthoglide(parameters: OrthoglideParameters | None = None) -> Robot:
 def _leg(
     name: str, along: NDArray, hinge: NDArray, P: OrthoglideParameters
 ) -> list[PlacedFrame]:
-    """A leg along an axis of the base, its hinges along another."""
+    """Return a leg along an axis of the base, with hinges along another axis."""
     near, far = -(P.leg + P.platform) * along, -P.platform * along
     slide = Frame(
         f"{name}.slide", joint="prismatic", actuated=True, position=-P.leg,

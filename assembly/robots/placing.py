@@ -1,8 +1,8 @@
-"""Frames given by their home poses, seen from the base.
+"""Frames given by their home poses in base axes.
 
-A robot's table is easiest to check in base axes; a tree of frames needs each one seen
-from its parent, after the parent's joint.  Joints with more than one degree of freedom
-are coincident revolute joints: a cardan joint of two, a ball joint of three.
+A robot's table is easiest to check in base axes; a tree of frames needs each frame
+relative to its parent, after the parent's joint.  Joints of several degrees of freedom
+are coincident revolute joints: two for a cardan joint, three for a ball joint.
 """
 
 import numpy as np
@@ -16,12 +16,12 @@ from stiffness.screws import transform
 def at(
     origin: ArrayLike, z: ArrayLike = (0, 0, 1), x: ArrayLike = (1, 0, 0)
 ) -> NDArray:
-    """A frame by its origin and two of its axes.
+    """Return the transform of a frame from its origin and two of its axes.
 
     Args:
-        origin: (3,) [m].
+        origin: (3,) [m] origin of the frame.
         z: (3,) direction of the z axis, of any length.
-        x: (3,) direction of the x axis; its part along z is dropped.
+        x: (3,) direction of the x axis; its part along z is removed.
 
     Returns:
         (4, 4) transform.
@@ -36,7 +36,7 @@ def at(
 def pin(
     name: str, parent: str, clearance: Clearance | None = None, link: Link | None = None
 ) -> Frame:
-    """A passive revolute joint, with the body that leads to it."""
+    """Return a passive revolute joint, with the body that leads to it."""
     return Frame(name, parent, joint="revolute", clearance=clearance, link=link)
 
 
@@ -44,15 +44,15 @@ def cardan_joint(
     name: str, parent: str, origin: NDArray, first: NDArray, second: NDArray,
     clearance: Clearance | None = None,
 ) -> list[PlacedFrame]:  # fmt: skip
-    """Two revolute joints at one point, their axes at right angles.
+    """Return a cardan joint: two perpendicular revolute joints at one point.
 
     Args:
-        name: of the joint; its frames are ``name_1`` and ``name_2``.
-        parent: the frame that carries it.
-        origin: (3,) [m] its centre.
+        name: name of the joint; its frames are ``name_1`` and ``name_2``.
+        parent: frame that carries the joint.
+        origin: (3,) [m] centre of the joint.
         first: (3,) axis fixed to the parent.
-        second: (3,) axis fixed to the child, at right angles to the first.
-        clearance: of the whole joint, assigned to its second frame.
+        second: (3,) axis fixed to the child, perpendicular to the first.
+        clearance: clearance of the whole joint, assigned to its second frame.
 
     Returns:
         The two frames.
@@ -68,17 +68,17 @@ def ball_joint(
     name: str, parent: str, origin: NDArray, first: NDArray, second: NDArray,
     clearance: Clearance | None = None, link: Link | None = None,
 ) -> list[PlacedFrame]:  # fmt: skip
-    """Three revolute joints at one point, their axes at right angles at home.
+    """Return a ball joint: three revolute joints at one point, perpendicular at home.
 
-    It is singular where the second joint has turned by a right angle.
+    The joint is singular if the second revolute joint has turned by a right angle.
 
     Args:
-        name: of the joint; its frames are ``name_1`` to ``name_3``.
-        parent: the frame that carries it.
-        origin: (3,) [m] its centre.
+        name: name of the joint; its frames are ``name_1`` to ``name_3``.
+        parent: frame that carries the joint.
+        origin: (3,) [m] centre of the joint.
         first: (3,) axis fixed to the parent.
-        second: (3,) the axis between; the third is at right angles to both.
-        clearance: of the whole joint, assigned to its last frame.
+        second: (3,) middle axis; the third is perpendicular to both.
+        clearance: clearance of the whole joint, assigned to its last frame.
         link: elasticity of the body between the parent and this joint.
 
     Returns:
@@ -94,14 +94,14 @@ def ball_joint(
 
 
 def drive_stiffness(stiffness: float, joint: str = "revolute") -> NDArray:
-    """Joint stiffness of a drive that is elastic along its own motion only.
+    """Return the joint stiffness of a drive that is elastic only along its own motion.
 
     Args:
-        stiffness: [N m/rad or N/m] of the drive.
+        stiffness: [N m/rad or N/m] stiffness of the drive.
         joint: ``"revolute"`` or ``"prismatic"``.
 
     Returns:
-        (6, 6) infinite on the diagonal but for RZ or TZ.
+        (6, 6) matrix, infinite on the diagonal except for RZ or TZ.
     """
     own = 5 if joint == "prismatic" else 2
     diagonal = np.full(6, np.inf)

@@ -19,9 +19,9 @@ class PlanarLeg:
     Attributes:
         near: [m] length of the driven arm.
         far: [m] length of the second arm.
-        link: the section and material of both.
+        link: section and material of both arms.
         drive: [N m/rad] stiffness of the drive.
-        clearance: of every pin.
+        clearance: clearance of every pin.
     """
 
     near: float
@@ -32,34 +32,34 @@ class PlanarLeg:
 
 
 def in_plane(point: ArrayLike, angle: float = 0.0) -> NDArray:
-    """(4, 4) frame at a point (x, y) [m], its x axis turned by an angle [rad]."""
+    """Return (4, 4) frame at a point (x, y) [m], with its x axis at an angle [rad]."""
     x, y = np.asarray(point, dtype=float)
     return at([x, y, 0.0], x=[math.cos(angle), math.sin(angle), 0.0])
 
 
 def direction(angle: float) -> NDArray:
-    """(2,) unit vector at an angle [rad] to the x axis."""
+    """Return the (2,) unit vector at an angle [rad] to the x axis."""
     return np.array([math.cos(angle), math.sin(angle)])
 
 
 def arm_angle(
     robot: str, foot: ArrayLike, tip: ArrayLike, near: float, far: float, side: int
 ) -> float:
-    """Angle of the first of two arms that reach from one point to another.
+    """Return the angle of the first of two arms that connect two points.
 
     Args:
-        robot: whose, for the message.
-        foot: (2,) [m] where the first arm turns.
-        tip: (2,) [m] where the second one ends.
-        near: [m] length of the first.
-        far: [m] length of the second.
-        side: 1 puts the elbow left of the line from foot to tip, -1 right.
+        robot: name of the robot, for the error message.
+        foot: (2,) [m] centre of rotation of the first arm.
+        tip: (2,) [m] end of the second arm.
+        near: [m] length of the first arm.
+        far: [m] length of the second arm.
+        side: 1 for the elbow left of the line from foot to tip, -1 for right.
 
     Returns:
-        [rad] to the x axis.
+        [rad] angle to the x axis.
 
     Raises:
-        BadInput: out of reach.
+        BadInput: the arms do not reach the tip.
     """
     along = np.asarray(tip, dtype=float) - foot
     reach = math.hypot(*along)
@@ -75,16 +75,16 @@ def arm_angle(
 def two_arms(
     name: str, foot: NDArray, angle: float, tip: NDArray, leg: PlanarLeg
 ) -> list[PlacedFrame]:
-    """Drive, elbow and the frame at the second arm's end, where a pin may sit.
+    """Return drive, elbow and the frame at the second arm's end.
 
     The drive's coordinate is the arm's angle to the x axis.
 
     Args:
-        name: of the leg.
-        foot: (2,) [m] of the drive.
-        angle: [rad] of the driven arm at home.
+        name: name of the leg.
+        foot: (2,) [m] position of the drive.
+        angle: [rad] angle of the driven arm at home.
         tip: (2,) [m] end of the second arm at home.
-        leg: its parameters.
+        leg: parameters of the leg.
 
     Returns:
         Frames ``drive``, ``elbow`` (a pin) and ``arm`` (fixed).

@@ -1,4 +1,4 @@
-"""A planar 3-RRR robot: three legs of two arms, a triangular platform.
+"""A planar 3-RRR robot: three legs of two arms and a triangular platform.
 
 Sources:
     Gosselin, Angeles (1988), The optimum kinematic design of a planar
@@ -28,7 +28,7 @@ from assembly.robots.planar import (
 
 @dataclass(frozen=True)
 class ThreeRRRParameters:
-    """Numbers of the robot [m]; aluminium arms, small ball bearings."""
+    """Parameters of the robot [m]; aluminium arms and small ball bearings."""
 
     base_radius: float = 0.300
     platform_radius: float = 0.080
@@ -42,26 +42,26 @@ class ThreeRRRParameters:
     )
 
     def feet(self) -> NDArray:
-        """(3, 2) [m] the drives, on a circle."""
+        """Return (3, 2) [m] positions of the drives, on a circle."""
         return self.base_radius * _triangle()
 
     def corners(self) -> NDArray:
-        """(3, 2) [m] the platform's pins in its own axes, on a circle."""
+        """Return (3, 2) [m] platform's pins in its own axes, on a circle."""
         return self.platform_radius * _triangle()
 
 
 def three_rrr(parameters: ThreeRRRParameters | None = None) -> Robot:
-    """The robot at its home pose, the platform parallel to the base.
+    """Return the robot at its home pose, the platform parallel to the base.
 
     Args:
-        parameters: of the robot, those above if absent.
+        parameters: parameters of the robot; by default those above.
 
     Returns:
-        15 frames, 2 closures; platform ``leg1.tip``, the triangle's centre.  A
-        drive's coordinate is its arm's angle to the x axis.
+        The robot with 15 frames and 2 closures; platform ``leg1.tip``, the triangle's
+        centre.  A drive's coordinate is its arm's angle to the x axis.
 
     Raises:
-        BadInput: the home pose is out of reach.
+        BadInput: the robot does not reach the home pose.
     """
     P = parameters or ThreeRRRParameters()
     leg = P.leg
@@ -82,5 +82,5 @@ def three_rrr(parameters: ThreeRRRParameters | None = None) -> Robot:
 
 
 def _triangle() -> NDArray:
-    """(3, 2) corners of an equilateral triangle in the unit circle, tip up."""
+    """Return (3, 2) corners of an equilateral triangle in the unit circle, one up."""
     return np.array([direction(math.pi * (1 / 2 + 2 * k / 3)) for k in range(3)])

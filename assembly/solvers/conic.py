@@ -1,12 +1,12 @@
 """Second-order cone programmes in the clearances, each solution with its certificate.
 
 There are two problems: the least energy of a reduced problem (22), and the least factor
-on the clearances of problem (21).  Both are scaled here to size 1.  The second is
-solved by Clarabel.  So is the first by the method ``"reference"``, each solution
-refined in :mod:`assembly.solvers.pressed_cones`; by ``"compiled"`` by the compiled
-interior-point method, in doubt by Clarabel, each solution refined by Newton's method on
-the dual (:mod:`assembly.solvers.one_problem`).  The certified gap, which does not
-depend on the solvers, decides which solution is kept.
+on the clearances of problem (21).  Both are scaled here to size 1.  Clarabel solves the
+second.  The first is solved by Clarabel with ``"reference"``, each solution refined in
+:mod:`assembly.solvers.pressed_cones`.  With ``"compiled"`` the compiled interior-point
+method solves it, in doubt Clarabel, each solution refined by Newton's method on the
+dual (:mod:`assembly.solvers.one_problem`).  The certified gap, which does not depend on
+the solvers, decides which solution is kept.
 
 Sources:
     Goulart, Chen (2024), Clarabel: an interior-point solver for conic programs with
@@ -29,16 +29,17 @@ from assembly.solvers.pressed_cones import refine
 
 _TOLERANCE = 1e-13
 # Clarabel's default static regularisation, 1e-8, stops 3 of 12 points of the paper's
-# robot at a relative gap of 1e-6; without any it reaches 1e-13 on all of them
+# robot at a relative gap of 1e-6; without it the gap is 1e-13 for all of them
 _REGULARISATIONS = (0.0, 1e-10, 1e-8)
-# gap that counts as proved: of the energy, and of the energy without clearance
+# gap that counts as proved: relative to the energy, and to that without clearance
 GAP, GAP_WITHOUT_CLEARANCE = 1e-8, 1e-12
-_GAP_WITHIN = 1e-12  # asked of the interior-point method
-_SHARE = 0.1  # of it that is asked here: the problem before elimination adds to it
-_STOP = 1e-2  # Newton's method stops at this fraction of it
-_STEPS, _FIRST_SIGMA = 150, 1e6  # of Newton's method
-_RESIDUAL = 1e-11  # accepted of a row that no spring enters
-_LARGEST_FACTOR = 1e8  # on the clearances: infeasibility is proved up to it
+_GAP_WITHIN = 1e-12  # required of the interior-point method
+# of the proved gap that is required here: the full problem adds to the gap
+_SHARE = 0.1
+_STOP = 1e-2  # share of this gap at which Newton's method stops
+_STEPS, _FIRST_SIGMA = 150, 1e6  # most steps of Newton's method, and its first sigma
+_RESIDUAL = 1e-11  # accepted residual of a row without springs
+_LARGEST_FACTOR = 1e8  # on the clearances: infeasibility is proved up to this factor
 _UNPROVED = "PrimalInfeasible, which its multipliers do not prove"
 
 
@@ -46,7 +47,7 @@ class SolverFailed(RuntimeError):
     """The solver gave up on a problem.
 
     Attributes:
-        problem: which one.
+        problem: name of the problem.
         status: reported by the solver.
     """
 
@@ -61,11 +62,11 @@ class ConicSolution:
 
     Attributes:
         clearances: (nu,) in units of their cones.
-        springs: (r,) [sqrt(2 J)] multipliers of the springs, G u + h but for the gap.
-        rigid_multipliers: (p,) [J] of the rows that no spring enters.
+        springs: (r,) [sqrt(2 J)] multipliers of the springs, G u + h up to the gap.
+        rigid_multipliers: (p,) [J] of the rows without springs.
         value: [J] of the objective.
         bound: [J] certified lower bound of the objective.
-        feasible: whether any clearances satisfy the rows that no spring enters.
+        feasible: whether any clearances satisfy the rows without springs.
     """
 
     clearances: NDArray
@@ -113,7 +114,7 @@ def minimise_energy(
     Raises:
         SolverFailed: Clarabel gave no usable solution.
     """
-    if not (h.any() or d.any() or k.any()):  # nothing to close, nothing to gain
+    if not (h.any() or d.any() or k.any()):  # no gap to close and no load
         zeros = np.zeros(len(h)), np.zeros(len(k))
         return ConicSolution(np.zeros(len(d)), *zeros, 0.0, 0.0)
     if G.shape[1] == 0:
@@ -159,7 +160,7 @@ def minimise_energy(
 
 
 def _proved(least: ConicSolution, h: NDArray) -> bool:
-    """Whether the certified gap of a scaled problem is small enough."""
+    """Return whether the certified gap of a scaled problem is small enough."""
     allowed = GAP * abs(least.value) + GAP_WITHOUT_CLEARANCE * float(h @ h) / 2
     return least.gap <= _SHARE * allowed
 
@@ -167,7 +168,7 @@ def _proved(least: ConicSolution, h: NDArray) -> bool:
 def _compiled(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray
 ) -> tuple[NDArray | None, NDArray, str]:
-    """The interior-point method of this package; its solution must satisfy H."""
+    """Solve by this package's interior-point method; the solution must satisfy H."""
     u, n = one_problem.interior_point((G, h, d, H, k), cone_starts(group), _GAP_WITHIN)
     finite = np.isfinite(u).all() and np.isfinite(n).all()
     if not finite or np.abs(H @ u - k).max(initial=0.0) > _RESIDUAL:
@@ -179,11 +180,11 @@ def _by_clarabel(
     regularisation: float, G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray,
     group: NDArray,
 ) -> tuple[NDArray | None, NDArray, str]:  # fmt: skip
-    """The same by Clarabel, with v = -G u - h as variables of their own."""
+    """Solve by Clarabel, with v = -G u - h as separate variables."""
     r, nu = G.shape
     cones, radii = _unit_cones(group, np.ones(nu))
     rows = np.vstack([G, H, cones.toarray()])
-    # put together dense: so small a sparse matrix takes longer than its problem
+    # dense: assembling so small a sparse matrix takes longer than its solution
     A = csc_matrix(np.hstack([rows, np.eye(len(rows), r)]))
     b = np.concatenate([-h, k, radii])
     P = csc_matrix(np.diag(np.repeat([0.0, 1.0], [nu, r])))
@@ -209,9 +210,9 @@ _SOLVERS: dict[Method, tuple[_Solver, ...]] = {
 def _certified(
     problem: ConeProgramme, u: NDArray, rigid: NDArray, method: Method
 ) -> Iterator[ConicSolution]:
-    """A solution with the bound of its own springs, and the same refined by Newton."""
+    """Return a solution with the bound of its own springs, or refined by Newton."""
     own = _certify(problem, u, problem.G @ u + problem.h, rigid)
-    if method == "reference":  # Clarabel's own is rarely the better one
+    if method == "reference":  # Clarabel's own is rarely better
         for refined in refine(problem, u, rigid):
             yield from _checked(problem, *refined)
     yield own
@@ -229,7 +230,7 @@ def _certified(
 def _checked(
     problem: ConeProgramme, u: NDArray, springs: NDArray, rigid: NDArray
 ) -> Iterator[ConicSolution]:
-    """What Newton's method ended at, if it is a solution."""
+    """Return the end of Newton's method, if it is a solution."""
     u = into_cones(u, problem.group)
     if all(np.isfinite(part).all() for part in (u, springs, rigid)):
         if np.abs(problem.H @ u - problem.k).max(initial=0.0) <= _RESIDUAL:
@@ -239,12 +240,12 @@ def _checked(
 def _certify(
     problem: ConeProgramme, u: NDArray, springs: NDArray, rigid: NDArray
 ) -> ConicSolution:
-    """A solution with its value and the bound that its multipliers prove."""
+    """Return a solution with its value and the bound by its multipliers."""
     strain = problem.G @ u + problem.h
     value = float(strain @ strain) / 2 - float(problem.d @ u)
     bound = _energy_bound(problem, springs, rigid)
     if not problem.d.any():
-        # any multiple of the multipliers is as good a proof: f gain - f^2 cost / 2
+        # any multiple of the multipliers is a valid proof: f gain - f^2 cost / 2
         cost = float(springs @ springs)
         factor = max(0.0, bound + cost / 2) / cost if cost > 0.0 else 0.0
         better = _energy_bound(problem, factor * springs, factor * rigid)
@@ -254,18 +255,18 @@ def _certify(
 
 
 def _energy_bound(problem: ConeProgramme, spring: NDArray, rigid: NDArray) -> float:
-    """Certified lower bound of problem (22) from any guess of its multipliers.
+    """Return a certified lower bound of problem (22) from a guess of its multipliers.
 
-    For every y and n:  |Gu + h|^2/2 - d.u  >=  y.(Gu + h) - y.y/2 - d.u + n.(k - Hu),
-    and the least of the right side over the unit cones is known in closed form.
+    For every y and n:  |Gu + h|^2/2 - d.u  >=  y.(Gu + h) - y.y/2 - d.u + n.(k - Hu).
+    The minimum of the right side over the unit cones has a closed form.
 
     Args:
         problem: scaled.
-        spring: (r,) the guess y, best G u + h at the minimum.
+        spring: (r,) the guess y; G u + h at the minimum is best.
         rigid: (p,) the guess n.
 
     Returns:
-        The bound; close to the minimum when the guess is close.
+        The bound; close to the minimum if the guess is close.
     """
     G, h, d, H, k, group = problem
     gradient = G.T @ spring - d - H.T @ rigid
@@ -276,7 +277,7 @@ def _energy_bound(problem: ConeProgramme, spring: NDArray, rigid: NDArray) -> fl
 def least_factor(
     B: NDArray, right: NDArray, group: NDArray, scaled: NDArray
 ) -> tuple[float | None, NDArray, NDArray]:
-    """Least t such that B u = right with |u_k| <= t (or <= 1 where not scaled).
+    """Return the least t with B u = right and |u_k| <= t (or <= 1 if not scaled).
 
     Args:
         B: (m, nu) of full row rank, m >= 1.
@@ -285,7 +286,7 @@ def least_factor(
         scaled: (nu,) bool, whether t scales the column's cone.
 
     Returns:
-        t, None if no factor helps; the u (nu,); the multipliers (m,) that prove it.
+        t, None if no factor suffices; u (nu,); the multipliers (m,) that prove it.
 
     Raises:
         SolverFailed: Clarabel gave no usable solution.
@@ -322,7 +323,7 @@ def least_factor(
 
 
 def _unit_cones(group: NDArray, radius: NDArray) -> tuple[csc_matrix, NDArray]:
-    """Rows s = b - A u with s in second-order cones [radius; -u_k], as (A, b)."""
+    """Return rows s = b - A u, s in second-order cones [radius; -u_k], as (A, b)."""
     nu, cones = len(group), int(group.max()) + 1
     # each cone's rows: one for the radius, then its columns, in order
     at = np.arange(nu) + group + 1
@@ -345,7 +346,7 @@ def _clarabel(
     P: csc_matrix, q: NDArray, A: csc_matrix, b: NDArray, cones: _Cones,
     regularisation: float,
 ) -> tuple[NDArray | None, NDArray, str]:  # fmt: skip
-    """Minimise x.P.x/2 + q.x, A x + s = b: primal (None if unusable), dual, status."""
+    """Minimise x.P.x/2 + q.x, A x + s = b; return primal (or None), dual, status."""
     import clarabel
 
     settings = clarabel.DefaultSettings()
@@ -360,7 +361,7 @@ def _clarabel(
     solution = clarabel.DefaultSolver(P, q, A, b, sets, settings).solve()
     status = str(solution.status)
     x, z = np.array(solution.x), np.array(solution.z)
-    # a solution that is not accurate may still be good: its certificate decides
+    # an inaccurate solution may still be good: its certificate decides
     usable = {"Solved", "AlmostSolved", "InsufficientProgress", "MaxIterations"}
     if status not in usable or not (np.isfinite(x).all() and np.isfinite(z).all()):
         return None, z, status
@@ -370,9 +371,9 @@ def _clarabel(
 def _proves_no_point(
     n: NDArray, H: NDArray, k: NDArray, group: NDArray, radius: NDArray
 ) -> bool:
-    """Whether n shows that no u with |u_k| <= radius_k satisfies H u = k."""
-    # n.H u is at most the sum of radius_k |(H^T n)_k|: n.k above it is a proof, once
-    # it is above the rounding of its own terms too
+    """Return whether n proves that no u with |u_k| <= radius_k satisfies H u = k."""
+    # n.H u is at most the sum of radius_k |(H^T n)_k|: a larger n.k is a proof, if it
+    # also exceeds the rounding of its own terms
     most = float(cone_sizes(H.T @ n, group) @ radius)
     rounding = 1e-13 * float(np.abs(n) @ (np.abs(k) + np.abs(H).sum(axis=1)))
     return bool(float(n @ k) > most + rounding)

@@ -1,4 +1,4 @@
-"""Which of the two methods gives an answer: every public solver takes and says it."""
+"""The two methods of every public solver, by name."""
 
 from typing import Literal, get_args
 
@@ -8,13 +8,13 @@ METHODS = get_args(Method)
 
 
 def check_method(method: str) -> None:
-    """Refuse other words.
+    """Reject an unknown method.
 
     Args:
-        method: as asked.
+        method: name of the method.
 
     Raises:
-        ValueError: it is neither.
+        ValueError: the method is unknown.
     """
     if method not in METHODS:
         names = " or ".join(repr(name) for name in METHODS)

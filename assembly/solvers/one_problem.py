@@ -1,6 +1,6 @@
-"""Cone programmes with cones of any size, and a body's farthest screw, compiled.
+"""Compiled cone programmes with cones of any size, and a body's farthest screw.
 
-One problem at a time; :func:`farthest_points` has many of one set side by side.
+They solve one problem at a time; :func:`farthest_points` solves many in parallel.
 """
 
 from collections.abc import Callable
@@ -12,18 +12,19 @@ from numpy.typing import NDArray
 from assembly.kernels.choice import kernels
 
 Problem = tuple[NDArray, NDArray, NDArray, NDArray, NDArray]
-# of a direction: certified height, (6,) screw that (nearly) attains it, (nv,) gradient
+# function of a direction: certified height, (6,) screw that (nearly) attains it,
+# (nv,) gradient
 Support = Callable[[NDArray], tuple[float, NDArray, NDArray]]
 
 
 class SolverLimits(NamedTuple):
-    """How far a method goes.
+    """Limits of an iterative method.
 
     Attributes:
-        relative: gap asked for, relative to |G u + h|^2 / 2 ..
+        relative: required gap, relative to |G u + h|^2 / 2 ..
         absolute: .. plus this.
-        first_sigma: of Newton's method, times the mean |G_k^T h|.
-        steps: most of Newton's method.
+        first_sigma: first sigma of Newton's method, times the mean |G_k^T h|.
+        steps: largest number of Newton steps.
     """
 
     relative: float
@@ -40,10 +41,10 @@ def interior_point(
     Args:
         problem: G (r, nu), h (r,), d (nu,), H (p, nu) of full row rank, k (p,).
         starts: (cones + 1,) first column of each cone, and nu.
-        tolerance: gap asked for.
+        tolerance: required gap.
 
     Returns:
-        u (nu,) and the multipliers (p,) of H, as far as the method came.
+        u (nu,) and the multipliers (p,) of H at the last iterate.
     """
     _, h, d, _, k = problem
     u, y = np.zeros(len(d)), np.zeros(len(h) + len(k))
@@ -54,15 +55,15 @@ def interior_point(
 def newton(
     problem: Problem, starts: NDArray, limits: SolverLimits, u: NDArray, y: NDArray
 ) -> None:
-    """The same by Newton's method on the dual.
+    """Minimise the same objective by Newton's method on the dual.
 
     Args:
-        problem: as above.
-        starts: as above.
-        limits: how far it goes.
+        problem: see :func:`interior_point`.
+        starts: see :func:`interior_point`.
+        limits: limits of the iteration.
         u: (nu,) first guess within the cones; overwritten with the solution.
-        y: (r + p,) overwritten with the multipliers of G's rows, and of H's, which are
-            a first guess too.
+        y: (r + p,) overwritten with the multipliers of G's rows, and of H's, whose
+            values are a first guess.
     """
     kernels.newton(*_contiguous(*problem), _integers(starts), *limits, u, y)
 
@@ -78,12 +79,12 @@ def farthest_points(
         starts: (cones + 1,) first column of each cone, and nu.
         directions: (k, nu) d, of length 1.
         right: (k, p).
-        tolerance: (k,) of d.u.
+        tolerance: (k,) accepted gap of d.u.
 
     Returns:
-        u (k, nu) and the multipliers n (k, p) of the rows, as far as the method came:
-        d.u <= n.right + sum |(d - rows^T n)_c|; (k,) bool, whether both are as close
-        as asked and the rows hold to rounding.
+        u (k, nu) and the multipliers n (k, p) of the rows at the last iterate: d.u <=
+        n.right + sum |(d - rows^T n)_c|; (k,) bool, whether both sides are as close as
+        required and the rows hold to rounding.
     """
     count, (p, nu) = len(directions), rows.shape
     points, multipliers = np.zeros((count, nu)), np.zeros((count, p))
@@ -108,15 +109,15 @@ def farthest(
         start: (nv,) within the unit cones.
         starts: (cones + 1,) first column of each cone, and nv.
         half: 0 for the rotation, 3 for the translation.
-        tolerance: [rad or m] asked of upper minus lower bound.
-        support: of a direction (3,) of that half, its gradient X^T d less what the
-            rows' multipliers take; asked where the compiled method does not come close
-            enough.
+        tolerance: [rad or m] required difference of upper and lower bound.
+        support: function of a direction (3,) of that half; its gradient is X^T d less
+            the part of the rows' multipliers.  It is called if the compiled method is
+            not accurate enough.
 
     Returns:
-        (2,) lower and upper bound, (6,) the screw that attains the lower, and how many
-        support functions it took: no more than 400, with which the bounds may be wider
-        than asked.
+        (2,) lower and upper bound, (6,) the screw that attains the lower, and the
+        number of support functions: at most 400, with which the bounds may be wider
+        than required.
     """
 
     def asked(direction: tuple[float, float, float]) -> tuple[float, NDArray, NDArray]:
@@ -133,10 +134,10 @@ def farthest(
 
 
 def _contiguous(*arrays: NDArray) -> tuple[NDArray, ...]:
-    """Numbers as C++ reads them."""
+    """Return the arrays in C++'s layout."""
     return tuple(np.ascontiguousarray(array, dtype=float) for array in arrays)
 
 
 def _integers(array: NDArray) -> NDArray:
-    """Whole numbers likewise."""
+    """Return integers in C++'s layout."""
     return np.ascontiguousarray(array, dtype=np.int64)

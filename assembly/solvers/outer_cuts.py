@@ -1,8 +1,8 @@
-"""A body's farthest screw, bracketed by cuts: the reference, in numpy.
+"""The farthest screw of a body, bracketed by cuts: the reference, in numpy.
 
-Each support function d.x <= h(d) cuts a half space off; what the cuts leave is a
-polytope that holds the body.  Its farthest corner is an upper bound, the farthest point
-that a support attains a lower one, and the next cut is made across that corner.
+Each support function d.x <= h(d) cuts off a half space; the cuts form a polytope around
+the body.  Its farthest corner is an upper bound; the farthest point that attains a
+support is a lower bound.  The next cut is made in the direction of that corner.
 
 Sources:
     Hoffman (1981), A method for globally minimizing concave functions over convex sets,
@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from assembly.solvers.one_problem import Support
 
-_MOST = 400  # support functions
-# what every cut leaves around the body, so that a flat one has corners, too: of the
-# tolerance, and at least of its size
+_MOST = 400  # largest number of support functions
+# distance of every cut from the body, so that a flat body has corners too: relative to
+# the tolerance, and at least to its size
 _SLACK, _LEAST_SLACK = 0.25, 1e-7
 
 
@@ -28,18 +28,18 @@ def farthest(
     Args:
         centre: (6,) [rad, m] a screw of the body.
         half: 0 for the rotation, 3 for the translation.
-        tolerance: [rad or m] asked of upper minus lower bound.
-        support: of a direction (3,) of that half.
+        tolerance: [rad or m] required difference of upper and lower bound.
+        support: function of a direction (3,) of that half.
 
     Returns:
-        Lower and upper bound, (6,) the screw that attains the lower, and how many
-        support functions it took: no more than 400, with which the bounds may be wider
-        than asked.
+        Lower and upper bound, (6,) the screw that attains the lower, and the number of
+        support functions: at most 400, with which the bounds may be wider than
+        required.
     """
     part = slice(half, half + 3)
     best, low = centre, float(np.linalg.norm(centre[part]))
     cuts: list[NDArray] = []
-    room: list[float] = []  # from the centre to each cut
+    room: list[float] = []  # distance from the centre to each cut
     directions = [*np.eye(3), *-np.eye(3)]
     while True:
         for direction in directions:
@@ -58,7 +58,7 @@ def farthest(
 
 
 def _farthest_corner(cuts: NDArray, room: NDArray, centre: NDArray) -> NDArray:
-    """(3,) the corner of {cuts (x - centre) <= room} of the largest size."""
+    """Return the (3,) corner of {cuts (x - centre) <= room} of the largest size."""
     from scipy.spatial import HalfspaceIntersection
 
     unit = room.max()

@@ -1,8 +1,8 @@
 r"""A minimum of :func:`assembly.solvers.conic.minimise_energy`, refined in numpy.
 
-A cone solver ends at a gap.  Once the cones that are pressed against their bound are
-known, with forces f, the minimum satisfies equations, which Newton's method solves to
-rounding; y are the springs, n the multipliers of H:
+A cone solver ends at a gap.  Once the cones pressed against their bound are known, with
+forces f, the minimum satisfies equations, which Newton's method solves to rounding; y
+are the springs, n the multipliers of H:
 
     G u + h - y = 0,  G' y - d - H' n + f_c u_c = 0,  H u = k,  (|u_c|^2 - 1) / 2 = 0.
 
@@ -17,18 +17,18 @@ from numpy.typing import NDArray
 
 from assembly.solvers.cones import cone_sizes
 
-_STEPS = 4  # two are usual
-_SETTLED = 1e-12  # [-] a last step of the clearances
-_GUESSES = 6  # of the cones that are pressed; one is usual
-_NEAR = 1e-2, 0.0  # [-] slack of a cone that is guessed to be pressed by any force
-_BEYOND = 1e-9  # [-] by which a cone that is not pressed may be left
+_STEPS = 4  # largest number of Newton steps; two are usual
+_SETTLED = 1e-12  # [-] last step of the clearances at convergence
+_GUESSES = 6  # largest number of guesses of the pressed cones; one is usual
+_NEAR = 1e-2, 0.0  # [-] slack below which a cone with any force counts as pressed
+_BEYOND = 1e-9  # [-] accepted excess over a cone that is not pressed
 
 _Problem = tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]
 _Point = tuple[NDArray, NDArray, NDArray]
 
 
 def refine(problem: _Problem, u: NDArray, n: NDArray) -> Iterator[_Point]:
-    """The same minimum to rounding.
+    """Refine a minimum to rounding.
 
     Args:
         problem: G (r, nu), h (r,), d (nu,), H (p, nu), k (p,), and the cone of each
@@ -37,13 +37,13 @@ def refine(problem: _Problem, u: NDArray, n: NDArray) -> Iterator[_Point]:
         n: (p,) its multipliers of H.
 
     Yields:
-        u (nu,), y (r,) and n (p,) from each guess of what is pressed; worse ones where
-        it cannot be told.
+        u (nu,), y (r,) and n (p,) for each guess of the pressed cones; less accurate
+        ones if these cannot be identified.
     """
     G, h, d, H, _, group = problem
     y = G @ u + h
     force, slack = cone_sizes(G.T @ y - d - H.T @ n, group), 1.0 - cone_sizes(u, group)
-    # force times slack is about the solver's gap: one of the two is nearly zero
+    # force times slack is about the solver's gap: one of them is nearly zero
     scale = max(float(y @ y) / 2, float(force.max()), 1e-300)
     for near in _NEAR:
         pressed = (slack < near) | (force > scale * slack)
@@ -53,7 +53,7 @@ def refine(problem: _Problem, u: NDArray, n: NDArray) -> Iterator[_Point]:
 def _settled(
     problem: _Problem, start: _Point, pressed: NDArray, force: NDArray
 ) -> _Point:
-    """The minimum after cones were added that are left, and let go that pull."""
+    """Return the minimum; add exceeded cones, and release those with negative force."""
     for _ in range(_GUESSES):
         settled, forces = _with_pressed(problem, start, pressed, force)
         beyond = ~pressed & (cone_sizes(settled[0], problem[-1]) > 1.0 + _BEYOND)
@@ -67,7 +67,7 @@ def _settled(
 def _with_pressed(
     problem: _Problem, start: _Point, pressed: NDArray, force: NDArray
 ) -> tuple[_Point, NDArray]:
-    """Newton's method with these cones pressed, and the forces on all cones."""
+    """Return Newton's method with these cones pressed, and the forces on all cones."""
     G, h, d, H, k, group = problem
     u, y, n = start
     held = np.flatnonzero(pressed)
@@ -93,7 +93,7 @@ def _with_pressed(
 
 
 def _derivatives(G: NDArray, H: NDArray, N: NDArray, curvature: NDArray) -> NDArray:
-    """Of the equations above by u, y, n and f; N are the normals of pressed cones."""
+    """Return the derivatives of the equations by u, y, n and f; N are the normals."""
     r, p, m = len(G), len(H), N.shape[1]
     return np.block([
         [G, -np.eye(r), np.zeros((r, p + m))],

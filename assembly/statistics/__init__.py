@@ -1,4 +1,4 @@
 """Monte Carlo statistics of geometric errors, and tolerance allocation.
 
-Begin at ``monte_carlo.py``; ``allocation.py`` for tolerances.
+Begin at ``monte_carlo.py`` for draws, at ``allocation.py`` for tolerances.
 """

@@ -1,4 +1,4 @@
-"""An allocation: tolerances, their cost, their proof; as plain values and data set."""
+"""An allocation: tolerances, their cost and their proof, as values and as data set."""
 
 from dataclasses import dataclass, field
 from importlib.metadata import version
@@ -12,13 +12,14 @@ from assembly.statistics.clearance_positions import clearance_means, contact_len
 from assembly.statistics.quantities import UNITS
 from assembly.statistics.requirement import Plan
 from assembly.sweeps.identity import robot_hash
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
+from forcefit.results.text import in_unit
 
 if TYPE_CHECKING:
     import xarray
 
 
-_SHOWN = {"rad": (1e3, "mrad"), "m": (1e3, "mm")}  # factor and unit of tolerances
+_SHOWN = {"rad": "mrad", "m": "mm"}  # display units of tolerances
 _SHARE_OF = {
     "reciprocal": "of the price",
     "logarithm": "of the saving by looser tolerances",
@@ -32,20 +33,20 @@ class Allocation:
     Attributes:
         plan: costs and limits.
         tolerances: (G,) [rad or m].
-        price: their cost.
-        uniformly_scaled: (G,) [rad or m] those with the proportions of the convex
+        price: cost of the tolerances.
+        uniformly_scaled: (G,) [rad or m] tolerances with the proportions of the convex
             programme, scaled uniformly to meet all limits.
-        price_uniformly_scaled: their cost; no less than ``price``.
+        price_uniformly_scaled: cost of ``uniformly_scaled``, at least ``price``.
         price_bound: lower bound of the cost of tolerances that always meet the convex
             limits; NaN for a yield below 1, or where a limit is not convex.
         cuts: planes in the convex programme.
         worst: by limit and for yield 1: the worst corner found and the proven upper
-            bound, over all postures; NaN where nothing is proven.
+            bound, over all postures; NaN if not proven.
         proven_scale: factor on the tolerances, 1 or less, at which the upper bounds
-            meet the limits too; NaN where nothing is proven.
-        verification: by fresh draws: yields with their intervals.
-        perfect_parts: by limit on a pose error, what clearances alone take of it [rad
-            or m], and at which posture.
+            meet the limits too; NaN if not proven.
+        verification: verification by fresh draws: yields with their intervals.
+        perfect_parts: by limit on a pose error, the pose error [rad or m] due to
+            clearances alone, and its posture.
     """
 
     plan: Plan
@@ -63,12 +64,12 @@ class Allocation:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Tolerances over ``class``, as ``--output`` writes them."""
+        """Return the tolerances over ``class``, as ``--output`` writes them."""
         return tolerance_dataset(self)
 
 
 def allocation_of(allocation: Allocation) -> dict[str, Any]:
-    """An allocation as plain values."""
+    """Return an allocation as plain values."""
     plan, shares = allocation.plan, price_shares(allocation)
     classes = [
         {
@@ -97,7 +98,7 @@ def allocation_of(allocation: Allocation) -> dict[str, Any]:
         },
         "proven_scale": allocation.proven_scale,
         "verification": allocation.verification,
-        "clearance": plan.clearance_model if plan.limits_pose else None,
+        "clearance": plan.clearance if plan.limits_pose else None,
         "contact_length": _contact_length(plan),
         **_distribution(plan),
         "draws": plan.draws,
@@ -110,11 +111,11 @@ def allocation_of(allocation: Allocation) -> dict[str, Any]:
 
 
 def price_shares(allocation: Allocation) -> NDArray:
-    """Share of each class in what looser tolerances would save.
+    """Return the share of each class in the saving by looser tolerances.
 
-    At least cost the saving for a relative change of a tolerance is the multiplier of
-    the limit times the change of the limited quantity: cost / tolerance, or the cost if
-    the law is logarithmic.  It has no unit, so angles and lengths compare.
+    At least cost, the saving for a relative change of a tolerance is the multiplier of
+    the limit times the change of the limited quantity.  This is cost / tolerance, or
+    the cost if the law is logarithmic.  It has no unit, so angles and lengths compare.
 
     Args:
         allocation: the tolerances.
@@ -133,9 +134,9 @@ def price_shares(allocation: Allocation) -> NDArray:
 def _taken(
     allocation: Allocation, key: str, reached: float, at: str
 ) -> dict[str, float | str]:
-    """What clearances alone take of a limit, and what the errors would be without."""
+    """Return the part of a limit due to clearances, and the cost without it."""
     plan, limit = allocation.plan, allocation.plan.limits[key]
-    # pose errors by errors and by clearances add up, nearly; tolerances scale with them
+    # pose errors by errors and by clearances nearly add up; tolerances scale with them
     looser = limit / (limit - reached) if reached < limit else np.inf
     without = allocation.price / looser
     if plan.cost == "logarithm":
@@ -147,31 +148,30 @@ def _taken(
 
 
 def _distribution(plan: Plan) -> dict[str, Any]:
-    """How errors are distributed within their tolerances."""
+    """Return how errors are distributed within their tolerances."""
     kind = KINDS[int(plan.sources.kind[0])]
     cut = float(plan.sources.limit[0]) if kind == "truncated" else None
     return {"distribution": kind, "deviations": cut}
 
 
 def _contact_length(plan: Plan) -> float | None:
-    """[m] contact length of the contact model, None for the others."""
-    if not plan.limits_pose or plan.clearance_model != "contact":
+    """Return the [m] contact length of the contact model, None for the others."""
+    if not plan.limits_pose or plan.clearance != "contact":
         return None
     return plan.contact_length or contact_length_of(plan.sources.robot)
 
 
 def _unit(allocation: Allocation, group: int) -> str:
-    """Unit of a class of tolerances."""
+    """Return the unit of a class of tolerances."""
     first = int(np.flatnonzero(allocation.plan.group == group)[0])
     return "rad" if allocation.plan.sources.component[first] < 3 else "m"
 
 
 def allocation_text(results: dict[str, Any]) -> str:
-    """An allocation for people."""
+    """Return an allocation as text."""
     lines = []
     for one in results["tolerances"]:
-        scale, unit = _SHOWN[one["unit"]]
-        line = f"  {one['name']}: +-{scale * one['tolerance']:.4g} {unit}"
+        line = f"  {one['name']}: +-{in_unit(one['tolerance'], _SHOWN[one['unit']])}"
         note = "the loosest allowed" if one["at_loosest"] else f"{one['share']:.0%}"
         lines.append(f"{line} ({note})")
     if lines:
@@ -206,10 +206,11 @@ def allocation_text(results: dict[str, Any]) -> str:
 
 def _taken_text(key: str, one: dict[str, Any]) -> str:
     """What clearances alone take of a limit."""
-    scale, unit = _SHOWN[one["unit"]]
-    reached, limit = scale * one["reached"], scale * one["limit"]
+    reached, limit = (
+        in_unit(one[k], _SHOWN[one["unit"]]) for k in ("reached", "limit")
+    )
     return (
-        f"clearances alone take {reached:.4g} of the {limit:.4g} {unit} of {key} (at "
+        f"clearances alone take {reached} of the {limit} of {key} (at "
         f"{one['at']}): without them tolerances could be about "
         f"{one['looser_without']:.3g} times looser, at a price of about "
         f"{one['price_without']:.3g}"
@@ -217,7 +218,7 @@ def _taken_text(key: str, one: dict[str, Any]) -> str:
 
 
 def _looks_text(check: dict[str, Any]) -> str:
-    """Number of looks, and the confidence of each and of all."""
+    """Return the number of verifications, and the confidence of each and of all."""
     left = check["yield"]["undecided"]
     undecided = f", {left} draws undecided" if left else ""
     return (
@@ -228,7 +229,7 @@ def _looks_text(check: dict[str, Any]) -> str:
 
 
 def _price_text(results: dict[str, Any]) -> str:
-    """Cost of the tolerances, and its lower bound or its reduction."""
+    """Return the cost of the tolerances, and its lower bound or its reduction."""
     price, alike, bound = (results[k] for k in ("price", "price_alike", "price_bound"))
     text = f"price {price:.5g}"
     if np.isfinite(bound):
@@ -241,7 +242,7 @@ def _price_text(results: dict[str, Any]) -> str:
 
 
 def tolerance_dataset(allocation: Allocation) -> "xarray.Dataset":
-    """An allocation as a data set over ``class``."""
+    """Return an allocation as a data set over ``class``."""
     import xarray
 
     plan, results = allocation.plan, allocation_of(allocation)

@@ -28,7 +28,7 @@ from assembly.statistics.scaling import (
 )
 from assembly.statistics.verification import prove_worst, verify
 
-_SCALING_DRAWS = 4  # times the training draws: only one factor is to be found
+_SCALING_DRAWS = 4  # times the training draws: many, since only one factor is searched
 
 
 def allocate(
@@ -41,7 +41,7 @@ def allocate(
     """Find the cheapest tolerances that meet a plan over postures, and verify them.
 
     Args:
-        postures: of one robot, the workspace.
+        postures: postures of one robot, the workspace.
         plan: costs and limits.
         fresh: independent draws for the verification; 0 for none.
         progress: called with the name of a step, its progress and its total.
@@ -51,8 +51,8 @@ def allocate(
         The tolerances.
 
     Raises:
-        BadInput: an error is taken up by nothing, or perfect parts or even the
-            tightest tolerances violate a limit.
+        BadInput: no part takes up an error, or a limit is violated by perfect parts or
+            by the tightest tolerances.
     """
     replay = replay or Replay()
     requirement = Requirement(postures, plan, replay)
@@ -94,7 +94,7 @@ def _scaled_tolerances(
     proportions: NDArray,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, NDArray]:
-    """The cheapest tolerances found, and the given proportions scaled uniformly."""
+    """Return the cheapest tolerances, and the given proportions scaled uniformly."""
     samples = draw_samples(requirement, TRAINING)
     if requirement.is_convex:
         uniformly_scaled = scale_uniformly(
@@ -121,7 +121,7 @@ def _scaled_tolerances(
 
 
 def _typical_energy(requirement: Requirement) -> float:
-    """[J] median of draws at the loosest tolerances, at the first posture."""
+    """Return [J] median of draws at the loosest tolerances, at the first posture."""
     plan = requirement.plan
     values = plan.draws_of(TRAINING, 200) * plan.spread(plan.most)
     rows = requirement.experiments[0].evaluate(values, range(len(values)))

@@ -35,12 +35,12 @@ class Positions:
     def start_chains(
         self, u: NDArray, rng: np.random.Generator, walks: NDArray
     ) -> None:
-        """Starts of the chains: close to the boundary in random directions.
+        """Compute the chains' starts: close to the boundary, in random directions.
 
         Args:
             u: (nu,) the ellipsoid's centre.
-            rng: of random numbers.
-            walks: (chains, nu) overwritten.
+            rng: generator of random numbers.
+            walks: (chains, nu) the starts, overwritten.
         """
         bits = rng.bit_generator
         with bits.lock:
@@ -49,12 +49,12 @@ class Positions:
     def walk(
         self, u: NDArray, every: int, rng: np.random.Generator, trace: NDArray
     ) -> None:
-        """Continue a chain; its platform screw is kept every so many trajectories.
+        """Continue a chain; keep its platform screw at regular intervals.
 
         Args:
             u: (nu,) the chain's point, overwritten.
             every: number of trajectories between two screws.
-            rng: of random numbers.
+            rng: generator of random numbers.
             trace: (kept, 6) [rad, m] overwritten with the screws.
         """
         bits = rng.bit_generator

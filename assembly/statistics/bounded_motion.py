@@ -1,9 +1,9 @@
 """Clearance positions where bounds of passive joints' own motion may be active.
 
-Those bounds are left out of the prepared posture: most are ranges that no clearance
-comes near.  Draws in which one may be reached are positioned one by one, in the set of
-platform screws of problem (27), ``frozen``, which has every bound that counts
-as a cone (:mod:`assembly.linear.reference.pose_error`).
+Those bounds are left out of the prepared posture, because clearances reach hardly any
+of them.  Draws in which one may be reached are positioned one by one.  For them the set
+of platform screws of problem (27), ``frozen``, has every bound that counts as a cone
+(:mod:`assembly.linear.reference.pose_error`).
 """
 
 from dataclasses import replace
@@ -19,20 +19,19 @@ from assembly.linear.reference.reduction import FreeMotion
 from assembly.solvers.conic import SolverFailed
 from assembly.statistics.linear_response import LinearResponse
 
-ASSUMPTION = "frozen"  # every spring as in the solution of (22)
+ASSUMPTION = "frozen"  # every spring is as in the solution of (22)
 
 
 def draws_at_bounds(prepared: LinearResponse, draws: Assembly) -> NDArray:
-    """Draws in which a passive joint may reach the bound of its own motion.
+    """Return the draws in which a passive joint may reach the bound of its own motion.
 
     Args:
         prepared: the posture.
         draws: its solutions for k draws.
 
     Returns:
-        (k,) bool: a bound is active in the solution, or the clearances can move a
-        joint up to its bound, or nothing else than the bound holds the joint and with
-        it the platform.
+        (k,) bool: a bound is active in the solution, or the clearances can move a joint
+        up to its bound, or the bound alone holds the joint and with it the platform.
     """
     solved = np.isfinite(draws.energy)
     active = solved & np.isnan(draws.clearances).any(axis=1)
@@ -51,7 +50,7 @@ def draws_at_bounds(prepared: LinearResponse, draws: Assembly) -> NDArray:
 
 
 def _moves_platform(prepared: LinearResponse) -> NDArray:
-    """(nq,) bool: free motions that the closures do not hold and the platform shows."""
+    """Return (nq,) bool: free motions of the platform that no closure holds."""
     mismatch = prepared.posture.mismatch
     A_q = prepared.closures @ prepared.joints.free
     P_q = prepared.platform @ prepared.joints.free
@@ -63,18 +62,18 @@ def _moves_platform(prepared: LinearResponse) -> NDArray:
 def bounded_position(
     draws: Assembly, i: int, wrench: NDArray | None, rng: np.random.Generator
 ) -> tuple[NDArray, bool]:
-    """Platform screw of one draw at contact, or uniform over its set.
+    """Return the platform screw of one draw at contact, or uniform over its set.
 
     Args:
-        draws: of one posture.
-        i: which of them.
+        draws: draws of one posture.
+        i: index of the draw.
         wrench: (6,) [N m, N] that displaces the platform to contact; None for the
             uniform distribution.
-        rng: of random numbers, for the uniform distribution.
+        rng: generator of random numbers, for the uniform distribution.
 
     Returns:
-        (6,) [rad, m], NaN where the draw has no solution or the solver fails; and
-        whether the walk mixed.  Motions without any bound stay at their least size.
+        (6,) [rad, m], NaN if the draw has no solution or the solver fails; and whether
+        the walk mixed.  Motions without any bound stay at their least size.
     """
     from assembly.statistics.uniform_clearance import sample_uniform_position
 

@@ -1,7 +1,7 @@
 """Clearance models: the positions that clearances take in an assembled robot.
 
-At least energy the clearances that carry load are at their bound.  The positions that
-the others may take without changing any spring form a convex set.  The models are
+At least energy the clearances that carry load are at their bound.  The other clearances
+may move without changing any spring; their positions form a convex set.  The models are
 
 ======== =====================================================================
 worst    any position: the largest pose errors count, see
@@ -11,9 +11,9 @@ contact  displaced by a wrench of random direction on the platform until in cont
 least    that of the solution of (22): one possible position of many
 ======== =====================================================================
 
-A direction of wrenches needs a length: the random moment, divided by it, is as large as
-the random force.  The positions depend on it, so it is named with every result; where
-the loads in service are known, they say how the clearances close, and no length is
+The contact model needs a length: random moments divided by it are as large as random
+forces.  The positions depend on this length, so it is stated with every result.  Where
+the loads in service are known they determine how the clearances close, and no length is
 needed.
 """
 
@@ -36,23 +36,23 @@ CLEARANCE_MODELS = {
     "contact": "clearances displaced to contact by a wrench of random direction",
     "least": "clearances where the solution leaves them, one possible place of many",
 }
-CLEARANCE_STREAM = 1  # of random numbers; 0 is the errors'
+CLEARANCE_STREAM = 1  # number of the stream of random numbers; 0 is the errors' stream
 
 
 def position_clearances(
     prepared: LinearResponse,
     draws: Assembly,
-    clearance_model: str,
+    clearance: str,
     generators: Sequence[np.random.Generator],
     contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:
-    """Platform screws with the clearances at positions of a clearance model.
+    """Return the platform screws with the clearances at positions of a clearance model.
 
     Args:
         prepared: the posture.
-        draws: k of them, of its ``solve``.
-        clearance_model: one of :data:`CLEARANCE_MODELS` but the worst.
-        generators: of random numbers, one for each draw; none for "least".
+        draws: k of them, by the posture's ``solve``.
+        clearance: one of :data:`CLEARANCE_MODELS` except the worst.
+        generators: of random numbers, one for each draw; not used for "least".
         contact_length: [m] of the contact model, see :func:`contact_length_of`.
 
     Returns:
@@ -61,16 +61,16 @@ def position_clearances(
         :func:`assembly.statistics.uniform_clearance.sample_uniform_position`.
 
     Raises:
-        ValueError: ``clearance_model`` is something else.
+        ValueError: ``clearance`` is something else.
     """
-    if clearance_model not in CLEARANCE_MODELS or clearance_model == "worst":
+    if clearance not in CLEARANCE_MODELS or clearance == "worst":
         valid = tuple(name for name in CLEARANCE_MODELS if name != "worst")
-        raise ValueError(f"clearance is {clearance_model!r}, expected one of {valid}")
+        raise ValueError(f"clearance is {clearance!r}, expected one of {valid}")
     mixed = np.ones(len(draws.energy), dtype=bool)
-    if clearance_model == "least":
+    if clearance == "least":
         return draws.platform_screw, mixed
     wrenches = None
-    if clearance_model == "contact":
+    if clearance == "contact":
         length = contact_length or contact_length_of(prepared.posture.robot)
         wrenches = _random_wrenches(generators, length)
     screws = draws.platform_screw.copy()
@@ -91,7 +91,7 @@ def _moved_clearances(
     prepared: LinearResponse, draws: Assembly, left: NDArray, wrenches: NDArray | None,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Motions of the clearances in the draws ``left``, and whether the walks mixed."""
+    """Return the clearances' motions in the draws ``left``, and whether walks mixed."""
     clearances, mixed = draws.clearances.copy(), np.ones(len(left), dtype=bool)
     loaded = loaded_clearances(prepared, draws)
     patterns, pattern_of_draw = np.unique(loaded, axis=0, return_inverse=True)
@@ -110,14 +110,14 @@ def _moved_clearances(
 
 
 def contact_length_of(robot: Robot) -> float:
-    """[m] default length that makes forces of moments: the robot's longest body."""
+    """Return the default contact length [m], the robot's longest body."""
     return size_of(robot)
 
 
-def clearance_means(clearance_model: str, contact_length: float | None = None) -> str:
-    """A clearance model in words, with the length that the contact model needs."""
-    words = CLEARANCE_MODELS[clearance_model]
-    if clearance_model != "contact" or contact_length is None:
+def clearance_means(clearance: str, contact_length: float | None = None) -> str:
+    """Return a clearance model in words, with the length of the contact model."""
+    words = CLEARANCE_MODELS[clearance]
+    if clearance != "contact" or contact_length is None:
         return words
     return f"{words} (moments / {contact_length:.4g} m, contact length, as forces)"
 
@@ -125,7 +125,7 @@ def clearance_means(clearance_model: str, contact_length: float | None = None) -
 def _random_wrenches(
     generators: Sequence[np.random.Generator], length: float
 ) -> NDArray:
-    """(k, 6) wrenches on the platform: moments over the length are as forces."""
+    """Return (k, 6) random wrenches on the platform, moments times the length."""
     scale = np.repeat([1.0, 1.0 / length], 3)
     wrenches = np.array([rng.normal(size=6) for rng in generators])
     return wrenches.reshape(-1, 6) * scale
@@ -135,7 +135,7 @@ def _at_random(
     prepared: LinearResponse, loaded: NDArray, clearances: NDArray,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Clearances uniform over their set, and whether the walks mixed."""
+    """Return the clearances uniform over their set, and whether the walks mixed."""
     from assembly.statistics.uniform_clearance import sample_uniform_position
 
     free = ~loaded
@@ -155,7 +155,7 @@ def _at_random(
 def _at_contact(
     prepared: LinearResponse, loaded: NDArray, clearances: NDArray, wrenches: NDArray
 ) -> NDArray:
-    """Clearances displaced along wrenches (k, 6) on the platform until in contact."""
+    """Move clearances along wrenches (k, 6) on the platform until in contact."""
     from assembly.statistics.contact_positions import move_to_contact
 
     rows, free = clearance_constraints(prepared, loaded), ~loaded
@@ -167,7 +167,7 @@ def _at_contact(
 
 
 def free_starts(prepared: LinearResponse, free: NDArray) -> NDArray:
-    """(cones + 1,) first column of each cone that is free among those that are."""
+    """Return the (cones + 1,) first columns of the free cones, among free columns."""
     sizes = np.diff(prepared.starts)[free[prepared.starts[:-1]]]
     return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
@@ -179,7 +179,7 @@ def _at_contact_alone(
     clearances: NDArray,
     direction: NDArray,
 ) -> NDArray:
-    """(nu,) the farthest position, by Clarabel."""
+    """Return the (nu,) farthest position, by Clarabel."""
     group = np.unique(prepared.joints.group[free], return_inverse=True)[1]
     none, size = np.zeros((0, int(free.sum()))), np.linalg.norm(direction[free])
     solution = minimise_energy(
@@ -196,30 +196,30 @@ def _at_contact_alone(
 
 
 def loaded_clearances(prepared: LinearResponse, draws: Assembly) -> NDArray:
-    """(k, nu) bool: clearances loaded at their bound, by strict complementarity."""
+    """Return (k, nu) bool: clearances with a force at their bound (complementarity)."""
     forces = draws.multipliers @ (_cone_columns(prepared))
     if prepared.loads is not None:
         forces += prepared.loads.joint @ prepared.joints.cones
     force_sizes = _sizes(forces, prepared.starts)
     slack = np.maximum(0.0, 1.0 - _sizes(draws.clearances, prepared.starts))
-    # force times slack is about the solver's gap: one of the two is nearly zero
+    # force times slack is about the solver's gap: one of them is nearly zero
     scale = np.maximum(draws.energy, 1e-18)[:, None]
     loaded = (force_sizes > scale * slack) & (force_sizes > 1e-9 * scale)
     return np.repeat(loaded, np.diff(prepared.starts), axis=1)
 
 
 def clearance_constraints(prepared: LinearResponse, loaded: NDArray) -> NDArray:
-    """(p, nu) orthonormal rows of the equations that the free clearances keep."""
+    """Return (p, nu) orthonormal rows of the equations that free clearances satisfy."""
     rows = np.vstack([prepared.G, prepared.H]) * ~loaded
     _, S, Vt = np.linalg.svd(rows, full_matrices=False)
     return np.ascontiguousarray(Vt[S > 1e-10 * S.max(initial=0.0)])
 
 
 def _cone_columns(prepared: LinearResponse) -> NDArray:
-    """(m, nu) closure columns of the clearances."""
+    """Return the (m, nu) closure columns of the clearances."""
     return prepared.closures @ prepared.joints.cones
 
 
 def _sizes(values: NDArray, starts: NDArray) -> NDArray:
-    """(k, cones) size of each cone's part."""
+    """Return the (k, cones) size of each cone's part."""
     return np.sqrt(np.add.reduceat(values**2, starts[:-1], axis=1))

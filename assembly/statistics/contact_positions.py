@@ -5,19 +5,19 @@ from numpy.typing import NDArray
 
 from assembly.solvers.one_problem import farthest_points
 
-_PRECISION = 1e-9  # of what a position attains along its direction
+_PRECISION = 1e-9  # relative precision of a position's component along its direction
 
 
 def move_to_contact(
     rows: NDArray, starts: NDArray, free: NDArray, positions: NDArray,
     directions: NDArray,
 ) -> NDArray:  # fmt: skip
-    """The farthest point of the clearances' set along each direction.
+    """Return the farthest point of the clearances' set along each direction.
 
     Args:
         rows: (p, nu) orthonormal, zero where not ``free``.
         starts: (cones + 1,) first column of each cone, and nu.
-        free: (nu,) bool, which may move; whole cones.
+        free: (nu,) bool, True for clearances that may move; whole cones.
         positions: (k, nu) points of the set.
         directions: (k, nu) linear objectives to be maximised.
 

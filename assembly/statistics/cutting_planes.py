@@ -2,11 +2,10 @@
 
 Two requirements are convex in the tolerances t:
 
-- *always* (yield 1): margin or energy at every corner of the tolerances, for
-  ``m(t s)`` is convex in t for every choice s of signs, and proportional to t if it is
-  the margin;
+- *always* (yield 1): margin or energy at every corner of the tolerances.  For every
+  choice s of signs ``m(t s)`` is convex in t; for the margin it is proportional to t.
 - *with a yield*: the mean of the worst (1 - yield) of many fixed draws s (the
-  conditional value at risk), which is more than the yield asks.
+  conditional value at risk), which is stricter than the yield.
 
 Each iteration solves the programme, finds the largest violation of the requirement, and
 adds the plane of its slopes.  Every plane holds for all tolerances that meet the
@@ -26,14 +25,14 @@ from assembly.statistics.requirement import TRAINING, Plan, Requirement
 from assembly.statistics.worst_case import CORNERS, random_corners
 from forcefit.inputs.table import BadInput
 
-_TOLERANCE = 1e-3  # of a limit: largest violation at the end
+_TOLERANCE = 1e-3  # relative to a limit: largest violation accepted at the end
 _MOST_CUTS = 200
 
 
 def cut_planes(
     requirement: Requirement, progress: Callable[[str, int, int], None]
 ) -> tuple[NDArray, float, int]:
-    """Cheapest tolerances that meet the convex limits of a requirement.
+    """Return the cheapest tolerances that meet the convex limits of a requirement.
 
     Args:
         requirement: limits at all postures.
@@ -64,7 +63,7 @@ def cut_planes(
 def cheapest_within(
     plan: Plan, planes: Sequence[NDArray], least: NDArray, most: NDArray
 ) -> NDArray:
-    """Cheapest tolerances with ``a.t <= 1`` for all planes a, and within bounds.
+    """Return cheapest tolerances with ``a.t <= 1`` for all planes a, and within bounds.
 
     Args:
         plan: its costs.
@@ -76,12 +75,12 @@ def cheapest_within(
         (G,) [rad or m].
 
     Raises:
-        BadInput: there are none.
+        BadInput: no tolerances satisfy the planes.
     """
     import cvxpy as cp
 
     A = np.array(planes).reshape(-1, len(plan.names))
-    # scaled: each alone would reach its plane at 1
+    # scaled so that each tolerance alone reaches its plane at 1
     steepest = np.maximum(A, 0.0).max(axis=0, initial=0.0)
     scale = np.minimum(most, 1.0 / np.maximum(steepest, 1e-300))
     x = cp.Variable(len(plan.names))
@@ -101,7 +100,7 @@ def cheapest_within(
 
 
 def _violated(requirement: Requirement, t: NDArray) -> Iterator[NDArray]:
-    """Planes ``a.t <= 1`` that cut off the tolerances t."""
+    """Yield planes ``a.t <= 1`` that cut off the tolerances t."""
     plan = requirement.plan
     spread = plan.spread(t)
     for key, prepared in requirement.convex.items():
@@ -131,7 +130,7 @@ def _violated(requirement: Requirement, t: NDArray) -> Iterator[NDArray]:
 
 
 def _plane(slopes: NDArray, value: float, t: NDArray, limit: float) -> NDArray:
-    """The plane ``a.t' <= 1`` of a linearised quantity and its limit."""
+    """Return the plane ``a.t' <= 1`` of a linearised quantity and its limit."""
     right = limit - value + float(slopes @ t)
     if right <= 0:
         raise BadInput(f"even perfect parts exceed a limit of {limit:g}")

@@ -15,12 +15,12 @@ _BINS, _RESAMPLES = 1024, 200
 
 
 def proportion(successes: int, count: int, level: float = 0.95) -> dict[str, float]:
-    """Probability of success with its Clopper-Pearson interval.
+    """Return the probability of success with its Clopper-Pearson interval.
 
     Args:
-        successes: of ``count`` independent trials.
+        successes: successes of ``count`` independent trials.
         count: > 0.
-        level: of confidence; the coverage is at least this.
+        level: level of confidence; the coverage is at least this.
 
     Returns:
         ``probability``, ``lower``, ``upper``.
@@ -35,13 +35,13 @@ def proportion(successes: int, count: int, level: float = 0.95) -> dict[str, flo
 def bracketed(
     holds: int, fails: int, count: int, level: float = 0.95
 ) -> dict[str, float]:
-    """Probability of success, where some trials are undecided.
+    """Return the probability of success, where some trials are undecided.
 
     Args:
         holds: certain successes of ``count`` independent trials.
         fails: certain failures.
         count: > 0.
-        level: of confidence, for any outcome of the undecided trials.
+        level: level of confidence, for any outcome of the undecided trials.
 
     Returns:
         ``probability`` of a certain success, ``lower``, ``upper``, number of
@@ -53,12 +53,12 @@ def bracketed(
 
 
 def quantile(values: ArrayLike, share: float, level: float = 0.95) -> dict[str, float]:
-    """A quantile with its interval by order statistics.
+    """Return a quantile with its interval by order statistics.
 
     Args:
         values: (k,) a sample.
-        share: of the distribution below it, in (0, 1).
-        level: of confidence.
+        share: share of the distribution below it, in (0, 1).
+        level: level of confidence.
 
     Returns:
         ``value``, ``lower``, ``upper``; infinite where the sample is too small, or has
@@ -79,11 +79,11 @@ def quantile(values: ArrayLike, share: float, level: float = 0.95) -> dict[str, 
 
 
 def mean(values: ArrayLike, level: float = 0.95) -> dict[str, float]:
-    """A mean with its interval by the central limit theorem.
+    """Return a mean with its interval by the central limit theorem.
 
     Args:
         values: (k,) a sample, k > 1.
-        level: of confidence.
+        level: level of confidence.
 
     Returns:
         ``value``, ``lower``, ``upper``, ``deviation`` of one draw.
@@ -100,15 +100,15 @@ def mean(values: ArrayLike, level: float = 0.95) -> dict[str, float]:
 def most_probable(
     values: ArrayLike, level: float = 0.95, *, positive: bool = False, seed: int = 1
 ) -> dict[str, float]:
-    """Mode of a sample's density, with a bootstrap interval.
+    """Return the mode of a sample's density, with a bootstrap interval.
 
     The density is estimated with a Gaussian kernel of Silverman's width, on 1024 bins.
 
     Args:
         values: (k,) a sample.
-        level: of confidence.
-        positive: of sizes: the kernel is reflected at zero.
-        seed: of the bootstrap.
+        level: level of confidence.
+        positive: whether the samples are sizes; the kernel is then reflected at zero.
+        seed: seed of the bootstrap.
 
     Returns:
         ``value``, ``lower``, ``upper``.
@@ -121,7 +121,7 @@ def most_probable(
     scale = min(float(x.std()), spread) or float(x.std())
     if scale <= 1e-12 * np.abs(x).max():  # all equal up to rounding
         return dict.fromkeys(("value", "lower", "upper"), float(x[0]))
-    # a long tail must not widen the bins: the mode is not there
+    # a long tail must not widen the bins: the mode is elsewhere
     ends = np.quantile(x, [0.25, 0.75]) + np.array([-8.0, 8.0]) * scale
     low = 0.0 if positive else max(float(x.min()) - 4 * scale, float(ends[0]))
     high = min(float(x.max()) + 4 * scale, float(ends[1]))
@@ -137,8 +137,8 @@ def most_probable(
 
 
 def _modes(counts: NDArray, width: float) -> NDArray:
-    """Bins where smoothed histograms, as rows, are largest, refined by parabolas."""
-    # a cosine transform goes on beyond both ends as in a mirror
+    """Return the modes of smoothed histograms, one a row, refined by parabolas."""
+    # a cosine transform continues the density beyond both ends by reflection
     bins = counts.shape[1]
     decay = np.exp(-0.5 * (np.pi * np.arange(bins) / bins * width) ** 2)
     density = fft.idct(fft.dct(counts.astype(float), axis=1) * decay, axis=1)

@@ -24,12 +24,15 @@ from assembly.statistics.posture_margins import PostureMargins, prepare_margins
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.stiffness_spread import draw_stiffnesses
 from assembly.statistics.worst_clearance import PRECISION, bound_worst_errors
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.renamed import renamed_fields, warn_renamed
 from forcefit.inputs.table import BadInput
+from forcefit.results.display import html_table, short_repr
 
-_PRECISION = 1e-3  # of a limit on a pose error: upper minus lower bound
+# relative to a limit on a pose error: required upper minus lower bound
+_PRECISION = 1e-3
 
 
+@renamed_fields(clearance_model="clearance")
 @dataclass(frozen=True, eq=False)
 class Experiment:
     """Distributions of the errors at a posture, and the quantities of each draw.
@@ -38,25 +41,25 @@ class Experiment:
         posture: of the robot; drawn errors replace its own.
         sources: of the errors.
         seed: of all draws.
-        clearance_model: one of
+        clearance: one of
             :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
         margins: whether the zone margins are computed.
         stress: whether the stress of the links is computed.
         load: (6,) [N m, N] on the platform at its origin, base axes; none if absent.
         gravity: (3,) [m/s^2] base axes; none if absent.
         stiffness: state of the platform's stiffness, one of
-            :data:`assembly.sweeps.point_stiffness.STATES`, not the nominal one;
-            empty for none.
+            :data:`assembly.sweeps.point_stiffness.STATES` except the nominal one; empty
+            for none.
         precision: [rad, m] of the largest pose errors of the worst clearance model:
-            upper minus lower bound; inf for one that is not needed.
-        contact_length: [m] by which random moments of the contact model are as large as
-            forces; None for the robot's longest body.
+            required upper minus lower bound; inf if not needed.
+        contact_length: [m] random moments of the contact model divided by it are as
+            large as random forces; None for the robot's longest body.
     """
 
     posture: Posture
     sources: ErrorSources
     seed: int = 1
-    clearance_model: str = "worst"
+    clearance: str = "worst"
     margins: bool = True
     stress: bool = True
     load: tuple[float, ...] | None = None
@@ -68,24 +71,30 @@ class Experiment:
     __repr__, _repr_html_ = short_repr, html_table
 
     def __post_init__(self) -> None:
-        if self.clearance_model not in CLEARANCE_MODELS:
+        if self.clearance not in CLEARANCE_MODELS:
             raise ValueError(
-                f"clearance is {self.clearance_model!r}, expected one of "
+                f"clearance is {self.clearance!r}, expected one of "
                 f"{tuple(CLEARANCE_MODELS)}"
             )
         if self.contact_length is not None and not 0 < self.contact_length < np.inf:
             raise ValueError(f"contact length is {self.contact_length}, expected > 0 m")
 
     @property
+    def clearance_model(self) -> str:
+        """The old name of ``clearance``, for one release."""
+        warn_renamed("Experiment.clearance_model", "Experiment.clearance")
+        return self.clearance
+
+    @property
     def used_contact_length(self) -> float | None:
         """[m] contact length of the contact model, None for the others."""
-        if self.clearance_model != "contact":
+        if self.clearance != "contact":
             return None
         return self.contact_length or contact_length_of(self.posture.robot)
 
     @cached_property
     def energies(self) -> LinearResponse:
-        """The posture prepared for (22).
+        """The posture, prepared for problem (22).
 
         Raises:
             BadInput: the load drives a motion that nothing resists.
@@ -97,7 +106,7 @@ class Experiment:
 
     @cached_property
     def zones(self) -> dict[str, PostureMargins]:
-        """The posture prepared for (21), by quantity."""
+        """The posture, prepared for problem (21), by quantity."""
         if not self.margins:
             return {}
         return {k: prepare_margins(self.posture, r) for k, r in MARGINS.items()}
@@ -111,7 +120,7 @@ class Experiment:
 
     @property
     def stress_errors(self) -> list[float]:
-        """[1] of each link's stress, the mesh's estimated relative error."""
+        """[-] estimated relative error of each link's stress by its mesh."""
         if not self.stress:
             return []
         return [x.relative_error for x in stressed_links(self.posture.robot)]
@@ -123,17 +132,17 @@ class Experiment:
             "energy": (), "duality_gap": (), "platform_screw": (6,), "rotation": (),
             "translation": (), "force": (), "moment": (), "stress": (len(self.links),),
         }  # fmt: skip
-        if self.clearance_model == "worst":
+        if self.clearance == "worst":
             shapes |= {f"{name}_lower": () for name in POSE_ERRORS}
         shapes |= dict.fromkeys(self.zones, ())
         if self.stiffness:
             shapes |= {"stiffness": (6,), "free_motion": (6, 6)}
         fields = [(name, "<f8", shape) for name, shape in shapes.items()]
-        flags = ["clearance_mixed"] if self.clearance_model == "uniform" else []
+        flags = ["clearance_mixed"] if self.clearance == "uniform" else []
         return np.dtype([*fields, *((name, "u1") for name in [*flags, "status"])])
 
     def check_limits(self, limits: Iterable[str]) -> None:
-        """Refuse limits on quantities that are not computed.
+        """Reject limits on quantities that are not computed.
 
         Raises:
             BadInput: margins were left out, or no link's stress can be computed.
@@ -148,12 +157,12 @@ class Experiment:
                 )
 
     def solve(self, first: int, count: int) -> NDArray:
-        """Records of the draws ``first`` .. ``first + count - 1``."""
+        """Return the records of the draws ``first`` .. ``first + count - 1``."""
         values = self.sources.draw(first, count, self.seed)
         return self.evaluate(values, range(first, first + count))
 
     def evaluate(self, values: NDArray, draws: Sequence[int] | NDArray) -> NDArray:
-        """Records of given values of the sources.
+        """Return the records of given values of the sources.
 
         Args:
             values: (k, m) [rad or m].
@@ -171,22 +180,20 @@ class Experiment:
         rows["duality_gap"] = solved.duality_gap()
         rows["status"] = ~np.isfinite(solved.energy)
         screws = solved.platform_screw
-        if self.clearance_model == "worst":
+        if self.clearance == "worst":
             bounds, _ = bound_worst_errors(solved, self.precision)
             for i, name in enumerate(POSE_ERRORS):
                 rows[f"{name}_lower"], rows[name] = bounds[:, i].T
         else:
-            # the positions of "least" are not random, and generators are slow to make
-            numbers = (
-                np.asarray(draws).tolist() if self.clearance_model != "least" else []
-            )
+            # the positions of "least" are not random, and generators are slow to create
+            numbers = np.asarray(draws).tolist() if self.clearance != "least" else []
             rngs = [draw_generator(self.seed, d, CLEARANCE_STREAM) for d in numbers]
             screws, mixed = position_clearances(
-                self.energies, solved, self.clearance_model, rngs, self.contact_length
+                self.energies, solved, self.clearance, rngs, self.contact_length
             )
             for i, name in enumerate(POSE_ERRORS):
                 rows[name] = np.linalg.norm(screws[:, 3 * i : 3 * i + 3], axis=1)
-            if self.clearance_model == "uniform":
+            if self.clearance == "uniform":
                 rows["clearance_mixed"] = mixed
         rows["platform_screw"] = screws
         at_tips = solved.frame_loads.at_tips
@@ -209,11 +216,11 @@ class Experiment:
 def precision_for(
     limits: Mapping[str, float], share: float = _PRECISION
 ) -> tuple[float, float]:
-    """Precision of pose errors that suffices to check limits on them.
+    """Return the precision of pose errors that suffices to check limits on them.
 
     Args:
-        limits: by quantity.
-        share: of a limit.
+        limits: limits by quantity.
+        share: share of a limit.
 
     Returns:
         [rad, m] for an :class:`Experiment`.

@@ -1,13 +1,13 @@
 """Variance-based importance of the errors: Sobol's indices.
 
 The first-order index of a source is the share of a result's variance that it explains
-alone, the total index the share that involves it.  By Saltelli's design they take
-(groups + 2) times the draws.  Where a result is linear in the errors they have a closed
-form, ``a_i^2 var_i / sum_j a_j^2 var_j``, and both are equal.
+alone; the total index is the share that involves it.  Saltelli's design computes both
+from (groups + 2) times the draws.  If a result is linear in the errors they have a
+closed form, ``a_i^2 var_i / sum_j a_j^2 var_j``, and are equal.
 
-A draw without a solution is discarded with the draws it would be compared with, and
-counted.  The errors of the remaining draws are no longer independent, so where more
-than a few are discarded no indices are given, but a reason.
+A draw without a solution is discarded with the draws compared with it, and counted. The
+errors of the remaining draws are then dependent.  So if more than a few are discarded,
+a reason is given instead of indices.
 
 Sources:
     Saltelli et al. (2010), Variance based sensitivity analysis of model output, table 2
@@ -23,8 +23,11 @@ from numpy.typing import NDArray
 from assembly.model.error_distributions import ErrorSources
 from assembly.statistics.ranking import kind_of
 
-STREAMS = (2, 3)  # of random numbers, see assembly.model.error_distributions
-MOST_FAILED = 0.05  # of the draws compared; with more the errors are dependent
+STREAMS = (
+    2,
+    3,
+)  # of random numbers, see assembly.model.error_distributions
+MOST_FAILED = 0.05  # largest share of draws discarded: the others are dependent
 _RESAMPLES = 200
 
 
@@ -35,10 +38,10 @@ class Importance:
     Attributes:
         groups: names of the groups.
         first: (s, d, 3) share explained alone: value, lower, upper.
-        total: (s, d, 3) share that involves the group: likewise.
+        total: (s, d, 3) share that involves the group: value, lower, upper.
         variance: (s,) of the results.
-        failed: (s, d) share of the base draws discarded, as one of the three draws
-            compared has no solution; the indices are NaN beyond :data:`MOST_FAILED`.
+        failed: (s, d) share of the base draws discarded because one of the three draws
+            compared has no solution; beyond :data:`MOST_FAILED` the indices are NaN.
     """
 
     groups: tuple[str, ...]
@@ -54,7 +57,7 @@ class SaltelliDesign:
 
     Attributes:
         A: (k, m) independent draws of the numbers.
-        B: (k, m) further ones.
+        B: (k, m) another set of independent draws.
         groups: name and columns of each of d groups.
     """
 
@@ -66,7 +69,7 @@ class SaltelliDesign:
         return len(self.A) * (len(self.groups) + 2)
 
     def rows(self, first: int, count: int) -> NDArray:
-        """(count, m) rows from ``first`` on."""
+        """Return the (count, m) rows from ``first`` on."""
         matrix, base = np.divmod(np.arange(first, first + count), len(self.A))
         rows = np.where((matrix == 1)[:, None], self.B[base], self.A[base])
         for g, (_, columns) in enumerate(self.groups):
@@ -82,14 +85,14 @@ def sobol_importance(
     count: int,
     level: float = 0.95,
 ) -> Importance:
-    """Sobol's indices of any function of independent numbers.
+    """Return Sobol's indices of any function of independent numbers.
 
     Args:
         evaluate: (k, m) numbers to (k, s) results, NaN without a solution.
         sample: stream and count to (count, m) independent draws of the numbers.
         groups: name and columns of each group of numbers.
         count: base draws; (groups + 2) times as many are evaluated.
-        level: of confidence of the bootstrap intervals.
+        level: level of confidence of the bootstrap intervals.
 
     Returns:
         The indices; NaN for a result that does not vary.
@@ -102,12 +105,12 @@ def sobol_importance(
 def sobol_indices(
     design: SaltelliDesign, results: NDArray, level: float = 0.95
 ) -> Importance:
-    """Sobol's indices from the results of a design.
+    """Return Sobol's indices from the results of a design.
 
     Args:
-        design: of k base draws and d groups.
+        design: design of k base draws and d groups.
         results: (k (d + 2), s) in the order of its rows; not finite without a solution.
-        level: of confidence of the bootstrap intervals.
+        level: level of confidence of the bootstrap intervals.
 
     Returns:
         The indices; NaN for a result that is constant, or that fails in too many draws.
@@ -138,7 +141,7 @@ def sobol_indices(
 
 
 def _shares(f: NDArray, weights: NDArray, level: float) -> tuple[NDArray, NDArray]:
-    """(3,) first and (3,) total index from results (3, k) of A, B and A with B's."""
+    """Return first and total index, each (3,), from results (3, k) of the design."""
     alone, left = f[1] * (f[2] - f[0]), 0.5 * (f[2] - f[0]) ** 2
     mean = weights @ (f[0] + f[1]) / 2
     variance = weights @ (f[0] ** 2 + f[1] ** 2) / 2 - mean**2
@@ -153,11 +156,11 @@ def _shares(f: NDArray, weights: NDArray, level: float) -> tuple[NDArray, NDArra
 def linear_importance(
     slopes: NDArray, sources: ErrorSources, groups: Sequence[tuple[str, NDArray]]
 ) -> NDArray:
-    """Closed-form indices of results that are linear in the errors.
+    """Return the closed-form indices of results that are linear in the errors.
 
     Args:
         slopes: (s, m) of the results with each source.
-        sources: m of them.
+        sources: the m sources.
         groups: name and columns of each group.
 
     Returns:
@@ -169,10 +172,10 @@ def linear_importance(
 
 
 def source_groups(sources: ErrorSources, by: str) -> list[tuple[str, NDArray]]:
-    """Groups of sources: each by itself, by frame, or by kind of error.
+    """Return the groups of sources: each by itself, by frame, or by kind of error.
 
     Args:
-        sources: of a robot.
+        sources: sources of a robot.
         by: ``"source"``; ``"frame"``; or ``"kind"``: the same component of the frame
             of the same name in every leg.
 

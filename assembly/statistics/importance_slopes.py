@@ -1,10 +1,10 @@
 """Exact slopes of the platform's screw with the errors, by groups of errors.
 
-A quotient of sampled deviations is no derivative: its noise is that of the sample.
-Where the same clearances are active the solution of (22) follows the errors linearly,
-and its slopes are known exactly (:mod:`assembly.statistics.sensitivity`).  A group's
-gain is their root mean square, over the group's errors by their variance and over some
-draws: where the answer is linear each draw has the same.
+A quotient of sampled deviations is no derivative, because it has the sample's noise.
+Where the same clearances are active the solution of (22) is linear in the errors, and
+its slopes are known exactly (:mod:`assembly.statistics.sensitivity`).  A group's gain
+is their root mean square: over the group's errors, weighted by variance, and over some
+draws.
 """
 
 import numpy as np
@@ -17,15 +17,15 @@ from assembly.statistics.importance import SaltelliDesign
 from assembly.statistics.linear_response import LinearResponse
 from assembly.statistics.sensitivity import solution_slopes
 
-DRAWS = 32  # whose slopes are averaged
+DRAWS = 32  # number of draws whose slopes are averaged
 
 
 def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
-    """Gains of groups of errors: the platform's motion for a unit of error.
+    """Return the gains of groups of errors: the platform's motion for a unit of error.
 
     Args:
         experiment: distributions and posture.
-        design: whose first draws are taken, and whose groups.
+        design: its first draws and its groups are used.
 
     Returns:
         (2, d) rotation [rad] and translation [m] for each rad or m; NaN for a group of
@@ -51,7 +51,7 @@ def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
 
 
 def platform_slopes(prepared: LinearResponse, draws: Assembly) -> NDArray:
-    """Slopes of the platform's screw with every geometric error.
+    """Return the slopes of the platform's screw with every geometric error.
 
     Args:
         prepared: the posture.
@@ -69,6 +69,6 @@ def platform_slopes(prepared: LinearResponse, draws: Assembly) -> NDArray:
 
 
 def error_units(sources: ErrorSources, design: SaltelliDesign) -> list[str]:
-    """Units of the errors of each group."""
+    """Return the units of the errors of each group."""
     angles = [sources.component[columns] < 3 for _, columns in design.groups]
     return ["rad" if a.all() else "rad, m" if a.any() else "m" for a in angles]

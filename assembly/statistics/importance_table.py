@@ -1,13 +1,13 @@
-"""The importance of errors as a data set, plain values and a table for people.
+"""The importance of errors as a data set, as plain values and as a text table.
 
-Two sizes are given beside the shares of the variance.  A group's *part* is the standard
-deviation of the platform's screw that involves the group, from the same sample.  The
-*gain* is a derivative, micrometres of the platform for each micrometre of error, and
-exact: see :mod:`assembly.statistics.importance_slopes`.  Both are of the platform's
-vector, so a platform that follows an error has a gain of 1.
+Two sizes are given in addition to the shares of the variance.  A group's *part* is the
+standard deviation of the platform's screw due to the group, from the same sample.  The
+*gain* is an exact derivative, micrometres of the platform for each micrometre of error:
+see :mod:`assembly.statistics.importance_slopes`.  Both are of the platform's vector, so
+a platform that follows an error has a gain of 1.
 
-Shares are estimates.  Groups whose intervals overlap are not distinguished by them, and
-have their possible ranks in common: see :mod:`assembly.statistics.ranking`.
+Shares are estimates.  Groups whose intervals overlap are not distinguished, and share
+their possible ranks: see :mod:`assembly.statistics.ranking`.
 """
 
 from collections.abc import Mapping
@@ -33,19 +33,13 @@ from assembly.statistics.ranking import (
     possible_ranks,
     rank_text,
 )
+from forcefit.results.quantities import QUANTITIES
 
 if TYPE_CHECKING:
     import xarray
 
-QUANTITIES = ("energy", "margin_free", "rotation", "translation", "force", "stress")
+EXPLAINED = ("energy", "margin_free", "rotation", "translation", "force", "stress")
 _ROWS = 15  # of the table
-_MEANINGS = {
-    "first_index": "share of the variance that a group explains alone",
-    "total_index": "share of the variance that involves a group",
-    "failed_share": "base draws left out, for a draw compared has no answer",
-    "part": "deviation of the platform's screw that involves a group, by component",
-    "gain": "exact slope of the platform's screw with the errors; NaN if rad and m",
-}
 
 
 @dataclass(frozen=True)
@@ -55,7 +49,7 @@ class ImportanceOptions:
     Attributes:
         draws: base draws; (groups + 2) times as many are solved.
         by: see :func:`assembly.statistics.importance.source_groups`.
-        level: of confidence of the intervals.
+        level: level of confidence of the intervals.
     """
 
     draws: int
@@ -66,11 +60,11 @@ class ImportanceOptions:
 def importance_design(
     experiment: Experiment, asked: ImportanceOptions
 ) -> SaltelliDesign:
-    """The design for the importance of an experiment's errors.
+    """Return the design for the importance of an experiment's errors.
 
     Args:
         experiment: distributions and quantities.
-        asked: base draws and groups.
+        asked: number of base draws, and groups.
 
     Returns:
         The design.
@@ -83,10 +77,10 @@ def importance_design(
 def importance_rows(
     experiment: Experiment, design: SaltelliDesign, first: int, count: int
 ) -> NDArray:
-    """Records of some rows of a design.
+    """Return the records of some rows of a design.
 
-    Random clearance positions would add variance that is not due to the errors: they
-    are then those of the solution of (22).
+    Random clearance positions would add variance that is not due to the errors.  The
+    positions of the solution of (22) are used in their place.
 
     Args:
         experiment: the quantities.
@@ -98,7 +92,7 @@ def importance_rows(
         (count,) of the experiment's record type.
     """
     asked = replace(
-        experiment, clearance_model=importance_clearance_model(experiment), stiffness=""
+        experiment, clearance=importance_clearance_model(experiment), stiffness=""
     )
     evaluated = asked.evaluate(design.rows(first, count), range(count))
     rows = np.zeros(count, dtype=experiment.record_type)
@@ -108,20 +102,20 @@ def importance_rows(
 
 
 def importance_clearance_model(experiment: Experiment) -> str:
-    """Clearance model of the importance of an experiment's errors."""
-    return "worst" if experiment.clearance_model == "worst" else "least"
+    """Return the clearance model of the importance of an experiment's errors."""
+    return "worst" if experiment.clearance == "worst" else "least"
 
 
 def importance_dataset(
     experiment: Experiment, design: SaltelliDesign, rows: NDArray, level: float = 0.95
 ) -> "xarray.Dataset":
-    """Importance of the sources for the results of an experiment.
+    """Return the importance of the sources for the results of an experiment.
 
     Args:
         experiment: distributions and quantities.
-        design: of the draws.
-        rows: of the experiment's record type, of all rows of the design.
-        level: of confidence of the intervals.
+        design: design of the draws.
+        rows: rows of the experiment's record type, of all rows of the design.
+        level: level of confidence of the intervals.
 
     Returns:
         Data set ``first_index``, ``total_index`` over ``quantity``, ``group`` and
@@ -130,7 +124,7 @@ def importance_dataset(
     """
     import xarray
 
-    names = [q for q in QUANTITIES if q in (rows.dtype.names or ())]
+    names = [q for q in EXPLAINED if q in (rows.dtype.names or ())]
     if not experiment.links:
         names.remove("stress")
     columns = [rows[n].max(axis=1) if rows[n].ndim == 2 else rows[n] for n in names]
@@ -141,15 +135,15 @@ def importance_dataset(
     indices, moves = ("quantity", "group", "estimate"), ("component", "group")
     kept = slice(0, len(names))
     values = {
-        "first_index": (indices, importance.first[kept], "1"),
-        "total_index": (indices, importance.total[kept], "1"),
-        "failed_share": (("quantity", "group"), importance.failed[kept], "1"),
-        "part": (moves, part, "rad, m"),
-        "gain": (moves, gain, "rad or m for each rad or m"),
+        "first_index": (indices, importance.first[kept]),
+        "total_index": (indices, importance.total[kept]),
+        "failed_share": (("quantity", "group"), importance.failed[kept]),
+        "part": (moves, part),
+        "gain": (moves, gain),
     }
     data = {
-        key: (dims, value, {"units": unit, "long_name": _MEANINGS[key]})
-        for key, (dims, value, unit) in values.items()
+        key: (dims, value, QUANTITIES[key].attributes)
+        for key, (dims, value) in values.items()
     }
     labels = {
         "quantity": names, "group": list(importance.groups),
@@ -165,9 +159,9 @@ def importance_dataset(
 
 
 def _parts(variances: NDArray) -> NDArray:
-    """(2, d) parts from the variance (6, d) of the screw due to groups."""
+    """Return the (2, d) parts from the variance (6, d) of the screw due to groups."""
     lost = np.isnan(variances).all(axis=0)
-    # a component that does not vary has no index, and adds nothing to the part
+    # a component that does not vary has no index and adds zero
     variances = np.maximum(np.nan_to_num(variances), 0.0)
     part = np.sqrt(np.stack([variances[:3].sum(axis=0), variances[3:].sum(axis=0)]))
     part[:, lost] = np.nan
@@ -175,15 +169,15 @@ def _parts(variances: NDArray) -> NDArray:
 
 
 def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
-    """The data of :func:`importance_dataset` as plain values.
+    """Return the data of :func:`importance_dataset` as plain values.
 
     Args:
-        data: with it, or merged with the draws.
+        data: data with it, or merged with the draws.
 
     Returns:
         Base draws, the indices of each quantity with the ranks that their intervals
-        allow, and by group part and gain; the share
-        of draws discarded and, where there are no indices, a reason.
+        allow, and by group part and gain; the share of draws discarded and, without
+        indices, the reason.
     """
     groups = [str(g) for g in data["group"].values]
     quantities: dict[str, Any] = {}
@@ -221,7 +215,7 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
 
 
 def importance_text(report: Mapping[str, Any]) -> str:
-    """The same as a table for people, the largest shares first."""
+    """Return the importance as a text table, the largest shares first."""
     quantities = report["quantities"]
     lines = [
         f"importance of the errors, {report['base_draws']} base draws, clearances "
@@ -262,7 +256,7 @@ def importance_text(report: Mapping[str, Any]) -> str:
 
 
 def _moves_text(one: Mapping[str, Any]) -> str:
-    """Part and exact slope of a group, in the table's columns."""
+    """Return the part and exact slope of a group, in the table's columns."""
     gain = {
         "m": (f"{one['translation_gain']:11.4g}", " " * 13),
         "rad": (" " * 11, f"{1e3 * one['translation_gain']:13.4g}"),
@@ -274,6 +268,6 @@ def _moves_text(one: Mapping[str, Any]) -> str:
 
 
 def _interval_text(share: NDArray) -> str:
-    """A share with its interval."""
+    """Return a share with its interval."""
     value, low, high = share
     return f"{value:.3f} ({low:.3f} to {high:.3f})"

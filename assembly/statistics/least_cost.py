@@ -1,11 +1,12 @@
 """Tolerances of locally least cost for nonconvex limits: sequential programming.
 
 Wrenches, stress and pose errors are not convex in the errors, and a yield is not convex
-in the tolerances.  But the worst samples have slopes with every error, so with every
-tolerance.  A convex programme with these planes, within a trust region around the
-current tolerances, gives a trial point.  It is scaled uniformly until the samples just
-fit again, and accepted if it is cheaper; if not, the trust region is reduced.  The cost
-never increases, and ends at a local minimum, which is not proved to be global.
+in the tolerances.  But the worst samples have slopes with every error, and so with
+every tolerance.  A convex programme with these planes, within a trust region around the
+current tolerances, gives a trial point.  The trial point is scaled uniformly until the
+samples just meet the limits again.  It is accepted if it is cheaper; otherwise the
+trust region is reduced.  So the cost never increases.  The end is a local minimum,
+which is not proved to be global.
 
 With a yield, the plane is the mean over the samples closest to a limit: the slope of
 the quantile.  For a yield of 1 each of the worst samples has its own plane, and the
@@ -25,23 +26,23 @@ from assembly.statistics.cutting_planes import cheapest_within
 from assembly.statistics.requirement import Plan, Requirement
 from assembly.statistics.scaling import Samples, scale_uniformly, with_worst_corners
 
-_COARSE = 1e-3  # of the limits: precision of intermediate costs
+_COARSE = 1e-3  # relative to the limits: precision of intermediate costs
 _GAIN = 1e-4  # relative, of the cost: smallest reduction of a step
-_LARGEST_RADIUS, _SMALLEST_RADIUS = 2.0, 1.01  # of the trust region, factors
+_LARGEST_RADIUS, _SMALLEST_RADIUS = 2.0, 1.01  # factors of the trust region
 _MOST_STEPS = 60
-_PLANES = 200  # worst samples, for a yield of 1
-_NEARLY_ACTIVE = 0.8  # of a limit
+_PLANES = 200  # number of worst samples, for a yield of 1
+_NEARLY_ACTIVE = 0.8  # relative to a limit: samples above it count as active
 
 
 def least_cost(
     requirement: Requirement, samples: Samples, t: NDArray,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, Samples]:  # fmt: skip
-    """Tolerances that cost no more than given proportions scaled uniformly.
+    """Return tolerances that cost no more than given proportions scaled uniformly.
 
     Args:
         requirement: limits at all postures.
-        samples: of the errors, that must fit.
+        samples: samples of the errors, that must meet the limits.
         t: (G,) [rad or m] proportions to start from.
         progress: called with the name of a step, its progress and its total.
 
@@ -49,7 +50,7 @@ def least_cost(
         (G,) [rad or m], and the samples with all worst corners of the iterations.
 
     Raises:
-        BadInput: the samples fit at no scale.
+        BadInput: the samples meet the limits at no scale.
     """
     plan, radius = requirement.plan, _LARGEST_RADIUS
     t = scale_uniformly(requirement, samples, t, _COARSE)
@@ -81,13 +82,13 @@ def least_cost(
 
 
 def _saving(plan: Plan, before: NDArray, after: NDArray) -> float:
-    """Reduction of the cost, relative to the cost of all tolerances."""
+    """Return the reduction of the cost, relative to the cost of all tolerances."""
     size = plan.price(before) if plan.cost == "reciprocal" else plan.costs.sum()
     return (plan.price(before) - plan.price(after)) / size
 
 
 def _planes(requirement: Requirement, samples: Samples, t: NDArray) -> list[NDArray]:
-    """(G,) each: linearised at t, a.t' <= 1 keeps the samples within the limits."""
+    """Return linearised planes (G,), a.t' <= 1, that keep samples within limits."""
     values = samples.values * requirement.plan.spread(t)
     utilisations = requirement.utilisations(values)[1]
     if requirement.plan.asked_yield == 1.0:

@@ -1,7 +1,7 @@
-"""What clearances and errors do at one posture to springs, closures and platform.
+"""Linear effect of clearances and errors on springs, closures and platform.
 
-It is linear, and the same for all draws of the errors, which
-:func:`assembly.linear.energy.solve_assembly` solves.
+It belongs to one posture, and is the same for all draws of the errors;
+:func:`assembly.linear.energy.solve_assembly` solves these.
 """
 
 from dataclasses import dataclass
@@ -36,33 +36,33 @@ from assembly.solvers.cones import cone_starts
 
 @dataclass(frozen=True, eq=False)
 class LinearResponse:
-    """How a posture follows clearances and errors, by :func:`linear_response`.
+    """Response of a posture to clearances and errors, by :func:`linear_response`.
 
-    With n frames, nu clearances, r springs left after elimination, m = 6 closures;
+    With n frames, nu clearances, r springs after elimination, m = 6 closures;
     ``screws`` and ``motions`` take the columns [clearances | errors].
 
     Attributes:
-        posture: where the robot stands; its own errors do not matter.
-        joints: what may move.
+        posture: the robot's configuration; its own errors do not matter.
+        joints: its virtual joints.
         starts: (cones + 1,) first clearance of each cone, and nu.
         G: (r, nu) sensitivity of the scaled strains to the clearances.
-        H: (p, nu) rows of the clearances that no spring enters.
+        H: (p, nu) rows of the clearances without springs.
         closures: (m, 6n) scaled closure rows.
         misfit: (r, 6n) sensitivity of the scaled strains to the errors.
         closing: (m, r) closure multipliers of the springs'.
-        redundant: (m, m - ..) closure rows that neither free motions nor springs enter,
+        redundant: (m, m - ..) closure rows without free motions and springs,
             orthonormal columns.
         infeasible: (m - .., 6n) infeasible component of the errors, redundant.T @
             closures.
         screws: (6, nu + 6n) platform screw.
-        platform: (6, 6n) screws of all frames to the platform's.
+        platform: (6, 6n) map of all frames' screws to the platform's.
         motions: (nq, nu + 6n) free motions.
         ranges: (nq,) [rad or m] bounds of the free motions, which were left out.
         wrench: (n, 6, m) [N m, N] wrenches of unit closure multipliers.
         load: (6,) [N m, N] on the platform at its origin, base axes; None for none.
         gravity: (3,) [m/s^2] base axes; None for none.
-        loads: of both on every small screw, None if there are none.
-        load_motions: (nq,) [rad, m] free motions of the tight robot under them.
+        loads: both loads on every small screw, None if there are none.
+        load_motions: (nq,) [rad, m] free motions under the loads without clearance.
     """
 
     posture: Posture
@@ -86,7 +86,7 @@ class LinearResponse:
     load_motions: NDArray
 
     def solve(self, errors: ArrayLike) -> Assembly:
-        """Least energies of k draws.
+        """Return the least energies of k draws.
 
         Args:
             errors: (k, n, 6) [rad, m] delta l.
@@ -108,14 +108,14 @@ class LinearResponse:
 
 
 def checked_errors(errors: ArrayLike, n: int) -> NDArray:
-    """Errors of k draws.
+    """Return the errors of k draws.
 
     Args:
         errors: (k, n, 6) [rad, m] delta l.
         n: frames.
 
     Returns:
-        The same.
+        The errors as an array.
 
     Raises:
         ValueError: the shape does not fit the robot, or a value is not finite.
@@ -134,12 +134,12 @@ def linear_response(
     """Eliminate free motions and springs at a posture.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
 
     Returns:
-        How it follows them.  Bounds of passive joints' own motion are left out, unless
+        The linear response.  Bounds of passive joints' own motion are left out, unless
         a load drives a joint up to its bound.
 
     Raises:
@@ -159,10 +159,10 @@ def linear_response(
         reduced = reduce_problem(lin, joints, loads)
     A, free = lin.rows, joints.free
     closing = reduced.basis @ reduced.elastic_inverse.T @ reduced.spread
-    # rows that neither free motions nor springs enter, as orthonormal rows
+    # rows without free motions and springs, as orthonormal rows
     held = np.linalg.qr(closing)[0] if closing.shape[1] else closing
     redundant = reduced.basis @ complement(reduced.basis.T @ held, RANK)
-    # free motions of least size close what the rest leaves open
+    # free motions of least size close the remaining gap
     inverse = np.linalg.pinv(A @ free, rcond=RANK)
     springs = joints.elastic @ reduced.spread
     misfit = -closing.T @ A
@@ -196,8 +196,8 @@ def linear_response(
 
 
 def _bent(reduced: Reduction, closing: NDArray) -> NDArray:
-    """(6n,) [rad, m] what loads bend in the tight robot."""
-    # wrenches that hold the free motions, and bend springs least
+    """Return the (6n,) [rad, m] deformations by loads, without clearance."""
+    # wrenches that balance the free motions with least spring energy
     bent = reduced.spread.T @ reduced.load_springs
     springs = spring_deformations(
         reduced.linearisation, reduced.joints, reduced.frame_loads,

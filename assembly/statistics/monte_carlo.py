@@ -1,8 +1,8 @@
 """Monte Carlo simulation at one posture: problems (21), (22) and (27) for each draw.
 
 Draws are solved in blocks, in any order and by any number of threads; each draw depends
-on its number and the seed only.  With a file, finished blocks are written to a journal
-beside it: a run that was killed resumes there.  The rows of the design for the
+on its number and the seed only.  If a file is given, finished blocks are written to a
+journal next to it, from which a killed run resumes.  The rows of the design for the
 importance of errors are further blocks.
 """
 
@@ -28,12 +28,13 @@ from assembly.statistics.importance_table import (
     importance_rows,
 )
 from assembly.statistics.perfect_parts import stored_perfect_parts
-from assembly.statistics.quantities import MEANINGS, POSE_ERRORS, UNITS
+from assembly.statistics.quantities import POSE_ERRORS
 from assembly.sweeps.dataset import save_dataset
 from assembly.sweeps.identity import program_hash, robot_hash
 from assembly.sweeps.journal import open_journal
 from assembly.sweeps.sweep import journal_path
 from forcefit.inputs.packages import need
+from forcefit.results.quantities import QUANTITIES, count
 from stiffness.screws import SCREW, WRENCH
 
 if TYPE_CHECKING:
@@ -41,7 +42,6 @@ if TYPE_CHECKING:
 
 BLOCK = 1024  # draws solved and journalled together
 # by axis: no limit is one number
-_UNITS = UNITS | {"stiffness": "N m/rad, N/m", "free_motion": "rad, m"}
 _QUEUED = 4  # blocks submitted ahead for each thread
 
 
@@ -62,12 +62,13 @@ def run_draws(
         path: NetCDF file to write; its journal is used and then removed.
         workers: threads.
         progress: called with the draws done and their number.
-        importance: of errors; not computed if None.
-        held: keeps the journal until it is closed, as in
+        importance: importance of errors; None if not computed.
+        held: context that keeps the journal until it is closed, as in
             :func:`assembly.sweeps.sweep.run_sweep`.
 
     Returns:
-        Data set over ``draw``, with the importance if asked; the file holds the same.
+        Data set over ``draw``, with the importance if requested; the file holds the
+        same.
 
     Raises:
         BadInput: the journal is another run's or locked by one, or a file cannot be
@@ -86,7 +87,7 @@ def _run_draws(
     progress: Callable[[int, int], None], importance: ImportanceOptions | None,
     held: ExitStack,
 ) -> "xarray.Dataset":  # fmt: skip
-    """The same; ``held`` keeps the journal."""
+    """Return the data set of draws; ``held`` keeps the journal."""
     design = None if importance is None else importance_design(experiment, importance)
     more = 0 if design is None else len(design)
     # blocks of draws, then of the design: first row and number of rows of each
@@ -103,7 +104,7 @@ def _run_draws(
     kept: dict[int, NDArray] = {}
     journal = None
     if path is not None:
-        # not the level: it does not change the draws
+        # the level of confidence does not change the draws
         rows_of_design = importance and (importance.draws, importance.by)
         identity = provenance(experiment) | {
             "draws": count, "block": BLOCK, "importance": str(rows_of_design),
@@ -115,7 +116,7 @@ def _run_draws(
     done = sum(map(len, kept.values()))
     progress(done, count + more)
     missing = [b for b in range(len(spans)) if b not in kept]
-    with threadpool_limits(1):  # the threads are ours
+    with threadpool_limits(1):  # only our own threads run in parallel
         for block, rows in _solved(solve, missing, workers):
             if journal is not None:
                 journal.add(block, rows, {})
@@ -137,7 +138,7 @@ def _run_draws(
 def _solved(
     solve: Callable[[int], NDArray], blocks: list[int], workers: int
 ) -> Iterator[tuple[int, NDArray]]:
-    """Blocks as they are finished; a few are queued ahead, so memory stays bounded."""
+    """Yield blocks when finished; a few are queued ahead, which bounds the memory."""
     if not blocks:
         return
     # the first one fills the caches that the threads share
@@ -162,7 +163,7 @@ def _solved(
 
 
 def provenance(experiment: Experiment) -> dict[str, str | int | float]:
-    """Values that must be equal for two runs to give the same draws."""
+    """Return the values that must be equal for two runs to have the same draws."""
     posture, sources = experiment.posture, experiment.sources
     contact = experiment.used_contact_length
     numbers = [
@@ -176,7 +177,7 @@ def provenance(experiment: Experiment) -> dict[str, str | int | float]:
         "robot_sha256": robot_hash(posture.robot),
         "sources_and_posture_sha256": digest.hexdigest(),
         "seed": experiment.seed,
-        "clearance": experiment.clearance_model,
+        "clearance": experiment.clearance,
         **({} if contact is None else {"contact_length": contact}),
         "precision": " ".join(map(repr, experiment.precision)),
         "margins": int(experiment.margins),
@@ -190,10 +191,10 @@ def provenance(experiment: Experiment) -> dict[str, str | int | float]:
 
 
 def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
-    """The draws as a data set with units and provenance.
+    """Return the draws as a data set with units and provenance.
 
     Args:
-        experiment: of the draws.
+        experiment: experiment of the draws.
         rows: (k,) of its record type.
 
     Returns:
@@ -204,21 +205,23 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
     dims = {"platform_screw": ("draw", "screw"), "stress": ("draw", "link"),
             "stiffness": ("draw", "wrench_component"),
             "free_motion": ("draw", "motion", "screw")}  # fmt: skip
-    meanings = MEANINGS | {
-        k: f"{MEANINGS[k]}; "
-        f"{clearance_means(experiment.clearance_model, experiment.used_contact_length)}"
-        for k in POSE_ERRORS
+    known = {
+        **QUANTITIES,
+        "stiffness": QUANTITIES["axis_stiffness"],
+        "status": count("status", meaning="0 solved, 1 no answer"),
     }
-    if experiment.clearance_model == "worst":
-        meanings |= {k: f"upper bound of the {meanings[k]}" for k in POSE_ERRORS}
-        meanings["platform_screw"] += f"; {clearance_means('least')}"
+    attributes = {name: known[name].attributes for name in rows.dtype.names or ()}
+    means = clearance_means(experiment.clearance, experiment.used_contact_length)
+    worst = experiment.clearance == "worst"
+    for name in POSE_ERRORS:
+        bound = "upper bound of the " if worst else ""
+        attributes[name]["long_name"] = f"{bound}{known[name].meaning}; {means}"
+    if worst:
+        attributes["platform_screw"]["long_name"] += f"; {clearance_means('least')}"
     variables = {
-        name: (
-            dims.get(name, ("draw",)), rows[name],
-            {"units": _UNITS.get(name, "1"), "long_name": meanings[name]},
-        )
+        name: (dims.get(name, ("draw",)), rows[name], attributes[name])
         for name in rows.dtype.names or ()
-    }  # fmt: skip
+    }
     labels = {
         "draw": np.arange(len(rows)), "screw": list(SCREW),
         "link": list(experiment.links), "source": list(experiment.sources.labels),

@@ -1,9 +1,9 @@
-"""What perfect parts reach: clearances and loads alone, with all errors zero.
+"""Quantities of perfect parts: clearances and loads alone, with all errors zero.
 
-No tolerance mends a limit that perfect parts break.  Each joint's clearance has a part
-in the pose error of the worst clearance model: without errors the largest error is
-homogeneous in the clearances, so by Euler it is the sum of each clearance times its
-slope, the multiplier of its bound.
+No tolerance can meet a limit that perfect parts exceed.  In the worst clearance model
+each joint's clearance has a part in the pose error.  Without errors the largest pose
+error is homogeneous in the clearances.  So by Euler it is the sum of each clearance
+times its slope, the multiplier of its bound.
 """
 
 import json
@@ -20,28 +20,28 @@ from assembly.statistics.quantities import POSE_ERRORS, UNITS
 from assembly.statistics.ranking import kind_of
 from assembly.statistics.worst_clearance import bound_worst_errors, worst_error_slopes
 
-_DRAWS = 200  # positions of a random clearance model, whose median counts
-_PRECISION = (1e-9, 1e-9)  # [rad, m] of the largest pose errors
-_SHARE = 1e-3  # of the largest pose error: smaller parts are not listed
+_DRAWS = 200  # number of positions of a random clearance model, whose median is used
+_PRECISION = (1e-9, 1e-9)  # [rad, m] required precision of the largest pose errors
+_SHARE = 1e-3  # relative to the largest pose error: smaller parts are not listed
 _KEYS = ("tilt", "spin", "radial", "axial")
-_OWN = 0.02  # of the largest pose error: less is the precision of the parts
+_OWN = 0.02  # relative to the largest pose error: precision of the parts
 OWN_MOTION = "own motion of passive joints"
-_EXCEEDED = 1e-9  # relative, above a limit
+_EXCEEDED = 1e-9  # relative excess above a limit
 
 
 def perfect_parts(experiment: Experiment) -> dict[str, Any]:
-    """Quantities with all errors zero.
+    """Return the quantities with all errors zero.
 
     Args:
         experiment: posture, loads and clearance model.
 
     Returns:
-        By quantity: ``reached``, of random clearance models the median of 200
-        positions; of pose errors of the worst model without loads also ``clearances``,
-        the part [rad or m] of each kind of clearance, the largest first.  Empty where
-        perfect parts have no solution.
+        By quantity: ``reached``, for random clearance models the median of 200
+        positions.  For pose errors of the worst model without loads also
+        ``clearances``, the part [rad or m] of each kind of clearance, the largest
+        first.  Empty if perfect parts have no solution.
     """
-    random = experiment.clearance_model in {"uniform", "contact"}
+    random = experiment.clearance in {"uniform", "contact"}
     count = _DRAWS if random else 1
     rows = experiment.evaluate(np.zeros((count, len(experiment.sources))), range(count))
     reached: dict[str, Any] = {}
@@ -53,7 +53,7 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
         if not np.isnan(value):  # infinite where the platform moves freely
             reached[key] = {"reached": value, "unit": UNITS[key]}
     prepared = experiment.energies
-    if experiment.clearance_model == "worst" and prepared.loads is None:
+    if experiment.clearance == "worst" and prepared.loads is None:
         for key, parts in _clearance_parts(prepared).items():
             whole = reached.get(key, {}).get("reached", np.nan)
             if np.isfinite(whole):
@@ -67,7 +67,7 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
 
 
 def _clearance_parts(prepared: LinearResponse) -> dict[str, dict[str, float]]:
-    """By pose error, the part of each kind of clearance in the largest."""
+    """Return the part of each kind of clearance in the largest pose errors."""
     draws = prepared.solve(np.zeros((1, len(prepared.posture.robot.frames), 6)))
     if not (np.isfinite(draws.energy).all() and np.isfinite(draws.clearances).all()):
         return {}
@@ -88,7 +88,7 @@ def _clearance_parts(prepared: LinearResponse) -> dict[str, dict[str, float]]:
 
 
 def _clearance_kinds(prepared: LinearResponse) -> list[str]:
-    """Kind of each cone, such as ``hinge.tilt``: of all legs together."""
+    """Return the kind of each cone, such as ``hinge.tilt``, common to all legs."""
     rows: NDArray = np.abs(prepared.joints.cones[:, prepared.starts[:-1]]).argmax(
         axis=0
     )
@@ -100,21 +100,21 @@ def _clearance_kinds(prepared: LinearResponse) -> list[str]:
 
 
 def stored_perfect_parts(experiment: Experiment) -> str:
-    """The same as text, an attribute of a data set of draws."""
+    """Return the quantities of perfect parts as text, for a data set's attribute."""
     return json.dumps(perfect_parts(experiment))
 
 
 def limits_broken(
     parts: Mapping[str, Any], limits: Mapping[str, float]
 ) -> dict[str, Any]:
-    """Limits that perfect parts break.
+    """Return the limits that perfect parts break.
 
     Args:
-        parts: of :func:`perfect_parts`.
-        limits: by quantity.
+        parts: parts of :func:`perfect_parts`.
+        limits: limits by quantity.
 
     Returns:
-        By quantity what is reached, its unit and the limit.
+        By quantity the value of perfect parts, its unit and the limit.
     """
     return {
         key: {**parts[key], "limit": limit}
@@ -124,7 +124,7 @@ def limits_broken(
 
 
 def perfect_text(summary: Mapping[str, Any]) -> list[str]:
-    """Lines for people: what perfect parts reach, and the limits that they break."""
+    """Return text lines: the values of perfect parts, and the limits they exceed."""
     parts, lines = summary.get("perfect_parts", {}), []
     alone = {k: parts[k] for k in POSE_ERRORS if parts.get(k, {}).get("reached")}
     why = "clearances and loads alone" if summary.get("load") else "clearances alone"
@@ -142,14 +142,14 @@ def perfect_text(summary: Mapping[str, Any]) -> list[str]:
 
 
 def _size_text(one: Mapping[str, Any]) -> str:
-    """What is reached, with its unit."""
+    """Return the value of perfect parts, with its unit."""
     if np.isinf(one["reached"]):
         return "without bound"
     return f"of {one['reached']:.4g} {one['unit']}"
 
 
 def _of_text(one: Mapping[str, Any]) -> str:
-    """The two largest parts of clearances, in brackets."""
+    """Return the two largest parts of clearances, in brackets."""
     parts = list(one.get("clearances", {}).items())[:2]
     if not parts:
         return ""

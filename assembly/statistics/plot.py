@@ -10,6 +10,8 @@ from assembly.statistics.estimates import most_probable, quantile
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.sweeps.panels import named_panels, quantity
 from forcefit.inputs.errors import BadInput, plot_label
+from forcefit.results.quantities import QUANTITIES
+from forcefit.results.units import FACTORS
 
 if TYPE_CHECKING:
     import xarray
@@ -17,29 +19,26 @@ if TYPE_CHECKING:
 
 KINDS = ("histogram", "tornado", "allocation")
 _MARGINS = ("margin", "margin_free")
-_SCALES = {
-    "rotation": (1e3, "mrad"), "translation": (1e3, "mm"), "energy": (1.0, "J"),
-    "margin": (1.0, "-"), "margin_free": (1.0, "-"), "force": (1.0, "N"),
-    "moment": (1.0, "N m"), "stress": (1e-6, "MPa"),
+_SHOWN = {
+    name: QUANTITIES[name]
+    for name in (
+        "rotation", "translation", "energy", "margin", "margin_free", "force", "moment",
+        "stress",
+    )
 }  # fmt: skip
-NAMES = {
-    "rotation": "platform rotation error", "translation": "platform position error",
-    "energy": "assembly energy", "margin": "zone margin, compliant joints rigid",
-    "margin_free": "zone margin, compliant joints free",
-    "force": "largest force in a body", "moment": "largest moment in a body",
-    "stress": "largest stress in a link",
-}  # fmt: skip
+NAMES = {name: one.words for name, one in _SHOWN.items()}
 
 
 def figure_of_draws(
     data: "xarray.Dataset", kind: str | None, quantities: Sequence[str] = ()
 ) -> "Figure | None":
-    """The figure of a data set of draws or tolerances.
+    """Return the figure of a data set of draws or tolerances.
 
     Args:
-        data: as saved by ``statistics`` or ``tolerances``, or any other.
+        data: data set saved by ``statistics`` or ``tolerances``, or another data set.
         kind: ``"histogram"``, ``"tornado"`` or ``"allocation"``; None to choose.
-        quantities: of a histogram, by the names of :mod:`assembly.sweeps.panels`.
+        quantities: quantities of a histogram, by the names of
+            :mod:`assembly.sweeps.panels`.
 
     Returns:
         The figure; None for another kind of data set.
@@ -64,10 +63,10 @@ def figure_of_draws(
 def histogram_figure(
     data: "xarray.Dataset", quantities: Sequence[str] = ()
 ) -> "Figure":
-    """Histograms with medians, 95 % quantiles and most probable values.
+    """Return the histograms with medians, 95 % quantiles and most probable values.
 
     Args:
-        data: of :func:`assembly.statistics.monte_carlo.run_draws`.
+        data: data of :func:`assembly.statistics.monte_carlo.run_draws`.
         quantities: to be shown, by the names of :mod:`assembly.sweeps.panels`; those
             with a limit if empty.
 
@@ -84,8 +83,8 @@ def histogram_figure(
         raise ValueError("histograms need a data set of draws")
     solved = data.isel(draw=np.flatnonzero(data["status"].values == 0))
     shown = [panel[:3] for panel in named_panels(data, quantities)] or [
-        (name, scale, f"{NAMES[name]} [{unit}]")
-        for name, (scale, unit) in _SCALES.items()
+        (name, FACTORS.get(unit, 1.0), f"{NAMES[name]} [{unit}]")
+        for name, unit in ((n, one.display_unit) for n, one in _SHOWN.items())
         if name in solved and solved[name].size
     ]
     figure = Figure(figsize=(12, 3.2 * -(-len(shown) // 2)), layout="constrained")
@@ -111,7 +110,7 @@ def histogram_figure(
 
 
 def _histogram(panel: Any, text: str, values: Any) -> None:
-    """One panel; of a variable with components their largest."""
+    """Draw one panel; of a variable with components, the largest."""
     x = values.max(axis=1) if values.ndim == 2 else values
     x = x[np.isfinite(x)]
     panel.set(xlabel=text, ylabel="draws")
@@ -131,16 +130,16 @@ def _histogram(panel: Any, text: str, values: Any) -> None:
             panel.axvspan(
                 estimate["lower"], estimate["upper"], color=colour, alpha=0.25
             )
-    # the place with the least behind it takes seconds to find among many bars
+    # matplotlib's search for the emptiest place takes seconds with many bars
     panel.legend(fontsize=8, loc="upper right")
 
 
 def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
-    """Tornado plot of the importance, the largest on top, with intervals.
+    """Return the tornado plot of the importance, the largest on top, with intervals.
 
     Args:
-        data: with ``first_index`` and ``total_index``.
-        most: bars a panel.
+        data: data with ``first_index`` and ``total_index``.
+        most: largest number of bars in a panel.
 
     Returns:
         A panel for each quantity: the total share light, the share alone dark.
@@ -183,14 +182,15 @@ def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
 
 
 def allocation_figure(data: "xarray.Dataset") -> "Figure":
-    """Bar chart of the tolerances, angles and lengths apart, with their upper bounds.
+    """Draw a bar chart of the tolerances with upper bounds; angles and lengths apart.
 
     Args:
-        data: of :func:`assembly.statistics.allocated_tolerances.tolerance_dataset`.
+        data: data of
+            :func:`assembly.statistics.allocated_tolerances.tolerance_dataset`.
 
     Returns:
-        A figure: wide bars are of least cost; narrow ones, where different, those of
-        the convex programme, scaled uniformly.  The title has cost and verification.
+        A figure: wide bars are of least cost; narrow ones, where different, are those
+        of the convex programme, scaled uniformly.  The title has cost and verification.
 
     Raises:
         ValueError: the data set has no tolerances.

@@ -14,12 +14,11 @@ from assembly.kinematics.posture import Posture
 from assembly.kinematics.ranks import RANK
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.reference.reduction import complement, reduce_problem
-from assembly.linear.zone import Zone, zone_margin
-from assembly.model.clearance import Compliant
+from assembly.linear.zone import Compliant, Zone, zone_margin
 from assembly.solvers.cones import cone_starts
 from assembly.statistics.linear_response import checked_errors
 
-_CLEARLY_INFEASIBLE = 1e-10  # [rad, reference lengths] where nothing closes the errors
+_CLEARLY_INFEASIBLE = 1e-10  # [rad, reference lengths] error that no motion can close
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,10 +26,10 @@ class PostureMargins:
     """A posture prepared for the margins of any errors, by :func:`prepare_margins`.
 
     Attributes:
-        posture: where the robot stands; its own errors do not matter.
+        posture: the robot's configuration; its own errors do not matter.
         starts: (cones + 1,) first clearance of each cone, and nu.
         B: (p, nu) orthonormal rows that the clearances must satisfy.
-        K: (p, 6n) and their right side by the errors: B u = K e.
+        K: (p, 6n) their right side by the errors: B u = K e.
         infeasible: (.., 6n) infeasible component of the errors.
         compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
     """
@@ -43,14 +42,14 @@ class PostureMargins:
     compliant: Compliant
 
     def solve(self, errors: ArrayLike) -> Zone:
-        """Margins of k draws.
+        """Return the margins of k draws.
 
         Args:
             errors: (k, n, 6) [rad, m] delta l.
 
         Returns:
-            Margins with their certificates; where no factor closes the errors, the
-            forces are those of what clearances close.
+            Margins with their certificates; if no factor closes the errors, the forces
+            are those on the part that clearances close.
 
         Raises:
             ValueError: the shape does not fit the robot, or a value is not finite.
@@ -68,13 +67,13 @@ class PostureMargins:
         return found
 
     def slopes(self, zone: Zone) -> NDArray:
-        """How margins grow with each error.
+        """Return the slopes of margins with each error.
 
         Args:
-            zone: of k draws, by :meth:`solve`.
+            zone: zone of k draws, by :meth:`solve`.
 
         Returns:
-            (k, n, 6) [1/rad, 1/m]; NaN where the reference solved.
+            (k, n, 6) [1/rad, 1/m]; NaN where the reference solved it.
         """
         slopes = zone.forces @ self.B.T @ self.K
         return slopes.reshape(len(slopes), -1, 6)
@@ -84,11 +83,11 @@ def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureM
     """Eliminate free motions at a posture, for the margins of any errors.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
 
     Returns:
-        What :meth:`PostureMargins.solve` needs.
+        The prepared posture, for :meth:`PostureMargins.solve`.
 
     Raises:
         ValueError: ``compliant`` is something else.
@@ -96,9 +95,9 @@ def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureM
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
     robot = posture.robot
-    lin, joints = linearise(posture), virtual_joints(robot, compliant)
+    lin, joints = linearise(posture), virtual_joints(robot, False, compliant == "free")
     reduced = reduce_problem(lin, joints)
-    # orthonormal rows, whatever the units of the closures
+    # orthonormal rows make the result independent of the closures' units
     U, S, B = svd(reduced.H, full_matrices=False)
     rigid = reduced.rigid
     held = np.linalg.qr(rigid)[0] if rigid.shape[1] else rigid

@@ -14,14 +14,14 @@ NOT_DISTINGUISHED = (
 
 
 def possible_ranks(shares: Mapping[str, NDArray]) -> dict[str, tuple[int, int]]:
-    """The first and the last rank that each contributor may have.
+    """Return the first and the last rank that each contributor may have.
 
     Args:
-        shares: by name (value, lower, upper).
+        shares: value, lower and upper bound by name.
 
     Returns:
-        By name: 1 + how many are surely larger, and the number of all less how many are
-        surely smaller; none for a share that is not known.
+        First and last rank by name.  A share precedes another one if its lower bound is
+        above the other's upper bound.  Unknown shares have no ranks.
     """
     known = {name: v for name, v in shares.items() if np.isfinite(v).all()}
     lower, upper = np.array([v[1:] for v in known.values()]).reshape(-1, 2).T
@@ -35,7 +35,7 @@ def possible_ranks(shares: Mapping[str, NDArray]) -> dict[str, tuple[int, int]]:
 
 
 def rank_text(rank: Sequence[int] | None) -> str:
-    """Possible ranks such as 1 or 2-4; empty where there are none."""
+    """Return possible ranks such as 1 or 2-4; empty where there are none."""
     if rank is None:
         return ""
     first, last = rank
@@ -43,20 +43,20 @@ def rank_text(rank: Sequence[int] | None) -> str:
 
 
 def leaders(ranks: Mapping[str, Sequence[int]]) -> list[str]:
-    """Names of the contributors that may be the largest."""
+    """Return the names of the contributors that may be the largest."""
     return [name for name, (first, _) in ranks.items() if first == 1]
 
 
 def named_together(names: Iterable[str], among: Iterable[str]) -> list[str]:
-    """Names of contributors, those of all legs as one.
+    """Return the names of contributors, with those of all legs joined to one.
 
     Args:
-        names: such as ``leg1.hinge.RX``, the contributors.
-        among: names of all there are.
+        names: names such as ``leg1.hinge.RX``, the contributors.
+        among: all names.
 
     Returns:
-        ``hinge.RX of all legs`` where each leg's is among the names, in the order of
-        the names; the others as they are.
+        ``hinge.RX of all legs`` if each leg's is among the names, in the order of the
+        names; other names unchanged.
     """
     names = list(names)
     of_kind: dict[str, list[str]] = {}
@@ -71,7 +71,7 @@ def named_together(names: Iterable[str], among: Iterable[str]) -> list[str]:
 
 
 def kind_of(name: str) -> str:
-    """A frame's or an error's name without its leg's: ``hinge.RX``."""
+    """Return a frame's or an error's name without its leg's: ``hinge.RX``."""
     frame, dot, component = name.rpartition(".")
     if component not in SCREW:
         frame, dot, component = name, "", ""

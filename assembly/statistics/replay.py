@@ -1,8 +1,8 @@
 """Expensive results of a deterministic computation, stored in a journal in order.
 
-A computation that was killed resumes by running again: results that are in the journal
-are read instead of computed.  Each is stored with a digest of its arguments and is
-computed again where the digest differs, as after a change of the program.
+A killed computation resumes when it is run again: results in the journal are read
+instead of computed.  Each is stored with a digest of its arguments.  It is computed
+again if the digest differs, as after a change of the program.
 """
 
 import io
@@ -25,11 +25,11 @@ _DIGEST = 32
 
 @dataclass(eq=False)
 class Replay:
-    """Results so far.
+    """Results stored so far.
 
     Attributes:
-        journal: of records :data:`RECORD`; None to store nothing.
-        asked: number of results asked for.
+        journal: journal of records :data:`RECORD`; None to store nothing.
+        asked: number of results requested.
     """
 
     journal: Journal | None = None
@@ -38,10 +38,10 @@ class Replay:
     def recall(
         self, compute: Callable[[], tuple[ArrayLike, ...]], *given: ArrayLike
     ) -> tuple[NDArray, ...]:
-        """The next result.
+        """Return the next result.
 
         Args:
-            compute: computes it.
+            compute: function that computes it.
             given: numbers and words on which it depends.
 
         Returns:
@@ -70,10 +70,10 @@ class Replay:
 def journalled(
     path: Path | None, whose: dict[str, Any]
 ) -> Generator[Replay, None, None]:
-    """Results stored beside a file until it is written.
+    """Store results next to a file until it is written.
 
     Args:
-        path: of the file; None to store nothing.
+        path: path of the file; None to store nothing.
         whose: values that must be equal for two computations to share results.
 
     Yields:

@@ -1,4 +1,4 @@
-"""Page of draws: yields, what perfect parts reach, what governs the results."""
+"""Page of draws: yields, values of perfect parts, and the main contributors."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import xarray
 
 _BINS = 60
-_GOOD = 0.95  # a yield below it is no good news
+_GOOD = 0.95  # a lower yield is shown as a warning
 _LISTED = 20  # errors in a table of shares
 _ASSUMED = (
     "Small screws: the closures are linear in the errors of each draw.",
@@ -32,10 +32,11 @@ def draws_page(
     summary: Mapping[str, Any], data: "xarray.Dataset", provenance: Provenance,
     robot: str = "",
 ) -> str:  # fmt: skip
-    """The page of an experiment.
+    """Return the page of an experiment.
 
     Args:
-        summary: of :func:`assembly.statistics.summary.summarise`, with ``robot``.
+        summary: summary of :func:`assembly.statistics.summary.summarise`, with
+            ``robot``.
         data: the draws.
         provenance: command and files.
         robot: HTML of :func:`assembly.statistics.scenes.drawn_robot`.
@@ -70,20 +71,20 @@ def draws_page(
 
 
 def _share(summary: Mapping[str, Any]) -> Mapping[str, float]:
-    """The yield: all limits kept, or going together where there are none."""
+    """Return the yield: all limits met, or assembled if there are no limits."""
     limits: Mapping[str, float] | None = summary.get("within_limits")
     forced: Mapping[str, float] = summary["assembles"]["forced"]
     return limits or forced
 
 
 def _share_text(interval: Mapping[str, float]) -> str:
-    """A probability in per cent, with its interval."""
+    """Return a probability in per cent, with its interval."""
     low, high = 100 * interval["lower"], 100 * interval["upper"]
     return f"{100 * interval['probability']:.2f} % ({low:.2f} to {high:.2f})"
 
 
 def _draws_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Yield, pose error, and the errors that matter."""
+    """Return tiles of yield, pose error, and the errors that matter."""
     share = _share(summary)
     low, high = (100 * share[end] for end in ("lower", "upper"))
     words = "all limits kept" if "within_limits" in summary else WORDS["forced"]
@@ -102,7 +103,7 @@ def _draws_tiles(summary: Mapping[str, Any]) -> list[Tile]:
 
 
 def _yields(summary: Mapping[str, Any]) -> str:
-    """Table of all probabilities."""
+    """Return the table of all probabilities."""
     named = {WORDS[key]: one for key, one in summary["assembles"].items()}
     for key, one in summary["exceeds"].items():
         limit = f"{one['limit']:g} {one['unit']}".removesuffix(" 1")
@@ -121,7 +122,7 @@ def _yields(summary: Mapping[str, Any]) -> str:
 
 
 def _perfect_parts(summary: Mapping[str, Any]) -> str:
-    """What perfect parts reach, and the part of each kind of clearance in it."""
+    """Return the values of perfect parts, with the part of each kind of clearance."""
     parts = {k: v for k, v in summary["perfect_parts"].items() if v["reached"]}
     if not parts:
         return ""
@@ -144,7 +145,7 @@ def _perfect_parts(summary: Mapping[str, Any]) -> str:
 
 
 def _quantities(summary: Mapping[str, Any]) -> str:
-    """Table of means and quantiles."""
+    """Return the table of means and quantiles."""
     rows: list[list[Cell]] = []
     for key, one in summary["quantities"].items():
         if "mean" not in one:
@@ -159,7 +160,7 @@ def _quantities(summary: Mapping[str, Any]) -> str:
 
 
 def _histograms(summary: Mapping[str, Any], data: "xarray.Dataset") -> str:
-    """A histogram of each quantity that varies, with median and 95 % quantile."""
+    """Return histograms of quantities that vary, with median and 95 % quantile."""
     charts, still = [], []
     solved = data["status"].values == 0
     for key, one in summary["quantities"].items():
@@ -175,7 +176,7 @@ def _histograms(summary: Mapping[str, Any], data: "xarray.Dataset") -> str:
 
 
 def _histogram(name: str, one: Mapping[str, Any], values: NDArray) -> str:
-    """Counts of a quantity in bins of one width."""
+    """Return the counts of a quantity in bins of one width."""
     counts, edges = np.histogram(values, _BINS)
     traces: list[dict[str, Any]] = [{
         "type": "bar", "x": (edges[1:] + edges[:-1]) / 2, "y": counts,
@@ -192,7 +193,7 @@ def _histogram(name: str, one: Mapping[str, Any], values: NDArray) -> str:
 
 
 def _importance(summary: Mapping[str, Any]) -> str:
-    """Which errors the variance is owed to."""
+    """Return the errors that cause the variance."""
     pieces = []
     for key, one in summary.get("importance", {}).get("quantities", {}).items():
         shares = ranked(summary, key)[:_LISTED]

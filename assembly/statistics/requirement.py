@@ -16,12 +16,13 @@ from assembly.statistics.quantities import POSE_ERRORS, UNITS
 from assembly.statistics.replay import Replay
 from assembly.statistics.responses import respond
 from assembly.statistics.worst_case import Corner, worst_corner
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput
+from forcefit.results.display import html_table, short_repr
 
 CONVEX = ("margin", "margin_free", "energy")
 COSTS = ("reciprocal", "logarithm")
-_PRECISION = 1e-4  # of a limit on a pose error: upper minus lower bound
+# relative to a limit on a pose error: required upper minus lower bound
+_PRECISION = 1e-4
 _BATCH = 512  # draws solved and stored together
 TRAINING, SCALING, FRESH = 10, 11, 12  # streams of random numbers; more from 12 on
 
@@ -33,18 +34,18 @@ class Plan:
     Attributes:
         sources: m errors within tolerances of 1 [rad or m].
         group: (m,) class of each.
-        names: of the G classes.
+        names: names of the G classes.
         costs: (G,) > 0.
-        least: (G,) [rad or m] no tolerance is tighter.
-        most: (G,) [rad or m] and none looser.
+        least: (G,) [rad or m] tightest tolerances.
+        most: (G,) [rad or m] loosest tolerances.
         cost: ``"reciprocal"`` or ``"logarithm"``.
-        limits: by quantity: margin, margin_free, energy [J], force [N], moment [N m],
-            stress [Pa], rotation [rad], translation [m].
+        limits: limits by quantity: margin, margin_free, energy [J], force [N], moment
+            [N m], stress [Pa], rotation [rad], translation [m].
         asked_yield: 1 means always; else the share of robots that must meet every
             limit at every posture.
         draws: training draws at every posture.
         seed: of all draws.
-        clearance_model: for limits of pose errors, one of
+        clearance: for limits of pose errors, one of
             :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
         contact_length: [m] of the contact model, see
             :class:`assembly.statistics.experiment.Experiment`.
@@ -61,7 +62,7 @@ class Plan:
     asked_yield: float = 1.0
     draws: int = 1000
     seed: int = 1
-    clearance_model: str = "worst"
+    clearance: str = "worst"
     contact_length: float | None = None
 
     @property
@@ -72,21 +73,21 @@ class Plan:
     __repr__, _repr_html_ = short_repr, html_table
 
     def spread(self, tolerances: NDArray) -> NDArray:
-        """(m,) the tolerance of every source."""
+        """Return the (m,) tolerance of every source."""
         return tolerances[self.group]
 
     def gather(self, slopes: NDArray) -> NDArray:
-        """(G,) sums over the sources of each class."""
+        """Return the (G,) sums over the sources of each class."""
         return np.bincount(self.group, weights=slopes, minlength=len(self.names))
 
     def price(self, tolerances: NDArray) -> float:
-        """Cost of tolerances."""
+        """Return the cost of tolerances."""
         if self.cost == "reciprocal":
             return float((self.costs / tolerances).sum())
         return float(-(self.costs * np.log(tolerances)).sum())
 
     def draws_of(self, stream: int, count: int) -> NDArray:
-        """(count, m) errors within tolerances of 1."""
+        """Return (count, m) drawn errors, as factors on the tolerances."""
         return self.sources.draw(0, count, self.seed, stream)
 
 
@@ -116,7 +117,7 @@ class Requirement:
         experiments = [
             Experiment(
                 p, plan.sources, margins=False, stress="stress" in plan.limits,
-                clearance_model=plan.clearance_model if plan.limits_pose else "least",
+                clearance=plan.clearance if plan.limits_pose else "least",
                 contact_length=plan.contact_length, precision=(rotation, translation),
             )
             for p in self.postures
@@ -151,7 +152,7 @@ class Requirement:
         return [(key, i) for key in self.plan.limits for i in range(len(self.postures))]
 
     def utilisations(self, values: NDArray) -> tuple[NDArray, NDArray]:
-        """Utilisation of the limits: every limited quantity over its limit.
+        """Return the utilisation of the limits: every limited quantity over its limit.
 
         Args:
             values: (k, m) [rad or m] errors.
@@ -170,7 +171,7 @@ class Requirement:
     def _batch_utilisations(
         self, values: NDArray, first: int
     ) -> tuple[NDArray, NDArray]:
-        """Those of a batch, posture by posture."""
+        """Return the utilisations of a batch, posture by posture."""
         some = values[first : first + _BATCH]
         rows = np.arange(first, first + len(some))
         keys = list(self.plan.limits)
@@ -179,7 +180,7 @@ class Requirement:
             self.replay.recall(partial(self._quantities, i, some, rows), some, rows, i)
             for i in range(len(self.postures))
         ]
-        # (bounds, limits, postures, k): the postures of a limit follow one another
+        # (bounds, limits, postures, k): the postures of a limit are adjacent
         utilisations = np.stack([np.array(b) / limits for b in bounds], axis=2)
         utilisations = np.where(np.isnan(utilisations), np.inf, utilisations)
         lower, upper = utilisations.reshape(2, -1, len(some))
@@ -188,7 +189,7 @@ class Requirement:
     def _quantities(
         self, i: int, values: NDArray, rows: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """(limits, k) lower and upper bounds of limited quantities, at posture i."""
+        """Return lower and upper bounds (limits, k) of quantities at posture i."""
         keys = list(self.plan.limits)
         rows_of_draws = None
         if any(not key.startswith("margin") for key in keys):
@@ -214,19 +215,19 @@ class Requirement:
         return bounds[0], bounds[1]
 
     def utilisation_slopes(self, case: int, values: NDArray) -> NDArray:
-        """(k, m) slopes of a row of :meth:`utilisations` with each error."""
+        """Return the (k, m) slopes of a row of :meth:`utilisations` with each error."""
         key, i = self.cases[case]
         return self.respond(key, i, values)[1] / self.plan.limits[key]
 
     def respond(self, key: str, i: int, values: NDArray) -> tuple[NDArray, NDArray]:
-        """A limited quantity at posture i and its slopes with each error."""
+        """Return a limited quantity at posture i and its slopes with each error."""
         size, slopes = self.replay.recall(
             lambda: respond(
                 self.prepared[key][i],
                 self.plan.sources,
                 values,
                 key,
-                self.plan.clearance_model,
+                self.plan.clearance,
                 self.plan.contact_length,
             ),
             values,
@@ -236,13 +237,13 @@ class Requirement:
         return size, slopes
 
     def worst_corner(self, key: str, i: int, t: NDArray, corners: NDArray) -> Corner:
-        """The worst corner of tolerances (G,) found at posture i."""
+        """Return the worst corner of tolerances (G,) found at posture i."""
         spread = self.plan.spread(t)
 
         def search() -> tuple:
             corner = worst_corner(
                 self.prepared[key][i], self.plan.sources, spread, corners, key,
-                self.plan.clearance_model, self.plan.contact_length,
+                self.plan.clearance, self.plan.contact_length,
             )  # fmt: skip
             return corner.value, corner.signs, corner.slopes
 
@@ -250,16 +251,16 @@ class Requirement:
         return Corner(float(value), signs, slopes)
 
     def perfect_parts(self) -> dict[str, tuple[float, str]]:
-        """What clearances alone take of each limit on a pose error, without errors.
+        """Return the part of each limit on a pose error that clearances alone use.
 
         Returns:
             By quantity the largest pose error [rad or m] over all postures, a lower
-            bound, and where; none of other clearance models than the worst.
+            bound, and its posture; empty for other clearance models than the worst.
 
         Raises:
             BadInput: one of them exceeds its limit.
         """
-        if self.plan.clearance_model != "worst" or not self.plan.limits_pose:
+        if self.plan.clearance != "worst" or not self.plan.limits_pose:
             return {}
         lower, _ = self.utilisations(np.zeros((1, len(self.plan.sources))))
         reached = {}
@@ -276,7 +277,7 @@ class Requirement:
         return reached
 
     def _refuse_broken(self, reached: Mapping[str, tuple[float, str]]) -> None:
-        """Refuse the limit that clearances alone exceed the most."""
+        """Reject the limit that clearances alone exceed the most."""
         limits = self.plan.limits
         for key in sorted(reached, key=lambda k: -reached[k][0] / limits[k]):
             value, where = reached[key]
@@ -289,10 +290,10 @@ class Requirement:
                 )
 
     def check_taken_up(self) -> None:
-        """Refuse errors that neither clearances nor springs take up at some posture.
+        """Reject errors that neither clearances nor springs take up at some posture.
 
         Raises:
-            BadInput: there is one; it is named.
+            BadInput: there is one; the message names it.
         """
         sources = self.plan.sources
         columns = 6 * sources.frame + sources.component

@@ -16,25 +16,25 @@ from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.sensitivity import solution_slopes
 from assembly.statistics.worst_clearance import bound_worst_errors, worst_error_slopes
 
-_STEP = 1e-6  # of a wrench, for differences of the stress formula
-_PRECISION = 1e-9  # [rad or m] asked of the largest pose errors
+_STEP = 1e-6  # step relative to a wrench, for differences of the stress formula
+_PRECISION = 1e-9  # [rad or m] required precision of the largest pose errors
 _PARTS = {"moment": slice(0, 3), "force": slice(3, 6)}
 
 
 def respond(
     prepared: PostureMargins | LinearResponse, sources: ErrorSources, values: NDArray,
-    key: str = "energy", clearance_model: str = "worst",
+    key: str = "energy", clearance: str = "worst",
     contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """A quantity for given errors, and its slopes with each of them.
+    """Return a quantity for given errors, and its slopes with each of them.
 
     Args:
         prepared: a posture prepared for margins, or for energies and all others.
         sources: m of them.
         values: (k, m) [rad or m].
-        key: which quantity, of a posture prepared for energies: energy [J], force [N],
+        key: the quantity, for a posture prepared for energies: energy [J], force [N],
             moment [N m], stress [Pa], rotation [rad] or translation [m].
-        clearance_model: for a pose error, one of
+        clearance: for a pose error, one of
             :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.  With the
             worst, value and slopes are those of the largest error found.  With uniform
             and contact positions the slopes are those of the solution of (22).
@@ -42,7 +42,7 @@ def respond(
             :class:`assembly.statistics.experiment.Experiment`.
 
     Returns:
-        (k,) and (k, m); NaN where there is no solution.
+        (k,) and (k, m); NaN without a solution.
     """
     errors = sources.errors(values)
     if isinstance(prepared, PostureMargins):
@@ -54,14 +54,14 @@ def respond(
         return draws.energy, -draws.wrenches[:, sources.frame, sources.component]
     size = np.full(len(values), np.nan)
     slopes = np.full(errors.shape, np.nan)
-    # without clearances in unit cones their active bounds are not known
+    # without clearances in unit cones their active bounds are unknown
     known = np.isfinite(draws.energy) & np.isfinite(draws.clearances).all(axis=1)
     solved = np.flatnonzero(known)
     if len(solved):
         some = draws[solved]
         if key in POSE_ERRORS:
             size[solved], by_screw, by_clearance = _pose_error(
-                prepared, some, key, (clearance_model, contact_length), solved
+                prepared, some, key, (clearance, contact_length), solved
             )
             by_wrench = np.zeros_like(errors[solved])
         else:
@@ -77,9 +77,9 @@ def _pose_error(
     prepared: LinearResponse, draws: Assembly, key: str,
     model: tuple[str, float | None], numbers: NDArray,
 ) -> tuple[NDArray, NDArray, NDArray | None]:  # fmt: skip
-    """Size of a pose error, and its slopes with platform screw and clearances."""
-    part, (clearance_model, contact_length) = 3 * POSE_ERRORS.index(key), model
-    if clearance_model == "worst":
+    """Return a pose error, and its slopes with platform screw and clearances."""
+    part, (clearance, contact_length) = 3 * POSE_ERRORS.index(key), model
+    if clearance == "worst":
         precision = (_PRECISION, np.inf) if key == "rotation" else (np.inf, _PRECISION)
         bounds, screws = bound_worst_errors(draws, precision)
         which = POSE_ERRORS.index(key)
@@ -89,7 +89,7 @@ def _pose_error(
         return bounds[:, which, 0], by_screw, -by_clearance
     generators = [draw_generator(1, i, CLEARANCE_STREAM) for i in numbers.tolist()]
     screws, _ = position_clearances(
-        prepared, draws, clearance_model, generators, contact_length
+        prepared, draws, clearance, generators, contact_length
     )
     slopes = np.zeros_like(screws)
     size, slopes[:, part : part + 3] = _size(screws[:, part : part + 3])
@@ -97,7 +97,7 @@ def _pose_error(
 
 
 def _wrench_quantity(some: Assembly, key: str) -> tuple[NDArray, NDArray]:
-    """The largest moment, force or stress, and its slopes with the wrenches."""
+    """Return the largest moment, force or stress, and its slopes with the wrenches."""
     wrenches, at_tips = some.wrenches, some.frame_loads.at_tips
     slopes, draws = np.zeros_like(wrenches), np.arange(len(wrenches))
     if key != "stress":
@@ -118,7 +118,7 @@ def _wrench_quantity(some: Assembly, key: str) -> tuple[NDArray, NDArray]:
 
 
 def _size(parts: NDArray) -> tuple[NDArray, NDArray]:
-    """Lengths of vectors, and their slopes with the components."""
+    """Return the lengths of vectors, and their slopes with the components."""
     size = np.linalg.norm(parts, axis=-1)
     return size, parts / np.maximum(size, 1e-300)[..., None]
 
@@ -126,7 +126,7 @@ def _size(parts: NDArray) -> tuple[NDArray, NDArray]:
 def _stress_slopes(
     link: LinkStress, wrenches: NDArray, at_tip: NDArray = WEIGHTLESS
 ) -> NDArray:
-    """(k, 6) slopes of the peak stress with a link's wrench."""
+    """Return the (k, 6) slopes of the peak stress with a link's wrench."""
     # differences of the formula, not of the solution: a fibre's stress is the root of
     # a quadratic form, and central differences lose 1e-10 of its slope
     slopes = np.zeros_like(wrenches)

@@ -10,7 +10,7 @@ from assembly.statistics.requirement import Requirement
 from assembly.statistics.worst_case import CORNERS, random_corners
 from forcefit.inputs.table import BadInput
 
-_FINE = 1e-4  # of the limits: precision of the largest utilisation
+_FINE = 1e-4  # relative to the limits: precision of the largest utilisation
 _MOST_TRIALS = 80
 
 
@@ -28,15 +28,15 @@ class Samples:
 
 
 def draw_samples(requirement: Requirement, stream: int, times: int = 1) -> Samples:
-    """Fixed draws, or corners of the tolerances for a yield of 1.
+    """Return the fixed draws, or corners of the tolerances for a yield of 1.
 
     Args:
         requirement: limits at all postures.
-        stream: of random numbers.
+        stream: stream of random numbers.
         times: multiple of the plan's draws.
 
     Returns:
-        The samples; the failures allowed show the yield asked for at 95 %.
+        The samples; with the failures allowed, they show the required yield at 95 %.
 
     Raises:
         BadInput: too few draws to show that yield.
@@ -53,7 +53,7 @@ def draw_samples(requirement: Requirement, stream: int, times: int = 1) -> Sampl
 def with_worst_corners(
     requirement: Requirement, samples: Samples, t: NDArray
 ) -> Samples:
-    """The samples and the worst corners of tolerances, by limit and posture.
+    """Return the samples with the worst corners of tolerances, by limit and posture.
 
     Args:
         requirement: limits at all postures; no failure is allowed.
@@ -61,7 +61,7 @@ def with_worst_corners(
         t: (G,) [rad or m] tolerances.
 
     Returns:
-        With the corners that were not among them.
+        The samples with the corners that were not among them.
     """
     corners = np.vstack([
         samples.values[: CORNERS // 2],
@@ -81,11 +81,11 @@ def with_worst_corners(
 def scale_uniformly(
     requirement: Requirement, samples: Samples, t: NDArray, precision: float = _FINE
 ) -> NDArray:
-    """Tolerances scaled uniformly, within their bounds, until the samples just fit.
+    """Scale tolerances uniformly, within their bounds, until the samples just fit.
 
     Args:
         requirement: limits at all postures.
-        samples: of the errors.
+        samples: samples of the errors.
         t: (G,) [rad or m] proportions.
         precision: relative, of the largest utilisation, or of the factor.
 
@@ -123,7 +123,7 @@ def scale_uniformly(
             steep = np.log(utilisation / previous[1]) / np.log(factor / previous[0])
             power = float(np.clip(steep, 0.3, 10.0))
         previous = factor, utilisation
-        # by a power law of the utilisation; else the middle of the interval
+        # a power law of the utilisation predicts the factor; else the interval's middle
         factor = _next_factor(low, high, factor, utilisation, power, precision)
     return np.clip(low * t, plan.least, plan.most)
 
@@ -132,7 +132,7 @@ def _next_factor(
     low: float, high: float, factor: float, utilisation: float, power: float,
     precision: float,
 ) -> float:  # fmt: skip
-    """The factor to try next."""
+    """Return the factor to try next."""
     if 0 < utilisation < np.inf:
         guess = factor * ((1 - precision / 2) / utilisation) ** (1 / power)
         if low * (1 + precision / 4) < guess < high * (1 - precision / 4):
@@ -143,7 +143,7 @@ def _next_factor(
 
 
 def _allowed_failures(draws: int, asked: float) -> int:
-    """Largest number of failures that still shows a yield at 95 %, one-sided."""
+    """Return the largest number of failures that shows a yield at 95 %, one-sided."""
     # proportion() decreases with the failures: bisection
     low, high = -1, draws
     while high - low > 1:

@@ -1,4 +1,4 @@
-"""Robots of an experiment to be turned in its page, and margins over a workspace."""
+"""Three-dimensional scenes of an experiment's robots, and maps of margins."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -27,14 +27,14 @@ _CAPTION = (
 
 
 def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
-    """The draw whose pose error is nearest to its 95 % quantile, assembled.
+    """Return the draw whose pose error is nearest to its 95 % quantile, assembled.
 
     Args:
-        experiment: that gave the draws.
+        experiment: the experiment of the draws.
         data: the draws, numbered from 0.
 
     Returns:
-        HTML of a scene; empty where no draw assembles.
+        HTML of a scene; empty if no draw assembles.
     """
     solved = data["status"].values == 0
     for key in ("translation", "energy"):
@@ -56,14 +56,14 @@ def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
 
 
 def tightest_robot(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
-    """The robot where its margin is largest, assembled with the errors it has.
+    """Return the robot at its largest margin, assembled with its present errors.
 
     Args:
-        postures: that were judged.
-        present: of :func:`assembly.statistics.tolerances.present_errors`.
+        postures: the postures assessed.
+        present: result of :func:`assembly.statistics.tolerances.present_errors`.
 
     Returns:
-        HTML of a scene; empty where it cannot be assembled.
+        HTML of a scene; empty if it cannot be assembled.
     """
     worst = postures[int(np.nanargmax(present["margins"]))]
     why = "The posture of the largest margin, with the errors there are."
@@ -77,7 +77,7 @@ def _forced_robot(
     *,
     why: str,
 ) -> str:
-    """A robot assembled, and why it is this one; empty where it does not assemble."""
+    """Return the scene of an assembled robot with a caption; empty without solution."""
     try:
         forced = solve_assembly(posture, load, gravity=gravity)
     except (CannotAssemble, SolverFailed):
@@ -86,14 +86,14 @@ def _forced_robot(
 
 
 def margin_map(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
-    """Margins over the postures of a grid.
+    """Return the margins over the postures of a grid.
 
     Args:
-        postures: that were judged.
-        present: of :func:`assembly.statistics.tolerances.present_errors`.
+        postures: the postures assessed.
+        present: result of :func:`assembly.statistics.tolerances.present_errors`.
 
     Returns:
-        HTML of a map; empty where the grid has no axis or more than two.
+        HTML of a map; empty if the grid has no axis or more than two.
     """
     poses = [posture.pose() for posture in postures]
     values = {name: np.array([pose[name] for pose in poses]) for name in poses[0]}
@@ -112,7 +112,7 @@ def margin_map(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
         (Axis(name, "m" if name.startswith("t") else "rad"), v)
         for name, v in ticks.items()
     ]
-    title = f"zone margin, eq. (21), compliant joints {present['compliant']}"
+    title = f"{NAMES[present['quantity']]}, eq. (21)"
     layer = Layer("margin", title, "", margins)
     caption = "Up to 1 it goes together by its clearances alone."
     return value_map(axes, [layer], states.astype(str), caption)

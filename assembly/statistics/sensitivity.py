@@ -1,7 +1,7 @@
 """Sensitivity to every geometric error, from multipliers and active clearances.
 
 The least energy (22) is the maximum of its dual ``-w.dl - ..`` over all balanced
-wrenches w: its slope with delta l is minus the wrench through the body.
+wrenches w.  So its slope with delta l is minus the wrench through the body.
 
 Wrenches and the platform's screw are part of the solution.  While the active clearances
 stay the same, its slopes follow from the optimality conditions, differentiated:
@@ -12,7 +12,7 @@ so du is orthogonal to u_c in every active cone, and
 
     P (G^T G + nu) P du + P H^T deta = -P G^T dh,   H P du = dk
 
-with P the projector on these directions.  One solution of the transposed equations
+where P is the projector on these directions.  One solution of the transposed equations
 gives the slopes with any number of errors (adjoint method).
 """
 
@@ -23,12 +23,13 @@ from assembly.linear.energy import Assembly
 from assembly.solvers.conic import GAP_WITHOUT_CLEARANCE
 from assembly.statistics.linear_response import LinearResponse
 
-_ACTIVE = 1e-7  # of the largest force on any cone: less is none
-_RANK = 1e-10  # of the equations: directions left undetermined do not move
+# relative to the largest force on any cone: smaller forces count as zero
+_ACTIVE = 1e-7
+_RANK = 1e-10  # relative rank tolerance: undetermined directions do not move
 
 
 def energy_slopes(assembly: Assembly) -> NDArray:
-    """Slopes of the least energy with every geometric error.
+    """Return the slopes of the least energy with every geometric error.
 
     Args:
         assembly: the assembly at least energy; under a load these are the slopes of
@@ -36,8 +37,8 @@ def energy_slopes(assembly: Assembly) -> NDArray:
 
     Returns:
         (n, 6) [J/rad, J/m], delta l of every frame in its axes.  Where rigid parts are
-        overconstrained the wrenches, and with them slopes of errors there, are those
-        of least size among many.
+        overconstrained the wrenches are not unique; the least ones, and their slopes,
+        are returned.
     """
     return -assembly.wrenches
 
@@ -46,18 +47,18 @@ def solution_slopes(
     prepared: LinearResponse, draws: Assembly, by_wrench: NDArray, by_screw: NDArray,
     by_clearance: NDArray | None = None,
 ) -> NDArray:  # fmt: skip
-    """Slopes of a function of wrenches and platform screw with every geometric error.
+    """Return slopes of a function of wrenches and platform screw with each error.
 
     Args:
         prepared: the posture.
-        draws: of :meth:`LinearResponse.solve`, k draws.
+        draws: draws of :meth:`LinearResponse.solve`, k draws.
         by_wrench: (k, n, 6) slopes of the function with the wrench through every body.
-        by_screw: (k, 6) and with the platform's screw.
-        by_clearance: (k, nu) and with the clearances, in units of their cones.
+        by_screw: (k, 6) slopes with the platform's screw.
+        by_clearance: (k, nu) slopes with the clearances, in units of their cones.
 
     Returns:
-        (k, n, 6) slopes with delta l of every frame in its axes; one of several where
-        a clearance is weakly active.  Undetermined clearances do not move; a passive
+        (k, n, 6) slopes with delta l of every frame in its axes; one of several if a
+        clearance is weakly active.  Undetermined clearances do not move.  A passive
         joint at the end of its motion is treated as if its motion had no bound.
     """
     A, nu, k = prepared.closures, prepared.starts[-1], len(draws.energy)
@@ -90,10 +91,11 @@ def solution_slopes(
 def _active_clearances(
     prepared: LinearResponse, draws: Assembly, forces: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """(k, nu, nu) projectors orthogonal to active clearances, and multipliers nu."""
+    """Return (k, nu, nu) projectors normal to active clearances, and multipliers."""
     k, nu = forces.shape
     P, N = np.tile(np.eye(nu), (k, 1, 1)), np.zeros((k, nu, nu))
-    # inside a zone multipliers y are rounding: energies y^2 / 2 beside forces G y
+    # inside a zone multipliers y are rounding: energies y^2 / 2 are far below forces G
+    # y
     pressed = draws.energy > GAP_WITHOUT_CLEARANCE * np.abs(forces).sum(
         axis=1, initial=0.0
     )

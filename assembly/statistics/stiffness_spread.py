@@ -1,8 +1,8 @@
-"""The platform's stiffness of every draw: what errors and clearances spread it to.
+"""Spread of the platform's stiffness over draws of errors and clearances.
 
-Errors do not change the nominal K_C.  What they change is which clearances are
-pressed, so the tangent of (22) differs from draw to draw; and internal forces and
-turned parts, which the tangent of the exact equilibrium has besides.
+Errors do not change the nominal K_C.  They change which clearances are pressed, so the
+tangent of (22) differs from draw to draw.  The tangent of the exact equilibrium also
+has the effects of internal forces and rotated parts.
 """
 
 from collections.abc import Mapping
@@ -21,30 +21,30 @@ from assembly.platform_stiffness.linear_tangent import in_contact
 from assembly.solvers.conic import SolverFailed
 from assembly.statistics.estimates import mean, proportion, quantile
 from assembly.sweeps.point_stiffness import STATES
-from forcefit.inputs.display import numbers
+from forcefit.results.display import numbers
 from stiffness.screws import WRENCH
 
-_NAMED = 5  # free motions, those of most draws
-_ALIKE = 2  # decimals to which motions of draws are the same
+_NAMED = 5  # largest number of free motions reported, those of most draws
+_ALIKE = 2  # decimals to which motions of two draws are compared
 
 
 def draw_stiffnesses(
     posture: Posture, errors: NDArray, state: str,
     load: ArrayLike | None = None, gravity: ArrayLike | None = None,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Stiffness along every axis, the others free, of each draw.
+    """Return the stiffness along every axis, the others free, of each draw.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         errors: (k, n, 6) [rad, m] of its frames.
         state: ``"contact"`` or ``"exact"``.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
 
     Returns:
-        (k, 6) [N m/rad, N/m] for ``[mx my mz fx fy fz]``; 0 where nothing resists, as
-        within a clearance, NaN where there is no equilibrium; and (k, 6, 6) [rad, m]
-        the unit screws that nothing resists, a row each, the others NaN.
+        (k, 6) [N m/rad, N/m] for ``[mx my mz fx fy fz]``; 0 for a free motion, as
+        within a clearance, NaN without equilibrium.  And (k, 6, 6) [rad, m] the unit
+        screws of free motions, a row each; other rows are NaN.
     """
     stiffnesses = np.full((len(errors), 6), np.nan)
     motions = np.full((len(errors), 6, 6), np.nan)
@@ -67,17 +67,18 @@ def draw_stiffnesses(
 def stiffness_report(
     stiffnesses: NDArray, motions: NDArray, state: str, level: float
 ) -> dict[str, Any]:
-    """Spread of the stiffness along each axis.
+    """Return the spread of the stiffness along each axis.
 
     Args:
         stiffnesses: (k, 6) of :func:`draw_stiffnesses`.
         motions: (k, 6, 6) of the same.
-        state: of the tangents.
-        level: of confidence.
+        state: state of the tangents.
+        level: level of confidence.
 
     Returns:
-        By axis: among how many draws with an answer, how often nothing resists, and of
-        the rest mean and quantiles with intervals; and the free motions of most draws.
+        By axis: the number of draws with a result, the share of draws with a free
+        motion, and of the other draws mean and quantiles with intervals.  And the free
+        motions of most draws.
     """
     axes: dict[str, Any] = {}
     for name, values in zip(WRENCH, stiffnesses.T, strict=True):
@@ -107,7 +108,7 @@ def stiffness_report(
 
 
 def stiffness_spread_text(report: Mapping[str, Any]) -> str:
-    """The spread for people, a line an axis."""
+    """Return the spread as text, a line for each axis."""
     lines = [f"stiffness of the platform, {report['means']}:"]
     for name, one in report["axes"].items():
         text = "nothing resists"

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     import xarray
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
-_ROUNDING = 1e-18  # of the largest value: less is zero
+_ROUNDING = 1e-18  # relative to the largest value: smaller ones count as zero
 _MARGINS = {"margin": "rigid", "margin_free": "rigid_compliant_free"}
 WORDS = {
     "forced": "goes together, by force if need be",
@@ -49,23 +49,22 @@ def summarise(
     strength: float | None = None,
     level: float = 0.95,
 ) -> dict[str, Any]:
-    """Summary of the draws of :func:`assembly.statistics.monte_carlo.run_draws`.
+    """Return a summary of draws of :func:`assembly.statistics.monte_carlo.run_draws`.
 
     Args:
         data: the draws.
-        limits: by quantity; a draw meets them if none is exceeded.
+        limits: limits by quantity; a draw meets them if none is exceeded.
         strength: [Pa] yield strength of the links.
-        level: of confidence of all intervals.
+        level: level of confidence of all intervals.
 
     Returns:
-        ``draws`` and how many of them are ``assembled``; ``clearance``, what it means
-        and its ``contact_length`` [m];
-        ``assembles`` (with any energy, rigidly with compliant joints held or free),
-        ``exceeds`` and
-        ``within_limits`` with the probabilities among all draws; what perfect parts
-        reach (``perfect_parts``) and which limits they break; mean, quantiles and
-        most probable value of every quantity among those that assemble, of margins
-        also among all; mean, covariance and most probable platform screw.
+        ``draws`` and the number of them that are ``assembled``; ``clearance``, its
+        meaning and its ``contact_length`` [m].  ``assembles`` (with any energy, rigidly
+        with compliant joints held or free), ``exceeds`` and ``within_limits``:
+        probabilities among all draws.  ``perfect_parts`` and the limits that these
+        exceed.  Mean, quantiles and most probable value of every quantity among the
+        assembled draws, for margins also among all.  Mean, covariance and most probable
+        platform screw.
 
     Raises:
         BadInput: a limit's quantity was not computed.
@@ -110,7 +109,7 @@ def summarise(
         }  # fmt: skip
     if strength is not None:
         largest = data["stress"].values[solved].max(axis=0, initial=0.0)
-        with np.errstate(divide="ignore"):  # endless without any stress
+        with np.errstate(divide="ignore"):  # infinite without any stress
             report["safety"] = strength / largest
         errors = data["stress"].attrs.get("estimated_relative_error")
         if errors is not None:
@@ -130,7 +129,7 @@ def summarise(
 def _yields(
     data: "xarray.Dataset", solved: NDArray, limits: Mapping[str, float], level: float
 ) -> dict[str, Any]:
-    """How often each limit, and any of them, is exceeded; undecided draws apart."""
+    """Return how often limits are exceeded, each and any, with undecided draws."""
     count = len(solved)
     met, failed, exceeds = solved.copy(), ~solved, {}
     for key, limit in limits.items():
@@ -138,7 +137,7 @@ def _yields(
             raise BadInput(f"limit {key}: not among what was computed")
         values, lower = _worst(data, key), f"{key}_lower"
         over = ~(values <= limit)
-        # of a largest pose error the draws hold two bounds, of all others one value
+        # for a largest pose error the draws hold two bounds, otherwise one value
         least = data[lower].values if lower in data else values
         surely = ~solved | (least > limit)
         met &= ~over
@@ -159,7 +158,7 @@ def _yields(
 
 
 def _worst(data: "xarray.Dataset", key: str) -> NDArray:
-    """(k,) a quantity of every draw; of all links the most stressed."""
+    """Return the (k,) values of a quantity; of several links the most stressed."""
     values = np.asarray(data[key].values, dtype=float)
     return values.max(axis=1) if values.ndim == 2 else values
 
@@ -167,7 +166,7 @@ def _worst(data: "xarray.Dataset", key: str) -> NDArray:
 def _described(
     data: "xarray.Dataset", key: str, solved: NDArray, level: float
 ) -> dict[str, Any]:
-    """Mean, quantiles and most probable value of sizes; 0 if most of them are zero."""
+    """Return mean, quantiles and most probable value; 0 if most values are zero."""
     every = _worst(data, key)
     values = every[solved]
     finite = values[np.isfinite(values)]
@@ -199,7 +198,7 @@ def _described(
 
 
 def summary_text(summary: Mapping[str, Any]) -> str:
-    """The results of :func:`summarise` for people."""
+    """Return the results of :func:`summarise` as text."""
     draws, assembled = summary["draws"], summary["assembled"]
     lines = [
         f"{draws} draws; in brackets {summary['confidence']:.0%} intervals",
@@ -246,14 +245,14 @@ def summary_text(summary: Mapping[str, Any]) -> str:
 
 
 def _titled(name: str, results: Mapping[str, Any]) -> str:
-    """A name with its clearance model, if it has one."""
+    """Return a name with its clearance model, if it has one."""
     return (
         f"{name} [clearance {results['clearance']}]" if "clearance" in results else name
     )
 
 
 def _share(interval: Mapping[str, float]) -> str:
-    """A probability with its interval, and the number of undecided draws."""
+    """Return a probability with its interval, and the number of undecided draws."""
     low, high = interval["lower"], interval["upper"]
     text = f"{interval['probability']:.5g} ({low:.5g} to {high:.5g})"
     undecided = interval.get("undecided", 0)
@@ -261,12 +260,12 @@ def _share(interval: Mapping[str, float]) -> str:
 
 
 def _named(value: float, unit: str) -> str:
-    """A number with its unit."""
+    """Return a number with its unit."""
     return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
 
 
 def _quantiles_text(quantiles: Mapping[str, Mapping[str, float]]) -> str:
-    """Median and the value that 95 % stay below."""
+    """Return the median and the 95 % quantile as text."""
     half, high = quantiles["0.5"], quantiles["0.95"]
     return (
         f"median {half['value']:.4g} ({half['lower']:.4g} to {half['upper']:.4g}), "

@@ -1,4 +1,4 @@
-"""Which error or clearance governs a result of draws, and what to tighten."""
+"""The error or clearance that dominates a result of draws, and advice to tighten it."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,10 +14,10 @@ _NAMED = 3  # contributors in a tile
 
 
 def ranked(summary: Mapping[str, Any], key: str) -> list[tuple[str, list[float]]]:
-    """Total shares of a quantity's variance by error, the largest first.
+    """Return the total shares of a quantity's variance by error, the largest first.
 
     Args:
-        summary: of :func:`assembly.statistics.summary.summarise`.
+        summary: summary of :func:`assembly.statistics.summary.summarise`.
         key: the quantity.
 
     Returns:
@@ -32,13 +32,13 @@ def ranked(summary: Mapping[str, Any], key: str) -> list[tuple[str, list[float]]
 
 
 def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """What perfect parts reach, what governs the result, and what to tighten.
+    """Return tiles: values of perfect parts, the main contributor, what to tighten.
 
     Args:
-        summary: of :func:`assembly.statistics.summary.summarise`.
+        summary: summary of :func:`assembly.statistics.summary.summarise`.
 
     Returns:
-        The tiles; of errors none without their importance.
+        The tiles; without importance, no tiles of errors.
     """
     tiles = _clearance_tiles(summary)
     broken, key = summary["perfect_parts_break"], _deciding(summary)
@@ -68,7 +68,7 @@ def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
 
 
 def _deciding(summary: Mapping[str, Any]) -> str:
-    """The quantity whose limit is exceeded most often; else translation, or energy."""
+    """Return the quantity exceeded most often; without any, translation or energy."""
     exceeds = sorted(
         summary["exceeds"], key=lambda k: -summary["exceeds"][k]["probability"]
     )
@@ -78,7 +78,7 @@ def _deciding(summary: Mapping[str, Any]) -> str:
 
 
 def _clearance_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """The pose error of perfect parts."""
+    """Return the pose error of perfect parts."""
     parts = summary["perfect_parts"]
     answer: list[str | Value] = []
     for key in ("translation", "rotation"):
@@ -94,7 +94,7 @@ def _clearance_tiles(summary: Mapping[str, Any]) -> list[Tile]:
 
 
 def _broken_tile(broken: Mapping[str, Any]) -> Tile:
-    """That no error, but the clearances have to be tightened."""
+    """Return the tile that advises to tighten clearances instead of errors."""
     key, one = next(iter(broken.items()))
     largest = next(iter(one.get("clearances", {})), "")
     note: list[str | Value] = [
@@ -109,6 +109,6 @@ def _broken_tile(broken: Mapping[str, Any]) -> Tile:
 
 
 def _listed(names: list[str]) -> str:
-    """Names, of many the first ones and how many more."""
+    """Return the first names, and the number of further ones."""
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     return ", ".join(names[:_NAMED]) + more

@@ -21,11 +21,11 @@ _LOOSEST = (0.1, 0.01)  # [rad, m] largest small screws
 
 
 def read_plan(path: Path | str, robot: Robot) -> Plan:
-    """The plan of a tolerance file.
+    """Return the plan of a tolerance file.
 
     Args:
         path: TOML file.
-        robot: whose frames it names.
+        robot: the robot with the frames named in the file.
 
     Returns:
         The plan.
@@ -77,7 +77,7 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
 
 
 class _Groups(NamedTuple):
-    """Tables ``[[tolerance]]``: errors that share one."""
+    """Tables ``[[tolerance]]``: groups of errors with a common tolerance."""
 
     of: dict[tuple[int, int], int]  # by frame and component
     names: list[str]
@@ -87,7 +87,7 @@ class _Groups(NamedTuple):
 
 
 def _groups(root: Table, tables: Sequence[Table], robot: Robot) -> _Groups:
-    """The groups of errors of a file."""
+    """Return the groups of errors of a file."""
     rows, names, costs, least, most = groups = _Groups({}, [], [], [], [])
     for number, table in enumerate(tables):
         places, unit = _places(table, robot)
@@ -112,7 +112,7 @@ def _groups(root: Table, tables: Sequence[Table], robot: Robot) -> _Groups:
 
 
 def _choice(table: Table, key: str, valid: tuple[str, ...]) -> str:
-    """One of some words, the first if absent."""
+    """Return one of the valid words; the first if the key is absent."""
     word = table.text(key, valid[0])
     if word not in valid:
         raise table.bad(key, f"found {quoted(word)}{nearest(word, valid)}")
@@ -120,7 +120,7 @@ def _choice(table: Table, key: str, valid: tuple[str, ...]) -> str:
 
 
 def _limits(table: Table) -> dict[str, float]:
-    """Limits by quantity."""
+    """Return the limits by quantity."""
     valid = limit_names()
     limits = {}
     for key in list(table.content):
@@ -131,7 +131,7 @@ def _limits(table: Table) -> dict[str, float]:
 
 
 def _places(table: Table, robot: Robot) -> tuple[list[tuple[int, int]], int]:
-    """Frames and components that share a tolerance; 0 if it is an angle, 1 a length."""
+    """Return frames and components with one tolerance; 0 for angles, 1 for lengths."""
     names = table.require("frames", "a list of frame names")
     parts = table.require("components", 'a list such as ["TX"]')
     for key, value in (("frames", names), ("components", parts)):

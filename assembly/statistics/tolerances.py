@@ -12,7 +12,7 @@ from assembly.kinematics.nominal import Target
 from assembly.kinematics.posture import Posture, place_many
 from assembly.kinematics.verdict import SINGULAR_WORDS, verdicts
 from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.model.clearance import Compliant
+from assembly.linear.zone import Compliant
 from assembly.model.robot import Robot
 from assembly.model.statuses import OUT_OF_REACH, SINGULAR
 from assembly.solvers.conic import SolverFailed
@@ -26,18 +26,18 @@ from stiffness.screws import SCREW
 
 
 def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int]]:
-    """Postures of a grid that the robot reaches and may use.
+    """Return the postures of a grid that the robot can reach and use.
 
     Args:
-        robot: any.
-        grid: such as ``"tx=-0.2:0.2:0.1,tz=-0.5"``.
+        robot: any robot.
+        grid: grid such as ``"tx=-0.2:0.2:0.1,tz=-0.5"``.
 
     Returns:
-        The postures; and how many are left out, by status: out of reach, and those of
-        :func:`assembly.kinematics.verdict.verdicts`.
+        The postures; and the number of those left out, by status: out of reach, and
+        those of :func:`assembly.kinematics.verdict.verdicts`.
 
     Raises:
-        BadInput: the grid is not one, or none of it is reached.
+        BadInput: the grid is invalid, or no posture of it is reached.
     """
     targets = grid_targets(parse_grid(grid))
     rows = targets.at(np.arange(int(np.prod(targets.shape))))
@@ -58,7 +58,7 @@ def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int
 
 
 def left_out_text(left_out: dict[str, int]) -> str:
-    """Postures that were not judged, in one line."""
+    """Return a line on the postures that were left out."""
     counts = ", ".join(f"{status}: {n}" for status, n in left_out.items())
     text = f"postures left out: {counts}"
     if SINGULAR in left_out:
@@ -67,7 +67,7 @@ def left_out_text(left_out: dict[str, int]) -> str:
 
 
 def identity_of(postures: Sequence[Posture], plan: Plan, fresh: int) -> dict[str, Any]:
-    """Values that must be equal for two allocations to share stored results."""
+    """Return the values that must be equal for two allocations to share results."""
     arrays = [p.transforms for p in postures]
     for one in (plan, plan.sources):
         arrays += [v for v in vars(one).values() if isinstance(v, np.ndarray)]
@@ -77,7 +77,7 @@ def identity_of(postures: Sequence[Posture], plan: Plan, fresh: int) -> dict[str
         "plan_and_postures_sha256": digest.hexdigest(),
         "limits": str(dict(plan.limits)),
         "cost": plan.cost,
-        "clearance": plan.clearance_model,
+        "clearance": plan.clearance,
         "contact_length": plan.contact_length or 0.0,
         "yield": plan.asked_yield,
         "draws": plan.draws,
@@ -96,13 +96,14 @@ def present_errors(
     """Assess the robot's own errors: largest margin over the postures, and its causes.
 
     Args:
-        postures: of a robot with errors.
+        postures: postures of a robot with errors.
         compliant: ``"free"`` or ``"rigid"``, about the own axis of compliant joints.
         progress: called with postures done and their number.
 
     Returns:
-        The margins, the largest and where; the factor on all errors at which it is 1;
-        slopes of the margin and of the energy there, by error, the steepest first.
+        The margins, the largest and its posture; the factor on all errors at which it
+        is 1; slopes of the margin and of the energy there, by error, the steepest
+        first.
     """
     prepared, zones = [], []
     for i, posture in enumerate(postures):
@@ -124,7 +125,7 @@ def present_errors(
     order = np.argsort(-np.nan_to_num(effect))
     return {
         "postures": len(postures),
-        "compliant": compliant,
+        "quantity": "margin_free" if compliant == "free" else "margin",
         "largest_margin": margin,
         "margins": values,
         "at": posture.pose(),
@@ -145,7 +146,7 @@ def present_errors(
 
 
 def present_text(results: dict[str, Any]) -> str:
-    """The results of :func:`present_errors` for people: the five largest errors."""
+    """Return results of :func:`present_errors` as text: the five largest errors."""
     where = ", ".join(
         f"{k} = {v:.4g}" for k, v in results["at"].items() if abs(v) > 1e-9
     )

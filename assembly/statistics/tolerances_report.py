@@ -1,4 +1,4 @@
-"""Page of tolerances: what was asked, the tolerances, and what clearances take."""
+"""Page of tolerances: requirement, tolerances, and the share of clearances."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,7 +13,7 @@ from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 
 _LISTED = 20  # errors in a table of shares
-_ALIKE = 0.01  # of the largest share: shares as close are equal
+_ALIKE = 0.01  # relative to the largest share: shares as close are equal
 _ASSUMED = (
     "Limits hold at the postures of the grid; between them nothing is said.",
     "Errors are independent and keep within their tolerances.",
@@ -32,11 +32,11 @@ _GOVERNED = {
 def tolerances_page(
     results: Mapping[str, Any], provenance: Provenance, pictures: Sequence[str] = ()
 ) -> str:
-    """The page of ``assembly tolerances``.
+    """Return the page of ``assembly tolerances``.
 
     Args:
-        results: with ``present``, ``allocation`` or both, number of ``postures`` and
-            their ``grid``.
+        results: results with ``present``, ``allocation`` or both, number of
+            ``postures`` and their ``grid``.
         provenance: command and files.
         pictures: HTML of :mod:`assembly.statistics.scenes`, of the errors present.
 
@@ -79,7 +79,7 @@ def tolerances_page(
 
 
 def _present_tiles(present: Mapping[str, Any]) -> list[Tile]:
-    """The largest margin, and the error it is owed to."""
+    """Return the largest margin, and the error that contributes most to it."""
     at = ", ".join(f"{k} = {v:.4g}" for k, v in present["at"].items() if abs(v) > 1e-9)
     note = f"at {at or 'the origin'} [m, rad]; 1 and less goes together."
     tiles = [Tile("Largest margin", [Value(present["largest_margin"])], [note])]
@@ -95,7 +95,7 @@ def _present_tiles(present: Mapping[str, Any]) -> list[Tile]:
 
 
 def _present_section(present: Mapping[str, Any]) -> str:
-    """Shares of the errors there are in the largest margin."""
+    """Return the shares of the present errors in the largest margin."""
     rows: list[list[Cell]] = [
         [one["error"], Value(one["value"], _error_unit(one["error"])),
          one["share_of_margin"]]
@@ -111,12 +111,12 @@ def _present_section(present: Mapping[str, Any]) -> str:
 
 
 def _error_unit(name: str) -> str:
-    """SI unit of an error such as ``leg1.link_a.TX``."""
+    """Return the SI unit of an error such as ``leg1.link_a.TX``."""
     return "rad" if name.rpartition(".")[2].startswith("R") else "m"
 
 
 def _allocation_sentence(allocation: Mapping[str, Any]) -> str:
-    """Whether the tolerances hold, by proof and by fresh draws."""
+    """Return whether the tolerances are met, by proof and by fresh draws."""
     text = f"Tolerances for a yield of {allocation['yield']:g}"
     proven = allocation["proven_scale"]
     if np.isfinite(proven):
@@ -128,7 +128,7 @@ def _allocation_sentence(allocation: Mapping[str, Any]) -> str:
 
 
 def _allocation_tiles(allocation: Mapping[str, Any]) -> list[Tile]:
-    """Yield, what clearances take, and the tolerances that govern the price."""
+    """Return tiles: yield, share of clearances, and the tolerances with most cost."""
     tiles = []
     check = allocation["verification"]
     if check:
@@ -144,7 +144,7 @@ def _allocation_tiles(allocation: Mapping[str, Any]) -> list[Tile]:
 
 
 def _tighten_tile(allocation: Mapping[str, Any]) -> Tile:
-    """The tolerances with the largest share of the price, if any is to be tight."""
+    """Return the tolerances with the largest share of the cost, if any is tight."""
     tight = [one for one in allocation["tolerances"] if not one["at_loosest"]]
     if not tight:
         why = "every tolerance may be the loosest allowed."
@@ -163,7 +163,7 @@ def _tighten_tile(allocation: Mapping[str, Any]) -> Tile:
 
 
 def _asked_section(results: Mapping[str, Any], allocation: Mapping[str, Any]) -> str:
-    """Limits, yield, clearances, distribution, cost law and postures."""
+    """Return the limits, yield, clearances, distribution, cost law and postures."""
     rows: list[list[Cell]] = [
         [f"{NAMES[key]}, at most", Value(limit, UNITS[key].removesuffix("1"), 6)]
         for key, limit in allocation["limits"].items()
@@ -194,7 +194,7 @@ def _asked_section(results: Mapping[str, Any], allocation: Mapping[str, Any]) ->
 
 
 def _allocation_section(allocation: Mapping[str, Any]) -> str:
-    """Tolerances by class, price and worst cases."""
+    """Return the tolerances by class, price and worst cases."""
     classes = allocation["tolerances"]
     rows: list[list[Cell]] = [
         [one["name"], *(Value(one[k], one["unit"]) for k in
@@ -208,7 +208,7 @@ def _allocation_section(allocation: Mapping[str, Any]) -> str:
         for key, one in allocation["worst"].items()
     ]  # fmt: skip
     charts = [
-        # from zero: a bar's length on a logarithmic axis means nothing
+        # bars start at zero, so their axis cannot be logarithmic
         bars(some, Axis("tolerance, plus or minus", unit), "", np.nan)
         for unit in ("rad", "m")
         if (some := {one["name"]: one["tolerance"] for one in classes
@@ -228,7 +228,7 @@ def _allocation_section(allocation: Mapping[str, Any]) -> str:
 
 
 def _price_paragraph(allocation: Mapping[str, Any]) -> str:
-    """The price, and whether nothing cheaper is proved."""
+    """Return the cost, and whether a lower bound of it is proved."""
     price, bound = (allocation[key] for key in ("price", "price_bound"))
     if np.isfinite(bound):
         return paragraph(
@@ -243,7 +243,7 @@ def _price_paragraph(allocation: Mapping[str, Any]) -> str:
 
 
 def _clearance_sections(allocation: Mapping[str, Any]) -> list[str]:
-    """What clearances alone take of the limits on the pose, without errors."""
+    """Return the share of clearances alone in the limits on the pose."""
     taken = {k: v for k, v in allocation["perfect_parts"].items() if v["reached"] > 0.0}
     if not taken:
         return []

@@ -6,11 +6,11 @@ So the directions are drawn from Dikin's ellipsoid at the analytic centre, which
 proportions of the set: the ellipsoid lies inside the set, and the set inside the
 ellipsoid scaled by the number of cones.  The walk is affine invariant.
 
-A trajectory is straight and reflected at every bound it meets, for a random time: it
-crosses the set several times, where a step of hit-and-run ends at the first bound.
-Several chains from different starts are compared.  Their length is doubled, the earlier
-half discarded, until split R-hat and the effective sample size of every component of
-the platform's screw meet their criteria.
+A trajectory is straight and reflected at every bound, for a random time.  It crosses
+the set several times, while a step of hit-and-run ends at the first bound.  Several
+chains from different starts are compared.  Their length is doubled, with the first half
+discarded, until split R-hat and the effective sample size of every component of the
+platform's screw meet their criteria.
 
 Sources:
     Gryazina, Polyak (2014), Random sampling: billiard walk algorithm; Nesterov,
@@ -23,27 +23,27 @@ from numpy.typing import NDArray
 
 CHAINS, KEPT = 4, 64  # chains, and points of each that are compared
 R_HAT, EFFECTIVE = 1.05, 100.0  # largest R-hat, smallest effective sample size
-DOUBLINGS = 10  # of the chains: trajectories of a draw, 4 x 65 472 at most
+DOUBLINGS = 10  # of the chains, at most: 4 x 65 472 trajectories of a draw
 _CONSTANT = 1e-12  # [rad or m] standard deviation of a component that does not vary
-_NEWTON = 300  # iterations
+_NEWTON = 300  # largest number of iterations
 
 
 def sample_uniform_position(
     Z: NDArray, starts: NDArray, to_screw: NDArray, u: NDArray,
     rng: np.random.Generator, doublings: int = DOUBLINGS,
 ) -> bool:  # fmt: skip
-    """A point uniformly distributed over the set.
+    """Return a point uniformly distributed over the set.
 
     Args:
         Z: (nu, n) orthonormal columns: the directions in which u may move.
         starts: (cones + 1,) first column of each cone, and nu.
-        to_screw: (6, nu) [rad, m] what u does to the platform.
+        to_screw: (6, nu) [rad, m] map from u to the platform's screw.
         u: (nu,) a point of the set, overwritten with the new one.
-        rng: of random numbers.
-        doublings: of the chains, at most.
+        rng: generator of random numbers.
+        doublings: largest number of doublings of the chains.
 
     Returns:
-        Whether the chains mixed; u is unchanged where the set has empty interior.
+        Whether the chains mixed; u is unchanged if the set has empty interior.
     """
     from assembly.statistics.billiard_walk import Positions
 
@@ -71,13 +71,13 @@ def sample_uniform_position(
 def _ellipsoid(
     Z: NDArray, starts: NDArray, start: NDArray
 ) -> tuple[NDArray, NDArray] | None:
-    """The analytic centre and (nu, n) the axes of Dikin's ellipsoid there.
+    """Return the analytic centre and (nu, n) the axes of Dikin's ellipsoid there.
 
-    Minimum of -sum log(rho^2 - |u_k|^2) by damped Newton steps, which stay inside; rho
-    begins so that the start is inside and decreases to 1.
+    Minimum of -sum log(rho^2 - |u_k|^2) by damped Newton steps, which stay inside.  At
+    first rho is large enough for the start to be inside; it decreases to 1.
 
     Returns:
-        Both, each axis a column; None where the set has empty interior.
+        Centre and axes, each axis a column; None if the set has empty interior.
     """
     u, heads = start.copy(), starts[:-1]
     cone = np.repeat(np.arange(len(heads)), np.diff(starts))
@@ -110,12 +110,12 @@ def _ellipsoid(
 
 
 def _largest(heads: NDArray, u: NDArray) -> float:
-    """Largest size over the cones; 1 on the boundary."""
+    """Return the largest size over the cones; 1 on the boundary."""
     return float(np.sqrt(np.add.reduceat(u * u, heads).max()))
 
 
 def is_mixed(trace: NDArray) -> bool:
-    """Whether every component (chains, kept, components) that varies has mixed."""
+    """Return whether all varying components (chains, kept, components) have mixed."""
     moving = trace[:, :, trace.std(axis=(0, 1)) > _CONSTANT]
     return all(
         # written so that NaN fails
@@ -125,14 +125,14 @@ def is_mixed(trace: NDArray) -> bool:
 
 
 def diagnose(x: NDArray) -> tuple[float, float]:
-    """Split R-hat and effective sample size of one component.
+    """Compute split R-hat and effective sample size of one component.
 
     Args:
         x: (chains, 2 k) values along each chain; the halves count as chains.
 
     Returns:
-        Both; R-hat tends to 1 as the chains become independent of their starts, and is
-        infinite where every chain stands still.
+        R-hat and size.  R-hat tends to 1 as the chains become independent of their
+        starts; it is infinite if no chain moves.
     """
     k = x.shape[1] // 2
     halves = x[:, : 2 * k].reshape(-1, k)

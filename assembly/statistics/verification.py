@@ -17,15 +17,15 @@ from assembly.statistics.worst_case import (
     random_corners,
 )
 
-_BATCH = 256  # draws between two reports of progress
-_ROUNDING = 1e-9  # of a limit
-LOOKS, CONFIDENCE = 4, 0.95  # most looks at fresh draws; confidence of all together
+_BATCH = 256  # number of draws between two reports of progress
+_ROUNDING = 1e-9  # relative to a limit: excess that counts as rounding
+LOOKS, CONFIDENCE = 4, 0.95  # largest number of verifications; their joint confidence
 
 
 def prove_worst(
     requirement: Requirement, t: NDArray, progress: Callable[[str, int, int], None]
 ) -> tuple[dict[str, tuple[float, float]], float]:
-    """Bounds of the worst case of errors within tolerances, over all postures.
+    """Return bounds of the worst case of errors within tolerances, over all postures.
 
     Args:
         requirement: limits at all postures.
@@ -64,7 +64,7 @@ def prove_worst(
 
 
 def _proof(bound: Callable, *given: Any) -> tuple[float]:
-    """An upper bound of the worst case at one posture."""
+    """Return an upper bound of the worst case at one posture."""
     return (bound(*given),)
 
 
@@ -74,19 +74,19 @@ def verify(
     fresh: int,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, dict[str, Any]]:
-    """Verify tolerances by fresh draws; tighten those that are contradicted.
+    """Verify tolerances by fresh draws; tighten those that fail.
 
-    Each look takes independent draws.  The probability of error of all looks together
-    is that of the confidence, split over them (Bonferroni).
+    Each verification takes independent draws.  The error probability of the confidence
+    is split over all verifications (Bonferroni).
 
     Args:
         requirement: limits at all postures.
         t: (G,) [rad or m] tolerances.
-        fresh: draws of each look, used for nothing else.
+        fresh: number of draws of each verification, used only there.
         progress: called with the name of a step, its progress and its total.
 
     Returns:
-        (G,) [rad or m] tolerances, and the results of the last look.
+        (G,) [rad or m] tolerances, and the results of the last verification.
     """
     asked = requirement.plan.asked_yield
     for look in range(LOOKS):
@@ -110,15 +110,15 @@ def verify_yield(
     progress: Callable[[str, int, int], None], stream: int = FRESH,
     level: float = CONFIDENCE,
 ) -> dict[str, Any]:  # fmt: skip
-    """Yield of fresh draws: of each posture, and of all postures together.
+    """Compute the yield of fresh draws, of each posture and of all together.
 
     Args:
         requirement: limits at all postures.
         t: (G,) [rad or m] tolerances.
-        fresh: draws, used for nothing else.
+        fresh: number of draws, used only here.
         progress: called with the name of a step, its progress and its total.
-        stream: of random numbers.
-        level: of confidence of the interval.
+        stream: stream of random numbers.
+        level: level of confidence of the interval.
 
     Returns:
         Plain values: the yield with its interval, that of every posture, the verdict.
@@ -147,7 +147,7 @@ def verify_yield(
 
 
 def _verdict(interval: Mapping[str, float], asked: float) -> str:
-    """Whether the interval contradicts the yield asked for."""
+    """Return whether the interval contradicts the required yield."""
     if asked == 1.0:
         return "no draw failed" if interval["probability"] == 1.0 else "contradicted"
     if interval["lower"] >= asked:

@@ -1,11 +1,12 @@
 """Worst case of errors within tolerances: lower and upper bounds.
 
 Margin and energy are convex in the errors, so their worst case is a corner, where every
-error is at one end of its tolerance.  Going from a corner to the one its slopes point
-to never lowers either.  Started from many corners this gives a lower bound; likewise of
-a wrench, a stress or a pose error, whose worst case need not be a corner.  An upper
-bound comes from clearances affine in the errors, ``u = sum_i V_i s_i`` for errors
-``t_i s_i``, abs(s_i) <= 1: one cone programme, whose V certifies the bound by itself.
+error is at one end of its tolerance.  The slopes at a corner point to another corner,
+whose value is never lower.  Repeated from many corners this yields a lower bound.  The
+same search bounds a wrench, a stress or a pose error from below, whose worst case need
+not be a corner.  For an upper bound the clearances are affine in the errors, ``u =
+sum_i V_i s_i`` for errors ``t_i s_i``, abs(s_i) <= 1.  One cone programme computes V,
+which certifies the bound.
 
 Sources:
     Ben-Tal, El Ghaoui, Nemirovski (2009), Robust Optimization, ch. 14 (affinely
@@ -22,8 +23,8 @@ from assembly.statistics.linear_response import LinearResponse
 from assembly.statistics.posture_margins import PostureMargins
 from assembly.statistics.responses import respond
 
-CORNERS = 24  # to start from
-_ITERATIONS = 12  # from corner to corner; most searches end after three
+CORNERS = 24  # number of corners to start from
+_ITERATIONS = 12  # most steps from corner to corner; three usually suffice
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,10 +45,10 @@ class Corner:
 def worst_corner(
     prepared: PostureMargins | LinearResponse, sources: ErrorSources,
     tolerances: NDArray, corners: NDArray, key: str = "energy",
-    clearance_model: str = "worst",
+    clearance: str = "worst",
     contact_length: float | None = None,
 ) -> Corner:  # fmt: skip
-    """Local search from corner to corner; the worst of all searches.
+    """Search from corner to corner; return the worst of all searches.
 
     Args:
         prepared: a posture prepared for margins, or for energies and all others.
@@ -55,8 +56,8 @@ def worst_corner(
         tolerances: (m,) [rad or m] half widths.
         corners: (k, m) signs to start from.
         key: the quantity, see :func:`assembly.statistics.responses.respond`.
-        clearance_model: see there.
-        contact_length: [m] see there.
+        clearance: see the same function.
+        contact_length: [m] see the same function.
 
     Returns:
         The worst corner.
@@ -71,7 +72,7 @@ def worst_corner(
     best = Corner(-np.inf, signs[0], np.zeros(len(sources)))
     for _ in range(_ITERATIONS):
         values, slopes = respond(
-            prepared, sources, signs * tolerances, key, clearance_model, contact_length
+            prepared, sources, signs * tolerances, key, clearance, contact_length
         )
         i = int(np.argmax(np.where(np.isnan(values), -np.inf, values)))
         if values[i] > best.value:
@@ -88,7 +89,7 @@ def _worst_without_clearance(
     prepared: LinearResponse, sources: ErrorSources, tolerances: NDArray,
     corners: NDArray,
 ) -> NDArray:  # fmt: skip
-    """(k, m) worst corners of the robot without clearances: energy (h s)^2 / 2."""
+    """Return (k, m) worst corners without clearances: the energy is (h s)^2 / 2."""
     h = prepared.misfit[:, 6 * sources.frame + sources.component] * tolerances
     signs = corners
     for _ in range(_ITERATIONS):
@@ -98,14 +99,14 @@ def _worst_without_clearance(
 
 
 def random_corners(count: int, sources: int, seed: int = 1) -> NDArray:
-    """(count, sources) signs to start from."""
+    """Return (count, sources) signs of random corners."""
     return np.random.default_rng(seed).choice([-1.0, 1.0], size=(count, sources))
 
 
 def bound_margin(
     zone: PostureMargins, sources: ErrorSources, tolerances: NDArray
 ) -> float:
-    """Upper bound of the largest margin over all errors within tolerances.
+    """Return an upper bound of the largest margin over all errors within tolerances.
 
     Args:
         zone: a posture prepared for margins, every clearance scaled by the margin.
@@ -113,7 +114,7 @@ def bound_margin(
         tolerances: (m,) [rad or m] half widths.
 
     Returns:
-        The bound; inf where some error is taken up by no clearance.
+        The bound; inf if no clearance takes up an error.
     """
     columns = 6 * sources.frame + sources.component
     if np.abs(zone.infeasible[:, columns] * tolerances).max(initial=0.0) > 1e-12:
@@ -129,7 +130,7 @@ def bound_margin(
 def bound_energy(
     prepared: LinearResponse, sources: ErrorSources, tolerances: NDArray
 ) -> float:
-    """Upper bound of the largest energy over all errors within tolerances.
+    """Return an upper bound of the largest energy over all errors within tolerances.
 
     Args:
         prepared: a posture prepared for energies.
@@ -137,9 +138,9 @@ def bound_energy(
         tolerances: (m,) [rad or m] half widths.
 
     Returns:
-        [J] the bound: that of clearances and springs affine in the errors.  The sizes
-        of their deflections are added up, so it may be several times the worst case.
-        inf where some error is taken up by no spring.
+        [J] the bound, for clearances and springs affine in the errors.  It adds up the
+        sizes of their deflections, so it may be several times the worst case.  inf if
+        no spring takes up an error.
     """
     columns = 6 * sources.frame + sources.component
     if np.abs(prepared.infeasible[:, columns] * tolerances).max(initial=0.0) > 1e-12:
@@ -154,14 +155,14 @@ def bound_energy(
 
 
 def _reach(V: NDArray, starts: NDArray) -> NDArray:
-    """(cones,) largest sizes of affine clearances in each cone."""
+    """Return the (cones,) largest sizes of affine clearances in each cone."""
     return np.sqrt(np.add.reduceat(V**2, starts[:-1], axis=0)).sum(axis=1)
 
 
 def _affine_clearances(
     B: NDArray, asked: NDArray, starts: NDArray, G: NDArray | None, h: NDArray | None
 ) -> NDArray:
-    """(nu, m) V with B V = asked of least size in the cones, or least spring energy."""
+    """Return (nu, m) V with B V = asked: least in the cones, or of least energy."""
     import cvxpy as cp
 
     nu, m = starts[-1], asked.shape[1]

@@ -1,15 +1,15 @@
 """Largest pose errors over all clearance positions: problem (27) for many draws.
 
-The assumption is ``frozen``: all springs as in the solution of (22), all clearances
-that carry no load anywhere within their bounds.  By strict convexity every solution of
-(22) has the same springs, and by complementary slackness the same loaded clearances.
-So this is the set of *all* solutions of (22), inside a zone and outside.  The positions
-of the uniform and the contact model and the solver's own solution are points of it.
-The other assumptions change the robot: ``free`` lets compliant joints turn without
-energy, ``budget`` lets parts store more energy than the least.
+The assumption is ``frozen``: all springs as in the solution of (22), all unloaded
+clearances anywhere within their bounds.  By strict convexity every solution of (22) has
+the same springs, and by complementary slackness the same loaded clearances.  So this is
+the set of *all* solutions of (22), inside a zone and outside.  It contains the
+positions of the uniform and the contact model, and the solver's own solution.  The
+other assumptions change the robot: ``free`` lets compliant joints turn without energy,
+``budget`` allows more energy than the least.
 
-Under a load the same holds for energy minus work: only clearances that no load holds
-are free.
+Under a load the same holds for energy minus work: only clearances without force are
+free.
 """
 
 import numpy as np
@@ -29,24 +29,25 @@ from assembly.statistics.linear_response import LinearResponse
 from assembly.statistics.quantities import POSE_ERRORS
 
 ASSUMPTION = "frozen"
-PRECISION = (1e-6, 1e-6)  # [rad, m] asked of upper minus lower bounds
+PRECISION = (1e-6, 1e-6)  # [rad, m] required difference of upper and lower bounds
 _SUPPORT_PRECISION = 1e-12  # [rad or m] of a support whose multipliers are slopes
 
 
 def bound_worst_errors(
     draws: Assembly, precision: tuple[float, float] = PRECISION
 ) -> tuple[NDArray, NDArray]:
-    """Certified bounds of the largest pose errors over all clearance positions.
+    """Return certified bounds of the largest pose errors over all clearance positions.
 
     Args:
         draws: k of them, at one posture.
-        precision: [rad, m] asked of upper minus lower bounds; inf leaves a part out.
+        precision: [rad, m] required difference of upper and lower bounds; inf for a
+            part that is not needed.
 
     Returns:
         (k, 2, 2) lower and upper bounds of the rotation [rad] and the translation [m],
-        no lower than the screw of ``draws``; NaN for a draw without a solution, upper
-        bounds inf where none is proved.  And (k, 2, 6) [rad, m] screws that attain the
-        lower bounds, at least nearly.
+        at least as large as for the screw of ``draws``.  NaN for a draw without a
+        solution; upper bounds are inf if not proved.  And (k, 2, 6) [rad, m] screws
+        that (nearly) attain the lower bounds.
     """
     bounds = np.full((len(draws), 2, 2), np.nan)
     screws = np.tile(draws.platform_screw[:, None], (1, 2, 1))
@@ -73,7 +74,7 @@ def bound_worst_errors(
 def _without_load(
     draws: Assembly, precision: tuple[float, float]
 ) -> tuple[NDArray, NDArray]:
-    """Bounds and screws of unloaded draws, compiled."""
+    """Return the bounds and screws of unloaded draws, compiled."""
     found = bound_pose_error(
         draws, ASSUMPTION,
         tolerance_rotation=precision[0], tolerance_translation=precision[1],
@@ -87,7 +88,7 @@ def _without_load(
 def _under_load(
     draws: Assembly, i: int, precision: tuple[float, float]
 ) -> tuple[NDArray, NDArray]:
-    """Bounds and screws of one loaded draw; NaN if the solver failed."""
+    """Return the bounds and screws of one loaded draw; NaN if the solver failed."""
     try:
         error_bound = bound_pose_error(
             draws[i], ASSUMPTION,
@@ -102,7 +103,7 @@ def _under_load(
 def worst_error_slopes(
     prepared: LinearResponse, draws: Assembly, key: str, screws: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Slopes of the largest pose error with the platform's screw and the clearances.
+    """Return slopes of the largest pose error with platform screw and clearances.
 
     The farthest point attains a support function in its own direction, so by the
     envelope theorem the slopes are those of the support function there.
@@ -111,7 +112,8 @@ def worst_error_slopes(
         prepared: the posture.
         draws: its solutions for k draws, none under a load.
         key: ``"rotation"`` or ``"translation"``.
-        screws: (k, 6) [rad, m] that attain the largest, of :func:`bound_worst_errors`.
+        screws: (k, 6) [rad, m] that attain the largest error, of
+            :func:`bound_worst_errors`.
 
     Returns:
         (k, 6) slopes of the largest error with the platform's screw, and (k, nu)
@@ -138,7 +140,7 @@ def worst_error_slopes(
 def _pressing(
     prepared: LinearResponse, free: NDArray, along: NDArray, clearances: NDArray
 ) -> NDArray:
-    """(k, ..) directions (k, ..) of free clearances, less what equations take."""
+    """Return directions (k, ..) of free clearances, less the part of the equations."""
     rows = clearance_constraints(prepared, ~free)[:, free]
     size = np.linalg.norm(along, axis=1, keepdims=True)
     moving = size[:, 0] > 0.0

@@ -1,4 +1,4 @@
-"""One question at many postures, designs and draws, kept in one file.
+"""Sweeps: the same quantities at many postures, designs and draws, in one file.
 
-Begin at ``request.py``, what is asked, and ``sweep.py``, how it is solved and resumed.
+Begin at ``request.py`` for the options, and at ``sweep.py`` for solving and resuming.
 """

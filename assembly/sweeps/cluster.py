@@ -1,11 +1,11 @@
 """Solution of a sweep in parallel: Dask distributed, local or on a cluster.
 
 The client keeps a few tasks in flight for each worker and writes their results to the
-journal, so that neither it nor a worker ever holds more than a few blocks.  A task has
-as many blocks as take about half a second, fewer towards the end, so that workers end
-together.  The tasks of a worker that dies are given to others by Dask.  The
-distribution of blocks changes no number: each process computes on one thread, and
-points do not depend on their neighbours.
+journal.  So neither the client nor a worker ever holds more than a few blocks.  A task
+has as many blocks as take about half a second, fewer towards the end, so that workers
+end together.  Dask gives the tasks of a dead worker to others.  The distribution of
+blocks changes no number: each process computes on one thread, and points do not depend
+on their neighbours.
 """
 
 import logging
@@ -32,13 +32,13 @@ from forcefit.inputs.table import BadInput
 if TYPE_CHECKING:
     import distributed
 
-_TASK = 0.5  # [s] that a task should take; Dask asks for 0.1 at least
-_IN_FLIGHT = 3  # tasks for each thread of the cluster
-_LARGEST = 256  # blocks in a task
-_LAST = 2  # tasks a thread into which the blocks that are left are divided
-# workers that note every 10 ms what they do take a thirtieth longer
+_TASK = 0.5  # [s] target duration of a task; Dask recommends at least 0.1
+_IN_FLIGHT = 3  # number of tasks for each thread of the cluster
+_LARGEST = 256  # largest number of blocks in a task
+_LAST = 2  # tasks for each thread into which the last blocks are divided
+# Dask's profiler, which samples every 10 ms, makes workers a thirtieth slower
 _QUIET = {"distributed.worker.profile.enabled": False}
-_PATIENCE = 60.0  # [s] to wait for a first worker
+_PATIENCE = 60.0  # [s] longest wait for a first worker
 
 Task = tuple[int, Points]
 
@@ -48,15 +48,15 @@ def cluster_solver(
     scheduler: str | None = None,
     report: Callable[[str], None] = lambda text: None,
 ) -> Solver:
-    """A solver for :func:`assembly.sweeps.sweep.run_sweep` that uses a cluster.
+    """Return a solver for :func:`assembly.sweeps.sweep.run_sweep` that uses a cluster.
 
     Args:
         workers: number of processes of a cluster started here, or
-        scheduler: address of one that runs, such as ``tcp://10.0.0.1:8786``.
-        report: called with a line when the sweep is done: tasks, their median time.
+        scheduler: address of a running cluster, such as ``tcp://10.0.0.1:8786``.
+        report: function called with a line at the end: number of tasks, median time.
 
     Returns:
-        The solver; the cluster is asked for, or started, when it begins.
+        The solver; the cluster is connected, or started, when it begins.
     """
 
     def solve(
@@ -84,7 +84,7 @@ def cluster_solver(
 
 @contextmanager
 def _without_interrupts() -> Generator[None, None, None]:
-    """Processes started in the block ignore Ctrl-C: the sweep stops them."""
+    """Make processes started in the block ignore Ctrl-C: the sweep stops them."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -96,7 +96,7 @@ def _without_interrupts() -> Generator[None, None, None]:
 
 
 def _connected(address: str) -> "distributed.Client":
-    """A client of a running scheduler."""
+    """Return a client of a running scheduler."""
     from distributed import Client
 
     try:
@@ -114,7 +114,7 @@ def _distribute_connected(
     blocks: list[int],
     report: Callable[[str], None],
 ) -> Iterator[tuple[int, SolvedPoints]]:
-    """Distribute blocks; the loss of the scheduler is one message."""
+    """Distribute blocks; report the loss of the scheduler in one message."""
     from distributed.comm import CommClosedError
 
     try:
@@ -173,17 +173,17 @@ def _distribute(
 
 
 def _threads(client: "distributed.Client") -> int:
-    """Of all workers, asked at each call: clusters grow and shrink."""
+    """Return the present number of threads of all workers: clusters grow and shrink."""
     from distributed.comm import CommClosedError
 
     try:
         return max(1, sum(client.nthreads().values()))
-    except OSError as error:  # a scheduler that is gone refuses to be asked, too
+    except OSError as error:  # a lost scheduler refuses the query, too
         raise CommClosedError(str(error)) from error
 
 
 def _check_workers(client: "distributed.Client") -> None:
-    """Refuse a cluster without workers, or with another program on them."""
+    """Reject a cluster without workers, or with another program version on them."""
     try:
         client.wait_for_workers(1, timeout=_PATIENCE)
     except TimeoutError:
@@ -201,7 +201,7 @@ def _check_workers(client: "distributed.Client") -> None:
 
 
 def _program() -> dict[str, str]:
-    """This program's version, and the digest of its sources and libraries."""
+    """Return this program's version, and the digest of its sources and libraries."""
     return {
         "program": f"forcefit {version('forcefit')}",
         "program_sha256": program_hash(),
@@ -211,18 +211,18 @@ def _program() -> dict[str, str]:
 def solve_task(
     question: bytes, digest: str, tasks: list[Task]
 ) -> tuple[float, list[tuple[int, SolvedPoints]]]:
-    """On a worker: solve some blocks on one thread.
+    """Solve some blocks on one thread, on a worker.
 
     Args:
         question: pickled.
-        digest: of the question on the client.
+        digest: digest of the question on the client.
         tasks: number and points of each block.
 
     Returns:
         [s] of computation, and each block's number with its results.
 
     Raises:
-        BadInput: the digest differs here: a mesh or a library is another one.
+        BadInput: the digest differs here, because a mesh or a library differs.
     """
     from threadpoolctl import threadpool_limits
 
@@ -235,7 +235,7 @@ def solve_task(
 
 @lru_cache(maxsize=4)
 def _question(content: bytes, digest: str) -> Question:
-    """The question, unpickled once on each worker: robots are cached by identity."""
+    """Return question, unpickled once on each worker: robots are cached by identity."""
     asked: Question = pickle.loads(content)
     question = replace(asked, robot=solve_links(asked.robot))
     if question_hash(question) != digest:

@@ -17,6 +17,7 @@ from assembly.sweeps.netcdf import check_heaps, forgive_damaged_files, netcdf_fi
 from assembly.sweeps.quantities import TEXTS, variables
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import NETCDF, check_writable
+from forcefit.results.quantities import QUANTITIES
 
 if TYPE_CHECKING:
     import xarray
@@ -28,11 +29,8 @@ Texts = dict[str, dict[int, str]]
 KINDS = {
     "a sweep": "near", "draws": "sources_and_posture_sha256", "tolerances": "cost_law"
 }  # fmt: skip
-_TEXT = {
-    "status": "ok, or why there is no answer: " + ", ".join(OF_POINTS[1:]),
-    "reason": "what was said where the status is not ok",
-    "near_singularity": "singularities near by, with the joints that show them",
-}
+_TEXT = {name: QUANTITIES[name].meaning for name in ("status", *TEXTS)}
+_TEXT["status"] += ": " + ", ".join(OF_POINTS[1:])
 # names in files of older releases, and the present ones
 _OLD_NAMES = {
     "rotation_error_play": "rotation_error_clearance",
@@ -40,17 +38,17 @@ _OLD_NAMES = {
     "play_mixed": "clearance_mixed",
 }
 _OLD_ATTRIBUTES = {"play": "clearance", "reading": "assumption"}
-# blocks written together: a write takes as long as that of a hundred points
+# number of blocks written together: one write takes as long as a hundred points
 _TOGETHER = 256
 
 
 def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dataset":
-    """The data set of a whole sweep in memory.
+    """Return the data set of a whole sweep in memory.
 
     Args:
-        sweep: of the results.
+        sweep: sweep of the results.
         records: (points,) rows of all points.
-        texts: by name, the text of points that have one.
+        texts: texts by name, the text of points that have one.
 
     Returns:
         The data set; units in the attribute ``units``.
@@ -60,7 +58,7 @@ def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dat
     data: dict[str, Any] = {}
     for name, one in variables(sweep.question).items():
         values = records[name].reshape(*sweep.shape, *records[name].shape[1:])
-        data[name] = ((*sweep.dims, *one.dims), values.copy(), _attributes(one))
+        data[name] = ((*sweep.dims, *one.dims), values.copy(), one.attributes)
     for name in _TEXT:
         column = _text_column(name, records, texts).reshape(sweep.shape)
         data[name] = (sweep.dims, column, {"long_name": _TEXT[name]})
@@ -77,9 +75,9 @@ def write_sweep(
     """Write the data set of a whole sweep as a NetCDF file, whole or not at all.
 
     Args:
-        sweep: of the results.
+        sweep: sweep of the results.
         read: rows and texts of a block.
-        path: of the new file; it replaces an old one only when it is complete.
+        path: path of the new file; it replaces an old one only when it is complete.
 
     Raises:
         BadInput: the file cannot be written.
@@ -91,7 +89,7 @@ def write_sweep(
 def _write(
     sweep: "Sweep", read: Callable[[int], tuple[NDArray, Texts]], file: Any
 ) -> None:
-    """The file, from its coordinates to its last block."""
+    """Write the file, from its coordinates to its last block."""
     import h5py
 
     text = h5py.string_dtype()
@@ -106,7 +104,7 @@ def _write(
         variable.attrs.update(attributes)
     for name, one in asked.items():
         dims = (*sweep.dims, *one.dims)
-        file.create_variable(name, dims, "<f8").attrs.update(_attributes(one))
+        file.create_variable(name, dims, "<f8").attrs.update(one.attributes)
     for name, meaning in _TEXT.items():
         variable = file.create_variable(name, sweep.dims, text)
         variable.attrs["long_name"] = meaning
@@ -138,15 +136,15 @@ def _put(variable: Any, shape: tuple[int, ...], first: int, values: NDArray) -> 
 
 
 def slabs(shape: tuple[int, ...], first: int, last: int) -> Iterator[tuple[slice, ...]]:
-    """Boxes that together hold the points ``first`` .. ``last - 1`` of an array.
+    """Yield boxes that together hold the points ``first`` .. ``last - 1`` of an array.
 
     Args:
-        shape: of the array.
+        shape: shape of the array.
         first: point, counted in C order.
         last: the one after the last point.
 
     Yields:
-        A slice for each axis; the boxes follow one another as the points do.
+        A slice for each axis; the boxes follow each other in the order of the points.
     """
     if len(shape) == 1:
         yield (slice(first, last),)
@@ -167,7 +165,7 @@ def slabs(shape: tuple[int, ...], first: int, last: int) -> Iterator[tuple[slice
 
 
 def _joined(blocks: list[tuple[NDArray, Texts]]) -> tuple[NDArray, Texts]:
-    """Blocks one after the other."""
+    """Return the blocks one after the other."""
     texts: Texts = {name: {} for name in TEXTS}
     start = 0
     for records, texts_of_block in blocks:
@@ -180,7 +178,7 @@ def _joined(blocks: list[tuple[NDArray, Texts]]) -> tuple[NDArray, Texts]:
 
 
 def _text_column(name: str, records: NDArray, texts: Texts) -> NDArray:
-    """(k,) of objects: a text variable of some points."""
+    """Return the (k,) texts of a variable, as objects."""
     if name == "status":
         return np.array(OF_POINTS, dtype=object)[records["status"]]
     column = np.full(len(records), "", dtype=object)
@@ -189,13 +187,8 @@ def _text_column(name: str, records: NDArray, texts: Texts) -> NDArray:
     return column
 
 
-def _attributes(variable: Any) -> dict[str, str]:
-    """Unit and meaning of a variable."""
-    return {"units": variable.unit, "long_name": variable.meaning}
-
-
 def _coordinates(sweep: "Sweep") -> dict[str, tuple[tuple[str, ...], NDArray, dict]]:
-    """Axes, values and attributes of every coordinate, by name."""
+    """Return the axes, values and attributes of every coordinate, by name."""
     table: dict[str, tuple[tuple[str, ...], NDArray, dict]] = {}
     units = sweep.units
     for path, values in zip(sweep.question.varied, sweep.values, strict=True):
@@ -219,8 +212,8 @@ def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
     """Write a data set as NetCDF, whole or not at all.
 
     Args:
-        data: any.
-        path: of the new file; it replaces an old one only once it is complete.
+        data: any data.
+        path: path of the new file; it replaces an old one only once it is complete.
 
     Raises:
         BadInput: the file cannot be written.
@@ -232,14 +225,15 @@ def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
 
 
 def check_dataset(path: Path | str, what: str) -> None:
-    """Refuse a NetCDF file that could not be written, before the work.
+    """Reject a NetCDF file that could not be written, before the work.
 
     Args:
-        path: of the file to be written later.
-        what: one of :data:`KINDS`; an existing file must be one.
+        path: path of the file to be written later.
+        what: one of :data:`KINDS`; an existing file must be of this kind.
 
     Raises:
-        BadInput: it is not, or as :func:`forcefit.inputs.writing.check_writable`.
+        BadInput: the file is of another kind, or as in
+            :func:`forcefit.inputs.writing.check_writable`.
     """
     check_writable(path, NETCDF)
     path = Path(path)
@@ -251,7 +245,7 @@ def check_dataset(path: Path | str, what: str) -> None:
 
 
 def _is(path: Path, what: str) -> bool:
-    """Whether the attributes of a file are those of a kind of ours."""
+    """Return whether the attributes of a file are those of one of our kinds."""
     import h5py
 
     try:
@@ -264,10 +258,10 @@ def _is(path: Path, what: str) -> bool:
 
 
 def open_dataset(path: Path | str) -> "xarray.Dataset":
-    """A data set from its file.
+    """Return a data set from its file.
 
     Args:
-        path: of a NetCDF file.
+        path: path of a NetCDF file.
 
     Returns:
         The data set, all in memory.
@@ -284,14 +278,14 @@ def open_dataset(path: Path | str) -> "xarray.Dataset":
     check_heaps(path)
     try:
         data = xarray.load_dataset(path, engine="h5netcdf")
-    except Exception as error:  # of a damaged file HDF5 raises whatever it meets
+    except Exception as error:  # for a damaged file HDF5 raises various exceptions
         reason = str(error).partition("\n")[0][:200]
         raise BadInput(f"{path}: cannot be read as NetCDF: {reason}") from None
     return _with_new_names(data)
 
 
 def _with_new_names(data: "xarray.Dataset") -> "xarray.Dataset":
-    """A data set of an older release under the present names."""
+    """Return a data set of an older release under the present names."""
     old = {name: new for name, new in _OLD_NAMES.items() if name in data.data_vars}
     data.attrs = {_OLD_ATTRIBUTES.get(str(k), k): v for k, v in data.attrs.items()}
     return data.rename_vars(old)

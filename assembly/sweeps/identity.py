@@ -23,23 +23,23 @@ from assembly.model.robot import LibraryLink, MeshLink, Robot
 from assembly.sweeps.parameters import Design
 from forcefit.inputs.program import sources_hash
 
-# libraries that the numbers depend on: another version may round differently
+# libraries on which the numbers depend: another version may round differently
 _LIBRARIES = ("numpy", "scipy", "clarabel")
 
 
 @cache
 def program_hash() -> str:
-    """SHA-256 of the program's sources and of the versions of its libraries."""
+    """Return SHA-256 of the program's sources and of the versions of its libraries."""
     packages = forcefit.inputs, stiffness, assembly
     own = sources_hash(packages, _LIBRARIES)
     return hashlib.sha256((own + kernels.sources).encode()).hexdigest()
 
 
 def robot_hash(robot: Robot) -> str:
-    """SHA-256 of the content of a robot file, and of the meshes it names.
+    """Return the SHA-256 of the content of a robot file, and of the meshes it names.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
         The digest.
@@ -59,7 +59,7 @@ def robot_hash(robot: Robot) -> str:
 
 
 def question_hash(question: Any) -> str:
-    """SHA-256 of a question: every attribute, by its name.
+    """Return the SHA-256 of a question: every attribute, by its name.
 
     Args:
         question: plain values, arrays, robots, designs and dataclasses of such.
@@ -71,7 +71,7 @@ def question_hash(question: Any) -> str:
 
 
 def _as_json(value: Any) -> Any:
-    """A value in terms of JSON; different values give different results."""
+    """Return a value in terms of JSON; different values have different results."""
     if isinstance(value, Robot):
         return ["robot", robot_hash(value)]
     if isinstance(value, Design):  # independent of its file's path

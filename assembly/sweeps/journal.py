@@ -2,10 +2,10 @@
 
 The file begins with one line of JSON that identifies its sweep, and its check sum.
 Records follow, each appended by one write: a block's number, its length and a check
-sum, then its rows and texts.  Each check sum continues the first line's, so that every
-record identifies its sweep.  Records with a wrong check sum are ignored: the last one,
-cut short by a kill, or a damaged one.  Records may come in any order, and twice.  The
-file is locked by one program at a time.
+sum, then its rows and texts.  Each check sum continues that of the first line, so that
+every record identifies its sweep.  Records with a wrong check sum are ignored, such as
+a last record cut short by a kill, or a damaged one.  Records may come in any order, and
+twice.  One program at a time locks the file.
 """
 
 import json
@@ -36,9 +36,9 @@ class Journal:
     """An open journal.
 
     Attributes:
-        path: of the file.
-        record_type: of the rows.
-        owner: check sum of the first line, with which those of the records begin.
+        path: path of the file.
+        record_type: type of the rows.
+        owner: check sum of the first line, which those of the records continue.
         places: offset and length of the content of each finished block's record.
     """
 
@@ -55,7 +55,7 @@ class Journal:
         Args:
             block: its number.
             records: its rows.
-            texts: by name, the text of rows that have one.
+            texts: texts by name, the text of rows that have one.
 
         Raises:
             BadInput: the file cannot be written, as on a full disk.
@@ -84,13 +84,13 @@ class Journal:
         held.push(remove)
 
     def read(self, block: int) -> tuple[NDArray, dict[str, dict[int, str]]]:
-        """Rows and texts of a finished block.
+        """Return the rows and texts of a finished block.
 
         Args:
             block: its number.
 
         Returns:
-            Both, as they were added.
+            The rows and texts, as they were added.
 
         Raises:
             BadInput: the file was changed in between, or cannot be read.
@@ -122,20 +122,20 @@ class Journal:
 def open_journal(
     path: Path, whose: dict[str, Any], record_type: np.dtype
 ) -> Generator[Journal, None, None]:
-    """A new journal, or that of an interrupted sweep, locked until the block ends.
+    """Open a new journal, or that of an interrupted sweep, until the block ends.
 
     Args:
-        path: of the file.
+        path: path of the file.
         whose: plain values that identify the sweep: all must be equal, except
             ``program``, whose version differs between commits of equal sources.
-        record_type: of the rows.
+        record_type: type of the rows.
 
     Yields:
         The journal, with the blocks that are finished.
 
     Raises:
-        BadInput: another program has locked the file; it is another sweep's, or no
-            journal, or cannot be written.
+        BadInput: another program has locked the file; it belongs to another sweep, is
+            no journal, or cannot be written.
     """
     check_writable(path)
     equal = {name: value for name, value in whose.items() if name != "program"}
@@ -156,7 +156,7 @@ def open_journal(
 
 
 def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]]:
-    """Places of the finished blocks; the first line is repaired, a torn end cut."""
+    """Return the places of finished blocks; repair the first line, cut a torn end."""
     try:
         with path.open("r+b") as file:
             size = os.fstat(file.fileno()).st_size
@@ -167,7 +167,7 @@ def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]
                 with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
                     places, end = _scan(content, len(header), owner)
             if first_line != header:
-                # valid records identify the sweep: only the line was damaged
+                # valid records identify the sweep: only the first line was damaged
                 if not places and not header.startswith(first_line):
                     file.seek(0)
                     raise BadInput(f"{path}: {_difference(file.readline(), header)}")
@@ -182,7 +182,7 @@ def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]
 def _scan(
     content: mmap.mmap, start: int, owner: int
 ) -> tuple[dict[int, tuple[int, int]], int]:
-    """Places of all sound records, and where the last one ends."""
+    """Return the places of all valid records, and the end of the last one."""
     places: dict[int, tuple[int, int]] = {}
     end = start
     place = content.find(_MAGIC, start)
@@ -202,13 +202,13 @@ def _scan(
 
 
 def _check(owner: int, block: int, content: bytes) -> int:
-    """Check sum of a record: of its sweep, its number, its length and its content."""
+    """Return the check sum of a record: sweep, number, length and content."""
     head = struct.pack("<QQ", block, len(content))
     return zlib.crc32(content, zlib.crc32(head, owner))
 
 
 def _difference(first_line: bytes, header: bytes) -> str:
-    """How a journal differs from the one expected."""
+    """Return how a journal differs from the one expected."""
     expected = json.loads(header.rpartition(b" ")[0])
     line, _, check = first_line.rstrip(b"\n").rpartition(b" ")
     if not first_line.startswith(b'{"kind": "forcefit sweep journal'):
@@ -220,7 +220,7 @@ def _difference(first_line: bytes, header: bytes) -> str:
         )
     other = json.loads(line)
     keys = [k for k in expected if other.get(k) != expected[k]]
-    # the hash of the whole question is no use where a part of it is named
+    # the hash of the whole question is redundant if a part of it is named
     keys = [k for k in keys if k != "question_sha256"] or keys
     theirs = ", ".join(f"{k} {str(other.get(k))[:60]!r}" for k in keys)
     wanted = ", ".join(f"{k} {str(expected[k])[:60]!r}" for k in keys)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.model.statuses import OK
 from assembly.sweeps.panels import Panel, named_panels, quantity, usual_panels
 from forcefit.inputs.errors import plot_label
 from forcefit.inputs.table import BadInput, nearest, quoted
@@ -24,17 +25,17 @@ def figure_of(
     at: Mapping[str, float | str] | None = None,
     quantities: Sequence[str] = (),
 ) -> "Figure":
-    """Maps of a sweep over two axes, or lines along one.
+    """Return the maps of a sweep over two axes, or lines along one.
 
     Args:
-        data: of a sweep, as saved.
-        at: values on other axes, by name, the nearest is taken; unless a draw is
-            chosen, the median of the draws is shown.
+        data: data of a sweep, as saved.
+        at: values on other axes, by name; the nearest points are shown.  Unless a draw
+            is chosen, the median of the draws is shown.
         quantities: to be shown, by the names of :mod:`assembly.sweeps.panels`; those
             of the paper's figure 5 if empty.
 
     Returns:
-        A figure with a panel for each, six if none is named.
+        A figure with a panel for each; with six panels if no quantity is named.
 
     Raises:
         BadInput: an axis or a quantity is unknown, or more than two axes are left.
@@ -52,13 +53,13 @@ def figure_of(
 
 
 def check_axes(sizes: Mapping[str, int]) -> None:
-    """Refuse to plot what is neither a map nor a line.
+    """Reject axes that form neither a map nor a line.
 
     Args:
         sizes: number of values on each axis.
 
     Raises:
-        BadInput: no axis, or more than two, with more than one value; draws aside.
+        BadInput: no axis, or more than two, with more than one value, besides draws.
     """
     long = {name: n for name, n in sizes.items() if n > 1 and name != "draw"}
     if len(long) > 2:
@@ -74,10 +75,10 @@ def check_axes(sizes: Mapping[str, int]) -> None:
 def part_of_sweep(
     data: "xarray.Dataset", at: Mapping[str, float | str]
 ) -> tuple["xarray.Dataset", str]:
-    """A part of a sweep: values on some axes fixed, draws by their median.
+    """Return a part of a sweep: some axes at fixed values, draws by their median.
 
     Args:
-        data: of a sweep.
+        data: data of a sweep.
         at: value by axis.
 
     Returns:
@@ -110,7 +111,7 @@ def part_of_sweep(
 
 
 def _number(name: str, value: float | str) -> float:
-    """A number asked for on an axis."""
+    """Return a number that was requested on an axis."""
     try:
         return float(value)
     except ValueError:
@@ -120,12 +121,12 @@ def _number(name: str, value: float | str) -> float:
 
 
 def _median(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Median over the draws; the first status other than ok, if there is one."""
+    """Return the median over the draws; the first status other than ok, if any."""
     numbers = [k for k, v in data.data_vars.items() if v.dtype.kind == "f"]
     middle = data[numbers].median("draw", skipna=True)
     first = data.isel(draw=0, drop=True)
     status = data["status"].transpose(..., "draw")
-    bad = (status != "ok").values
+    bad = (status != OK).values
     shown = np.take_along_axis(
         status.values, bad.argmax(axis=-1)[..., None], axis=-1
     )[..., 0]  # fmt: skip
@@ -137,7 +138,7 @@ def _median(data: "xarray.Dataset") -> "xarray.Dataset":
 
 
 def _squeezed(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Without the points' axes of one value."""
+    """Return the data set without the points' axes of one value."""
     single = [d for d in data["status"].dims if data.sizes[d] == 1]
     return data.squeeze(single, drop=True)
 
@@ -145,10 +146,10 @@ def _squeezed(data: "xarray.Dataset") -> "xarray.Dataset":
 def map_figure(
     data: "xarray.Dataset", panels: Sequence[Panel] | None = None
 ) -> "Figure":
-    """Maps over a two-dimensional grid: margins, energy and platform error.
+    """Return the maps over a two-dimensional grid: margins, energy and platform error.
 
     Args:
-        data: of a sweep over two axes with more than one value each.
+        data: data of a sweep over two axes with more than one value each.
         panels: to be shown; the usual ones and the status if absent.
 
     Returns:
@@ -172,7 +173,7 @@ def map_figure(
         low, high = float(finite.min()), float(finite.max())
         if low < high:
             figure.colorbar(image, ax=panel)
-        elif low == high:  # a scale about one value shows differences there are none of
+        elif low == high:  # a scale about one value would show rounding as differences
             title = f"{title}: {low:.4g} everywhere"
         inside = bool((finite < 1).any()) and bool((finite > 1).any())
         if key.startswith("margin") and inside and min(finite.shape) > 1:
@@ -186,7 +187,7 @@ def map_figure(
 
 
 def _figure_for(count: int, height: float) -> tuple["Figure", "list[Axes]"]:
-    """A figure with so many panels and at most one more, side by side."""
+    """Return a figure with a given number of panels, or one more, in a grid."""
     from matplotlib.figure import Figure
 
     rows, columns = -(-count // 2), min(count, 2)
@@ -198,10 +199,10 @@ def _figure_for(count: int, height: float) -> tuple["Figure", "list[Axes]"]:
 def path_figure(
     data: "xarray.Dataset", panels: Sequence[Panel] | None = None
 ) -> "Figure":
-    """The same quantities along one axis, or from posture to posture of a list.
+    """Return figures of the quantities along one axis, or over the postures of a list.
 
     Args:
-        data: of a sweep over one axis.
+        data: data of a sweep over one axis.
         panels: to be shown; the usual ones and the condition if absent.
 
     Returns:
@@ -235,7 +236,7 @@ def path_figure(
 
 
 def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
-    """The same with increasing numbers on each axis: labels become 1, 2, .."""
+    """Return data set with increasing numbers on each axis: labels become 1, 2, .."""
     for name in map(str, data["status"].dims):
         if data[name].dtype.kind not in "fiu":
             data = data.assign_coords({name: np.arange(data.sizes[name]) + 1})
@@ -244,7 +245,7 @@ def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
 
 
 def _near(data: "xarray.Dataset") -> NDArray:
-    """Bool: where a singularity is near."""
+    """Return a bool array: where a singularity is near."""
     if "near_singularity" not in data:
         return np.zeros(data["status"].shape, dtype=bool)
     texts = data["near_singularity"].transpose(*data["status"].dims)
@@ -252,7 +253,7 @@ def _near(data: "xarray.Dataset") -> NDArray:
 
 
 def _mark(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
-    """Crosses where a singularity is near."""
+    """Draw crosses where a singularity is near."""
     i, j = np.nonzero(_near(data))
     if len(i):
         x_first = data["status"].dims[0] == x
@@ -261,7 +262,7 @@ def _mark(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
 
 
 def _states(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
-    """Status of the points, as text and colour."""
+    """Draw the status of the points, as text and colour."""
     texts = data["status"].transpose(y, x).values.astype(str)
     _, codes = np.unique(texts, return_inverse=True)
     codes = codes.reshape(texts.shape)
@@ -271,7 +272,7 @@ def _states(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
 
 
 def _label(panel: "Axes", data: "xarray.Dataset", x: str, y: str, title: str) -> None:
-    """Title and axes; lengths beside lengths have one scale."""
+    """Set title and axes; two axes of lengths have the same scale."""
     same = data[x].attrs.get("units") == data[y].attrs.get("units")
     spans = [float(np.ptp(data[k].values)) for k in (x, y)]
     fits = same and 0.2 < spans[0] / spans[1] < 5
@@ -280,19 +281,19 @@ def _label(panel: "Axes", data: "xarray.Dataset", x: str, y: str, title: str) ->
 
 
 def _axis_name(data: "xarray.Dataset", name: str) -> str:
-    """Name and unit of an axis."""
+    """Return the name and unit of an axis."""
     unit = data[name].attrs.get("units")
     return plot_label(f"{name} [{unit}]" if unit else name)
 
 
 def _counts(data: "xarray.Dataset") -> str:
-    """How many points have each status."""
+    """Return the number of points of each status."""
     names, counts = np.unique(data["status"].values.astype(str), return_counts=True)
     return ", ".join(f"{n}: {c}" for n, c in zip(names, counts, strict=True))
 
 
 def _caption(data: "xarray.Dataset") -> str:
-    """Robot, statuses, and the singularities that the crosses mark."""
+    """Return the robot, statuses, and the singularities that the crosses mark."""
     caption = f"{data.attrs.get('robot', '')}; {_counts(data)}"
     if _near(data).any():
         texts = np.unique(data["near_singularity"].values.astype(str))

@@ -1,4 +1,4 @@
-"""NetCDF files, written whole or not at all, also when the disk is full."""
+"""NetCDF files that are written completely or not at all, even if the disk is full."""
 
 import struct
 from collections.abc import Generator
@@ -22,7 +22,7 @@ def netcdf_file(path: Path | str) -> Generator[Any, None, None]:
     """Write a NetCDF file.
 
     Args:
-        path: of the file; it appears when the block ends well.
+        path: path of the file; it appears when the block ends without an error.
 
     Yields:
         The open ``h5netcdf.File``.
@@ -43,11 +43,11 @@ def netcdf_file(path: Path | str) -> Generator[Any, None, None]:
 
 
 class Stored(NamedTuple):
-    """A variable of a file, by the names that xarray has for these.
+    """A variable of a file, with the attribute names of xarray.
 
     Attributes:
         dims: names of its axes.
-        values: all of it.
+        values: all of them.
         attrs: its attributes.
     """
 
@@ -57,11 +57,11 @@ class Stored(NamedTuple):
 
 
 class StoredDataset(NamedTuple):
-    """What a summary reads of a data set, without the second that xarray takes.
+    """A data set for a summary, read without xarray, whose import takes a second.
 
     Attributes:
         data_vars: variables by name, coordinates left out.
-        attrs: of the whole.
+        attrs: attributes of the whole data set.
     """
 
     data_vars: dict[str, Stored]
@@ -69,13 +69,13 @@ class StoredDataset(NamedTuple):
 
 
 def stored_dataset(path: Path | str) -> StoredDataset:
-    """A data set just written, for its summary.
+    """Return a newly written data set, for its summary.
 
     Args:
-        path: of a NetCDF file of ours.
+        path: path of a NetCDF file written by forcefit.
 
     Returns:
-        All of its variables but the coordinates.
+        All of its variables except the coordinates.
     """
     import h5netcdf
 
@@ -93,7 +93,7 @@ def stored_dataset(path: Path | str) -> StoredDataset:
 
 
 def _decoded(values: NDArray) -> NDArray:
-    """Texts of a variable, which HDF5 hands over as bytes; numbers as they are."""
+    """Return texts of a variable, which HDF5 returns as bytes; numbers unchanged."""
     if values.dtype != object:
         return values
     texts = [text.decode() for text in values.ravel()]
@@ -104,17 +104,17 @@ def forgive_damaged_files() -> None:
     """Keep h5netcdf from writing to stderr when it closes a damaged file."""
     import h5netcdf
 
-    h5netcdf.File._writable = False  # until a file says otherwise
+    h5netcdf.File._writable = False  # until a file sets it
 
 
 def check_heaps(path: Path) -> None:
-    """Refuse a file whose heaps of texts are damaged: HDF5 would read them for ever.
+    """Reject a file whose heaps of texts are damaged: HDF5 would read them endlessly.
 
     Args:
-        path: of an HDF5 file; others pass.
+        path: path of an HDF5 file; other files pass.
 
     Raises:
-        BadInput: an entry of a heap leads nowhere.
+        BadInput: an entry of a heap points outside it.
     """
     size = path.stat().st_size
     if not size:
@@ -126,7 +126,7 @@ def check_heaps(path: Path) -> None:
             end, place = start + min(length, size - start), start + 16
             while place + 16 <= end:
                 number, _, own = struct.unpack_from("<HH4xQ", data, place)
-                # an entry, or the free space, which counts itself
+                # an entry, or the free space, which includes its own head
                 step = 16 + -(-own // 8) * 8 if number else own
                 if step < 16:
                     raise BadInput(f"{path}: cannot be read as NetCDF: damaged heap")
@@ -135,10 +135,10 @@ def check_heaps(path: Path) -> None:
 
 
 class _Target:
-    """The file that HDF5 writes to; when it fails, a copy in memory takes its place.
+    """The file to which HDF5 writes; when it fails, a copy in memory replaces it.
 
-    HDF5 crashes the whole process when a file cannot be closed, or when what it reads
-    is not what it wrote before.
+    HDF5 crashes the whole process when a file cannot be closed, or when data read back
+    differ from the data written.
     """
 
     def __init__(self, file: FileIO) -> None:
@@ -146,7 +146,7 @@ class _Target:
         self.failure: OSError | None = None
 
     def write(self, content: Any) -> int:
-        """Write the content; a failure is recorded and success returned."""
+        """Write the content; record a failure and return success."""
         left = memoryview(content).cast("B")
         size = len(left)
         while left:
@@ -163,7 +163,7 @@ class _Target:
         return self.file.readinto(content) or 0
 
     def read(self, size: int = -1) -> bytes:
-        """The same as bytes."""
+        """Return bytes written before."""
         return self.file.read(size) or b""
 
     def seek(self, offset: int, whence: int = SEEK_SET) -> int:
@@ -171,11 +171,11 @@ class _Target:
         return self.file.seek(offset, whence)
 
     def tell(self) -> int:
-        """The position in the file."""
+        """Return the position in the file."""
         return self.file.tell()
 
     def truncate(self, size: int | None = None) -> int:
-        """Set the file's size; a failure is recorded."""
+        """Set the file's size; record a failure."""
         try:
             return self.file.truncate(size)
         except OSError as error:
@@ -183,10 +183,10 @@ class _Target:
             return self.truncate(size)
 
     def flush(self) -> None:
-        """Nothing is buffered."""
+        """Do nothing: no data are buffered."""
 
     def _go_on_in_memory(self, failure: OSError) -> None:
-        """Keep the failure and copy what has been written."""
+        """Keep the failure and copy the data written so far."""
         self.failure = failure
         position = self.file.tell()
         self.file.seek(0)

@@ -1,9 +1,9 @@
-"""What a figure of a sweep or of draws shows: quantities by name, units, titles.
+"""Panels of a figure of a sweep or of draws: quantities, units, titles.
 
-A quantity is a variable of the data set, with its component where it has several:
-``energy``, ``stiffness.FX``, ``wrench.leg1.link_a.FZ``, as the columns of
-:func:`assembly.sweeps.point_table.point_table` are called; or ``rotation`` and
-``translation``, the size of the platform's pose error.
+A quantity is a variable of the data set, with its component if it has several:
+``energy``, ``stiffness.FX``, ``wrench.leg1.link_a.FZ``.  These are the column names of
+:func:`assembly.sweeps.point_table.point_table`.  ``rotation`` and ``translation`` are
+the sizes of the platform's pose error.
 """
 
 from collections.abc import Sequence
@@ -19,9 +19,9 @@ from forcefit.inputs.table import BadInput, nearest, quoted
 if TYPE_CHECKING:
     import xarray
 
-_MOST = 12  # panels of a figure that can be read
+_MOST = 12  # largest number of panels in a readable figure
 _HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
-# unit of the file: factor and unit of the figure
+# unit in the file: factor and unit in the figure
 _SHOWN = {
     "rad": (1e3, "mrad"), "m": (1e3, "mm"), "N/m": (1e-6, "N/um"), "Pa": (1e-6, "MPa"),
     "1": (1.0, "-"),
@@ -32,10 +32,10 @@ class Panel(NamedTuple):
     """One panel of a figure.
 
     Attributes:
-        key: of the quantity.
+        key: name of the quantity.
         scale: factor on its numbers.
-        title: with the unit after that.
-        colours: of a map.
+        title: title with the unit after the factor.
+        colours: colour map.
     """
 
     key: str
@@ -44,8 +44,8 @@ class Panel(NamedTuple):
     colours: str
 
 
-# the six panels of the paper's figure 5, then those that replace the last two where
-# they were not asked for
+# the six panels of the paper's figure 5, then those that replace the last two if these
+# were not computed
 _PAPER = (
     Panel("margin_free", 1.0, "zone margin, compliant joints free [-]", "magma_r"),
     Panel("energy", 1.0, "minimum assembly energy [J]", "inferno"),
@@ -66,10 +66,10 @@ _FREQUENCY = Panel("frequency.1", 1.0, "lowest natural frequency [Hz]", "viridis
 
 
 def usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
-    """The panels of a sweep's figure for which no quantity is named.
+    """Return the panels of a sweep's figure if no quantity is named.
 
     Args:
-        data: of a sweep.
+        data: data of a sweep.
 
     Returns:
         Those whose quantities are stored.
@@ -88,7 +88,7 @@ def usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
 
 
 def _is_stored(data: "xarray.Dataset", key: str) -> bool:
-    """Whether a quantity follows from what is stored."""
+    """Return whether a quantity can be computed from the stored data."""
     try:
         quantity(data, key)
     except KeyError:
@@ -97,7 +97,7 @@ def _is_stored(data: "xarray.Dataset", key: str) -> bool:
 
 
 def _usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
-    """The same where everything is stored."""
+    """Return the panels if all quantities are stored."""
     if "rotation_error_clearance" in data:
         return _PAPER
     middle = _STIFFNESS if "eigen_stiffness" in data else _PAPER[2:4]
@@ -107,11 +107,11 @@ def _usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
 
 
 def named_panels(data: "xarray.Dataset", names: Sequence[str]) -> tuple[Panel, ...]:
-    """Panels of quantities by name; a variable's name alone means its components.
+    """Return panels of named quantities; a variable's name means all its components.
 
     Args:
-        data: of a sweep or of draws.
-        names: of the quantities.
+        data: data of a sweep or of draws.
+        names: names of the quantities.
 
     Returns:
         A panel for each component.
@@ -143,18 +143,18 @@ def named_panels(data: "xarray.Dataset", names: Sequence[str]) -> tuple[Panel, .
 
 
 def quantity(data: "xarray.Dataset", key: str) -> Any:
-    """A quantity over the points.
+    """Return a quantity over the points.
 
     Args:
-        data: of a sweep or of draws.
-        key: its name; of the size of a pose error it is the certified upper bound, or
-            else half the platform screw.
+        data: data of a sweep or of draws.
+        key: its name; the size of a pose error is the certified upper bound, or
+            otherwise half the platform screw.
 
     Returns:
         Data array over the axes of the points.
 
     Raises:
-        KeyError: there is none of that name.
+        KeyError: there is no quantity of that name.
     """
     if key in _HALVES and key not in data:
         if f"{key}_error" in data:
@@ -172,7 +172,7 @@ def quantity(data: "xarray.Dataset", key: str) -> Any:
 
 
 def _quantities(data: "xarray.Dataset") -> dict[str, str]:
-    """Unit of every numeric quantity over the points, by name."""
+    """Return the unit of every numeric quantity over the points, by name."""
     units: dict[str, str] = {}
     points = set(data["status"].dims)
     for name in map(str, data.data_vars):
@@ -189,5 +189,5 @@ def _quantities(data: "xarray.Dataset") -> dict[str, str]:
 
 
 def _further(data: "xarray.Dataset", name: str) -> list[str]:
-    """Axes of a variable beside those of the points."""
+    """Return the axes of a variable in addition to those of the points."""
     return [str(d) for d in data[name].dims if d not in data["status"].dims]

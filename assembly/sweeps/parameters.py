@@ -1,10 +1,10 @@
 """Design parameters: any number of a robot file, addressed by its path.
 
-A path is the frame's name and the keys that lead to the number, such as
+A path is the frame's name and the keys of the number, such as
 ``leg1.link_a.link.beam.radius`` or ``leg1.elbow.clearance.radial``.  A frame's name
 without its leg means that frame in every leg.  Three numbers in brackets are x, y, z;
-six are rx .. tz, and so are the rows of six by six (``stiffness.rx.ty`` sets both
-places of a symmetric matrix).
+six are rx .. tz, and so are the rows and columns of six by six (``stiffness.rx.ty``
+sets both entries of a symmetric matrix).
 """
 
 import copy
@@ -21,7 +21,7 @@ from assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 
 _AXES = {3: ("x", "y", "z"), 6: ("rx", "ry", "rz", "tx", "ty", "tz")}
-_ABSENT: dict[str, Any] = {  # values of keys that a frame leaves out
+_ABSENT: dict[str, Any] = {  # values of keys that a frame may omit
     "geometric_error": [0.0] * 6, "mass": 0.0, "centre_of_mass": [0.0] * 3
 }  # fmt: skip
 _PLACED: dict[str, Any] = {"translation": [0.0] * 3, "rotation": [0.0] * 3}
@@ -44,8 +44,8 @@ class Design:
 
     Attributes:
         content: the root table, plain values.
-        file: name of the file, for messages; paths in the table lead from its folder.
-        name: of the robot if the table has none.
+        file: name of the file, for messages; paths in the table start in its folder.
+        name: name of the robot if the table has none.
     """
 
     content: dict[str, Any]
@@ -64,7 +64,7 @@ class Design:
         return {path: float(value) for path, value, _ in numbers}
 
     def find(self, path: str) -> list[str]:
-        """Full paths that a path matches.
+        """Return the full paths that a path matches.
 
         Args:
             path: full, or with the frame's name without its leg.
@@ -85,10 +85,10 @@ class Design:
         return matches
 
     def changed(self, values: Mapping[str, float]) -> dict[str, Any]:
-        """The root table with other numbers.
+        """Return the root table with other numbers.
 
         Args:
-            values: by path.
+            values: values by path.
 
         Returns:
             A new table.
@@ -104,10 +104,10 @@ class Design:
         return content
 
     def robot(self, values: Mapping[str, float]) -> Robot:
-        """The robot with other numbers.
+        """Return the robot with other numbers.
 
         Args:
-            values: by path.
+            values: values by path.
 
         Returns:
             The robot, checked as if its file had been written so.
@@ -123,27 +123,28 @@ class Design:
             raise BadInput(f"{self.file}: {error}") from None
 
     def check(self, values: Mapping[str, float]) -> None:
-        """Refuse numbers that break a rule of the format.
+        """Reject numbers that break a rule of the format.
 
         Args:
-            values: by path.
+            values: values by path.
 
         Raises:
-            BadInput: they do; whether the closures still hold is not checked.
+            BadInput: a number breaks a rule; whether the closures still hold is not
+                checked.
         """
         declared_robot(Table(self.changed(values), self.file, ""), self.name)
 
 
 def design_of(robot: Robot) -> Design:
-    """A robot in memory as the file it could be written to."""
+    """Return a robot in memory as the file it could be written to."""
     return Design(robot_table(robot), robot.name, robot.name)
 
 
 def load_design(name: str | Path) -> Design:
-    """A built-in robot, or a robot file, as a design.
+    """Return a built-in robot, or a robot file, as a design.
 
     Args:
-        name: such as ``"irsbot2"``, or the path of a robot file.
+        name: name such as ``"irsbot2"``, or the path of a robot file.
 
     Returns:
         The design.
@@ -154,7 +155,7 @@ def load_design(name: str | Path) -> Design:
     from assembly.exchange.robot_files import OTHERS, load_robot
     from assembly.robots import BUILT_IN
 
-    # refuses a wrong file before numbers are changed
+    # refuses an invalid file before numbers are changed
     robot = load_robot(name, links=False)
     if str(name) in BUILT_IN or Path(name).suffix.lower() in OTHERS:
         return design_of(robot)
@@ -167,7 +168,7 @@ def load_design(name: str | Path) -> Design:
 
 
 def unit_of(path: str) -> str:
-    """Unit of the number a path leads to; ``"SI"`` where it depends on more."""
+    """Return the unit of the number at a path; ``"SI"`` if it depends on other keys."""
     *_, above, key = path.split(".")
     if above == "dh":
         return _DH_UNITS[key]
@@ -177,7 +178,7 @@ def unit_of(path: str) -> str:
 
 
 def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
-    """Path, value, setter of every number; absent ones that mean zero are put there."""
+    """Yield path, value and setter of every number; absent zeros are added."""
     for frame in content.get("frame", ()):
         given = dict(_ABSENT) if "dh" in frame else _ABSENT | _PLACED
         if frame.get("joint", "fixed") != "fixed":
@@ -188,7 +189,7 @@ def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
 
 
 def _inside(path: str, table: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
-    """Numbers of a table."""
+    """Yield the numbers of a table."""
     for key, value in table.items():
         path_of_key = f"{path}.{key}"
         if _is_number(value):
@@ -207,17 +208,17 @@ def _inside(path: str, table: dict[str, Any]) -> Iterator[tuple[str, float, Sett
 
 
 def _is_number(value: object) -> bool:
-    """Whether a plain value is a number; true and false are not."""
+    """Return whether a plain value is a number; true and false are not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _setter(place: Any, key: Any) -> Setter:
-    """The function that writes a number to its place."""
+    """Return the function that writes a number to its place."""
     return lambda number: place.__setitem__(key, number)
 
 
 def _setter_of_two(rows: list[list[float]], i: int, j: int) -> Setter:
-    """The same for both places of a symmetric matrix."""
+    """Return the function that writes both entries of a symmetric matrix."""
 
     def write(number: float) -> None:
         rows[i][j] = rows[j][i] = number

@@ -14,8 +14,8 @@ from assembly.sweeps.parameters import unit_of
 from assembly.sweeps.points import Points
 from assembly.sweeps.quantities import Question, record_type
 from assembly.sweeps.targets import LARGEST_GRID, Targets, unit_of_target
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.errors import BadInput
+from forcefit.results.display import html_table, short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,10 +25,10 @@ class Sweep:
     Attributes:
         question: the quantities.
         targets: the postures.
-        values: of each varied parameter, in the order of ``question.varied``.
+        values: values of each varied parameter, in the order of ``question.varied``.
         draws: number of draws of errors; 0 for the robot's own.
-        command: of the command line, for provenance; empty without one.
-        block_size: points solved and journalled together.
+        command: command line, for provenance; empty without one.
+        block_size: number of points solved and journalled together.
     """
 
     question: Question
@@ -69,7 +69,7 @@ class Sweep:
         return -(-self.size // self.block_size)
 
     def points(self, block: int) -> Points:
-        """The points of a block."""
+        """Return the points of a block."""
         first = block * self.block_size
         numbers = np.arange(first, min(first + self.block_size, self.size))
         numbers, draws = np.divmod(numbers, max(1, self.draws))
@@ -127,6 +127,6 @@ class Sweep:
             "strength": str(question.strength),
             "conditions": str((question.load, question.gravity, dict(question.under))),
             "block": str(self.block_size),
-            # all that is not named above
+            # all values that are not named above
             "question_sha256": question_hash(question),
         }

@@ -1,8 +1,8 @@
 """Conditions at the points of a sweep: load, gravity and the effects of the robot.
 
-Points are solved together by compiled functions, under loads and with effects that
-change errors, springs or clearances.  Where places give by laws of their own each is
-solved by itself, which takes some milliseconds.
+Compiled functions solve points together, under loads and with effects that change
+errors, springs or clearances.  Points with nonlinear compliances are solved one by one,
+in some milliseconds each.
 """
 
 from dataclasses import replace
@@ -29,11 +29,11 @@ from assembly.sweeps.quantities import Question
 def point_conditions(
     question: Question, robot: Robot, postures: list[Posture], errors: NDArray | None
 ) -> Conditions:
-    """Conditions at points of one design, effects applied.
+    """Return the conditions at points of one design, effects applied.
 
     Args:
-        question: of the sweep: load, gravity and covariates.
-        robot: of the design.
+        question: question of the sweep: load, gravity and covariates.
+        robot: robot of the design.
         postures: k of them.
         errors: (k, n, 6) [rad, m] drawn; None for the robot's own.
 
@@ -60,20 +60,20 @@ def point_conditions(
 
 
 def is_loaded(conditions: Conditions) -> bool:
-    """Whether there are loads, weights, or compliances of effects and contacts."""
+    """Return whether there are loads, weights, or compliant effects or contacts."""
     loaded = conditions.load.any() or conditions.gravity.any()
     return bool(loaded or conditions.laws or conditions.yields)
 
 
 def assemble_rows(conditions: Conditions) -> tuple[Assembly, NDArray, NDArray]:
-    """Least energies of all rows under loads.
+    """Return the least energies of all rows under loads.
 
     Args:
         conditions: k rows of a robot of n frames.
 
     Returns:
         Assemblies, screws and certificates in the order given; the (k, n, 6) [N m, N]
-        wrenches of the links' springs; and (k, n, 6) of these the part that is the
+        wrenches of the links' springs; and (k, n, 6) the part of them that is the
         links' own weight.
     """
     c = conditions
@@ -91,7 +91,7 @@ def assemble_rows(conditions: Conditions) -> tuple[Assembly, NDArray, NDArray]:
 
 
 def _assembled(conditions: Conditions, i: int) -> Assembly | Exception:
-    """A point by itself, or why there is no solution."""
+    """Return one point solved separately, or the exception raised."""
     try:
         assembly = assemble_row(conditions, i)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:

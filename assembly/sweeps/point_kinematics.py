@@ -1,7 +1,7 @@
-"""What a sweep's points are by their nominal geometry alone, before errors are asked.
+"""Properties of a sweep's points that follow from the nominal geometry alone.
 
-Joint coordinates, distances to singularities, and whether the posture may be used:
-within the joints' limits, regular, and on home's side of all singularities.
+They are joint coordinates, distances to singularities, and whether the posture is
+usable: within the joints' limits, regular, and on home's side of all singularities.
 """
 
 from collections.abc import Sequence
@@ -17,23 +17,23 @@ from assembly.model.robot import Robot
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.targets import of_joints
 
-_NEAR = 1e-4  # distance below which a posture is looked at more closely
+_NEAR = 1e-4  # distance below which a posture is examined more closely
 
 
 def note_geometry(
     question: Question, robot: Robot, goals: NDArray, postures: Sequence[Posture],
     rows: Sequence[range], records: NDArray, near_singularity: dict[int, str],
 ) -> list[tuple[str, str]]:  # fmt: skip
-    """Record what the postures are, and say which of them may not be used.
+    """Record the geometry of postures; return which of them are not usable.
 
     Args:
-        question: of the sweep.
-        robot: of the design.
+        question: question of the sweep.
+        robot: robot of the design.
         goals: (k, 6) or (k, n) of the k postures, as they were reached.
-        postures: that were reached.
-        rows: the records of each.
-        records: of the points, to fill.
-        near_singularity: by row, the names of singularities near by, to fill.
+        postures: the postures reached.
+        rows: indices of each posture's records.
+        records: records of the points, to fill.
+        near_singularity: by row, the names of nearby singularities, to fill.
 
     Returns:
         Status and reason of each, as :func:`assembly.kinematics.verdict.verdicts`.

@@ -1,8 +1,8 @@
 """K_C at the points of a sweep: nominal, or with errors, loads and clearances.
 
-Errors, loads and clearances do not change the nominal K_C, so draws of a posture
-share it.  A tangent is found point by point: of problem (22), with its clearances free
-or pressed, or of the exact equilibrium, with its internal forces.
+Errors, loads and clearances do not change the nominal K_C, so draws of a posture share
+it.  A tangent is computed point by point: of problem (22), with its clearances free or
+pressed, or of the exact equilibrium, with its internal forces.
 """
 
 from collections.abc import Mapping
@@ -35,20 +35,20 @@ _FORCES = Part("", "forces")
 
 
 def stiffness_parts(robot: Robot, state: str) -> tuple[str, ...]:
-    """Names of what gives way, such as ``"leg1.distal link"``.
+    """Return the names of the compliant parts, such as ``"leg1.distal link"``.
 
     Args:
-        robot: of the sweep.
-        state: of :data:`STATES`.
+        robot: robot of the sweep.
+        state: state of :data:`STATES`.
 
     Returns:
-        Links and joints; of a tangent pressed clearances, or forces already there, too.
+        Links and joints; for a tangent also pressed clearances, or existing forces.
     """
     return tuple(map(_name, _parts(robot, state)))
 
 
 def _parts(robot: Robot, state: str) -> list[Part]:
-    """The same as parts."""
+    """Return the compliant parts."""
     joints = virtual_joints(robot)
     parts = list(dict.fromkeys(owners(joints)))
     if state == "contact":
@@ -58,14 +58,14 @@ def _parts(robot: Robot, state: str) -> list[Part]:
 
 
 def _name(part: Part) -> str:
-    """As a label."""
+    """Return a part's label."""
     return f"{part.frame} {part.kind}" if part.frame else "forces already there"
 
 
 def nominal_stiffnesses(
     posture: Posture,
 ) -> tuple[dict[str, NDArray], dict[int, str]]:
-    """The nominal K_C of k postures, without errors and loads.
+    """Return the nominal K_C of k postures, without errors and loads.
 
     Args:
         posture: k postures.
@@ -88,15 +88,15 @@ def nominal_stiffnesses(
 def tangent_stiffnesses(
     conditions: Conditions, state: str
 ) -> tuple[dict[str, NDArray], dict[int, str]]:
-    """Tangents of k points under their errors, loads and effects.
+    """Return the tangents of k points under their errors, loads and effects.
 
     Args:
-        conditions: of k rows.
+        conditions: conditions of k rows.
         state: ``"contact"`` or ``"exact"``.
 
     Returns:
-        As :func:`nominal_stiffnesses`; NaN where there is no equilibrium, 0 along
-        what nothing resists, and why.
+        As :func:`nominal_stiffnesses`; NaN without equilibrium, 0 along free motions;
+        and the reasons by row.
     """
     parts = _parts(conditions.robot, state)
     rows, reasons = [], {}
@@ -117,7 +117,7 @@ def tangent_stiffnesses(
 
 
 def _tangent(conditions: Conditions, i: int, state: str) -> PlatformStiffness:
-    """Of one point; on the soft side of a change of contact."""
+    """Return the tangent at one point, on the compliant side of a contact change."""
     if conditions.laws or any(not place.linear for place in conditions.yields):
         raise SolverFailed("tangent", "an effect gives by a law that is no spring")
     assembly = assemble_row(replace(conditions, exact=state == "exact"), i)
@@ -127,7 +127,7 @@ def _tangent(conditions: Conditions, i: int, state: str) -> PlatformStiffness:
 
 
 def _quantities(tangent: PlatformStiffness, parts: list[Part]) -> dict[str, NDArray]:
-    """What is kept of a tangent."""
+    """Return the stored quantities of a tangent."""
     eigen = tangent.eigen
     shares: list[Mapping[Part, float]] = [tangent.shares(axis) for axis in np.eye(6)]
     return {
@@ -140,7 +140,7 @@ def _quantities(tangent: PlatformStiffness, parts: list[Part]) -> dict[str, NDAr
 
 
 def _unknown(parts: int) -> dict[str, NDArray]:
-    """The same of no tangent."""
+    """Return the stored quantities as NaN, for a point without a tangent."""
     sizes = {
         "compliance": (6, 6), "stiffness": (6,), "eigen_stiffness": (6,),
         "stiffness_condition": (), "share": (parts, 6),

@@ -17,17 +17,17 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# whose axes are those of the points: of sweeps and draws, and of tolerances
+# variables whose axes are those of the points: of sweeps and draws, and of tolerances
 _OF_POINTS = ("status", "tolerance")
 
 
 def point_table(
     data: "xarray.Dataset | Path | str", rows: Sequence[str] = ()
 ) -> "pandas.DataFrame":
-    """A data set as a table, one row for each point, draw or tolerance.
+    """Return a data set as a table, one row for each point, draw or tolerance.
 
     Args:
-        data: of a sweep, of draws or of tolerances; or the path of its file.
+        data: data of a sweep, of draws or of tolerances; or the path of its file.
         rows: axes whose points are the rows, such as ``["quantity", "group"]`` for the
             importance of errors; those of the sweep's points, the draws or the
             tolerances' classes if empty.
@@ -68,9 +68,9 @@ def write_point_table(
     columns, ``variable.component [unit]``.  A missing number is an empty cell.
 
     Args:
-        data: as for :func:`point_table`.
-        path: of the file.
-        rows: likewise.
+        data: see :func:`point_table`.
+        path: path of the file.
+        rows: see :func:`point_table`.
 
     Raises:
         BadInput: as :func:`point_table`; or the file cannot be written.
@@ -91,5 +91,5 @@ def write_point_table(
 
 
 def _head(name: str, unit: str) -> str:
-    """Head of a column."""
+    """Return the heading of a column."""
     return f"{name} [{unit}]" if unit else name

@@ -1,7 +1,8 @@
 """Solution of a sweep's points: margins, energy, wrenches, errors, singularities.
 
 Points are solved in blocks.  A point without a solution has its reason in ``status``
-and ``reason`` and stops no other; no point's numbers depend on the others of its block.
+and ``reason`` and stops no other point.  No point's numbers depend on the others of its
+block.
 """
 
 from collections.abc import Iterator, Mapping
@@ -24,6 +25,7 @@ from assembly.model.statuses import (
     BEYOND_SINGULARITY,
     INVALID_ROBOT,
     OF_POINTS,
+    OK,
     OUT_OF_REACH,
     SINGULAR,
     SOLVER_FAILED,
@@ -51,7 +53,7 @@ from assembly.sweeps.quantities import (
 from assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput
 
-_PAGE = 256  # draws generated together
+_PAGE = 256  # number of draws generated together
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +71,7 @@ class Points:
     draws: NDArray
 
     def part(self, some: slice) -> "Points":
-        """Some of them."""
+        """Return a selection of the points."""
         return Points(self.values[some], self.rows[some], self.draws[some])
 
 
@@ -79,7 +81,7 @@ class SolvedPoints:
 
     Attributes:
         records: (k,) of :func:`record_type`; NaN where there is no solution.
-        texts: by name, those of :data:`TEXTS`, the text of points that have one.
+        texts: texts by name in :data:`TEXTS`, the text of points that have one.
     """
 
     records: NDArray
@@ -91,7 +93,7 @@ def solve_points(question: Question, points: Points) -> SolvedPoints:
 
     Args:
         question: the quantities.
-        points: consecutive in the sweep, so that those of one posture are too.
+        points: consecutive in the sweep, so that points of one posture are adjacent.
 
     Returns:
         Rows in the order of the points.
@@ -114,7 +116,7 @@ def solve_points(question: Question, points: Points) -> SolvedPoints:
 
 
 def _runs(rows: NDArray) -> Iterator[slice]:
-    """Runs of equal rows."""
+    """Yield the runs of equal rows."""
     steps = np.flatnonzero(np.any(rows[1:] != rows[:-1], axis=1)) + 1
     edges = [0, *steps.tolist(), len(rows)]
     for first, last in zip(edges, edges[1:], strict=False):
@@ -123,7 +125,7 @@ def _runs(rows: NDArray) -> Iterator[slice]:
 
 @lru_cache(maxsize=4)
 def _robots(question: Question, values: tuple[float, ...]) -> tuple[Robot, Robot]:
-    """The robot of a design, and the same without errors."""
+    """Return the robot of a design, and the same without errors."""
     robot = question.robot
     if question.design is not None:
         robot = question.design.robot(dict(zip(question.varied, values, strict=True)))
@@ -160,7 +162,7 @@ def _solve_variant(
             _fail(solved, rows[i], status, reason)
             continue
         reachable += [(row, posture) for row in rows[i]]
-        if status:  # its numbers are right; whether the robot gets there is not said
+        if status:  # its numbers are right; it is unknown whether the robot gets there
             far += [(row, reason) for row in rows[i]]
     if not reachable:
         return
@@ -181,7 +183,7 @@ def _solve_or_split(
     question: Question, robot: Robot, perfect: Robot, postures: list[Posture],
     errors: NDArray | None, solved: SolvedPoints, rows: NDArray,
 ) -> None:  # fmt: skip
-    """Solve points whose posture exists; one by one where a solver fails for all."""
+    """Solve points whose posture exists; one by one if a solver fails for all."""
     try:
         _solve_reached(question, robot, perfect, postures, errors, solved, rows)
     except (np.linalg.LinAlgError, SolverFailed) as error:
@@ -204,14 +206,14 @@ def _fail(solved: SolvedPoints, rows: range, status: str, reason: str) -> None:
 
 
 def _errors(question: Question, draws: NDArray) -> NDArray:
-    """(k, n, 6) [rad, m] errors of some draws."""
+    """Return the (k, n, 6) [rad, m] errors of some draws."""
     pages = {page: _page(question, page) for page in np.unique(draws // _PAGE).tolist()}
     return np.array([pages[d // _PAGE][d % _PAGE] for d in draws.tolist()])
 
 
 @lru_cache(maxsize=8)
 def _page(question: Question, page: int) -> NDArray:
-    """(256, n, 6) [rad, m] errors of draws 256 page .."""
+    """Return the (256, n, 6) [rad, m] errors of draws 256 page .."""
     sources = question.sources
     assert sources is not None
     return sources.errors(sources.draw(page * _PAGE, _PAGE, question.seed))
@@ -272,13 +274,13 @@ def _solve_reached(
 def _solved_rows(
     energies: Assembly, failed: Mapping[int, str], solved: SolvedPoints, rows: NDArray
 ) -> list[int]:
-    """Which points have a solution; of the others status and reason are kept."""
+    """Return the points with a solution; keep status and reason of the others."""
     ok = []
     for i, row in enumerate(rows.tolist()):
         status, reason = energies.status[i], energies.reason[i]
         if i in failed:
             status, reason = SOLVER_FAILED, failed[i]
-        if status == "ok":
+        if status == OK:
             ok.append(i)
         else:
             _fail(solved, range(row, row + 1), status, reason)
@@ -289,7 +291,7 @@ def _record_wrenches(
     question: Question, robot: Robot, wrenches: NDArray, at_tips: NDArray,
     solved: SolvedPoints, rows: NDArray,
 ) -> None:  # fmt: skip
-    """Wrenches at the frames asked for, and the stress of the links."""
+    """Record the wrenches at the chosen frames, and the stress of the links."""
     out = solved.records
     if question.wrenches:
         chosen = [robot.index(name) for name in question.wrenches]
@@ -306,7 +308,7 @@ def _record_wrenches(
 def _record_stiffness(
     state: str, conditions: Conditions, solved: SolvedPoints, rows: NDArray
 ) -> None:
-    """The nominal K_C once a posture, its draws share it; a tangent at each point."""
+    """Record K_C: the nominal one per posture, tangents per point."""
     T = conditions.transforms
     runs = list(_runs(T.reshape(len(T), -1)))
     if state == "nominal":
@@ -327,7 +329,7 @@ def _record_frequencies(
     count: int, robot: Robot, conditions: Conditions, solved: SolvedPoints,
     rows: NDArray,
 ) -> None:  # fmt: skip
-    """Natural frequencies once a posture, as K_C; NaN beyond the modes there are."""
+    """Record natural frequencies per posture, as K_C; NaN beyond the existing modes."""
     T = conditions.transforms
     for run in _runs(T.reshape(len(T), -1)):
         i = run.start
@@ -337,16 +339,16 @@ def _record_frequencies(
         try:
             frequencies = natural_modes(there, count).frequencies
         except BadInput:
-            continue  # what has a mass does not move there
+            continue  # no part with a mass moves there
         solved.records["frequency"][rows[run], : len(frequencies)] = frequencies
 
 
 def _record_bounds(bounds: PoseError, solved: SolvedPoints, rows: NDArray) -> None:
-    """Bounds of (27) where (22) has a solution; their failure is the point's."""
+    """Record bounds of (27) where (22) has a solution; a failure fails the point."""
     out = solved.records
     for i in np.flatnonzero(out["status"][rows] == 0).tolist():
         row = int(rows[i])
-        if bounds.status[i] != "ok":
+        if bounds.status[i] != OK:
             _fail(solved, range(row, row + 1), bounds.status[i], bounds.reason[i])
             continue
         out["rotation_error"][row] = bounds.rotation_error[i]
@@ -356,7 +358,7 @@ def _record_bounds(bounds: PoseError, solved: SolvedPoints, rows: NDArray) -> No
 def _bound_clearance_only(
     perfect: Posture, solved: SolvedPoints, rows: NDArray
 ) -> None:
-    """Bounds of (27) by clearances alone, once for each posture."""
+    """Record bounds of (27) by clearances alone, once for each posture."""
     T = perfect.transforms
     runs = list(_runs(T.reshape(len(T), -1)))
     starts = [run.start for run in runs]
@@ -366,7 +368,7 @@ def _bound_clearance_only(
         solved.records["translation_error_clearance"][rows[run]] = (
             bounds.translation_error[i]
         )
-        if bounds.status[i] != "ok":
+        if bounds.status[i] != OK:
             for row in rows[run].tolist():
                 reason = f"clearances alone: {bounds.reason[i]}"
                 solved.texts["reason"].setdefault(row, reason)
@@ -375,7 +377,7 @@ def _bound_clearance_only(
 def _compare_finite(
     conditions: Conditions, i: int, solved: SolvedPoints, row: int
 ) -> None:
-    """Linearisation error at a point."""
+    """Record the linearisation error at a point."""
     out = solved.records
     try:
         exact = assemble_row(replace(conditions, exact=True), i)

@@ -1,6 +1,6 @@
-"""The quantities of a sweep: what may be asked at its points, and their table."""
+"""The quantities of a sweep: those that may be requested, and their table."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -11,30 +11,33 @@ from assembly.model.link_stress import stressed_names
 from assembly.model.robot import Robot
 from assembly.sweeps.parameters import Design
 from assembly.sweeps.point_stiffness import STATES, stiffness_parts
-from forcefit.inputs.display import html_table, short_repr
-from stiffness.screws import SCREW, WRENCH
+from forcefit.results.display import html_table, short_repr
+from forcefit.results.quantities import LABELS, QUANTITIES, Quantity
 
 if TYPE_CHECKING:
     from assembly.model.error_distributions import ErrorSources
 
 TEXTS = ("reason", "near_singularity")
-
+ERRORS = ("rotation_error", "translation_error")
+BY_CLEARANCE = ("rotation_error_clearance", "translation_error_clearance")
+FINITE = ("linearisation_rotation", "linearisation_translation", "linearisation_energy")
+STRESS = ("stress", "stress_error", "safety")
 
 _READING = ("registration", "drift")  # effects that change readings, not screws
 
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """The quantities asked for at every point; sent to each worker once.
+    """The quantities requested at every point; sent to each worker once.
 
-    Attributes:
-        robot: with its errors, which are used where none are drawn.
+    robot: robot with its errors, which are used if none are drawn.
+    design: its parameters, if some vary; otherwise None.
         design: its parameters, if some vary; else None.
         varied: paths of the varied parameters.
-        components: of the postures, see :mod:`assembly.sweeps.targets`.
-        sources: of drawn errors; None for the robot's own.
-        seed: of the draws.
-        assumption: of problem (27), or None to leave its bounds out.
+        components: components of the postures, see :mod:`assembly.sweeps.targets`.
+        sources: sources of drawn errors; None for the robot's own.
+        seed: seed of the draws.
+        assumption: assumption of problem (27), or None to leave its bounds out.
         clearance_only: bound (27) also for the robot without errors.
         wrenches: frames whose wrench is recorded.
         linearisation: compare each point with finite motions.
@@ -43,9 +46,9 @@ class Question:
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         under: covariates that the robot's effects depend on.
-        stiffness: also K_C and the shares of its parts, in a state of
-            :data:`assembly.sweeps.point_stiffness.STATES`; none if empty.
-        frequencies: how many natural frequencies, of the same K_C and declared masses.
+        stiffness: state of K_C, in :data:`assembly.sweeps.point_stiffness.STATES`, if
+            K_C and the shares of its parts are computed too; otherwise empty.
+        frequencies: number of natural frequencies, of the same K_C and declared masses.
         kept: names of the variables that are stored; all that are computed if empty.
     """
 
@@ -86,20 +89,34 @@ class Variable:
 
     Attributes:
         dims: axes beside those of the points, with their labels.
-        unit: of its numbers.
-        meaning: for ``long_name``.
+        quantity: of the table of quantities.
+        condition: under which it is computed; it follows the meaning.
     """
 
     dims: Mapping[str, tuple[str, ...]]
-    unit: str
-    meaning: str
+    quantity: Quantity
+    condition: str = ""
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Unit and meaning, as attributes of a NetCDF variable."""
+        known = self.quantity.attributes
+        return known | {"long_name": known["long_name"] + self.condition}
+
+
+def _variable(name: str, condition: str = "", **labels: tuple[str, ...]) -> Variable:
+    """A quantity of the table over its dimensions, all labelled."""
+    known = QUANTITIES[name]
+    every = {**LABELS, **labels}
+    dims = {dim: every[dim] for dim in (*labels, *known.dims)}
+    return Variable(dims, known, condition)
 
 
 def variables(question: Question) -> dict[str, Variable]:
-    """The numeric quantities that a sweep stores, by name.
+    """Return the numeric quantities that a sweep stores, by name.
 
     Args:
-        question: of a sweep.
+        question: question of a sweep.
 
     Returns:
         All but ``status`` and the texts.
@@ -109,125 +126,70 @@ def variables(question: Question) -> dict[str, Variable]:
 
 
 def computed(question: Question) -> dict[str, Variable]:
-    """The numeric quantities that are computed, some perhaps not stored.
+    """Return the numeric quantities that are computed; some may not be stored.
 
     Args:
-        question: of a sweep.
+        question: question of a sweep.
 
     Returns:
         All but ``status`` and the texts.
     """
-    screw, bound = {"screw": SCREW}, {"bound": ("lower", "upper")}
-    table = {
-        "margin": Variable(
-            {}, "1", "factor on all clearances at which it just assembles, compliant "
-            "rigid",
-        ),
-        "margin_free": Variable(
-            {}, "1", "the same, compliant joints free about their own axis"
-        ),
-        "energy": Variable({}, "J", "least elastic energy that closes it, eq. (22)"),
-        "platform_screw": Variable(
-            screw, "rad, m", "pose error at the platform's origin, base axes"
-        ),
-        "closure_residual": Variable(
-            {}, "1", "largest closure error left, rad or reference lengths"
-        ),
-        "clearance_excess": Variable({}, "1", "by how much a clearance is exceeded"),
-        "duality_gap": Variable({}, "J", "certified: energy is at most this too high"),
-        "singular_distance": Variable(
-            {"kind": KINDS}, "1", "0 at a singularity of the kind, at most 1"
-        ),
-        "condition": Variable({}, "1", "condition of the map from drives to platform"),
-    }  # fmt: skip
+    names = [
+        "margin", "margin_free", "energy", "platform_screw", "closure_residual",
+        "clearance_excess", "duality_gap",
+    ]  # fmt: skip
+    table = {name: _variable(name) for name in names} | {
+        "singular_distance": _variable("singular_distance", kind=KINDS),
+        "condition": _variable("condition"),
+    }
     if question.reads_otherwise:
-        table["reading"] = Variable(screw, "rad, m", "what a measuring device reads")
-    for suffix, condition in _bound_suffixes(question):
-        for part, unit in (("rotation", "rad"), ("translation", "m")):
-            table[f"{part}_error{suffix}"] = Variable(
-                bound, unit, f"certified bounds of the largest {part} error, eq. (27)"
-                + condition,
-            )  # fmt: skip
+        table["reading"] = _variable("reading")
+    if question.assumption is not None:
+        condition = f", {question.assumption}"
+        table |= {name: _variable(name, condition) for name in ERRORS}
+    if question.clearance_only:
+        table |= {name: _variable(name) for name in BY_CLEARANCE}
     if question.wrenches:
-        table["wrench"] = Variable(
-            {"frame": question.wrenches, "wrench_component": WRENCH}, "N m, N",
-            "what the outer part exerts on the inner, at the frame in its axes",
-        )  # fmt: skip
+        table["wrench"] = _variable("wrench", frame=question.wrenches)
     if question.strength is not None:
-        links = {"link": stressed_names(question.robot)}
-        table["stress"] = Variable(links, "Pa", "largest von Mises stress in the link")
-        table["stress_error"] = Variable(
-            links, "1", "estimated relative error of the stress, by the mesh; a beam's "
-            "formulas have 0, links with an inner edge without a fillet infinity",
-        )  # fmt: skip
-        table["safety"] = Variable({}, "1", "yield strength over the largest stress")
+        links = stressed_names(question.robot)
+        table |= {name: _variable(name, link=links) for name in STRESS[:2]}
+        table["safety"] = _variable("safety")
     if question.stiffness:
         table |= _stiffness_variables(question.robot, question.stiffness)
     if question.frequencies:
         modes = tuple(str(k + 1) for k in range(question.frequencies))
-        table["frequency"] = Variable(
-            {"mode": modes},
-            "Hz",
-            "natural, lowest first, drives held, without load and gravity",
-        )
+        table["frequency"] = _variable("frequency", mode=modes)
     if question.linearisation:
-        for part, unit in (("rotation", "rad"), ("translation", "m")):
-            table[f"linearisation_{part}"] = Variable(
-                {}, unit, f"size of the platform's {part}, linear minus exact"
-            )
-        table["linearisation_energy"] = Variable(
-            {}, "1", "energy, linear minus exact, relative to the exact one"
-        )
-    table["joint_coordinate"] = Variable(
-        {"joint": _moving(question.robot)}, "rad or m",
-        "nominal, of every joint, also where the status is not ok",
-    )  # fmt: skip
-    return table
+        table |= {name: _variable(name) for name in FINITE}
+    joints = _moving(question.robot)
+    return table | {"joint_coordinate": _variable("joint_coordinate", joint=joints)}
 
 
 def _moving(robot: Robot) -> tuple[str, ...]:
-    """Names of the joints that are not fixed."""
+    """Return the names of the joints that are not fixed."""
     return tuple(f.name for f in robot.frames if f.joint != "fixed")
 
 
 def _stiffness_variables(robot: Robot, state: str) -> dict[str, Variable]:
-    """What is kept of K_C."""
-    along = {"wrench_component": WRENCH}
+    """The variables of K_C and of its parts."""
+    eigen, parts = tuple("123456"), stiffness_parts(robot, state)
     return {
-        "compliance": Variable(
-            {"screw": SCREW, **along}, "rad/(N m) .. m/N",
-            f"of the platform at its origin, base axes, {STATES[state]}",
-        ),
-        "stiffness": Variable(
-            along, "N m/rad, N/m", "along each axis, the others free"
-        ),
-        "eigen_stiffness": Variable(
-            {"eigen": tuple("123456")}, "N/m", "softest first, angles times the "
-            "longest body",
-        ),
-        "stiffness_condition": Variable({}, "1", "stiffest over softest of them"),
-        "share": Variable(
-            {"part": stiffness_parts(robot, state), **along}, "1",
-            "of every link and joint in the compliance along each axis",
-        ),
-    }  # fmt: skip
-
-
-def _bound_suffixes(question: Question) -> Iterator[tuple[str, str]]:
-    """Suffix and meaning of each pair of bounds asked for."""
-    if question.assumption is not None:
-        yield "", f", {question.assumption}"
-    if question.clearance_only:
-        yield "_clearance", ", frozen, by clearances alone: without errors"
+        "compliance": _variable("compliance", f", {STATES[state]}"),
+        "stiffness": _variable("axis_stiffness"),
+        "eigen_stiffness": _variable("eigen_stiffness", eigen=eigen),
+        "stiffness_condition": _variable("stiffness_condition"),
+        "share": _variable("share", part=parts),
+    }
 
 
 def record_type(question: Question) -> np.dtype:
-    """Type of a point's record: what is stored, and ``status`` as a code."""
+    """Return type of a point's record: stored quantities, and ``status`` as a code."""
     return record_of(variables(question))
 
 
 def record_of(table: Mapping[str, Variable]) -> np.dtype:
-    """Type of a record of some quantities, and ``status`` as a code."""
+    """Return the type of a record of some quantities, and ``status`` as a code."""
     fields = [
         (name, "<f8", tuple(len(labels) for labels in v.dims.values()))
         for name, v in table.items()

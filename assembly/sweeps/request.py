@@ -1,4 +1,4 @@
-"""A sweep from the options of its command, checked first; and its summary."""
+"""A sweep from the options of its command, checked before solving; its summary."""
 
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,6 +16,7 @@ from assembly.kinematics.posture import home_posture
 from assembly.linear.reference.pose_error import ASSUMPTIONS
 from assembly.model.link_stress import stressed_names
 from assembly.model.robot import Robot
+from assembly.model.statuses import OK, OUT_OF_REACH
 from assembly.platform_stiffness.vibration import check_masses
 from assembly.sweeps.parameters import Design, load_design
 from assembly.sweeps.plan import Sweep
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
     from assembly.model.error_distributions import ErrorSources
     from assembly.sweeps.netcdf import Stored, StoredDataset
 
-_MODES = 100  # natural frequencies at most
+_MODES = 100  # largest number of natural frequencies
 
 
 @dataclass(frozen=True)
@@ -68,14 +69,14 @@ class SweepOptions:
 
 
 def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
-    """The sweep that ``forcefit assembly sweep`` would run.
+    """Return the sweep that ``forcefit assembly sweep`` would run.
 
     Args:
         robot: a robot, a robot file, or a built-in name.
-        options: of the command.
+        options: options of the command.
 
     Returns:
-        The sweep, everything in it checked.
+        The sweep, with all its options checked.
 
     Raises:
         BadInput: an option, a file it names or the robot breaks a rule.
@@ -136,7 +137,7 @@ def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
 
 
 def _check(options: SweepOptions, machine: Robot) -> None:
-    """Refuse options that contradict each other or the robot."""
+    """Reject options that contradict each other or the robot."""
     if (options.grid is None) == (options.poses is None):
         raise BadInput("sweep: expected --grid or --poses, one of them")
     assumption, near = options.assumption, options.near
@@ -168,7 +169,7 @@ def _check(options: SweepOptions, machine: Robot) -> None:
 def _sources(
     options: SweepOptions, machine: Robot, varied: Mapping[str, NDArray]
 ) -> "ErrorSources | None":
-    """How the errors drawn are distributed; None if none are."""
+    """Return the distributions of the errors drawn; None if none are drawn."""
     if (options.errors is None) != (options.draws is None):
         raise BadInput("sweep: --errors and --draws go together; found one of them")
     if options.errors is None:
@@ -185,12 +186,12 @@ def _sources(
 
 
 def _short(value: float | str) -> str:
-    """A covariate as on the command line."""
+    """Return a covariate as on the command line."""
     return value if isinstance(value, str) else f"{value:g}"
 
 
 def _check_assumption(question: Question) -> None:
-    """Refuse bounds of the pose error of a loaded robot: (27) has no load."""
+    """Reject bounds of the pose error of a loaded robot: (27) has no load."""
     home = point_conditions(
         question, question.robot, [home_posture(question.robot)], None
     )
@@ -203,14 +204,14 @@ def _check_assumption(question: Question) -> None:
 
 
 def _targets(robot: Robot, grid: str | None, poses: Path | str | None) -> Targets:
-    """The postures."""
+    """Return the postures."""
     if poses is not None:
         return read_targets(poses, robot)
     return grid_targets(parse_grid(grid or "", robot))
 
 
 def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
-    """Values by path; the least and the largest must be valid in a robot file."""
+    """Return values by path; least and largest must be valid in a robot file."""
     values_by_path: dict[str, NDArray] = {}
     owner: dict[str, str] = {}
     for text in texts:
@@ -235,7 +236,7 @@ def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
 
 
 def _command(robot: str | Path, options: SweepOptions) -> str:
-    """The command of the same sweep, options at their default left out."""
+    """Return the command of the same sweep, without options at their default."""
     default = {option.name: option.default for option in fields(options)}
     given = {name: getattr(options, name) for name in default} | {
         "load": _assigned((name.lower() for name in WRENCH), options.load),
@@ -251,21 +252,21 @@ def _command(robot: str | Path, options: SweepOptions) -> str:
             words += [word for one in value for word in (name, str(one))]
         elif value not in (None, False) and value != default[key]:
             words += [name, str(value)]
-    # names of files may hold bytes that are not UTF-8
+    # names of files may contain bytes that are not UTF-8
     return shlex.join(words).encode(errors="backslashreplace").decode()
 
 
 def _assigned(names: Iterable[str], values: Iterable[float]) -> str | None:
-    """As on the command line, zeros left out; None if nothing is left."""
+    """Return values as on the command line, without zeros; None if all are zero."""
     given = zip(names, values, strict=True)
     return ",".join(f"{name}={value:g}" for name, value in given if value) or None
 
 
 def summary_of(data: "xarray.Dataset | StoredDataset") -> dict[str, Any]:
-    """Summary of a sweep as plain values.
+    """Return the summary of a sweep as plain values.
 
     Args:
-        data: of a sweep.
+        data: data of a sweep.
 
     Returns:
         Axes, the number of points of each status, and of each quantity the least,
@@ -289,7 +290,7 @@ def summary_of(data: "xarray.Dataset | StoredDataset") -> dict[str, Any]:
 
 
 def _spread(variable: "xarray.DataArray | Stored") -> dict[str, Any] | None:
-    """Least, median and largest finite value; None where no value is finite."""
+    """Return least, median and largest finite value; None where no value is finite."""
     values = variable.values[np.isfinite(variable.values)]
     if not values.size:
         return None
@@ -300,11 +301,11 @@ def _spread(variable: "xarray.DataArray | Stored") -> dict[str, Any] | None:
 
 
 def summary_text(summary: Mapping[str, Any], data: "StoredDataset") -> str:
-    """The same for people: statuses, and the first reason of each that is not ok."""
+    """Return text of the statuses, and of the first reason for each that is not ok."""
     lines = [", ".join(f"{name}: {n}" for name, n in summary["status"].items())]
     status = data.data_vars["status"].values.astype(str).ravel()
     for name in summary["status"]:
-        if name not in {"ok", "out of reach"} and "reason" in data.data_vars:
+        if name not in {OK, OUT_OF_REACH} and "reason" in data.data_vars:
             first = int(np.flatnonzero(status == name)[0])
             reasons = data.data_vars["reason"]
             reason = str(reasons.values.ravel()[first])

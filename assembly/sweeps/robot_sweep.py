@@ -1,4 +1,4 @@
-"""A whole sweep in one call: a robot and what varies in, a data set out.
+"""A whole sweep in one call: from a robot and varied quantities to a data set.
 
 Begin at :func:`sweep`; the command ``forcefit assembly sweep`` takes the same options.
 """
@@ -52,40 +52,40 @@ def sweep(
 
     Args:
         robot: a robot, a robot file, or a built-in name.
-        grid: such as ``tx=-0.2:0.2:0.025,tz=-0.5``, or
+        grid: grid such as ``tx=-0.2:0.2:0.025,tz=-0.5``, or
         poses: a table of postures.
         vary: design parameters, such as ``link_a.link.beam.radius=0.03,0.04``; of a
             robot file or a built-in name.
-        errors: file that says how errors are distributed, see docs/statistics.md.
+        errors: file with the distributions of the errors, see docs/statistics.md.
         draws: number of draws.
-        seed: of the draws.
-        assumption: of problem (27): ``"frozen"``, ``"free"``, ``"budget"``, or
-            ``"none"`` to leave its bounds out.
-        quantities: names of the data variables to compute and store, with
-            ``"default"`` for those that are stored without names: the bounds by
-            clearances alone (``"rotation_error_clearance"``,
-            ``"translation_error_clearance"``) and what finite motions change
-            (``"linearisation_rotation"``, ..) are only computed where they are named.
+        seed: seed of the draws.
+        assumption: assumption of problem (27): ``"frozen"``, ``"free"``, ``"budget"``,
+            or ``"none"`` to leave its bounds out.
+        quantities: names of the data variables to compute and store, with ``"default"``
+            for those that are stored if none are named.  The bounds by clearances alone
+            (``"rotation_error_clearance"``, ``"translation_error_clearance"``) and the
+            changes by finite motions (``"linearisation_rotation"``, ..) are only
+            computed if they are named.
         wrench_of: frames whose wrench is recorded.
         near: distance below which a singularity is named.
         yield_strength: [Pa] of the links, for their stress and safety.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         under: covariates that effects of the robot's file depend on.
-        state: ``"nominal"``, ``"contact"`` or ``"exact"``: also K_C in this state, and
-            the shares of links and joints in it.
-        frequencies: how many natural frequencies.
-        rest: a frame that takes what a closure leaves open at home.
+        state: ``"nominal"``, ``"contact"`` or ``"exact"``: compute also K_C in this
+            state, and the shares of links and joints in it.
+        frequencies: number of natural frequencies.
+        rest: a frame that takes up the closures' mismatch at home.
         mismatch: ``"spring"``: redundant drives that do not fit at home are preloaded.
         output: NetCDF file to write.  Finished points are kept in
             ``<output>.journal``; after a kill the same call resumes from it and writes
             the same file, byte for byte.
-        progress: called with the number of points done, and of all.
-        solve: solves blocks of points; those of a file may be solved by others than
-            this process, see :mod:`assembly.sweeps.cluster`.
+        progress: function called with the number of points done, and of all.
+        solve: function that solves blocks of points; with a file, other processes may
+            solve them, see :mod:`assembly.sweeps.cluster`.
 
     Returns:
-        The data set over the axes, with units; of a file all of it, in memory.
+        The data set over the axes, with units; all of it in memory, even with a file.
 
     Raises:
         BadInput: an option, a file it names or the robot breaks a rule; the journal is
@@ -108,7 +108,7 @@ def sweep(
 
 
 def options_by_old_names(**options: Any) -> SweepOptions:
-    """Options of a sweep by the keywords of the last release.
+    """Return the options of a sweep by the keywords of the last release.
 
     Args:
         options: ``reading``, ``play_alone``, ``wrench``, ``linearisation``,

@@ -1,34 +1,38 @@
-"""Which quantities a sweep computes and stores, by the names of its data variables."""
+"""Selection of the quantities that a sweep computes and stores, by variable names."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
-from assembly.sweeps.quantities import Question, Variable, computed
+from assembly.sweeps.quantities import (
+    BY_CLEARANCE,
+    ERRORS,
+    FINITE,
+    STRESS,
+    Question,
+    Variable,
+    computed,
+)
 from forcefit.inputs.errors import BadInput, nearest, quoted
 
 DEFAULT = "default"  # stands for what is stored where no quantity is named
 MODES = 6  # natural frequencies where their number is not given
-BY_CLEARANCE = ("rotation_error_clearance", "translation_error_clearance")
-FINITE = ("linearisation_rotation", "linearisation_translation", "linearisation_energy")
 _STIFFNESS = (
     "compliance", "stiffness", "eigen_stiffness", "stiffness_condition", "share",
 )  # fmt: skip
-_STRESS = ("stress", "stress_error", "safety")
-_ERRORS = ("rotation_error", "translation_error")
 _NEEDED = (
-    dict.fromkeys(_STRESS, "--yield-strength")
-    | dict.fromkeys(_ERRORS, "an --assumption")
+    dict.fromkeys(STRESS, "--yield-strength")
+    | dict.fromkeys(ERRORS, "an --assumption")
     | {"wrench": "--wrench-of", "reading": "effects that change what a device reads"}
 )  # fmt: skip
 
 
 def select(question: Question, texts: Sequence[str]) -> Question:
-    """Restrict a question to quantities that are named.
+    """Restrict a question to named quantities.
 
     Args:
-        question: of the other options.
-        texts: names of data variables, between commas; ``"default"`` stands for those
-            that are stored without names.
+        question: question of the other options.
+        texts: names of data variables, between commas; ``"default"`` means those that
+            are stored if none are named.
 
     Returns:
         The question; nothing is computed for variables that are not named.
@@ -52,7 +56,7 @@ def select(question: Question, texts: Sequence[str]) -> Question:
 
 
 def _with_optional(question: Question) -> Question:
-    """The question for every quantity whose options are given or have a default."""
+    """Return a question for all quantities whose options are given or have defaults."""
     return replace(
         question, clearance_only=True, linearisation=True,
         stiffness=question.stiffness or "nominal",
@@ -61,30 +65,30 @@ def _with_optional(question: Question) -> Question:
 
 
 def _for(question: Question, kept: dict[str, Variable]) -> Question:
-    """The question for the variables kept and no others."""
+    """Return the question for exactly these variables."""
     every = _with_optional(question)
     return replace(
         question,
         kept=tuple(kept),
-        assumption=question.assumption if set(_ERRORS) & set(kept) else None,
+        assumption=question.assumption if set(ERRORS) & set(kept) else None,
         clearance_only=bool(set(BY_CLEARANCE) & set(kept)),
         linearisation=bool(set(FINITE) & set(kept)),
         stiffness=every.stiffness if set(_STIFFNESS) & set(kept) else "",
         frequencies=every.frequencies if "frequency" in kept else 0,
         wrenches=question.wrenches if "wrench" in kept else (),
-        strength=question.strength if set(_STRESS) & set(kept) else None,
+        strength=question.strength if set(STRESS) & set(kept) else None,
     )
 
 
 def quantities_text() -> str:
-    """Every data variable of sweeps: name, unit, meaning, and the option it needs."""
+    """Return every data variable of sweeps: name, unit, meaning and needed option."""
     from assembly.robots import BUILT_IN
 
     robot = BUILT_IN["four_bar"]()
     frame = robot.frames[0].name
     question = Question(robot, assumption="frozen", wrenches=(frame,), strength=1.0)
     lines = [
-        f"{name:28s}{one.unit:20s}{one.meaning}"
+        f"{name:28s}{one.quantity.unit:20s}{one.attributes['long_name']}"
         + (f"; needs {_NEEDED[name]}" if name in _NEEDED else "")
         for name, one in computed(_with_optional(question)).items()
     ]

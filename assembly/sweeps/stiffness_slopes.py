@@ -1,4 +1,4 @@
-"""How K_C answers to any number of a robot file, the file's effects applied."""
+"""Derivatives of K_C by any number of a robot file, with the file's effects."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,13 +11,14 @@ from assembly.platform_stiffness.tangent_slopes import TangentState, compliance_
 from assembly.sweeps.parameters import Design
 from forcefit.inputs.table import BadInput
 
-_STEP = 1e-4  # of the number, or of a unit where it is zero: an error of 1e-8
-_SMALL_STEP = 1e-8  # [rad, m] of errors: contacts change within some um of them
+# relative to the number, or of 1 if it is zero: the derivative's error is 1e-8
+_STEP = 1e-4
+_SMALL_STEP = 1e-8  # [rad, m] for errors, because contacts change within some um
 _AS_ERROR = {"translation": "t", "rotation": "r"}
 
 
 class CannotChange(BadInput):
-    """A number that cannot change alone: the robot does not exist beside it."""
+    """A number that cannot change alone: the robot does not exist for other values."""
 
 
 def stiffness_slopes(
@@ -28,14 +29,15 @@ def stiffness_slopes(
     asked: TangentState | None = None,
     under: Mapping[str, float | str] | None = None,
 ) -> dict[str, NDArray]:
-    """Derivatives of the platform's compliance by design numbers.
+    """Return the derivatives of the platform's compliance by design numbers.
 
     Args:
-        design: the robot as its file says it, its effects too.
-        paths: of numbers; a frame's name without its leg moves all legs at once.
+        design: the robot of the file, with its effects.
+        paths: paths of numbers; a frame's name without its leg changes all legs
+            together.
         pose: nominal platform pose, which is kept.
-        joints: actuated coordinates, which are kept, instead.
-        asked: of which tangent; the nominal one if absent.
+        joints: actuated coordinates, which are kept in place of the pose.
+        asked: state of the tangent, and its point; the nominal state if absent.
         under: covariates that effects depend on.
 
     Returns:
@@ -44,8 +46,8 @@ def stiffness_slopes(
 
     Raises:
         BadInput: no such number.
-        CannotChange: the robot or its posture does not exist a step beside it, as with
-            a length in an overconstrained loop.
+        CannotChange: the robot or its posture does not exist a step away, as with a
+            length in an overconstrained loop.
         CannotAssemble: the errors cannot be closed.
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: no equilibrium was found.
@@ -82,7 +84,7 @@ def stiffness_slopes(
 
 
 def _cannot_change(path: str, reason: str) -> str:
-    """Which number, why, and what may stand for it."""
+    """Return a message: the number, the reason, and a number to use in its place."""
     frame, *keys = path.rsplit(".", 2)
     instead = ""
     if len(keys) == 2 and keys[0] in _AS_ERROR and keys[1] in {"x", "y", "z"}:

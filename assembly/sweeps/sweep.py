@@ -1,8 +1,8 @@
 """A sweep over postures, draws of errors and designs, to one data set.
 
 A sweep's points are its designs x postures x draws, draws innermost.  They are divided
-into blocks that are solved and journalled in any order, by any process: no number
-depends on the process or on what was solved before.
+into blocks that are solved and journalled in any order, by any process.  No number
+depends on the process or on earlier blocks.
 """
 
 import signal
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import xarray
 
 Progress = Callable[[int, int], None]
-# yields each block's number with its results, in any order
+# function that yields each block's number with its results, in any order
 Solver = Callable[["Sweep", Iterable[int]], Iterator[tuple[int, SolvedPoints]]]
 
 
@@ -37,7 +37,7 @@ def solve_here(
     sweep: Sweep, blocks: Iterable[int]
 ) -> Iterator[tuple[int, SolvedPoints]]:
     """Solve blocks one after the other, on one thread."""
-    # small matrices: more threads take longer, and sum in another order
+    # more threads take longer for small matrices, and sum in another order
     with threadpool_limits(1), _interrupts_noted() as noted:
         for block in blocks:
             yield block, solve_points(sweep.question, sweep.points(block))
@@ -47,7 +47,7 @@ def solve_here(
 
 @contextmanager
 def _interrupts_noted() -> Generator[list[int], None, None]:
-    """The first Ctrl-C is recorded, to finish the block; a second stops at once."""
+    """Record a first Ctrl-C, to finish the block; stop immediately at a second."""
     noted: list[int] = []
     if threading.current_thread() is not threading.main_thread():
         yield noted
@@ -79,12 +79,15 @@ def run_sweep(
 
     Args:
         sweep: to be solved.
-        path: of the file; it appears when it is complete, and the journal is removed.
+        path: path of the file; it appears when it is complete, and the journal is
+            removed.
         progress: called at the start and after each block with the number of points
             that are in the journal, and of all.
-        solve: solves blocks: :func:`solve_here`, or :mod:`assembly.sweeps.cluster`.
-        held: keeps the journal until it is closed, while further results are made from
-            the file: after a kill the same sweep has no block to solve again.
+        solve: function that solves blocks: :func:`solve_here`, or
+            :mod:`assembly.sweeps.cluster`.
+        held: context that keeps the journal until it is closed, while further results
+            are computed from the file: after a kill the same sweep has no block to
+            solve again.
 
     Raises:
         BadInput: the journal is another sweep's, another run holds it, or a file
@@ -109,13 +112,13 @@ def run_sweep(
 
 
 def journal_path(path: Path | str) -> Path:
-    """Path of the journal of a file."""
+    """Return the path of the journal of a file."""
     path = Path(path)
     return path.with_name(path.name + ".journal")
 
 
 def _length(sweep: Sweep, block: int) -> int:
-    """Number of points of a block."""
+    """Return the number of points of a block."""
     return min(sweep.block_size, sweep.size - block * sweep.block_size)
 
 
@@ -148,15 +151,15 @@ def sweep_poses(
     progress: Progress = lambda done, total: None,
     assumption: str | None = None,
 ) -> "xarray.Dataset":
-    """Solve (21) and (22), and if asked (27), at every pose of a grid.
+    """Solve (21) and (22), and (27) if requested, at every pose of a grid.
 
     Args:
-        robot: with its errors, clearances and stiffnesses.
+        robot: robot with its errors, clearances and stiffnesses.
         axes: values [m or rad] by pose component or ``q.<frame>``; components not named
             are free.
         progress: called after each block with the number of points done, and of all.
-        assumption: of problem (27): ``"frozen"``, ``"free"`` or ``"budget"``; None
-            leaves the bounds of the pose error out.
+        assumption: assumption of problem (27): ``"frozen"``, ``"free"`` or
+            ``"budget"``; None leaves the bounds of the pose error out.
 
     Returns:
         Data set over the axes: ``margin``, ``margin_free``, ``energy``,
@@ -171,5 +174,5 @@ def sweep_poses(
 
 
 def assemblable(data: "xarray.Dataset", key: str = "margin_free") -> NDArray:
-    """Bool over the grid: inside the assembly zone by the margin."""
+    """Return a bool array over the grid: inside the assembly zone by the margin."""
     return np.asarray(data[key] <= ASSEMBLABLE)

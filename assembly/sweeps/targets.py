@@ -1,8 +1,8 @@
 """The postures of a sweep: a grid of poses or joint coordinates, or a list of them.
 
-A grid has an axis for each component named; a list has one axis, ``posture``.  Names
-are ``tx ty tz rx ry rz`` for the platform's pose, ``q.<frame>`` for the coordinate of
-an actuated joint, never both; a list may also write ``pose.tx``, as campaigns do.
+A grid has an axis for each named component; a list has one axis, ``posture``.  Names
+are ``tx ty tz rx ry rz`` for the platform's pose, or ``q.<frame>`` for the coordinate
+of an actuated joint, never both.  A list may also write ``pose.tx``, as campaigns do.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,19 +16,19 @@ from assembly.kinematics.posture import POSE
 from assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, nearest, quoted, read_rows
 
-LARGEST_GRID = 10_000_000  # points; more is a mistaken step
+LARGEST_GRID = 10_000_000  # largest number of points; more is a mistaken step
 _JOINT = "q."
 
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """Poses or joint coordinates, on the axes of a grid or one after the other.
+    """Poses or joint coordinates, on the axes of a grid or in a list.
 
     Attributes:
-        names: of the components, ``tx`` .. or ``q.<frame>``.
-        values: for a grid the values on each component's axis, for a list those of
-            each posture [m or rad].
-        labels: of the postures of a list; None for a grid.
+        names: names of the components, ``tx`` .. or ``q.<frame>``.
+        values: for a grid, the values on each component's axis, for a list those
+            of each posture [m or rad].
+        labels: labels of the postures of a list; None for a grid.
     """
 
     names: tuple[str, ...]
@@ -48,7 +48,7 @@ class Targets:
         return self.names if self.labels is None else ("posture",)
 
     def at(self, numbers: NDArray) -> NDArray:
-        """(k, components) values of some postures, counted along the axes in order."""
+        """Return the (k, components) values of postures by their numbers."""
         if self.labels is not None:
             return np.stack([v[numbers] for v in self.values], axis=1)
         places = np.unravel_index(numbers, self.shape)
@@ -57,11 +57,11 @@ class Targets:
 
 
 def goals_of(names: Sequence[str], robot: Robot, rows: NDArray) -> NDArray:
-    """Poses or coordinates as :mod:`assembly.kinematics.posture` takes them.
+    """Return the poses or coordinates as :mod:`assembly.kinematics.posture` takes them.
 
     Args:
-        names: of the components, of one kind.
-        robot: of n frames.
+        names: names of the components, of one kind.
+        robot: robot of n frames.
         rows: (k, components) of :meth:`Targets.at`.
 
     Returns:
@@ -78,17 +78,17 @@ def goals_of(names: Sequence[str], robot: Robot, rows: NDArray) -> NDArray:
 
 
 def of_joints(names: Sequence[str]) -> bool:
-    """Whether components are joint coordinates, not a pose."""
+    """Return whether components are joint coordinates, not a pose."""
     return any(name.startswith(_JOINT) for name in names)
 
 
 def grid_targets(axes: Mapping[str, NDArray]) -> Targets:
-    """All combinations of the values on each axis."""
+    """Return all combinations of the values on each axis."""
     return Targets(tuple(axes), tuple(np.asarray(v, float) for v in axes.values()))
 
 
 def unit_of_target(name: str, robot: Robot) -> str:
-    """``"m"`` or ``"rad"``."""
+    """Return ``"m"`` or ``"rad"``."""
     if name.startswith(_JOINT):
         frame = robot.frame(name.removeprefix(_JOINT))
         return "m" if frame.joint == "prismatic" else "rad"
@@ -96,18 +96,19 @@ def unit_of_target(name: str, robot: Robot) -> str:
 
 
 def parse_grid(text: str, robot: Robot | None = None) -> dict[str, NDArray]:
-    """Axes of a grid from text such as ``"tx=-0.2:0.2:0.025,tz=-0.6:-0.3:0.025"``.
+    """Return the axes of a grid from text, ``"tx=-0.2:0.2:0.025,tz=-0.6:-0.3:0.025"``.
 
     Args:
         text: for each component ``start:stop:step`` [m or rad], or one number.
             Both ends count when (stop - start)/step is whole within 1e-9.
-        robot: whose actuated joints may be named, as ``q.<frame>``; none without one.
+        robot: robot with actuated joints ``q.<frame>`` that may be named; none if
+            absent.
 
     Returns:
         Values by component, in the order given.
 
     Raises:
-        BadInput: not of that form, or far too many points.
+        BadInput: the text has another form, or gives too many points.
     """
     axes: dict[str, NDArray] = {}
     for part in text.split(","):
@@ -123,7 +124,7 @@ def parse_grid(text: str, robot: Robot | None = None) -> dict[str, NDArray]:
 
 
 def _check_name(whose: str, what: str, name: str, robot: Robot | None) -> None:
-    """Refuse a component that no posture has."""
+    """Reject a component that no posture has."""
     frames = robot.frames if robot is not None else ()
     valid = [*POSE, *(_JOINT + f.name for f in frames if f.actuated)]
     if name not in valid:
@@ -132,7 +133,7 @@ def _check_name(whose: str, what: str, name: str, robot: Robot | None) -> None:
 
 
 def _check_kind(whose: str, names: Mapping | Sequence[str]) -> None:
-    """Refuse poses beside joints."""
+    """Reject poses together with joints."""
     joints = [name for name in names if name.startswith(_JOINT)]
     if joints and len(joints) < len(names):
         other = next(name for name in names if not name.startswith(_JOINT))
@@ -142,7 +143,7 @@ def _check_kind(whose: str, names: Mapping | Sequence[str]) -> None:
 
 
 def parse_values(whose: str, spec: str) -> NDArray:
-    """Values written ``start:stop:step``, or as one number.
+    """Return the values written ``start:stop:step``, or as one number.
 
     Args:
         whose: place of the text, for messages.
@@ -152,7 +153,7 @@ def parse_values(whose: str, spec: str) -> NDArray:
         The values; both ends where the step fits within 1e-9.
 
     Raises:
-        BadInput: not of that form, or far too many.
+        BadInput: the text has another form, or gives too many points.
     """
     expected = "expected START:STOP:STEP or one number"
     try:
@@ -173,18 +174,18 @@ def parse_values(whose: str, spec: str) -> NDArray:
 
 
 def read_targets(path: Path | str, robot: Robot) -> Targets:
-    """Postures of a table: columns ``pose.tx`` .. or ``q.<frame>``, perhaps ``id``.
+    """Return the postures of a table: columns ``pose.tx`` or ``q.<frame>``, ``id``.
 
     Args:
         path: CSV file with a header, one row a posture.
-        robot: whose actuated joints may be columns; those without one keep their
-            ``position``.
+        robot: robot with actuated joints that may be columns; joints without one keep
+            their ``position``.
 
     Returns:
         The postures in the order of the file.
 
     Raises:
-        BadInput: not such a table; the line and the column are named.
+        BadInput: the table is invalid; the message names line and column.
     """
     path = Path(path)
     rows = [row for row in enumerate(read_rows(path), 1) if any(map(str.strip, row[1]))]
@@ -218,7 +219,7 @@ def read_targets(path: Path | str, robot: Robot) -> Targets:
 
 
 def _cell(whose: str, text: str) -> float:
-    """The number in a cell."""
+    """Return the number in a cell."""
     try:
         value = float(text)
     except ValueError:
@@ -229,7 +230,7 @@ def _cell(whose: str, text: str) -> float:
 
 
 def _check_labels(path: Path, labels: Sequence[str]) -> None:
-    """Refuse two rows of one id."""
+    """Reject equal ids in two rows."""
     if len(set(labels)) < len(labels):
         twice = next(label for label in labels if labels.count(label) > 1)
         raise BadInput(f"{path}: id: found {quoted(twice)} twice; expected unique ids")

@@ -12,7 +12,7 @@ from assembly.linear.energy import solve_assembly
 from assembly.linear.load import loads_on_frames, weights
 from assembly.linear.reference.energy import solve_with
 from assembly.linear.reference.zone import margin_with
-from assembly.model.clearance import Compliant
+from assembly.linear.zone import Compliant
 from assembly.model.robot import BeamLink, Robot, beam_axis
 from validation.assumptions.bushes import bush_joints
 from validation.assumptions.validity import Cost, cost_between
@@ -55,7 +55,7 @@ def bush_margin(posture: Posture, compliant: Compliant = "rigid") -> float:
     Raises:
         SolverFailed: the cone solver gave up.
     """
-    joints = bush_joints(virtual_joints(posture.robot, compliant))
+    joints = bush_joints(virtual_joints(posture.robot, False, compliant == "free"))
     return margin_with(linearise(posture), joints)[0]
 
 

@@ -1,4 +1,4 @@
-"""A four-anchor Hangprinter: its robot, and 41 samples to a campaign folder."""
+"""Robot of a four-anchor Hangprinter, and a campaign folder of its 41 samples."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,21 +26,21 @@ ANCHORS = np.array([
     [0.0, -1.600, -0.110], [1.290, 1.240, -0.155],
     [-1.410, 0.740, -0.150], [0.0, 0.0, 2.350],
 ])  # fmt: skip
-ADVANTAGE = np.array([2.0, 2.0, 2.0, 4.0])  # of the blocks
-GEAR = 255 / 20  # turns of the motor for one of the spool
-RADIUS = 0.075  # [m] of the spools
-STIFFNESS = 1e4  # [N/m] of every line; only their being equal matters here
-CAMERA = 2e-3  # [m] one sigma of a position: four lines say three coordinates
+ADVANTAGE = np.array([2.0, 2.0, 2.0, 4.0])  # mechanical advantage of the blocks
+GEAR = 255 / 20  # turns of the motor for one turn of the spool
+RADIUS = 0.075  # [m] radius of the spools
+STIFFNESS = 1e4  # [N/m] of every line; only equal stiffnesses matter here
+CAMERA = 2e-3  # [m] sigma of a position: four lines determine three coordinates
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """What was recorded; k rows, a column for each line.
+    """The recorded samples: k rows, a column for each line.
 
     Attributes:
-        position: (k, 3) [m] of the effector, by camera.
+        position: (k, 3) [m] position of the effector by camera.
         spool: (k, 4) [rad] turn of each spool since the first sample.
-        force: (k, 4) [N] of each line.
+        force: (k, 4) [N] force of each line.
     """
 
     position: NDArray
@@ -49,7 +49,7 @@ class Samples:
 
 
 def read_samples(data: Path | None = None) -> Samples:
-    """The 41 samples, in SI; those beside this file unless others are given."""
+    """Return the 41 samples in SI units, by default from the folder of this file."""
     path = (data / NAME if data else Path(__file__).parent) / FILE
     table = np.genfromtxt(path, delimiter=",", names=True)
     where = np.column_stack([table[f"{axis}_mm"] for axis in "xyz"]) / 1e3
@@ -59,14 +59,15 @@ def read_samples(data: Path | None = None) -> Samples:
 
 
 def cable_robot(anchors: NDArray = ANCHORS) -> Robot:
-    """Four taut lines from anchors to one point, each a driven strut.
+    """Return a robot of four taut lines from anchors to a point, as driven struts.
 
     Args:
-        anchors: (4, 3) [m].
+        anchors: (4, 3) [m] positions of the anchors.
 
     Returns:
-        The robot at the origin; the coordinate of ``A.line`` is that line's length.
-        The platform, a point, may turn: give its rotation with its place.
+        The robot at the origin.  The coordinate of ``A.line`` is the length of that
+        line. The platform is a point that can rotate, so a pose must contain its
+        rotation.
     """
     placed: list[PlacedFrame] = []
     for line, anchor in zip(LINES, anchors, strict=True):
@@ -77,7 +78,7 @@ def cable_robot(anchors: NDArray = ANCHORS) -> Robot:
 
 
 def _line(name: str, anchor: NDArray) -> Sequence[PlacedFrame]:
-    """A line from its anchor to the origin, between a cardan and a ball joint."""
+    """Return a line from its anchor to the origin, from a cardan to a ball joint."""
     length = float(np.linalg.norm(anchor))
     along = -anchor / length
     first = np.cross([1.0, 0.0, 0.0], along)
@@ -97,7 +98,7 @@ def _line(name: str, anchor: NDArray) -> Sequence[PlacedFrame]:
 
 
 def commanded(samples: Samples) -> NDArray:
-    """(k, 3) [m] where the motors think the effector is: nominal lines agree best."""
+    """Return (k, 3) [m] effector positions by the motors, by least squares."""
     paid = RADIUS * samples.spool / ADVANTAGE
     lengths = np.linalg.norm(ANCHORS, axis=1) + paid
 
@@ -112,11 +113,11 @@ def commanded(samples: Samples) -> NDArray:
 
 
 def convert(out: Path, data: Path | None = None) -> Path:
-    """Write the campaign folder: the pose commanded, the camera's deviation from it.
+    """Write the campaign folder: commanded poses, and deviations by the camera.
 
     Args:
-        out: the folder.
-        data: where all measured data lie.
+        out: folder of the campaign.
+        data: folder of all measured data.
 
     Returns:
         The folder.

@@ -1,7 +1,7 @@
-"""Hilti's construction robot: URDF to a robot file, waypoints to campaign folders.
+"""Hilti's construction robot: robot file from its URDF, campaigns from its waypoints.
 
-The robot file is derived from the URDF and stays under its licence (CC BY-NC-SA 3.0):
-it is written beside the campaigns and not kept in this repository.
+The robot file is derived from the URDF and has its licence (CC BY-NC-SA 3.0): it is
+written to the campaigns' folder, and is not part of this repository.
 """
 
 import xml.etree.ElementTree as ET
@@ -26,28 +26,29 @@ from stiffness.screws import rotation_matrix, rotation_vector, transform
 
 NAME = "hilti_trailblazer"
 FILES = ("flat", "pallet", "orthogonal_wood")
-SEGMENTS = {"column_middle_joint": -0.706, "column_top_joint": -0.736}  # [m] README
+# [m] from the README of the data
+SEGMENTS = {"column_middle_joint": -0.706, "column_top_joint": -0.736}
 ARM = tuple(f"dsr_joint{k}" for k in range(1, 7))
-G = 9.80665  # [m/s^2]
-SIGMA = 0.75e-3  # [m] of the total station, an axis
+G = 9.80665  # [m/s^2] gravity
+SIGMA = 0.75e-3  # [m] sigma of the total station along an axis
 STATIONING = ("stationing_measurements", "evaluation_measurements")
 
 
 def urdf_robot(path: Path, tip: str = "prism") -> Robot:
-    """The chain of a URDF from its root to a link; that link's frame is the platform.
+    """Return the chain of a URDF from its root to a link, whose frame is the platform.
 
-    A URDF link hangs behind its joint, a body of ours reaches to it: the mass of a
-    link belongs to the next frame.  Side branches are left out with their masses.
+    A URDF link follows its joint; a body of forcefit leads to its joint.  So the mass
+    of a link belongs to the next frame.  Side branches are left out with their masses.
 
     Args:
-        path: of the file.
+        path: path of the file.
         tip: name of the last link.
 
     Returns:
-        The robot; every joint of the chain that moves is actuated.
+        The robot, in which every movable joint of the chain is actuated.
 
     Raises:
-        BadInput: a joint moves about or along another axis than its z.
+        BadInput: a joint moves about or along another axis than its z axis.
     """
     root = ET.parse(path).getroot()
     links = {said(link, "name"): link for link in root.findall("link")}
@@ -77,13 +78,13 @@ def urdf_robot(path: Path, tip: str = "prism") -> Robot:
 
 
 def said(element: ET.Element, key: str, inside: str = "", default: str = "") -> str:
-    """An attribute of an element, or of one inside it."""
+    """Return an attribute of an element, or of an element inside it."""
     found = element.find(inside) if inside else element
     return default if found is None else found.get(key) or default
 
 
 def _origin(element: ET.Element) -> NDArray:
-    """(4, 4) of an ``origin``; roll, pitch, yaw about fixed axes."""
+    """Return (4, 4) transform of an ``origin``; roll, pitch, yaw about fixed axes."""
     xyz = [float(x) for x in said(element, "xyz", "origin", "0 0 0").split()]
     rpy = said(element, "rpy", "origin", "0 0 0").split()
     r, p, y = (float(x) for x in rpy)
@@ -96,7 +97,7 @@ def convert(out: Path, data: Path | None = None) -> dict[str, Path]:
 
     Args:
         out: folder of the campaigns.
-        data: where all measured data lie.
+        data: folder of all measured data.
 
     Returns:
         The folders by file.
@@ -107,7 +108,7 @@ def convert(out: Path, data: Path | None = None) -> dict[str, Path]:
 
 
 def _convert(robot: Robot, source: Path, file: str, folder: Path) -> Path:
-    """One file of waypoints."""
+    """Write the campaign folder of one file of waypoints."""
     text = (source / f"{file}.yaml").read_text()
     rows = list(_rows(yaml.load(text, yaml.CSafeLoader)))
     rows.sort(key=lambda row: row["time"])
@@ -125,13 +126,13 @@ def _convert(robot: Robot, source: Path, file: str, folder: Path) -> Path:
     columns["cov.time"] = time - time[0]
     for name in ("stationing", "height", "space"):
         columns[f"cov.{name}"] = np.array([float(row[name]) for row in rows])
-    # how the column leans against the base, and the base against its own mean: what
-    # both lean to is the floor's, another one on another day
+    # tilt of the column relative to the base, and of the base relative to its mean; the
+    # mean tilt is that of the floor, different on another day
     rocking = _up(rows, "base") - _up(rows, "base").mean(axis=0)
     lean = _up(rows, "column") - _up(rows, "base")
     for name, up in (("column", lean), ("base", rocking)):
         columns[f"cov.{name}_rx"], columns[f"cov.{name}_ry"] = up[:, 1], -up[:, 0]
-    # the total station's z is vertical; the accelerometer follows it from row to row
+    # the total station's z is vertical; the accelerometer gives changes between rows
     vertical = base_pose(T, measured)[2, :3] + rocking
     for k, axis in enumerate("xyz"):
         columns[f"cov.gravity.{axis}"] = -G * vertical[:, k]
@@ -139,13 +140,13 @@ def _convert(robot: Robot, source: Path, file: str, folder: Path) -> Path:
 
 
 def _up(rows: list[dict], place: str) -> NDArray:
-    """(k, 3) unit vector up, as an accelerometer sees it in its own axes."""
+    """Return (k, 3) unit vectors upward in the axes of an accelerometer."""
     accel = np.array([row[f"tilt_sensor_{place}_accel"] for row in rows])
     return accel / np.linalg.norm(accel, axis=1)[:, None]
 
 
 def _rows(content: dict) -> list[dict]:
-    """All waypoints, with column height, solution space and whether for stationing."""
+    """Return all waypoints with column height, solution space, and stationing."""
     found = []
     for height, at_height in content["column_heights"].items():
         for space, station in at_height["solution_spaces"].items():

@@ -1,4 +1,4 @@
-"""A UR5 and a Barrett WAM under a laser tracker: a table of poses to a campaign folder.
+"""A UR5 and a Barrett WAM, measured by a laser tracker: a campaign folder of poses.
 
     python -m examples.serial_robots.convert FILE.csv -o FOLDER
     forcefit validation diagnose FOLDER --save corrected.toml
@@ -22,23 +22,25 @@ from forcefit.inputs.table import BadInput
 
 HERE = Path(__file__).parent
 NAME = "serial_robots"
-SIGMA = {"ur5": 3e-5, "wam": 1e-3}  # [m] from the makers' repeatability, 0.1 and 2 mm
-_AGREES = 1e-4  # [m] by which targets may differ from the poses of the angles
+# [m] from the manufacturers' repeatability, 0.1 and 2 mm
+SIGMA = {"ur5": 3e-5, "wam": 1e-3}
+_AGREES = 1e-4  # [m] largest difference between targets and the poses of the angles
 _AXES = "xyz"
 
 
 def convert(file: Path, out: Path) -> Path:
-    """Write a campaign of one file of the data.
+    """Write a campaign folder of one file of the data.
 
     Args:
-        file: with columns ``x_t`` .., ``x_dif`` .. [mm] and ``joint_1`` .. [degrees].
+        file: file with columns ``x_t`` .., ``x_dif`` .. [mm] and ``joint_1`` ..
+            [degrees].
         out: folder of the campaign.
 
     Returns:
         The folder.
 
     Raises:
-        BadInput: another table, or targets that are not where the angles lead.
+        BadInput: the file has other columns, or the angles do not lead to the targets.
     """
     with file.open(newline="", encoding="utf-8-sig") as lines:
         rows = list(csv.DictReader(lines))
@@ -56,8 +58,8 @@ def convert(file: Path, out: Path) -> Path:
     _check_targets(file, robot, q, target)
     columns = {"id": np.array([f"m{row['step_order']}" for row in rows])}
     columns |= {f"q.joint{k + 1}": angle for k, angle in enumerate(q.T)}
-    # reached = target + difference: so their sums have the six decimals that the
-    # tracker writes, in every row, and target - difference in none
+    # reached = target + difference: the sums have six decimals in every row, as the
+    # tracker writes them, and the differences target - difference do not
     columns |= {f"meas.t{k}": deviation[:, i] for i, k in enumerate(_AXES)}
     return write_campaign(out, robot, columns, (1e-4, SIGMA[name]))
 
@@ -65,7 +67,7 @@ def convert(file: Path, out: Path) -> Path:
 def _check_targets(
     file: Path, robot: Robot, q: np.ndarray, target: np.ndarray
 ) -> None:  # fmt: skip
-    """Refuse targets that another robot would have."""
+    """Raise an error if the angles do not lead to the targets."""
     coordinates = np.zeros((len(q), len(robot.frames)))
     coordinates[:, : q.shape[1]] = q
     postures, _ = place_many_joints(robot, coordinates)
@@ -76,17 +78,17 @@ def _check_targets(
 
 
 def find(file: Path, data: Path | None = None) -> Path:
-    """A table by its path, or by its name in the data set.
+    """Return the path of a table, given by its path or its name in the data set.
 
     Args:
-        file: either.
-        data: where all measured data lie, as for :func:`.campaign_folder.data_folder`.
+        file: path or name.
+        data: folder of all measured data, see :func:`.campaign_folder.data_folder`.
 
     Returns:
-        Its path.
+        The path of the table.
 
     Raises:
-        BadInput: it is at neither place.
+        BadInput: there is no such table.
     """
     if file.is_file():
         return file

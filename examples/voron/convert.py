@@ -1,4 +1,4 @@
-"""Homing heights of a printer against temperatures: two runs to campaign folders."""
+"""Homing heights of a printer at varying temperatures: campaign folders of two runs."""
 
 import csv
 from datetime import datetime
@@ -15,20 +15,21 @@ RUNS = {
     "run_a": "run_a_2021-06-13_05-41-53.csv",
     "run_b": "run_b_2021-06-13_20-04-43.csv",
 }
-STEP = 0.0025e-3  # [m]; the header of run b says 0.0125 mm: the runs then disagree
-SIGMA = 2.0e-6  # [m] a step and the repeats within a sample
+# [m]; the header of run b has 0.0125 mm, but then the runs would disagree
+STEP = 0.0025e-3
+SIGMA = 2.0e-6  # [m] from a step and the repeats in a sample
 OTHERS = ("bed", "chamber", "he")
 
 
 def convert(out: Path, data: Path | None = None) -> dict[str, Path]:
     """Write a campaign folder for each run.
 
-    A nozzle that stands too high by d meets the pin d lower, so the deviation is minus
+    A nozzle that is too high by d touches the pin d lower, so the deviation is minus
     the change of the homing position.
 
     Args:
         out: folder of the campaigns.
-        data: where all measured data lie.
+        data: folder of all measured data.
 
     Returns:
         The folders by run.
@@ -56,7 +57,7 @@ def convert(out: Path, data: Path | None = None) -> dict[str, Path]:
 
 
 def read_run(path: Path) -> dict[str, NDArray]:
-    """Columns of a run; ``time`` in seconds since its first row."""
+    """Return columns of a run, with ``time`` in seconds since its first row."""
     with path.open(newline="") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     clock = [datetime.strptime(row.pop("time"), "%Y/%m/%d-%H:%M:%S") for row in rows]

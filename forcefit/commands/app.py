@@ -16,14 +16,16 @@ import typer
 from forcefit.commands import assembly, report, stiffness, validation
 from forcefit.commands.convert import convert
 from forcefit.commands.example import example
+from forcefit.commands.help import Commands
 from forcefit.commands.old_names import with_new_names
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars, report_loading
+from forcefit.commands.schema import schema
 from forcefit.inputs.errors import BadInput, one_line, quoted
 from forcefit.inputs.packages import naming_packages, need
 from forcefit.inputs.writing import write_json
 
-app = typer.Typer(
+app = Commands(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -35,6 +37,7 @@ app.add_typer(validation.app, name="validation", help="Is it true?")
 app.add_typer(report.app, name="report", help="What changed between two runs?")
 app.command()(convert)
 app.command()(example)
+app.command()(schema)
 
 
 def _print_version(asked: bool) -> None:

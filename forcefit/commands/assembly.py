@@ -9,6 +9,7 @@ import typer
 
 from forcefit.commands.deflection import deflection
 from forcefit.commands.frequencies import frequencies
+from forcefit.commands.help import Commands
 from forcefit.commands.options import (
     AlongOption,
     AtOption,
@@ -28,9 +29,11 @@ from forcefit.commands.options import (
     posture_of,
 )
 from forcefit.commands.platform_stiffness import stiffness
-from forcefit.commands.progress import one_thread, progress_lines
+from forcefit.commands.plot import plot
+from forcefit.commands.progress import one_thread
+from forcefit.commands.solve import solve
 from forcefit.commands.statistics import statistics, tolerances
-from forcefit.commands.sweep import plot, sweep, table
+from forcefit.commands.sweep import sweep
 from forcefit.inputs.errors import BadInput, checked, nearest
 from forcefit.inputs.writing import (
     PIXELS,
@@ -39,90 +42,8 @@ from forcefit.inputs.writing import (
     write_json,
 )
 
-app = typer.Typer(no_args_is_help=True)
-
-
-@app.command()
-def solve(
-    robot: RobotArgument,
-    pose: PoseOption = None,
-    joint: JointOption = None,
-    rest: RestOption = None,
-    mismatch: MismatchOption = None,
-    load: LoadOption = None,
-    gravity: GravityOption = None,
-    under: UnderOption = None,
-    json: JsonOption = None,
-) -> None:
-    """Close at least energy: pose error, energy, wrenches, margin."""
-    from assembly.report.results import solution_of, solution_text
-
-    applied = declared_under(
-        robot, pose, joint, load, gravity, under, rest=rest, mismatch=mismatch,
-        note=False,
-    )  # fmt: skip
-    with one_thread():
-        results = solution_of(applied.posture, applied.load, applied.gravity)
-    if results["status"] == "ok" and applied.conditions.reads_otherwise:
-        results["reading"] = applied.reading(results["platform_screw"])
-    write_json(results, json)
-    if json != "-":
-        print(solution_text(results))
-    if results["status"] != "ok":
-        raise typer.Exit(1)
-
-
-@app.command()
-def zone(
-    robot: RobotArgument,
-    pose: PoseOption = None,
-    joint: JointOption = None,
-    rest: RestOption = None,
-    mismatch: MismatchOption = None,
-    json: JsonOption = None,
-) -> None:
-    """Whether clearances alone let the robot assemble; the margin."""
-    from assembly.report.first_order import singular_status
-    from assembly.report.results import zone_of, zone_text
-
-    posture = posture_of(robot, pose, joint, rest, mismatch, links=False)
-    margins = zone_of(posture) | singular_status(posture)
-    write_json({"robot": robot, "zone": margins}, json)
-    if json != "-":
-        print(zone_text(margins))
-    if margins["status"] != "ok":
-        raise typer.Exit(1)
-
-
-@app.command()
-def exact(
-    robot: RobotArgument,
-    pose: PoseOption = None,
-    joint: JointOption = None,
-    rest: RestOption = None,
-    mismatch: MismatchOption = None,
-    load: LoadOption = None,
-    gravity: GravityOption = None,
-    under: UnderOption = None,
-    json: JsonOption = None,
-) -> None:
-    """Close the robot with finite motions: closures hold exactly."""
-    from assembly.report.results import exact_of, exact_text
-
-    applied = declared_under(
-        robot, pose, joint, load, gravity, under, finite=True, rest=rest,
-        mismatch=mismatch,
-    )  # fmt: skip
-    with one_thread(), progress_lines() as update:
-        results = exact_of(
-            applied.posture, applied.load, applied.gravity,
-            lambda done, most: update("steps", done, most),
-        )  # fmt: skip
-    write_json(results, json)
-    if json != "-":
-        print(exact_text(results))
-    if results["status"] != "ok":
-        raise typer.Exit(1)
+app = Commands(no_args_is_help=True)
+app.command()(solve)
 
 
 @app.command()
@@ -157,6 +78,7 @@ def error(
     """Certified bounds of the largest pose error, problem (27)."""
     from assembly.linear.reference.pose_error import ASSUMPTIONS
     from assembly.model.largest import LARGEST_LENGTH
+    from assembly.model.statuses import OK
     from assembly.report.pose_errors import pose_error_of, pose_error_text
 
     for name in assumption or ():
@@ -186,7 +108,7 @@ def error(
     write_json(results, json)
     if json != "-":
         print(pose_error_text(results))
-    if results["status"] != "ok":
+    if results["status"] != OK:
         raise typer.Exit(1)
 
 
@@ -266,6 +188,6 @@ def show(
 
 
 for command in (
-    stiffness, deflection, frequencies, statistics, tolerances, sweep, plot, table
+    stiffness, deflection, frequencies, statistics, tolerances, sweep, plot
 ):  # fmt: skip
     app.command()(command)

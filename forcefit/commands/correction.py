@@ -48,6 +48,7 @@ def predict(
     are empty.
     """
     from assembly.exchange.robot_files import load_robot
+    from forcefit.results.text import readings_text
     from validation.campaign.campaign_file import read_commands
     from validation.correction.prediction import predict as predict_readings
     from validation.correction.prediction import reading_table
@@ -60,12 +61,8 @@ def predict(
     if json != "-":
         print(f"{output}: {len(prediction.commands)} readings")
         error = prediction.error
-        if error.position == error.position:
-            print(f"rms of measured minus predicted: {1e6 * error.position:.4g} um")
-        if error.rotation == error.rotation:
-            print(f"  rotation: {1e6 * error.rotation:.4g} urad")
         if error.normalised == error.normalised:
-            print(f"  in sigma: {error.normalised:.4g}")
+            print(f"rms of measured minus predicted: {readings_text(vars(error))}")
         print("\n".join(_about(table)))
         for row in table["without_answer"]:
             print(f"{row['id']}: {row['reason']}")
@@ -75,11 +72,13 @@ def predict(
 
 def _about(table: dict[str, Any]) -> list[str]:
     """What a prediction rests on, a line each."""
+    from forcefit.results.text import readings_text
+
     lines = []
     if any(size > 0.0 for size in table["std"].values()):
         lines.append(
-            f"uncertainty of the model, 1 sigma: {_sizes(table['std'])}; of a reading "
-            f"about it: {_sizes(table['noise'])}"
+            f"uncertainty of the model, 1 sigma: {readings_text(table['std'])}; of a "
+            f"reading about it: {readings_text(table['noise'])}"
         )
     if table["not_measured"]:
         names = ", ".join(table["not_measured"])
@@ -95,13 +94,6 @@ def _about(table: dict[str, Any]) -> list[str]:
         count = len(table["extrapolated"])
         lines.append(f"{count} rows extrapolate (column extrapolated)")
     return lines
-
-
-def _sizes(both: dict[str, float]) -> str:
-    """Position and rotation as far as they are known."""
-    units = {"position": "um", "rotation": "urad"}
-    known = [f"{1e6 * both[k]:.4g} {u}" for k, u in units.items() if both[k] == both[k]]
-    return ", ".join(known) or "unknown"
 
 
 def compensate(

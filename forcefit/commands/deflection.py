@@ -17,6 +17,7 @@ from forcefit.commands.options import (
     RobotArgument,
     UnderOption,
     declared_under,
+    parse_state,
 )
 from forcefit.commands.progress import one_thread, progress_lines
 from forcefit.inputs.errors import BadInput, describe, nearest
@@ -37,12 +38,13 @@ def deflection(
     load: LoadOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
-    exact: Annotated[
-        bool,
+    state: Annotated[
+        str,
         typer.Option(
-            "--exact", help="With finite motions: large deflections, buckling."
+            help="contact (errors, loads, clearances) | exact (finite motions: large "
+            "deflections, buckling)."
         ),
-    ] = False,
+    ] = "contact",
     back: Annotated[
         bool, typer.Option("--back", help="Also back to the first load.")
     ] = False,
@@ -61,6 +63,7 @@ def deflection(
 
     Free motion in clearances, contacts, elastic deformation, jumps.
     """
+    from assembly.model.statuses import OK
     from assembly.report.deflection import (
         deflection_of,
         deflection_text,
@@ -71,6 +74,7 @@ def deflection(
         raise BadInput("--follow: not with --back; the path turns by itself")
     if figure is not None:
         check_writable(figure, PICTURE)
+    exact = parse_state(state, ("contact", "exact")) == "exact"
     component, loads = parse_along(along)
     loads = [*loads, *reversed(loads[:-1])] if back else loads
     applied = declared_under(
@@ -79,15 +83,15 @@ def deflection(
     )  # fmt: skip
     with one_thread(), progress_lines() as update:
         results = deflection_of(
-            applied.posture, component, loads, applied.load, applied.gravity, exact,
-            follow, update,
+            applied.posture, component, loads, applied.load, applied.gravity,
+            "exact" if exact else "contact", follow, update,
         )  # fmt: skip
     write_json(results, json)
     if json != "-":
         print(deflection_text(results))
     if figure is not None and "deflection" in results:
         save_figure(plot_deflection(results), figure)
-    if results["status"] != "ok":
+    if results["status"] != OK:
         raise typer.Exit(1)
 
 

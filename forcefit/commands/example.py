@@ -70,7 +70,7 @@ EXAMPLES = {
     "stiffness_library": _Example(
         "bars, tubes, boxes and cones by finite elements",
         ("examples/stiffness_library",),
-        "forcefit stiffness library look-up examples/stiffness_library/tube "
+        "forcefit stiffness library read examples/stiffness_library/tube "
         "--at length=0.37",
     ),
     "surfaces": _Example(

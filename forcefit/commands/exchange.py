@@ -1,4 +1,4 @@
-"""The commands ``forcefit validation import`` and ``validation iso``."""
+"""The command ``forcefit validation import``."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 
 from forcefit.commands.diagnose import diagnose as trace
-from forcefit.commands.inspect import CampaignArgument
 from forcefit.commands.options import JsonOption
 from forcefit.commands.report import ReportOption
 from forcefit.inputs.errors import BadInput
@@ -53,18 +52,3 @@ def import_(
         print(imported.text())
     if diagnose:
         trace(output, json, report)
-
-
-def iso(campaign: CampaignArgument, json: JsonOption = None) -> None:
-    """Figures of ISO 9283 and ISO 230-2, from repeats.
-
-    Pose accuracy and repeatability, distance accuracy, drift; reversal, repeatability
-    and accuracy of each reading that was approached from both sides.
-    """
-    from validation.campaign.campaign_file import read_campaign
-    from validation.standards.figures import standard_figures
-
-    figures = standard_figures(read_campaign(campaign))
-    write_json(figures.table(), json)
-    if json != "-":
-        print(figures.text())

@@ -44,6 +44,7 @@ def frequencies(
 
     Masses must be declared.
     """
+    from assembly.model.statuses import OK
     from assembly.report.vibration import vibration_of, vibration_text
 
     word = parse_state(state, ("nominal", "exact"))
@@ -58,5 +59,5 @@ def frequencies(
     write_json(results, json)
     if json != "-":
         print(vibration_text(results))
-    if results["status"] != "ok":
+    if results["status"] != OK:
         raise typer.Exit(1)

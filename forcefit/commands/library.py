@@ -6,12 +6,13 @@ from typing import Annotated
 
 import typer
 
+from forcefit.commands.help import Commands
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import write_json
 
-library = typer.Typer(no_args_is_help=True)
+library = Commands(no_args_is_help=True)
 Folder = Annotated[Path, typer.Argument(metavar="LIBRARY", help="Its folder.")]
 
 
@@ -32,9 +33,48 @@ def build(
         print(f"{len(files)} entries in {wanted.folder}")
 
 
-@library.command(name="list")
-def list_entries(folder: Folder, json: JsonOption = None) -> None:
-    """The entries of a library and how good they are."""
+@library.command()
+def read(
+    folder: Folder,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="K_E between entries, interpolated, with its error: such as "
+            "radius=0.02,length=0.4."
+        ),
+    ] = None,
+    family: Annotated[
+        str, typer.Option(help="With --at: of parts by their surface.")
+    ] = "",
+    to: Annotated[
+        str | None,
+        typer.Option(
+            help="Print the library as csv, or one entry's K_E for exudyn, adams or "
+            "mapdl."
+        ),
+    ] = None,
+    key: Annotated[
+        str | None, typer.Option(help="With --to: one entry; all for csv if absent.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """List a library's entries, look up K_E between them, export them."""
+    if at and to:
+        raise BadInput("library read: found --at and --to, expected one of them")
+    for name, value, other in (("--family", family, at), ("--key", key, to)):
+        if value and not other:
+            needed = "--at" if name == "--family" else "--to"
+            raise BadInput(f"{name}: found without {needed}, expected both")
+    if at:
+        _look_up(folder, at, family, json)
+    elif to is not None:
+        _export(folder, to, key, json)
+    else:
+        _list(folder, json)
+
+
+def _list(folder: Path, json: str | None) -> None:
+    """Print the entries of a library and how good they are."""
     from stiffness.report.library import read_library
 
     entries = read_library(folder)
@@ -45,14 +85,8 @@ def list_entries(folder: Folder, json: JsonOption = None) -> None:
             print(f"{entry.key}  error {error:.2g}")
 
 
-@library.command(name="look-up")
-def look_up_entry(
-    folder: Folder,
-    at: Annotated[list[str], typer.Option(help="Such as radius=0.02,length=0.4.")],
-    family: Annotated[str, typer.Option(help="Of parts by their surface.")] = "",
-    json: JsonOption = None,
-) -> None:
-    """K_E between a library's entries, interpolated, with its error."""
+def _look_up(folder: Path, at: list[str], family: str, json: str | None) -> None:
+    """Print K_E between a library's entries, interpolated, with its error."""
     from forcefit.commands.options import parse_assignments
     from stiffness.link import scaled
     from stiffness.report.library import look_up, read_library
@@ -68,20 +102,17 @@ def look_up_entry(
         print(f"largest relative error: {worst:.2g} (estimate)")
 
 
-@library.command()
-def export(
-    folder: Folder,
-    to: Annotated[str, typer.Option(help="csv, json, exudyn, adams or mapdl.")] = "csv",
-    key: Annotated[str | None, typer.Option(help="One entry; all for csv.")] = None,
-) -> None:
+def _export(folder: Path, to: str, key: str | None, json: str | None) -> None:
     """Print a library, or one entry's K_E for another program."""
     from stiffness.report.export import library_csv, stiffness_for
     from stiffness.report.library import read_entry, read_library
 
+    if json is not None and to != "json":
+        raise BadInput(f"--json: found with --to {to}, expected one of the two")
     if to in {"csv", "json"}:
         entries = read_library(folder) if key is None else [read_entry(folder, key)]
         if to == "json":
-            write_json({"entries": [entry.about for entry in entries]}, "-")
+            write_json({"entries": [entry.about for entry in entries]}, json or "-")
         else:
             print(library_csv(entries), end="")
         return

@@ -1,4 +1,4 @@
-"""Old names of options: each works for one release, with a line on stderr.
+"""Old names of commands and options: each works for one release, with a line on stderr.
 
 The commands themselves know the new names only; ``--help`` shows no others.  Those that
 the public formats name stay for good, and nothing is said of them.
@@ -7,6 +7,19 @@ the public formats name stay for good, and nothing is said of them.
 import sys
 from collections.abc import Sequence
 
+# new words by the words of a command that is part of another one now
+COMMANDS: dict[str, tuple[str, ...]] = {
+    "assembly exact": ("assembly", "solve", "--state", "exact"),
+    "assembly zone": ("assembly", "solve", "--quantities", "margin"),
+    "assembly table": ("assembly", "plot"),
+    "stiffness curve": ("stiffness", "beam"),
+    "stiffness solids": ("stiffness", "fea", "--part", "list"),
+    "stiffness slenderness": ("stiffness", "compare", "--ratios", "5,10,20,40"),
+    "stiffness library list": ("stiffness", "library", "read"),
+    "stiffness library look-up": ("stiffness", "library", "read"),
+    "stiffness library export": ("stiffness", "library", "read", "--to", "csv"),
+    "validation iso": ("validation", "inspect", "--iso"),
+}
 _PICTURE: dict[str, tuple[str, ...]] = {"-o": ("--figure",), "--output": ("--figure",)}
 # new words by command and old option; a value follows where the option takes one
 OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
@@ -37,21 +50,32 @@ OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
         "--reading": ("--assumption",),
     },
     "assembly statistics": {"--stiffness": ("--state",), "--play": ("--clearance",)},
-    "assembly tolerances": {"--play": ("--clearance",)},
-    "assembly deflection": _PICTURE,
+    "assembly tolerances": {
+        "--play": ("--clearance",),
+        "--compliant": ("--quantities",),
+    },
+    "assembly deflection": _PICTURE | {"--exact": ("--state", "exact")},
+    "assembly table": {"-o": ("--csv",), "--output": ("--csv",)},
     "assembly plot": _PICTURE | {"--quantity": ("--quantities",)},
     "report compare": {"-o": ("--report",), "--output": ("--report",)},
-    "validation crosscheck": {"--clearances": ("--with-clearance",)},
+    "validation crosscheck": {
+        "--clearances": ("--with-clearance",),
+        "--stiffness": ("--state", "exact"),
+    },
     "validation generate": {"--point": ("--at",)},
     "validation plan": {"--point": ("--at",)},
     "stiffness beam": {"--axis": ("--along",)},
 }
 
+# new values of an old option
+VALUES = {"--compliant": {"free": "margin_free", "rigid": "margin"}}
 STAY = {("assembly error", "--reading"), ("stiffness beam", "--axis")}
 
 
 def with_new_names(words: Sequence[str]) -> list[str]:
-    """Replace options given by their old names, each reported on stderr once.
+    """Replace commands and options given by their old names.
+
+    Each is reported on stderr once.
 
     Args:
         words: of the command line, without the program's name.
@@ -63,7 +87,9 @@ def with_new_names(words: Sequence[str]) -> list[str]:
     end = words.index("--") if "--" in words else len(words)
     reported: list[str] = []
     new_words: list[str] = []
+    values: dict[str, str] = {}  # of the word that follows
     for word in words[:end]:
+        word, values = values.get(word, word), {}
         option, equals, value = _parts(word)
         if option not in renamed:
             new_words.append(word)
@@ -72,8 +98,20 @@ def with_new_names(words: Sequence[str]) -> list[str]:
         if option not in reported and option not in _staying(words):
             print(f"forcefit: {option} is now {' '.join(new)}", file=sys.stderr)
         reported.append(option)
-        new_words += [*new[:-1], new[-1] + equals + value]
-    return new_words + list(words[end:])
+        of_option = VALUES.get(option, {})
+        values = {} if equals else of_option
+        new_words += [*new[:-1], new[-1] + equals + of_option.get(value, value)]
+    return _with_new_command(new_words) + list(words[end:])
+
+
+def _with_new_command(words: list[str]) -> list[str]:
+    """Replace a command that is part of another one now."""
+    for old, new in COMMANDS.items():
+        count = len(old.split())
+        if words[:count] == old.split():
+            print(f"forcefit: {old} is now {' '.join(new)}", file=sys.stderr)
+            return [*new, *words[count:]]
+    return words
 
 
 def _parts(word: str) -> tuple[str, str, str]:

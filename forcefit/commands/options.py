@@ -295,7 +295,7 @@ def posture_of(
     applied = apply_robot_effects(declared)
     if applied.gravity is not None or applied.load.any():
         raise BadInput(
-            f"{robot}: its effects load it; expected assembly solve or exact, or "
+            f"{robot}: its effects load it; expected assembly solve or "
             "validation crosscheck, which know loads"
         )
     return applied.posture

@@ -66,6 +66,7 @@ def stiffness(
     json: JsonOption = None,
 ) -> None:
     """How stiff the platform is, and which part gives way."""
+    from assembly.model.statuses import OK
     from assembly.report.platform_stiffness import (
         plot_shares,
         stiffness_of,
@@ -103,7 +104,7 @@ def stiffness(
         _print_slopes(results)
     if figure is not None and "shares" in results:
         save_figure(plot_shares(results), figure)
-    if results["status"] != "ok" or results.get("cannot_change"):
+    if results["status"] != OK or results.get("cannot_change"):
         raise typer.Exit(1)
 
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from forcefit.commands.help import Commands
 from forcefit.commands.options import JsonOption
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import PAGE, check_writable, write_json, write_text
@@ -12,7 +13,7 @@ from forcefit.inputs.writing import PAGE, check_writable, write_json, write_text
 if TYPE_CHECKING:
     from forcefit.page.page import Provenance
 
-app = typer.Typer(no_args_is_help=True)
+app = Commands(no_args_is_help=True)
 
 
 def _checked(path: Path | None) -> Path | None:

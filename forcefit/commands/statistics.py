@@ -24,9 +24,9 @@ from forcefit.commands.options import (
     parse_load,
     posture_of,
 )
+from forcefit.commands.plot import CsvOption
 from forcefit.commands.progress import progress_bars
 from forcefit.commands.report import ReportOption, provenance
-from forcefit.commands.sweep import CsvOption
 from forcefit.inputs.errors import BadInput, nearest
 from forcefit.inputs.packages import need
 from forcefit.inputs.writing import (
@@ -231,9 +231,13 @@ def tolerances(
     plan: Annotated[
         Path | None, typer.Option(help="What tightness costs and must hold (TOML).")
     ] = None,
-    compliant: Annotated[
-        str, typer.Option(help="Present errors: compliant joints free | rigid.")
-    ] = "free",
+    quantities: Annotated[
+        str,
+        typer.Option(
+            help="Of present errors: margin_free (compliant joints free about their "
+            "own axis) | margin (rigid)."
+        ),
+    ] = "margin_free",
     clearance: ClearanceOption = "worst",
     contact_length: ContactLengthOption = None,
     rest: RestOption = None,
@@ -261,6 +265,7 @@ def tolerances(
 
     from assembly.exchange.robot_files import load_robot
     from assembly.kinematics.closing import closing_of
+    from assembly.linear.zone import MARGINS
     from assembly.model.statuses import SINGULAR
     from assembly.statistics.allocated_tolerances import allocation_of, allocation_text
     from assembly.statistics.allocation import allocate
@@ -276,7 +281,7 @@ def tolerances(
     from assembly.sweeps.dataset import check_dataset
 
     _check_clearance_model(clearance, contact_length)
-    _check_word("--compliant", compliant, ("free", "rigid"))
+    _check_word("--quantities", quantities, tuple(MARGINS))
     if plan is None and (output or figure or csv):
         raise BadInput("tolerances: --output, --figure and --csv need a --plan")
     if output or figure or csv:
@@ -292,7 +297,7 @@ def tolerances(
         if plan is None
         else replace(
             read_plan(plan, machine),
-            clearance_model=clearance,
+            clearance=clearance,
             contact_length=contact_length,
         )
     )
@@ -312,7 +317,7 @@ def tolerances(
         if machine.errors.any():
             results["present"] = present_errors(
                 postures,
-                "free" if compliant == "free" else "rigid",
+                MARGINS[quantities],
                 lambda d, n: update("present errors", d, n),
             )
             texts.append(present_text(results["present"]))

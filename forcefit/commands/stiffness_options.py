@@ -1,9 +1,20 @@
-"""Arguments and options that the stiffness commands share."""
+"""Arguments and options that the stiffness commands share, and their parsing."""
 
+import logging
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from forcefit.inputs.errors import BadInput
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from forcefit.commands.beam_options import BeamOptions
+    from stiffness.fem.material import Material
+    from stiffness.link import LinkStiffness
+    from stiffness.surface.interface import Interface
 
 Surface = Annotated[
     Path, typer.Argument(metavar="SURFACE", help="STL, OBJ, PLY, VTK, MSH, STEP.")
@@ -48,11 +59,100 @@ Parts = Annotated[
         "--part",
         help='Of another material: "z=0.2..0.4/young=2e11,poisson=0.3,density=7800", '
         'a box along the mesh\'s axes [m], or "solid=one+other/young=...", of a STEP '
-        "file. May be repeated; the last counts.",
+        "file (fea: list prints its solids). May be repeated; the last counts.",
     ),
 ]
 Masses = Annotated[
     list[str] | None,
     typer.Option("--mass", help='Added: "1.5/0,0,0.452" [kg, m]. May be repeated.'),
 ]
+OptionalSurface = Annotated[
+    Path | None,
+    typer.Argument(metavar="SURFACE", help="STL, OBJ, PLY, VTK, MSH, STEP."),
+]
+OptionalBase = Annotated[
+    str | None,
+    typer.Option(
+        help='Held: "z=0", "bore=0,0,0/0,1,0/0.01", "disc=..." [m]; a mesh needs one.'
+    ),
+]
+OptionalTip = Annotated[
+    str | None,
+    typer.Option(help="Where the screw is read, like --base [m]; a mesh needs one."),
+]
 TimeLimit = Annotated[float, typer.Option(help="Budget of time [s].")]
+
+
+def tell_progress() -> None:
+    """Each mesh's unknowns, error and expected cost, on stderr, as they come."""
+    log = logging.getLogger("stiffness.fem.fea")
+    log.setLevel(logging.INFO)
+    log.handlers = [logging.StreamHandler()]
+
+
+def parse_interfaces(
+    base: str | None, tip: str | None
+) -> "tuple[Interface, Interface]":
+    """Both interfaces of the options."""
+    from stiffness.surface.interface import parse_interface
+
+    if base is None or tip is None:
+        option = "--base" if base is None else "--tip"
+        raise BadInput(f'{option}: missing; expected an interface, such as "z=0"')
+    return parse_interface(base, "--base"), parse_interface(tip, "--tip")
+
+
+def parse_up(text: str | None) -> "NDArray | None":
+    """The section's z, if it was given."""
+    from forcefit.commands.options import parse_axis
+
+    return None if text is None else parse_axis("--up", text)
+
+
+def parse_materials(
+    young: float | None, poisson: float | None, density: float, parts: list[str] | None
+) -> "list[Material]":
+    """The link's materials: one that fills it, then those of its parts."""
+    from forcefit.commands.beam_options import BeamOptions
+    from forcefit.inputs.errors import checked
+    from stiffness.fem.material import Material
+    from stiffness.fem.part_text import parse_part
+
+    others = [parse_part("--part", text) for text in parts or ()]
+    if (young is None) != (poisson is None):
+        raise BadInput("--young, --poisson: found one of them, expected both")
+    if young is None or poisson is None:
+        if not (others and others[0].solid):
+            raise BadInput(
+                "--young: missing; expected a modulus [Pa], or --part "
+                '"solid=.../young=...,poisson=..." for every solid'
+            )
+        return others
+    E, nu = BeamOptions(young, poisson).material()
+    density = checked("--density", density, "kg/m^3", least=0)
+    return [Material(E, nu, density), *others]
+
+
+def parse_accuracy(value: float) -> float:
+    """An accuracy that can be asked for."""
+    from forcefit.inputs.errors import checked
+
+    return checked("--accuracy", value, "1", least=1e-5, below=0.5)
+
+
+def curve_link(
+    path: Path, options: "BeamOptions"
+) -> "tuple[LinkStiffness, float, float]":
+    """A beam along a curve, its section's size and its length [m]."""
+    from forcefit.commands.beam_options import beam_name
+    from stiffness.beam.curve import curve_compliance, curve_length
+    from stiffness.beam.curve_file import read_curve
+    from stiffness.link import LinkStiffness
+
+    E, nu = options.material()
+    theory = options.checked_theory()
+    pieces = read_curve(path, nu)
+    C = curve_compliance(pieces, E, nu, theory=theory)
+    name = f"{beam_name(theory)} along a curve"
+    link = LinkStiffness(name, C, tip=pieces[-1].place(1.0), base=pieces[0].place(0.0))
+    return link, pieces[0].section(0.0).size, curve_length(pieces)

@@ -1,4 +1,4 @@
-"""The commands ``forcefit assembly sweep``, ``plot`` and ``table``."""
+"""The command ``forcefit assembly sweep``."""
 
 import sys
 from contextlib import ExitStack
@@ -22,12 +22,12 @@ from forcefit.commands.options import (
     parse_gravity,
     parse_load,
 )
+from forcefit.commands.plot import CsvOption
 from forcefit.commands.progress import progress_bars
-from forcefit.inputs.errors import BadInput, nearest
+from forcefit.inputs.errors import BadInput
 from forcefit.inputs.packages import need
 from forcefit.inputs.writing import (
     PICTURE,
-    TABLE,
     check_writable,
     save_figure,
     write_json,
@@ -35,24 +35,6 @@ from forcefit.inputs.writing import (
 
 if TYPE_CHECKING:
     from assembly.sweeps.sweep import Solver
-
-
-def _table(path: Path | None) -> Path | None:
-    """Refuse a table that could not be written, before the computation."""
-    if path is not None:
-        check_writable(path, TABLE)
-    return path
-
-
-CsvOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--csv",
-        help="Also write a CSV table: a row for each point, a column for each "
-        "component.",
-        callback=_table,
-    ),
-]
 
 
 def _list_quantities(names: list[str] | None) -> list[str] | None:
@@ -231,66 +213,3 @@ def _solver(workers: int | None, scheduler: str | None) -> "Solver":
 
     need("distributed")
     return cluster_solver(workers, scheduler)
-
-
-def plot(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Of a sweep.")],
-    picture: Annotated[Path, typer.Option("--figure", help="PNG, SVG or PDF file.")],
-    at: Annotated[
-        list[str] | None,
-        typer.Option(help="Where to stand on other axes, such as draw=3."),
-    ] = None,
-    kind: Annotated[
-        str | None,
-        typer.Option(help="histogram | tornado | allocation; else what the file is."),
-    ] = None,
-    quantities: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="What to show, such as stiffness.FX,translation or "
-            "wrench.leg1.link_a.FZ. A variable alone: all components."
-        ),
-    ] = None,
-) -> None:
-    """Plot a saved file: maps, lines, histograms, tolerances."""
-    from assembly.statistics.plot import KINDS, figure_of_draws
-    from assembly.sweeps.dataset import open_dataset
-    from assembly.sweeps.maps import figure_of
-
-    if kind is not None and kind not in KINDS:
-        raise BadInput(f'--kind: found "{kind[:60]}"{nearest(kind, KINDS)}')
-    check_writable(picture, PICTURE)
-    places = {}
-    for text in at or ():
-        name, equals, value = (piece.strip() for piece in text.rpartition("="))
-        if not equals:
-            raise BadInput(f'--at: found "{text[:60]}", expected AXIS=VALUE')
-        places[name] = value
-    names = [part.strip() for text in quantities or () for part in text.split(",")]
-    data = open_dataset(file)
-    try:
-        figure = figure_of_draws(data, kind, names)
-    except ValueError as error:
-        raise BadInput(f"{file}: {error}") from None
-    save_figure(figure or figure_of(data, places, names), picture)
-
-
-def table(
-    file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="Of a sweep, draws or tolerances.")
-    ],
-    output: Annotated[Path, typer.Option("-o", "--output", help="CSV file.")],
-    rows: Annotated[
-        str | None,
-        typer.Option(help="Axes of other rows than points, such as quantity,group."),
-    ] = None,
-) -> None:
-    """Write a saved file as CSV, a row for each point.
-
-    There is a column for each component of every variable.  The first column, id,
-    counts the rows from 0; heads have the units in brackets.
-    """
-    from assembly.sweeps.point_table import write_point_table
-
-    axes = [name.strip() for name in rows.split(",")] if rows is not None else []
-    write_point_table(file, output, axes)

@@ -9,8 +9,9 @@ import typer
 
 from forcefit.commands.correction import carry, compensate, explain, predict
 from forcefit.commands.diagnose import diagnose
-from forcefit.commands.exchange import import_, iso
+from forcefit.commands.exchange import import_
 from forcefit.commands.generate import generate
+from forcefit.commands.help import Commands
 from forcefit.commands.inspect import inspect
 from forcefit.commands.options import (
     FigureOption,
@@ -27,6 +28,7 @@ from forcefit.commands.options import (
     parse_covariates,
     parse_gravity,
     parse_load,
+    parse_state,
     posture_of,
 )
 from forcefit.commands.plan import plan
@@ -40,13 +42,12 @@ if TYPE_CHECKING:
     from assembly.kinematics.posture import Posture
     from assembly.model.robot import Robot
 
-app = typer.Typer(no_args_is_help=True)
+app = Commands(no_args_is_help=True)
 app.command()(diagnose)
 app.command()(generate)
 app.command()(inspect)
 app.command()(plan)
 app.command("import")(import_)
-app.command()(iso)
 app.command()(carry)
 app.command()(explain)
 app.command()(predict)
@@ -132,13 +133,13 @@ def crosscheck(
             "--with-clearance", help="Keep the joints' clearances in both models."
         ),
     ] = False,
-    stiffness: Annotated[
-        bool,
+    state: Annotated[
+        str | None,
         typer.Option(
-            "--stiffness",
-            help="Compare the platform's stiffness instead, where the robot stands.",
+            help="Compare the platform's stiffness instead, in a state: exact (around "
+            "the equilibrium with errors and loads)."
         ),
-    ] = False,
+    ] = None,
     grid: Annotated[
         str | None,
         typer.Option(help="At every pose of a grid: tx=-0.2:0.2:0.1,tz=-0.5."),
@@ -167,8 +168,10 @@ def crosscheck(
     g, covariates = parse_gravity(gravity), parse_covariates(under)
     if with_clearance and figure is not None:
         raise BadInput("--figure: with --with-clearance there is no slope to draw")
-    if stiffness and (figure is not None or grid is not None):
-        raise BadInput("--stiffness: not with --figure or --grid")
+    if state is not None:
+        parse_state(state, ("exact",))
+    if state is not None and (figure is not None or grid is not None):
+        raise BadInput("--state: not with --figure or --grid")
     if figure is not None:
         check_writable(figure, PICTURE)
     if grid is not None and (pose or joint or figure):
@@ -180,7 +183,7 @@ def crosscheck(
         fixed = None if own else posture.robot.errors
         with_errors = _with_errors(posture, errors, seed, fixed)
         applied = apply_robot_effects(with_errors, wrench, g, covariates)
-        if stiffness:
+        if state is not None:
             return check_stiffness(
                 applied.posture,
                 applied.load,

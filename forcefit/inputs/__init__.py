@@ -1,4 +1,4 @@
-"""Input and output: files read and checked, files written whole or not at all.
+"""Reading and checking of input files, and writing of output files as a whole.
 
-Begin at ``table.py``, which reads TOML, and ``errors.py``, which words error messages.
+Begin with ``table.py``, which reads TOML, and ``errors.py``, which words the errors.
 """

@@ -9,18 +9,18 @@ from forcefit.inputs.errors import BadInput
 def parse_assignments(
     texts: Iterable[str], option: str, largest: float = 1e40
 ) -> dict[str, float]:
-    """Values given as ``NAME=VALUE``, several in one text by commas, or in several.
+    """Return the numbers given as ``NAME=VALUE``, with commas or in several texts.
 
     Args:
-        texts: such as ``["tx=0.1,tz=-0.5", "rz=0"]``.
-        option: their name, for messages.
-        largest: no sound value is larger than this, either sign.
+        texts: for example ``["tx=0.1,tz=-0.5", "rz=0"]``.
+        option: name of the option, for error messages.
+        largest: bound on the absolute value of each number.
 
     Returns:
         The numbers by name.
 
     Raises:
-        BadInput: not of that form, not a finite number, too large, or a name given
+        BadInput: a text has another form, or a number is not finite, too large or given
             twice.
     """
     values: dict[str, float] = {}

@@ -1,7 +1,7 @@
-"""Where meshes and links' solutions are kept: the first folder that can be written.
+"""Folder in which meshes and links' solutions are kept.
 
-A read-only installation, a user without a home or with a read-only one, and a full
-disk are no errors: the next folder is tried, and where there is none nothing is kept.
+The first writable folder of a list is used.  A read-only installation, a user without a
+home folder and a full disk are no errors: if no folder is writable, nothing is kept.
 """
 
 import os
@@ -13,17 +13,17 @@ from pathlib import Path
 
 
 def cache_folder() -> Path | None:
-    """Folder for what is computed once: an absent one is made.
+    """Return the folder of results that are computed once; create it if it is absent.
 
     Returns:
-        ``$FORCEFIT_CACHE``, the user's cache folder or one of the user's own among the
-        temporary files, the first that can be written; None if none can.
+        The first writable folder of ``$FORCEFIT_CACHE``, the user's cache folder and
+        the user's folder among the temporary files; None if none is writable.
     """
     return next((folder for folder in _candidates() if is_writable(folder)), None)
 
 
 def is_writable(folder: Path) -> bool:
-    """Whether a file can be made in a folder, which is made if it is absent."""
+    """Return whether a file can be created in a folder; an absent folder is created."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -33,17 +33,17 @@ def is_writable(folder: Path) -> bool:
 
 
 def _candidates() -> Iterator[Path]:
-    """Folders in the order in which they are tried."""
+    """Return the folders in the order in which they are tried."""
     if given := os.environ.get("FORCEFIT_CACHE"):
         yield Path(given)
-    with suppress(RuntimeError):  # a user without a home
+    with suppress(RuntimeError):  # no home folder
         yield _of_user() / "forcefit"
-    with suppress(OSError):  # no temporary folder, or somebody else's
+    with suppress(OSError):  # no temporary folder, or another user's
         yield _temporary()
 
 
 def _of_user() -> Path:
-    """The user's cache folder, as each system has it."""
+    """Return the user's cache folder on this operating system."""
     if sys.platform == "win32":
         return Path(os.environ.get("LOCALAPPDATA") or Path.home())
     if sys.platform == "darwin":
@@ -52,8 +52,8 @@ def _of_user() -> Path:
 
 
 def _temporary() -> Path:
-    """The user's own folder among the temporary files, writable by this user only."""
-    # numbers of other programs are read from it
+    """Return the user's own temporary folder, writable by this user only."""
+    # other users could otherwise write numbers that forcefit reads
     user = os.getuid() if hasattr(os, "getuid") else 0
     folder = Path(tempfile.gettempdir()) / f"forcefit-{user}"
     folder.mkdir(mode=0o700, exist_ok=True)

@@ -1,7 +1,7 @@
-"""Error messages: one short line with the place, what was found and what expected.
+"""Error messages: one line with the place, the value found and the value expected.
 
 :class:`BadInput` is a ``ValueError``; the command line prints it and exits with status
-2.  Large or odd values are abbreviated, so that the message stays one short line.
+2.  Long values are abbreviated, so that the message stays one short line.
 """
 
 import difflib
@@ -11,18 +11,19 @@ import sys
 import unicodedata
 from collections.abc import Iterable
 
-_LONGEST_MESSAGE = 800  # characters: a path, a place, what was found and expected
+# characters of a path, a place, the value found and the value expected
+_LONGEST_MESSAGE = 800
 
 
 class BadInput(ValueError):
-    """An input is wrong; the message is one line."""
+    """Error of an input; its message is one line."""
 
     def __init__(self, message: str) -> None:
         super().__init__(one_line(message, _LONGEST_MESSAGE))
 
 
 def one_line(text: str, longest: int) -> str:
-    """The text without control characters, abbreviated in the middle."""
+    """Return a text without control characters, abbreviated in the middle."""
     if len(text) > longest:
         half = (longest - 5) // 2
         text = f"{text[:half]} ... {text[-half:]}"
@@ -30,15 +31,15 @@ def one_line(text: str, longest: int) -> str:
 
 
 def printable(text: str) -> bool:
-    """Whether a text has no line breaks, other controls or lone surrogates."""
+    """Return whether a text has no line breaks, other controls or lone surrogates."""
     return not any(unicodedata.category(c) in {"Cc", "Cs", "Zl", "Zp"} for c in text)
 
 
 def plot_label(text: str) -> str:
-    """A text escaped for matplotlib, which reads a formula between dollar signs.
+    """Return a text escaped for matplotlib, which reads a formula between dollar signs.
 
     Args:
-        text: with a name in it that a user chose.
+        text: text with a name that a user chose.
 
     Returns:
         The escaped text.
@@ -47,12 +48,12 @@ def plot_label(text: str) -> str:
 
 
 def quoted(name: str) -> str:
-    """A name in double quotes, on one line, abbreviated if long."""
+    """Return a name in double quotes, on one line, abbreviated if long."""
     return f'"{one_line(name, 60)}"'
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:
-    """``'; did you mean "x"?'``, or the list of valid names if none is near."""
+    """Return ``'; did you mean "x"?'``, or the list of valid names if none is near."""
     names = list(dict.fromkeys(str(v) for v in valid))
     close = difflib.get_close_matches(name[:200], names, n=1, cutoff=0.6)
     if close:
@@ -63,7 +64,7 @@ def nearest(name: str, valid: Iterable[str]) -> str:
 
 
 def describe(value: object) -> str:
-    """Short description of a wrong value, abbreviated if long."""
+    """Return a short description of a wrong value."""
     text = _SHORT.repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
@@ -97,21 +98,21 @@ def checked(
     least: float = -math.inf,
     below: float = math.inf,
 ) -> float:
-    """A finite number inside its range.
+    """Return a finite number inside its range.
 
     Args:
-        option: such as ``--length``, for the message.
-        value: what was given.
-        unit: for the message.
-        above: the value must be larger.
-        least: the value must not be smaller.
-        below: the value must be smaller.
+        option: name of the option, for example ``--length``, for the error message.
+        value: the number given by the user.
+        unit: unit for the error message.
+        above: bound that the value must exceed.
+        least: smallest value allowed.
+        below: bound that the value must not reach.
 
     Returns:
         The value.
 
     Raises:
-        BadInput: it is not finite, outside the range, or of no physical size.
+        BadInput: the value is not finite, outside its range, or of no physical size.
     """
     if abs(value) > sys.float_info.max:  # an integer may be
         value = math.copysign(math.inf, 1 if value > 0 else -1)

@@ -1,8 +1,7 @@
-"""Files that one program at a time may write.
+"""Locks on files that only one program at a time may write.
 
-The lock is the operating system's, on a file ``FILE.lock`` next to the file; it ends
-with the program that holds it.  A killed one leaves ``FILE.lock``, which the next takes
-away.
+The operating system locks a file ``FILE.lock`` next to the file, until the program
+ends.  A killed program leaves ``FILE.lock``; the next program removes it.
 """
 
 import atexit
@@ -12,27 +11,28 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-_NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP}  # some network disks
-_POLL = 0.01  # [s] between looks at a file that another program has locked
+# errors of network disks without locks
+_NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP}
+_POLL = 0.01  # [s] between two tries to lock a file
 
 
 @contextmanager
 def locked_file(path: Path, wait: bool = True) -> Generator[None, None, None]:
     """Lock a file against other programs.
 
-    Where the package filelock is missing, or a disk has no locks, nothing is locked.
+    Nothing is locked if the package filelock is missing or the disk has no locks.
 
     Args:
-        path: of the file, created if it is absent.  The program with the lock may
+        path: file to lock, created if it is absent.  The program with the lock may
             rename or remove it.
-        wait: until it is unlocked.
+        wait: wait until another program unlocks the file.
 
     Yields:
         Nothing; the file is locked until the block ends.
 
     Raises:
         BlockingIOError: another program has locked it, and ``wait`` is False.
-        OSError: it cannot be opened.
+        OSError: the file cannot be opened.
     """
     with _lock(path.with_name(path.name + ".lock"), wait):
         path.touch()
@@ -41,10 +41,10 @@ def locked_file(path: Path, wait: bool = True) -> Generator[None, None, None]:
 
 @contextmanager
 def _lock(own: Path, wait: bool) -> Generator[None, None, None]:
-    """Hold the lock on a file that is there for that alone, and is removed."""
+    """Hold the lock on a file that exists only for it; remove the file at the end."""
     try:
         from filelock import FileLock, Timeout
-    except ModuleNotFoundError:  # the least that forcefit is installed with
+    except ModuleNotFoundError:  # forcefit works without the package
         yield
         return
     lock = FileLock(own, thread_local=False, poll_interval=_POLL)
@@ -55,7 +55,7 @@ def _lock(own: Path, wait: bool) -> Generator[None, None, None]:
             lock.acquire(timeout=-1 if wait else 0)
         except Timeout:
             raise BlockingIOError(errno.EWOULDBLOCK, "locked", str(own)) from None
-        except BaseException as error:  # a full disk, or a signal
+        except BaseException as error:  # such as a full disk or a signal
             if new and not lock.is_locked:
                 own.unlink(missing_ok=True)
             if getattr(error, "errno", None) not in _NO_LOCKS:
@@ -66,7 +66,7 @@ def _lock(own: Path, wait: bool) -> Generator[None, None, None]:
         del _locks[id(lock)]
 
 
-# a signal may come before a lock is released: what is left is released at the end
+# locks to be released when the program ends, because a signal may prevent it earlier
 _locks: dict[int, tuple[Any, Path]] = {}
 
 
@@ -77,9 +77,10 @@ def _release_all() -> None:
 
 
 def _release(lock: Any, own: Path) -> None:
-    """Remove a lock's file, and release it; that of another program stays."""
-    # while it is held: who waits for it sees that it is gone, and makes another;
-    # where no open file can be removed (Windows), releasing it does that
+    """Remove the file of a lock and release it; another program's lock remains."""
+    # removed while it is locked: a waiting program sees that the file is gone and
+    # creates a new one; Windows cannot remove an open file, and releasing the lock
+    # removes it
     if lock.is_locked:
         with suppress(OSError):
             own.unlink()

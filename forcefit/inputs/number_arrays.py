@@ -9,15 +9,15 @@ from forcefit.inputs.errors import describe
 
 
 def find_fault(value: object, shape: tuple[int, ...], infinite: bool = False) -> str:
-    """The fault in numbers of a given shape, and its place, counted from 1.
+    """Return the fault in numbers of a given shape, and its place, counted from 1.
 
     Args:
-        value: wrong nested lists, or another value.
-        shape: expected.
+        value: nested lists with a fault, or another value.
+        shape: expected shape.
         infinite: whether inf is allowed.
 
     Returns:
-        The wrong entry or row with its place, or the whole, abbreviated.
+        The wrong entry or row with its place, or the whole value, abbreviated.
     """
     if not isinstance(value, list):
         return describe(value)
@@ -34,7 +34,7 @@ def find_fault(value: object, shape: tuple[int, ...], infinite: bool = False) ->
 
 
 def number_array(value: object) -> NDArray | None:
-    """Nested lists of numbers as an array; None when ragged or not numbers."""
+    """Return nested lists of numbers as an array; None if ragged or not of numbers."""
     if not isinstance(value, list):
         return None
     if value and all(isinstance(v, list) for v in value):
@@ -45,7 +45,7 @@ def number_array(value: object) -> NDArray | None:
 
 
 def comma_numbers(text: str) -> NDArray:
-    """Finite numbers between commas; none at all if one of them is not."""
+    """Return the finite numbers between commas; none if one of them is not a number."""
     try:
         numbers = np.array([float(part) for part in text.split(",")])
     except ValueError:
@@ -54,7 +54,7 @@ def comma_numbers(text: str) -> NDArray:
 
 
 def as_number(value: object) -> float:
-    """The number, or nan for anything that is not one (true and false are not)."""
+    """Return a number as float; nan for other values, also for true and false."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return math.nan
     try:
@@ -64,5 +64,5 @@ def as_number(value: object) -> float:
 
 
 def _proper(values: list) -> bool:
-    """Whether all are numbers that a float can hold; nan and inf are, true is not."""
+    """Return whether all values are numbers that a float can hold; nan and inf are."""
     return all(isinstance(v, float) or not math.isnan(as_number(v)) for v in values)

@@ -1,7 +1,8 @@
-"""Packages that only some questions need, and what to install where one is missing.
+"""Packages that only some functions need, and the command that installs them.
 
-A module imports such a package where it is used; that it is missing is found there, and
-said in one line by :func:`naming_packages`, which the command line wraps around all.
+A module imports such a package where it is used.  If the package is missing,
+:func:`naming_packages` writes an error of one line; the command line uses it
+everywhere.
 """
 
 from collections.abc import Generator
@@ -9,7 +10,7 @@ from contextlib import contextmanager
 
 from forcefit.inputs.errors import BadInput
 
-# the extra that brings a package; pyproject.toml says what an extra is for
+# name of the extra that installs each package, as in pyproject.toml
 _EXTRAS = {
     "dask": "sweeps",
     "distributed": "sweeps",
@@ -25,27 +26,28 @@ _EXTRAS = {
     "xarray": "sweeps",
     "yaml": "yaml",
 }
-# absent only where forcefit was installed without what it requires
+# packages that every installation of forcefit has
 _REQUIRED = (
     "clarabel", "cvxpy", "exudyn", "filelock", "jinja2", "numpy", "pytetwild",
     "pyvista", "rich", "scipy", "threadpoolctl", "typer", "vtkmodules",
 )  # fmt: skip
-_DISTRIBUTIONS = {"yaml": "pyyaml", "vtkmodules": "vtk"}  # named otherwise
+# distributions with another name than their package
+_DISTRIBUTIONS = {"yaml": "pyyaml", "vtkmodules": "vtk"}
 
 
 @contextmanager
 def naming_packages(
     whose: str = "this command", instead: str = ""
 ) -> Generator[None, None, None]:
-    """Say which package a block lacks, and what to install.
+    """Name the package that a block of code lacks, and how to install it.
 
     Args:
-        whose: what needs it.
-        instead: what else can be done.
+        whose: name of the function or command that needs the package.
+        instead: alternative without the package.
 
     Raises:
-        BadInput: a package is missing that forcefit knows.
-        ModuleNotFoundError: another module is.
+        BadInput: a package that forcefit uses is missing.
+        ModuleNotFoundError: any other module is missing.
     """
     try:
         yield
@@ -65,13 +67,13 @@ def naming_packages(
 
 
 def need(*packages: str) -> None:
-    """Refuse work whose end would need a package that is missing.
+    """Raise an error before a computation if a package that it needs is missing.
 
     Args:
-        packages: names as they are imported.
+        packages: names by which the packages are imported.
 
     Raises:
-        ModuleNotFoundError: the first of them that is missing.
+        ModuleNotFoundError: names the first missing package.
     """
     from importlib.util import find_spec
 

@@ -1,4 +1,4 @@
-"""What program this is: a digest of its sources and of the libraries beneath them."""
+"""Digest of the program's sources and of the versions of its libraries."""
 
 import hashlib
 from collections.abc import Sequence
@@ -8,10 +8,10 @@ from types import ModuleType
 
 
 def sources_hash(packages: Sequence[ModuleType], libraries: Sequence[str]) -> str:
-    """SHA-256 of packages' Python sources and of the versions of libraries.
+    """Return SHA-256 of packages' Python sources and of the versions of libraries.
 
     Args:
-        packages: all ``.py`` files below their folders count.
+        packages: all ``.py`` files in their folders are digested.
         libraries: names of distributions; one that is not installed counts as absent.
 
     Returns:
@@ -21,7 +21,7 @@ def sources_hash(packages: Sequence[ModuleType], libraries: Sequence[str]) -> st
     for package in packages:
         root = Path(str(package.__file__)).parent
         for path in sorted(root.rglob("*.py")):
-            # line ends are the checkout's
+            # the line ends depend on the checkout
             source = path.read_bytes().replace(b"\r\n", b"\n")
             name = path.relative_to(root.parent).as_posix()
             digest.update(f"{name} {len(source)}\n".encode() + source)
@@ -30,7 +30,7 @@ def sources_hash(packages: Sequence[ModuleType], libraries: Sequence[str]) -> st
 
 
 def _version(name: str) -> str:
-    """Of a distribution, or that it is absent."""
+    """Return the version of a distribution, or a text that it is absent."""
     try:
         return version(name)
     except PackageNotFoundError:

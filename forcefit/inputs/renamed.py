@@ -1,4 +1,4 @@
-"""Old names of arguments and values: each works for one release, with a warning."""
+"""Old names of arguments, fields and values: they work for one release and warn."""
 
 import warnings
 from collections.abc import Callable, Mapping
@@ -7,15 +7,17 @@ from typing import Any, ParamSpec, TypeVar
 
 P = ParamSpec("P")
 R = TypeVar("R")
+C = TypeVar("C", bound=type)
 
 
 def warn_renamed(old: str, new: str, frames: int = 3) -> None:
-    """Warn that a name is old.
+    """Warn that a name is an old one.
 
     Args:
-        old: the name found.
-        new: the name to write in its place.
-        frames: of the call stack from here up to the caller's line that has it.
+        old: name in the caller's code.
+        new: present name.
+        frames: number of frames of the call stack up to the caller's line with the
+            name.
     """
     warnings.warn(f"{old} is now {new}", FutureWarning, stacklevel=frames)
 
@@ -23,11 +25,11 @@ def warn_renamed(old: str, new: str, frames: int = 3) -> None:
 def renamed_keywords(
     **new_names: str | tuple[str, Mapping[Any, Any]],
 ) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Let a function take keywords by their old names too, each with a warning.
+    """Return a decorator that accepts old names of keywords, each with a warning.
 
     Args:
-        new_names: the new keyword by the old one; or a pair of that and of the new
-            values by the old ones.
+        new_names: the present keyword by the old one; or the present keyword and the
+            present values by the old values.
 
     Returns:
         A decorator.
@@ -37,7 +39,8 @@ def renamed_keywords(
         @wraps(function)
         def call(*args: P.args, **kwargs: P.kwargs) -> R:
             for old in new_names.keys() & kwargs.keys():
-                given, entry, name = kwargs.pop(old), new_names[old], function.__name__
+                given, entry = kwargs.pop(old), new_names[old]
+                name = function.__qualname__.removesuffix(".__init__")
                 new, values = (entry, {}) if isinstance(entry, str) else entry
                 kwargs[new] = values.get(given, given)
                 warn_renamed(
@@ -50,16 +53,34 @@ def renamed_keywords(
     return decorate
 
 
-def current_value(argument: str, value: str, new_values: Mapping[str, str]) -> str:
-    """Return the present word for a value given by its old one, with a warning.
+def renamed_fields(**new_names: str) -> Callable[[C], C]:
+    """Let a dataclass be made with fields by their old names too, with a warning.
 
     Args:
-        argument: its name, for the warning.
-        value: as given.
-        new_values: the new word by the old one.
+        new_names: the new field by the old one.
 
     Returns:
-        The new word; the value itself where it is no old one.
+        A decorator.
+    """
+
+    def decorate(cls: C) -> C:
+        init = renamed_keywords(**new_names)(cls.__init__)  # type: ignore[misc]
+        cls.__init__ = init  # type: ignore[misc]
+        return cls
+
+    return decorate
+
+
+def current_value(argument: str, value: str, new_values: Mapping[str, str]) -> str:
+    """Return the present word for a value given by its old word, with a warning.
+
+    Args:
+        argument: name of the argument, for the warning.
+        value: word in the caller's code.
+        new_values: the present word by the old word.
+
+    Returns:
+        The present word; ``value`` itself if it is not an old word.
     """
     if value not in new_values:
         return value

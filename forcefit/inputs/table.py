@@ -1,7 +1,7 @@
-"""Reading of TOML files, with one message for every mistake.
+"""Reading of TOML files, with one error message for each mistake.
 
-A message names the file, the place in it, what was found and what was expected, and
-the nearest valid name where a name is wrong; see ``forcefit/inputs/errors.py``.
+A message names the file, the place in it, the value found and the value expected. For a
+wrong name it gives the nearest valid one; see ``forcefit/inputs/errors.py``.
 """
 
 import csv
@@ -39,24 +39,25 @@ __all__ = [
     "read_toml",
 ]
 
-_LARGEST_FILE = 64 << 20  # [byte] a robot of a million frames would be smaller
-_DEEP_KEY = re.compile(r"(?<![\w-])(?:[\w-]+\s*\.\s*){100}")  # a.a.a.a ...
+_LARGEST_FILE = 64 << 20  # [byte] more than a robot of a million frames needs
+# a key such as a.a.a. ... with 100 dots
+_DEEP_KEY = re.compile(r"(?<![\w-])(?:[\w-]+\s*\.\s*){100}")
 
 
 def read_bytes(path: Path | str) -> bytes:
-    """Content of a file.
+    """Return the content of a file.
 
     Args:
-        path: the file.
+        path: path of the file.
 
     Returns:
-        Its bytes.
+        The bytes of the file.
 
     Raises:
-        BadInput: the file is absent, a folder, unreadable or far too large.
+        BadInput: the file is absent, a folder, unreadable or too large.
     """
     try:
-        with Path(path).open("rb") as file:  # which may be a pipe, or have no end
+        with Path(path).open("rb") as file:  # a pipe may have no end
             content = file.read(_LARGEST_FILE + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
@@ -67,17 +68,17 @@ def read_bytes(path: Path | str) -> bytes:
 
 
 def read_text(path: Path | str) -> str:
-    r"""Text of a UTF-8 file, with or without a byte order mark.
+    r"""Return the text of a UTF-8 file, with or without a byte order mark.
 
     Args:
-        path: the file.
+        path: path of the file.
 
     Returns:
-        Its text with line ends as ``\n``.
+        The text with line ends ``\n``.
 
     Raises:
-        BadInput: the file is absent, a folder, unreadable, far too large, not UTF-8,
-            or holds NUL.
+        BadInput: the file is absent, a folder, unreadable, too large, not UTF-8, or
+            contains NUL.
     """
     content = read_bytes(path)
     try:
@@ -93,13 +94,13 @@ def read_text(path: Path | str) -> str:
 
 
 def read_rows(path: Path | str) -> list[list[str]]:
-    """Cells of a CSV file, a list for each of its lines.
+    """Return the cells of a CSV file, as a list for each of its lines.
 
     Args:
-        path: the file.
+        path: path of the file.
 
     Returns:
-        The cells as written; none for a blank line.
+        The cells as text; an empty list for a blank line.
 
     Raises:
         BadInput: the file cannot be read, or holds a cell without end.
@@ -112,19 +113,19 @@ def read_rows(path: Path | str) -> list[list[str]]:
 
 
 def read_toml(path: Path | str) -> "Table":
-    """Root table of a TOML file.
+    """Return the root table of a TOML file.
 
     Args:
-        path: the file.
+        path: path of the file.
 
     Returns:
-        The table, ready to be asked for its keys.
+        The table, whose methods read its keys.
 
     Raises:
         BadInput: the file cannot be read or is not TOML.
     """
     text = read_text(path)
-    if _DEEP_KEY.search(text):  # tomllib would take minutes
+    if _DEEP_KEY.search(text):  # tomllib would need minutes
         raise BadInput(f"{path}: not valid TOML: nested too deeply")
     try:
         return Table(tomllib.loads(text), str(path), "")
@@ -140,12 +141,12 @@ def read_toml(path: Path | str) -> "Table":
 
 @dataclass(eq=False)
 class Table:
-    """A TOML table that records the keys asked for and refuses all others.
+    """A TOML table that records the keys that were read and refuses all others.
 
     Attributes:
-        content: the table's keys and values.
-        file: name of the file, for messages.
-        place: where in the file, such as ``frame "elbow".link``; empty at the root.
+        content: keys and values of the table.
+        file: name of the file, for error messages.
+        place: place in the file, such as ``frame "elbow".link``; empty at the root.
     """
 
     content: dict[str, Any]
@@ -154,26 +155,26 @@ class Table:
     _asked: set[str] = field(default_factory=set)
 
     def bad(self, key: str, message: str) -> BadInput:
-        """The error for a key of this table, to be raised by the caller."""
+        """Return the error for a key of this table; the caller raises it."""
         where = ".".join(part for part in (self.place, key) if part)
         return BadInput(f"{self.file}: {where}{': ' if where else ''}{message}")
 
     def has(self, key: str) -> bool:
-        """Whether the key is there; it then counts as known."""
+        """Return whether the key exists; it then counts as read."""
         self._asked.add(key)
         return key in self.content
 
     def get(self, key: str, default: object = None) -> Any:
-        """The raw value of a key, or the default."""
+        """Return the raw value of a key, or the default."""
         self._asked.add(key)
         return self.content.get(key, default)
 
     def require(self, key: str, expected: str) -> Any:
-        """The raw value of a key that must be there.
+        """Return the value of a key that must exist, unchecked.
 
         Args:
-            key: its name.
-            expected: what should stand there, for the message.
+            key: name of the key.
+            expected: description of a valid value, for the error message.
 
         Returns:
             The value.
@@ -195,20 +196,21 @@ class Table:
         expected: str = "a string",
         longest: int = 4000,
     ) -> str:
-        """A string of one line.
+        """Return a string of one line.
 
         Args:
-            key: its name.
-            default: taken when the key is absent; absent is an error without one.
-            expected: what should stand there, for the message.
-            longest: most characters it may have.
+            key: name of the key.
+            default: value of an absent key; without a default, an absent key is an
+                error.
+            expected: description of a valid value, for the error message.
+            longest: most characters that the string may have.
 
         Returns:
             The string.
 
         Raises:
-            BadInput: missing without a default, not a string, empty, too long, or
-                with line breaks or other control characters.
+            BadInput: the key is missing without a default; or the value is not a
+                string, empty, too long, or has line breaks or other control characters.
         """
         if default is not None and not self.has(key):
             return default
@@ -224,13 +226,13 @@ class Table:
         return value
 
     def choice(self, key: str, valid: Iterable[str], default: str | None = None) -> str:
-        """A string out of a few.
+        """Return a string that is one of a few valid ones.
 
         Returns:
             The string.
 
         Raises:
-            BadInput: missing without a default, or not one of them.
+            BadInput: the key is missing without a default, or the string is not valid.
         """
         valid = tuple(valid)
         names = " | ".join(f'"{v}"' for v in valid)
@@ -242,13 +244,13 @@ class Table:
         return value
 
     def boolean(self, key: str, default: bool) -> bool:
-        """True or false.
+        """Return the truth value of a key.
 
         Returns:
             The value, or the default.
 
         Raises:
-            BadInput: something else.
+            BadInput: the value is neither true nor false.
         """
         value = self.get(key, default)
         if not isinstance(value, bool):
@@ -256,13 +258,14 @@ class Table:
         return value
 
     def integer(self, key: str, default: int | None = None, least: int = 0) -> int:
-        """A whole number of at least ``least``.
+        """Return a whole number of at least ``least``.
 
         Returns:
             The number.
 
         Raises:
-            BadInput: missing without a default, or something else.
+            BadInput: the key is missing without a default, or the value is not such a
+                number.
         """
         expected = f"a whole number >= {least}"
         if default is not None and not self.has(key):
@@ -283,22 +286,24 @@ class Table:
         below: float = math.inf,
         largest: float = math.inf,
     ) -> float:
-        """A finite number.
+        """Return a finite number.
 
         Args:
-            key: its name.
-            unit: for the message.
-            default: taken when the key is absent; absent is an error without one.
-            above: the value must be larger than this.
-            least: the value must not be smaller than this.
-            below: the value must be smaller than this.
-            largest: no sound value is larger than this, either sign.
+            key: name of the key.
+            unit: unit for the error message.
+            default: value of an absent key; without a default, an absent key is an
+                error.
+            above: bound that the value must exceed.
+            least: smallest value allowed.
+            below: bound that the value must not reach.
+            largest: bound on the absolute value.
 
         Returns:
             The number.
 
         Raises:
-            BadInput: missing without a default, not a number, or out of range.
+            BadInput: the key is missing without a default, or the value is not a number
+                or out of range.
         """
         limits = [
             f"> {above:g}" if above > -math.inf else "",
@@ -328,20 +333,22 @@ class Table:
         *,
         largest: float = math.inf,
     ) -> NDArray:
-        """An array of finite numbers of a given shape.
+        """Return an array of finite numbers of a given shape.
 
         Args:
-            key: its name.
-            shape: expected.
-            unit: for the message.
-            default: taken when the key is absent; absent is an error without one.
-            largest: no sound entry is larger than this, either sign.
+            key: name of the key.
+            shape: expected shape.
+            unit: unit for the error message.
+            default: value of an absent key; without a default, an absent key is an
+                error.
+            largest: bound on the absolute value of each entry.
 
         Returns:
             The array.
 
         Raises:
-            BadInput: missing without a default, another shape, or not finite numbers.
+            BadInput: the key is missing without a default, or the value has another
+                shape or entries that are not finite numbers.
         """
         size = " rows of ".join(str(n) for n in shape)
         expected = f"{size} finite numbers [{unit}]"
@@ -358,13 +365,13 @@ class Table:
         return array
 
     def table(self, key: str) -> "Table":
-        """A table inside this one.
+        """Return the table of a key of this table.
 
         Returns:
             The table.
 
         Raises:
-            BadInput: missing, or not a table.
+            BadInput: the key is missing, or its value is not a table.
         """
         value = self.require(key, "a table")
         if not isinstance(value, dict):
@@ -372,13 +379,13 @@ class Table:
         return Table(value, self.file, ".".join(filter(None, (self.place, key))))
 
     def tables(self, key: str) -> list["Table"]:
-        """The tables of ``[[key]]``, none if the key is absent.
+        """Return the tables of ``[[key]]``; none if the key is absent.
 
         Returns:
-            One :class:`Table` for each, numbered from 1 in messages.
+            A :class:`Table` for each; messages number them from 1.
 
         Raises:
-            BadInput: the key holds something else.
+            BadInput: the key has another value.
         """
         value = self.get(key, [])
         if not isinstance(value, list) or not all(isinstance(v, dict) for v in value):
@@ -390,10 +397,10 @@ class Table:
         ]
 
     def finish(self) -> None:
-        """Refuse keys that were not asked for.
+        """Raise an error if the table has keys that were not read.
 
         Raises:
-            BadInput: a key that this table does not have.
+            BadInput: names such a key.
         """
         for key in self.content:
             if key not in self._asked:

@@ -1,7 +1,7 @@
-"""Output files, each written whole or not at all.
+"""Writing of output files, each as a whole or not at all.
 
-The content is written to ``FILE.part`` beside the file, which is renamed when it is
-complete and on the disk.  The remains of a killed program are overwritten by the next.
+The content is written to ``FILE.part`` in the same folder.  The complete file is then
+renamed.  The next program overwrites the remains of a killed one.
 """
 
 import io
@@ -27,10 +27,10 @@ class Kind:
     """A kind of file that commands write.
 
     Attributes:
-        name: for messages.
-        endings: that the names of its files may have.
-        begins: possible first bytes of its files; letters of either case.
-        packages: that write it, beyond what is always there.
+        name: name of the kind, for error messages.
+        endings: valid endings of the file names.
+        begins: valid first bytes of the files; letters in upper or lower case.
+        packages: optional packages that write the files.
     """
 
     name: str
@@ -61,15 +61,15 @@ ROBOT = Kind(
 
 
 def check_writable(path: Path | str, kind: Kind | None = None) -> None:
-    """Refuse a file that could not be written, before the computation.
+    """Raise an error, before the computation, if a file cannot be written.
 
     Args:
-        path: of a file to be written later.
-        kind: of the file; an existing file must be of it.
+        path: path of a file that will be written later.
+        kind: kind of the file; an existing file must be of this kind.
 
     Raises:
-        BadInput: its ending is not of the kind; its folder is absent or not writable;
-            the existing file is not regular, not writable, or of another kind.
+        BadInput: the ending is not valid; the folder is absent or not writable; or the
+            existing file is not regular, not writable, or of another kind.
         ModuleNotFoundError: a package that writes this kind is missing.
     """
     path = Path(path)
@@ -96,7 +96,7 @@ def check_writable(path: Path | str, kind: Kind | None = None) -> None:
 
 
 def _check_there(path: Path, mode: int, kind: Kind | None) -> None:
-    """Refuse to replace an existing file that is not writable or of another kind."""
+    """Raise an error if an existing file is not writable or of another kind."""
     if stat.S_ISDIR(mode):
         raise BadInput(f"{path}: found a folder, expected a file or nothing")
     if not stat.S_ISREG(mode):
@@ -121,7 +121,7 @@ def _check_there(path: Path, mode: int, kind: Kind | None) -> None:
 
 
 def unwritable(path: Path | str, error: Exception) -> str:
-    """The message of a file that cannot be written, with the reason."""
+    """Return the error message of a file that cannot be written, with the reason."""
     number = getattr(error, "errno", None)
     reason = os.strerror(number) if number else str(error)
     return f"{path}: cannot be written: {reason}"
@@ -129,14 +129,14 @@ def unwritable(path: Path | str, error: Exception) -> str:
 
 @contextmanager
 def whole_file(path: Path | str) -> Generator[Path, None, None]:
-    """Write a file whole or not at all.
+    """Write a file as a whole or not at all.
 
     Args:
-        path: of the file; for a symbolic link, its target is written.
+        path: path of the file; of a symbolic link, its target is written.
 
     Yields:
-        The path to write to.  When the block ends it is renamed to the file; when it
-        fails it is removed, and the file is unchanged.
+        The path to write to.  At the end of the block the written file is renamed;
+        after an error it is removed, and the old file is unchanged.
 
     Raises:
         BadInput: the file cannot be written, as on a full disk.
@@ -149,7 +149,7 @@ def whole_file(path: Path | str) -> Generator[Path, None, None]:
         with locked_file(part):
             try:
                 yield part
-                with part.open("r+b") as file:  # Windows syncs what may be written
+                with part.open("r+b") as file:  # Windows needs a writable file here
                     os.fsync(file.fileno())
                 if real.exists():
                     shutil.copymode(real, part)
@@ -162,13 +162,13 @@ def whole_file(path: Path | str) -> Generator[Path, None, None]:
 
 
 def check_new_folder(folder: Path | str) -> None:
-    """Refuse a folder that files cannot be written to, before the work.
+    """Raise an error, before the computation, if a folder cannot be filled.
 
     Args:
-        folder: new, or empty.
+        folder: path of a new or empty folder.
 
     Raises:
-        BadInput: it holds something already, or cannot be written.
+        BadInput: the folder contains a file, or cannot be written.
     """
     folder = Path(folder)
     check_writable(folder.parent / f"{folder.name}.new")
@@ -178,16 +178,16 @@ def check_new_folder(folder: Path | str) -> None:
 
 @contextmanager
 def whole_folder(folder: Path | str) -> Generator[Path, None, None]:
-    """A folder that appears with all its files, or not at all.
+    """Write a folder with all its files or not at all.
 
     Args:
-        folder: new, or empty.
+        folder: path of a new or empty folder.
 
     Yields:
-        Where to write its files.
+        The folder in which the files are to be written.
 
     Raises:
-        BadInput: it holds something already, or cannot be written.
+        BadInput: the folder contains a file, or cannot be written.
     """
     folder = Path(folder)
     check_new_folder(folder)
@@ -196,7 +196,7 @@ def whole_folder(folder: Path | str) -> Generator[Path, None, None]:
     try:
         part.mkdir()
         yield part
-        if folder.is_dir():  # empty; Windows replaces no folder
+        if folder.is_dir():  # the empty folder; Windows replaces no folder
             folder.rmdir()
         part.replace(folder)
     except OSError as error:
@@ -206,14 +206,14 @@ def whole_folder(folder: Path | str) -> Generator[Path, None, None]:
 
 
 def path_from(folder: Path, path: Path | str) -> str:
-    """A path as a file of a folder names it, on every system with slashes.
+    """Return a path relative to a folder, with slashes on every system.
 
     Args:
-        folder: of the file.
-        path: absolute, or from where the program runs.
+        folder: folder of the file that will contain the path.
+        path: absolute, or relative to the working folder.
 
     Returns:
-        The path relative to the folder; on another drive than it, the absolute one.
+        The path relative to the folder; the absolute path if it is on another drive.
     """
     try:
         return Path(os.path.relpath(path, folder)).as_posix()
@@ -222,25 +222,25 @@ def path_from(folder: Path, path: Path | str) -> str:
 
 
 def write_text(text: str, path: Path | str) -> None:
-    r"""Write a text file whole or not at all.
+    r"""Write a text file as a whole or not at all.
 
     Args:
-        text: with line ends ``\n``, written so on every system, in UTF-8.
-        path: of the file.
+        text: text with line ends ``\n``, kept on every system; written in UTF-8.
+        path: path of the file.
 
     Raises:
         BadInput: the file cannot be written.
     """
-    # names of files may hold bytes that are not UTF-8
+    # names of files may contain bytes that are not UTF-8
     write_bytes(text.encode("utf-8", errors="backslashreplace"), path)
 
 
 def write_bytes(content: bytes, path: Path | str) -> None:
-    """Write a file whole or not at all.
+    """Write a file as a whole or not at all.
 
     Args:
-        content: of the file.
-        path: of the file.
+        content: bytes of the file.
+        path: path of the file.
 
     Raises:
         BadInput: the file cannot be written.
@@ -250,32 +250,33 @@ def write_bytes(content: bytes, path: Path | str) -> None:
 
 
 def save_figure(figure: Any, path: Path | str) -> None:
-    """Write a figure whole or not at all.
+    """Write a figure as a whole or not at all.
 
     Args:
-        figure: of matplotlib.
-        path: of a :data:`PICTURE`.
+        figure: figure of matplotlib.
+        path: path with an ending of :data:`PICTURE`.
 
     Raises:
-        BadInput: the ending is none of those, or the file cannot be written.
+        BadInput: the ending is not valid, or the file cannot be written.
     """
     check_writable(path, PICTURE)
     content = io.BytesIO()
-    with warnings.catch_warnings():  # a letter that the font lacks is drawn as a box
+    # matplotlib draws a box for a letter that the font lacks
+    with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         figure.savefig(content, dpi=150, format=Path(path).suffix[1:].lower())
     write_bytes(content.getvalue(), path)
 
 
 def save_pixels(pixels: Any, path: Path | str) -> None:
-    """Write an RGB picture whole or not at all.
+    """Write an RGB picture as a whole or not at all.
 
     Args:
-        pixels: (rows, columns, 3) of 0 .. 255.
-        path: of :data:`PIXELS`.
+        pixels: (rows, columns, 3) values from 0 to 255.
+        path: path with an ending of :data:`PIXELS`.
 
     Raises:
-        BadInput: the ending is none of those, or the file cannot be written.
+        BadInput: the ending is not valid, or the file cannot be written.
     """
     from matplotlib.image import imsave
 
@@ -287,16 +288,16 @@ def save_pixels(pixels: Any, path: Path | str) -> None:
 
 
 def check_json(target: str | None) -> str | None:
-    """Refuse a target of :func:`write_json` before the computation.
+    """Raise an error, before the computation, if :func:`write_json` could not write.
 
     Args:
-        target: a path, ``"-"`` for standard output, None for nowhere.
+        target: a path, ``"-"`` for standard output, or None for no output.
 
     Returns:
         The target.
 
     Raises:
-        BadInput: as :func:`check_writable`.
+        BadInput: the file cannot be written; see :func:`check_writable`.
     """
     if target not in {None, "-"}:
         check_writable(str(target), JSON)
@@ -304,11 +305,11 @@ def check_json(target: str | None) -> str | None:
 
 
 def write_json(results: dict, target: str | None) -> None:
-    """Write results to a file, whole or not at all, or to standard output.
+    """Write results as JSON to a file, as a whole or not at all, or to standard output.
 
     Args:
         results: plain values; infinities and NaN become null.
-        target: a path, ``"-"`` for standard output, None for nowhere.
+        target: a path, ``"-"`` for standard output, or None for no output.
 
     Raises:
         BadInput: the file cannot be written.
@@ -323,7 +324,7 @@ def write_json(results: dict, target: str | None) -> None:
 
 
 def plain(value: Any) -> Any:
-    """Arrays as lists, numbers that are not finite as None, keys as text."""
+    """Return a value for JSON: arrays as lists, infinities and NaN as None."""
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}
     if hasattr(value, "tolist"):

@@ -3,5 +3,6 @@
 Begin with :func:`forcefit.page.page.page`.  Pieces of a page are HTML texts: tables
 (:mod:`forcefit.page.tables`), charts, maps (:mod:`forcefit.page.charts`) and scenes.
 Numbers are SI in the page's data and shown in the units of a drawing
-(:mod:`forcefit.page.units`); ``page.js`` draws, sorts, switches units and opens points.
+(:mod:`forcefit.results.units`); ``page.js`` draws, sorts, switches units and opens
+points.
 """

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.inputs.writing import plain
 from forcefit.page.markup import piece
 from forcefit.page.tables import Value
-from forcefit.page.units import shown_in
+from forcefit.results.units import shown_in
 
 BLUE, RED, GREY = "#1f6fb4", "#c0392b", "#9aa3ab"
 

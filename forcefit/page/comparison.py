@@ -8,7 +8,7 @@ from typing import Any
 from forcefit.page.markup import piece
 from forcefit.page.page import Page, Provenance, Tile, page, section
 from forcefit.page.tables import Cell, Value, table
-from forcefit.page.words import in_words, unit_of
+from forcefit.results.quantities import in_words, unit_of
 
 SAME = 1e-9  # relative: less is rounding
 _LISTED = 60  # changes on the page at once: some two sheets of paper

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from forcefit.page.markup import piece
-from forcefit.page.units import Shown, number_text, shown_in
+from forcefit.results.units import Shown, number_text, shown_in
 
 _LONG = (
     48  # characters of a text that may wrap in its cell; shorter ones and numbers not

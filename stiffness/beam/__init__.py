@@ -1,4 +1,4 @@
-"""Closed forms: sections, straight and curved beams, their stress.
+"""Closed forms: sections, straight and curved beams, and their stress.
 
-Begin at ``beam.py``: the compliance of a cantilever.
+Begin at ``beam.py``, the compliance of a cantilever.
 """

@@ -31,19 +31,19 @@ def beam_compliance(
     axis: ArrayLike = (1.0, 0.0, 0.0),
     up: ArrayLike | None = None,
 ) -> NDArray:
-    r"""Tip compliance of a straight cantilever of constant section.
+    r"""Return the tip compliance of a straight cantilever of constant section.
 
     The link is clamped at its base; the screw is read at its tip.  Bending, torsion,
-    stretching and (Timoshenko) shear are included; warping restraint, taper and the
-    local compliance of the end fittings are not: :func:`stiffness.fem.fea.mesh_link`
-    has them.
+    stretching and (Timoshenko) shear are included.  Warping restraint, taper and the
+    local compliance of the end fittings are left out;
+    :func:`stiffness.fem.fea.mesh_link` includes them.
 
     Args:
         length: [m] from the clamped section to the tip, > 0.
-        section: its constants.
+        section: its section constants.
         E: [Pa] Young's modulus, > 0.
         nu: [-] Poisson's ratio, in (-1, 0.5).
-        theory: ``"timoshenko"``, or ``"euler"``, which leaves shear out.
+        theory: ``"timoshenko"``, or ``"euler"``, without shear.
         axis: (3,) any length, from base to tip, in the axes of the result.
         up: (3,) the section's z, in the same axes; its component along the axis
             is removed.  Default: y, unless the beam lies along y, then z.
@@ -58,7 +58,7 @@ def beam_compliance(
         Timoshenko & Gere, *Mechanics of Materials*: cantilever under an end load.
 
     Example:
-        A downward force of 100 N turns the tip about y:
+        A downward force of 100 N rotates the tip about y:
 
         >>> from stiffness.beam.sections import round_section
         >>> section = round_section(0.04, nu=0.3)
@@ -80,7 +80,7 @@ def beam_compliance(
 def _compliance_in_section_axes(
     length: float, section: Section, E: float, nu: float, shear: bool
 ) -> NDArray:
-    """Tip compliance in the section's own x, y, z."""
+    """Return the tip compliance in the section's own x, y, z."""
     G = E / (2 * (1 + nu))
     slope_y, slope_z = length / (E * section.I_y), length / (E * section.I_z)
     C = np.diag([
@@ -94,13 +94,13 @@ def _compliance_in_section_axes(
     if shear:
         C[4, 4] += length / (G * section.area * section.shear_y)
         C[5, 5] += length / (G * section.area * section.shear_z)
-    C[2, 4] = C[4, 2] = slope_z * length / 2  # fy turns the tip about +z
-    C[1, 5] = C[5, 1] = -slope_y * length / 2  # fz turns the tip about -y
+    C[2, 4] = C[4, 2] = slope_z * length / 2  # fy rotates the tip about +z
+    C[1, 5] = C[5, 1] = -slope_y * length / 2  # fz rotates the tip about -y
     return C
 
 
 def section_axes(axis: ArrayLike, up: ArrayLike | None = None) -> NDArray:
-    """Axes of a section, as columns x (along the beam), y, z (up).
+    """Return the axes of a section, as columns x (along the beam), y, z (up).
 
     Args:
         axis: (3,) any length, from base to tip.
@@ -127,17 +127,17 @@ def section_axes(axis: ArrayLike, up: ArrayLike | None = None) -> NDArray:
 
 
 def unit_vector(name: str, vector: ArrayLike) -> NDArray:
-    """The direction of a vector given from outside.
+    """Return the unit vector of a vector given by the user.
 
     Args:
-        name: for the message.
+        name: name for error messages.
         vector: (3,) any length but zero.
 
     Returns:
         (3,) of length one.
 
     Raises:
-        BadInput: it is not three finite numbers, or zero.
+        BadInput: the vector is not three finite numbers, or is zero.
     """
     direction = np.asarray(vector, dtype=float)
     if direction.shape != (3,) or not np.isfinite(direction).all():

@@ -1,4 +1,4 @@
-r"""Largest von Mises stress in a straight beam, of a wrench at its tip and its weight.
+r"""Largest von Mises stress in a straight beam, under its tip's wrench and its weight.
 
 ========  ==========================================================  ======
 symbol    meaning                                                     unit
@@ -6,18 +6,18 @@ symbol    meaning                                                     unit
 x y z     axes of the beam: x from base to tip, z up                  -
 N V       force on a section along x, and along y and z               N
 M         moment on a section, about x (torsion), y and z             N m
-W         weight of the beam, the same on every part of its length    N
+W         weight of the beam, uniform along its length                N
 s         distance of a section from the tip                          m
 sigma     normal stress along x                                       Pa
 tau       shear stress along y and along z                            Pa
 ========  ==========================================================  ======
 
-In a section sigma = N / A + M_y z / I_y - M_z y / I_z.  Without weight shear forces and
-torsion load every section alike and M is linear in x, so the von Mises stress of a
-fibre, sqrt(sigma^2 + 3 tau^2), is convex in x: its largest value is at the base or at
-the tip, and only these two sections are evaluated.  With weight forces grow with
-s W / L and moments with s^2 / 2 (e_x x W) / L: evaluated are also 31 sections between,
-and those where the moment about y or z has its extremum.
+In a section sigma = N / A + M_y z / I_y - M_z y / I_z.  Without weight, shear forces
+and torsion are equal in all sections and M is linear in x.  The von Mises stress of a
+fibre, sqrt(sigma^2 + 3 tau^2), is then convex in x: its largest value is at the base or
+at the tip, and only these two sections are evaluated.  With weight, forces grow with s
+W / L and moments with s^2 / 2 (e_x x W) / L.  Then 31 sections between are evaluated
+too, and those where the moment about y or z has its extremum.
 """
 
 import math
@@ -29,10 +29,10 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.inputs.table import BadInput
 from stiffness.beam.sections import Section, declared_section
 
-_AROUND = 360  # fibres around a round section; between two the cosine loses 4e-5
-_ACROSS = 33  # fibres along a side; between two a parabola loses 1e-3
-_CHUNK = 2048  # sections at a time: 2048 x 1089 x 3 numbers are 54 MB
-_ALONG = 33  # sections of a heavy beam; between two a parabola loses 1e-3
+_AROUND = 360  # fibres around a round section; the cosine between two loses 4e-5
+_ACROSS = 33  # fibres along a side; a parabola between two loses 1e-3
+_CHUNK = 2048  # sections per chunk: 2048 x 1089 x 3 numbers are 54 MB
+_ALONG = 33  # sections of a heavy beam; a parabola between two loses 1e-3
 _SHAPES = "radius (inner_radius), or width and height (wall)"
 
 
@@ -42,32 +42,34 @@ def peak_beam_stress(
     wrench: ArrayLike,
     weight: ArrayLike = (0.0, 0.0, 0.0),
 ) -> tuple[NDArray, NDArray]:
-    """Largest von Mises stress in a straight beam, and where it is.
+    """Return the largest von Mises stress in a straight beam, and its position.
 
-    Axial force, bending, torsion and shear act together.  Evaluated are, in the
-    sections at the base and at the tip, of a beam with weight also between them,
+    Axial force, bending, torsion and shear act together.  The stress is evaluated in
+    the sections at base and tip, for a beam with weight also between them, at
 
     - round bar and tube: 360 points of the outer circle;
     - solid rectangle: a grid of 33 x 33 points, corners and middles included;
     - hollow rectangle: 33 points along each outer side.
 
-    Left out: local stress where a joint holds the link's ends (a held edge is
-    singular, see :mod:`stiffness.fem.stress`), and the stress in the inner corners of a
-    hollow rectangle, which their fillets decide.
+    Two local effects are left out: the stress where a joint holds the link's ends (a
+    held edge is singular, see :mod:`stiffness.fem.stress`), and the stress in the inner
+    corners of a hollow rectangle, which depends on their fillets.
 
     Args:
-        section: ``radius`` and perhaps ``inner_radius``, or ``width`` (along y) and
-            ``height`` (along z) and perhaps ``wall`` [m].
+        section: ``radius`` and optionally ``inner_radius``, or ``width`` (along y) and
+            ``height`` (along z) and optionally ``wall`` [m].
         length: [m] of the beam, >= 0.
         wrench: (..., 6) [N m, N] at the tip, in the axes of the beam.
-        weight: (3,) or (..., 3) [N] force spread evenly over the length, likewise.
+        weight: (3,) or (..., 3) [N] force distributed evenly over the length, in the
+            same axes.
 
     Returns:
-        (...) [Pa], and (..., 3) [m] the place, in the axes of the beam from its base.
+        (...) [Pa], and (..., 3) [m] its position, in the axes of the beam from its
+        base.
 
     Raises:
-        BadInput: the section is known by its constants only, or is not proper; the
-            length or the wrench is not proper.
+        BadInput: the section is given by its constants only, or is invalid; the length
+            or the wrench is invalid.
 
     Sources:
         Timoshenko & Gere, *Mechanics of Materials*, for bending and for shear by
@@ -113,7 +115,7 @@ def peak_beam_stress(
 
 
 def _sections(wrench: NDArray, weight: NDArray, length: float) -> NDArray:
-    """(n, k) [m] distances of sections from the tip, the base's first."""
+    """Return the (n, k) [m] distances of sections from the tip, the base's first."""
     ends = np.broadcast_to([length, 0.0], (len(wrench), 2))
     if not weight.any():
         return ends
@@ -129,10 +131,10 @@ def _sections(wrench: NDArray, weight: NDArray, length: float) -> NDArray:
 def _on_sections(
     wrench: NDArray, weight: NDArray, s: NDArray, length: float
 ) -> NDArray:
-    """(n, k, 6) [N m, N] on sections (n, k) at distances s from the tip."""
+    """Return (n, k, 6) [N m, N] loads on sections at distances s from the tip."""
     on = np.repeat(wrench[:, None], s.shape[1], axis=1)
     share = s / length if length else np.zeros_like(s)
-    # force at half of the distance: what the part between tip and section weighs
+    # middle: force by half of the weight between tip and section
     middle = wrench[:, None, 3:] + share[..., None] * weight[:, None] / 2
     on[..., 1] -= s * middle[..., 2]  # arm x force
     on[..., 2] += s * middle[..., 1]
@@ -141,23 +143,23 @@ def _on_sections(
 
 
 def _stresses(influence: NDArray, forces: NDArray) -> tuple[NDArray, NDArray]:
-    """(n, p) sigma [Pa] and 3 tau^2 [Pa^2] at each fibre, of (n, 6) section loads."""
+    """Return (n, p) sigma [Pa] and 3 tau^2 [Pa^2] of fibres from section loads."""
     sigma, tau_y, tau_z = (forces @ influence[:, k].T for k in range(3))
     return sigma, 3 * (tau_y**2 + tau_z**2)
 
 
 def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
-    """Fibres of a section and the stresses that moments and forces cause there.
+    """Return fibres of a section and the stresses that moments and forces cause there.
 
     Args:
-        section: as in :func:`peak_beam_stress`.
+        section: see :func:`peak_beam_stress`.
 
     Returns:
         (p, 2) [m] y and z of the fibres, and (p, 3, 6) [1/m^3, 1/m^2] sigma, tau along
         y and along z there, of each of the moments and forces x, y, z on the section.
 
     Raises:
-        BadInput: the section is known by its constants only, or is not proper.
+        BadInput: the section is given by its constants only, or is invalid.
     """
     if "area" in section:
         raise BadInput(
@@ -172,7 +174,7 @@ def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
             f"stress: found a section of {', '.join(section) or 'nothing'}; "
             f"expected {_SHAPES}"
         )
-    # Poisson's ratio enters the factors of shear deformation only
+    # only the factors of shear deformation depend on Poisson's ratio
     constants = declared_section(section, nu=0.3)
     if "radius" in section:
         return _round(constants, section["radius"], section.get("inner_radius", 0.0))
@@ -183,7 +185,7 @@ def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
 
 
 def _bending(section: Section, y: NDArray, z: NDArray) -> NDArray:
-    """(p, 3, 6) normal stress of axial force and bending; shear is zero."""
+    """Return the (p, 3, 6) normal stress of axial force and bending; shear is zero."""
     influence = np.zeros((len(y), 3, 6))
     influence[:, 0, 1] = z / section.I_y
     influence[:, 0, 2] = -y / section.I_z
@@ -192,7 +194,7 @@ def _bending(section: Section, y: NDArray, z: NDArray) -> NDArray:
 
 
 def _round(section: Section, radius: float, hole: float) -> tuple[NDArray, NDArray]:
-    """The outer circle: shear stress runs along it."""
+    """Return fibres on the outer circle, along which the shear stress acts."""
     angle = 2 * np.pi * np.arange(_AROUND) / _AROUND
     out = np.column_stack([np.cos(angle), np.sin(angle)])
     along = np.column_stack([-out[:, 1], out[:, 0]])
@@ -208,7 +210,7 @@ def _round(section: Section, radius: float, hole: float) -> tuple[NDArray, NDArr
 def _rectangle(
     section: Section, width: float, height: float
 ) -> tuple[NDArray, NDArray]:
-    """A grid over the whole section."""
+    """Return fibres on a grid over the whole section."""
     share = np.linspace(-0.5, 0.5, _ACROSS)
     y, z = (v.ravel() for v in np.meshgrid(width * share, height * share))
     influence = _bending(section, y, z)
@@ -224,7 +226,7 @@ def _rectangle(
 
 
 def _torsion(p: NDArray, q: NDArray, a: float, b: float) -> tuple[NDArray, NDArray]:
-    """Shear [m] along p and q for unit G theta; half sides a <= b along p and q."""
+    """Return shear [m] along p and q for unit G theta; half sides a <= b along p, q."""
     along_p, along_q = np.zeros_like(p), 2 * p
     # the terms fall as exp(-n pi (b - |q|) / 2a), on the short sides as 1 / n^2
     for n in range(1, 400, 2):
@@ -240,11 +242,11 @@ def _torsion(p: NDArray, q: NDArray, a: float, b: float) -> tuple[NDArray, NDArr
 def _hollow(
     section: Section, width: float, height: float, wall: float
 ) -> tuple[NDArray, NDArray]:
-    """The outer sides, counterclockwise; shear runs along them."""
+    """Return fibres on the outer sides, counterclockwise; shear acts along them."""
     share = np.linspace(-0.5, 0.5, _ACROSS)
     places, influences = [], []
     for turns in range(4):
-        # the side at the right of a section turned by so many quarters
+        # the right side of a section rotated by quarter turns
         across, up = (width, height) if turns % 2 == 0 else (height, width)
         second = section.I_y if turns % 2 == 0 else section.I_z
         out = np.round([np.cos(turns * np.pi / 2), np.sin(turns * np.pi / 2)])
@@ -255,7 +257,7 @@ def _hollow(
         around = 2 * (b + h)
         # Bredt's flow over the wall, and the wall's own twist at its outer face
         twist = 2 * b * h / around / section.J + wall / section.J
-        # V Q / (I b): flange above, then the wall; beyond the hole there is no wall
+        # V Q / (I b): flange above, then the wall; there is no wall beyond the hole
         inside = np.minimum(np.abs(up * share), up / 2 - wall)
         flange = across * (up**2 - (up - 2 * wall) ** 2) / 8
         Q = flange + wall * ((up / 2 - wall) ** 2 - inside**2)

@@ -6,8 +6,9 @@ integral of the compliance of its slices, each read at the tip,
     C = integral A(s) c(s) A(s)^T ds,   A(s) = screw_map(p(s) - tip, R(s)),
 
 with c(s) = diag(1/GJ, 1/EI_y, 1/EI_z, 1/EA, 1/GA_y, 1/GA_z) per unit length in the
-section's axes R(s).  Exact for beams whose curvature is small against their section
-(the theory of thick curved bars and the warping at kinks are left out).
+section's axes R(s).  This is exact for beams whose radius of curvature is large
+compared with their section.  The theory of thick curved bars and the warping at kinks
+are left out.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,7 +33,7 @@ class Piece:
     Attributes:
         place: position (3,) [m] at t.
         tangent: derivative (3,) [m] of the position by t.
-        section: at t.
+        section: the section at t.
         up: (3,) the section's z at t, orthogonalised against the tangent; None for
             the default of :func:`stiffness.beam.beam.section_axes`.
     """
@@ -49,7 +50,7 @@ def straight_piece(
     section: Section | Callable[[float], Section],
     up: ArrayLike | None = None,
 ) -> Piece:
-    """A straight piece, tapered if its section is a function of t.
+    """Return a straight piece, tapered if its section is a function of t.
 
     Args:
         start: (3,) [m].
@@ -80,10 +81,10 @@ def arc_piece(
     turn: ArrayLike,
     section: Section | Callable[[float], Section],
 ) -> Piece:
-    """An arc of a circle; the section's z is the axis it turns about.
+    """Return an arc of a circle; the section's z is the axis of rotation.
 
     Args:
-        start: (3,) [m] where it begins.
+        start: (3,) [m] its beginning.
         center: (3,) [m] of the circle.
         turn: (3,) [rad] rotation vector from start to end about the centre.
         section: constant, or at t from 0 to 1.
@@ -92,7 +93,7 @@ def arc_piece(
         The piece.
 
     Raises:
-        BadInput: the turn is zero, or not across the radius.
+        BadInput: the turn is zero, or not normal to the radius.
     """
     p, c = np.asarray(start, dtype=float), np.asarray(center, dtype=float)
     angle = np.asarray(turn, dtype=float)
@@ -111,7 +112,7 @@ def arc_piece(
 def _as_function(
     section: Section | Callable[[float], Section],
 ) -> Callable[[float], Section]:
-    """A section at t, whether or not it changes."""
+    """Return a section as a function of t, constant or not."""
     return (lambda t: section) if isinstance(section, Section) else section
 
 
@@ -123,13 +124,13 @@ def curve_compliance(
     theory: str = "timoshenko",
     tolerance: float = 1e-10,
 ) -> NDArray:
-    """Tip compliance of a beam along a curve.
+    """Return the tip compliance of a beam along a curve.
 
     Args:
         pieces: from base to tip, each beginning where the one before ends.
         E: [Pa] Young's modulus, > 0.
         nu: [-] Poisson's ratio, in (-1, 0.5).
-        theory: ``"timoshenko"``, or ``"euler"``, which leaves shear out.
+        theory: ``"timoshenko"``, or ``"euler"``, without shear.
         tolerance: [1] of the integral, entries scaled by sqrt(C_ii C_jj).
 
     Returns:
@@ -201,7 +202,7 @@ def curve_mass(pieces: Sequence[Piece], density: float) -> tuple[float, NDArray]
 
 
 def curve_length(pieces: Sequence[Piece]) -> float:
-    """Length of a beam along its curve.
+    """Return the length of a beam along its curve.
 
     Args:
         pieces: straight ones and arcs, base to tip.
@@ -217,7 +218,7 @@ def curve_length(pieces: Sequence[Piece]) -> float:
 
 
 def _check_joined(pieces: Sequence[Piece]) -> None:
-    """Each piece must begin where the one before ends."""
+    """Check that each piece begins where the one before ends."""
     for number, (one, next_one) in enumerate(
         zip(pieces[:-1], pieces[1:], strict=True), start=2
     ):
@@ -233,7 +234,7 @@ def _check_joined(pieces: Sequence[Piece]) -> None:
 def _integral(
     piece: Piece, tip: NDArray, E: float, nu: float, theory: str, parts: int
 ) -> NDArray:
-    """Compliance of one piece, by ten Gauss points in each of its equal parts."""
+    """Return the compliance of one piece, by ten Gauss points in each equal part."""
     G, shear = E / (2 * (1 + nu)), theory == "timoshenko"
     total = np.zeros((6, 6))
     for first in range(parts):

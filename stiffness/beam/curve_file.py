@@ -10,26 +10,26 @@ from forcefit.inputs.table import BadInput, Table, read_toml
 from stiffness.beam.curve import Piece, arc_piece, straight_piece
 from stiffness.beam.sections import Section, check_section, declared_section
 
-_LARGEST = 1e6  # in SI: beyond any beam
+_LARGEST = 1e6  # in SI: larger than any beam
 
 
 def read_curve(path: Path | str, nu: float) -> list[Piece]:
-    """The pieces of a beam.
+    """Return the pieces of a beam.
 
     Args:
         path: TOML with tables ``[[piece]]``.  Each has a ``section``, as in a robot
-            file or with ``wall`` (a box), ``web`` and ``flange`` (an I); the one before
-            counts where it is absent.  A straight piece has ``end``, and
-            ``tip_section`` if it tapers (its lengths change linearly) and perhaps
-            ``up``; an arc has ``center`` and ``turn``, a rotation vector.  ``start``
-            [m] belongs to the first piece and is the origin if absent.
+            file or with ``wall`` (a box), ``web`` and ``flange`` (an I); if absent,
+            that of the piece before is used.  A straight piece has ``end``, optionally
+            ``up``, and ``tip_section`` if it tapers (its lengths change linearly).  An
+            arc has ``center`` and ``turn``, a rotation vector.  ``start`` [m] belongs
+            to the first piece and is the origin if absent.
         nu: [-] Poisson's ratio, for the shear factors.
 
     Returns:
         The pieces, base to tip.
 
     Raises:
-        BadInput: the file, a name or a value is not proper.
+        BadInput: the file, a name or a value is invalid.
     """
     table = read_toml(path)
     tables = table.tables("piece")
@@ -70,7 +70,7 @@ def read_pieces(tables: Sequence[Table], start: NDArray, nu: float) -> list[Piec
 
 
 def _section(part: Table, key: str) -> dict[str, float]:
-    """Lengths or constants of a section by name."""
+    """Return the lengths or constants of a section by name."""
     inner = part.table(key)
     given = {
         name: inner.number(name, "m", largest=_LARGEST) for name in list(inner.content)
@@ -82,7 +82,7 @@ def _section(part: Table, key: str) -> dict[str, float]:
 def _piece(
     part: Table, start: NDArray, section: Mapping[str, float], nu: float
 ) -> Piece:
-    """One piece of the curve."""
+    """Return one piece of the curve."""
     try:
         shape = _tapered(part, section, nu)
         if part.has("turn"):
@@ -104,7 +104,7 @@ def _piece(
 def _tapered(
     part: Table, section: Mapping[str, float], nu: float
 ) -> Section | Callable[[float], Section]:
-    """A constant section, or one whose lengths change linearly."""
+    """Return a constant section, or one whose lengths change linearly."""
     constant = declared_section(section, nu)
     if not part.has("tip_section"):
         return constant

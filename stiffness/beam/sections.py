@@ -21,15 +21,15 @@ from forcefit.inputs.errors import LARGEST, BadInput, nearest
 
 @dataclass(frozen=True)
 class Section:
-    """What a straight beam needs to know about its section.
+    """Constants of a section for a straight beam.
 
     Attributes:
         area: [m^2].
         I_y: [m^4] second moment of area for bending about y (deflection along z).
         I_z: [m^4] the same about z.
         J: [m^4] torsion constant.
-        shear_y: [1] share of the area that resists a force along y.
-        shear_z: [1] the same along z.
+        shear_y: [-] share of the area that resists a force along y.
+        shear_z: [-] the same along z.
     """
 
     area: float
@@ -60,7 +60,7 @@ _SECTIONS = (
 
 
 def round_section(radius: float, nu: float, inner_radius: float = 0.0) -> Section:
-    """Section of a round bar or tube.
+    """Return the section of a round bar or tube.
 
     Args:
         radius: [m] outer radius, > 0.
@@ -93,7 +93,7 @@ def round_section(radius: float, nu: float, inner_radius: float = 0.0) -> Sectio
 
 
 def rectangular_section(width: float, height: float, nu: float) -> Section:
-    """Section of a solid rectangular bar.
+    """Return the section of a solid rectangular bar.
 
     Args:
         width: [m] along the section's y, > 0.
@@ -125,7 +125,7 @@ def rectangular_section(width: float, height: float, nu: float) -> Section:
 
 
 def _rectangle_torsion(width: float, height: float) -> float:
-    """Saint-Venant's series; the terms left out sum to less than 1e-16 of it."""
+    """Return the torsion constant by Saint-Venant's series, to 1e-16."""
     long, short = max(width, height), min(width, height)
     odd = np.arange(1.0, 2001.0, 2.0)
     # tanh is 1 for all but the first few terms; their tail decays as n^-4
@@ -134,7 +134,7 @@ def _rectangle_torsion(width: float, height: float) -> float:
 
 
 def box_section(width: float, height: float, wall: float, nu: float) -> Section:
-    """Hollow rectangle of one wall thickness.
+    """Return the section of a hollow rectangle of one wall thickness.
 
     Args:
         width: [m] outside, along y.
@@ -169,8 +169,8 @@ def box_section(width: float, height: float, wall: float, nu: float) -> Section:
 
 
 def _box_shear(along: float, across: float, nu: float) -> float:
-    """Cowper's thin box of one wall; force along ``along``."""
-    m = n = across / along  # flange over web area of equal walls is the same ratio
+    """Return Cowper's shear factor of a thin box, for a force along one side."""
+    m = n = across / along  # flange over web area is the same ratio for equal walls
     top = 10 * (1 + nu) * (1 + 3 * m) ** 2
     plain = 12 + 72 * m + 150 * m**2 + 90 * m**3
     poisson = 11 + 66 * m + 135 * m**2 + 90 * m**3
@@ -181,7 +181,7 @@ def _box_shear(along: float, across: float, nu: float) -> float:
 def i_section(
     width: float, height: float, web: float, flange: float, nu: float
 ) -> Section:
-    """I-beam with equal flanges, the web along z (up).
+    """Return the section of an I-beam with equal flanges, the web along z (up).
 
     Args:
         width: [m] of the flanges, along y.
@@ -191,8 +191,8 @@ def i_section(
         nu: [-] Poisson's ratio.
 
     Returns:
-        The section; torsion is that of an open thin wall (warping free), shear along y
-        is carried by the flanges as by two rectangles.
+        The section; torsion is that of an open thin wall (warping free).  The flanges
+        carry shear along y like two rectangles.
 
     Raises:
         BadInput: a dimension or Poisson's ratio is out of its range.
@@ -223,12 +223,12 @@ def i_section(
 
 
 def declared_section(given: Mapping[str, float], nu: float) -> Section:
-    """The section of a beam from the numbers that declare it.
+    """Return the section of a beam from the numbers that declare it.
 
     Args:
-        given: ``radius`` and perhaps ``inner_radius``; or ``width`` and ``height`` and
-            perhaps ``wall`` (a box) or ``web`` and ``flange`` (an I); or the attributes
-            of a :class:`Section` [m, m^2, m^4].
+        given: ``radius`` and optionally ``inner_radius``; or ``width`` and ``height``
+            and optionally ``wall`` (a box) or ``web`` and ``flange`` (an I); or the
+            attributes of a :class:`Section` [m, m^2, m^4].
         nu: [-] Poisson's ratio.
 
     Returns:
@@ -248,15 +248,16 @@ def declared_section(given: Mapping[str, float], nu: float) -> Section:
 
 
 def check_section(place: str, given: Mapping[str, float]) -> None:
-    """Refuse what describes no section.
+    """Reject numbers that do not describe a section.
 
     Args:
-        place: where it stands, for the message.
+        place: name of the key, for the message.
         given: lengths or constants by name, see
             :func:`stiffness.beam.sections.declared_section`.
 
     Raises:
-        BadInput: a name belongs to no section, one lacks, or a value is of no section.
+        BadInput: a name belongs to no section, a name is missing, or a value is
+            invalid.
     """
     if set(given) in _SECTIONS:
         for name, value in given.items():
@@ -274,10 +275,10 @@ def check_section(place: str, given: Mapping[str, float]) -> None:
 
 
 def check_material(who: str, E: float, nu: float) -> None:
-    """Refuse elastic constants of no isotropic solid.
+    """Reject elastic constants of no isotropic solid.
 
     Args:
-        who: whose they are, for the message.
+        who: name of the part, for the message.
         E: [Pa] Young's modulus.
         nu: [-] Poisson's ratio.
 
@@ -289,19 +290,19 @@ def check_material(who: str, E: float, nu: float) -> None:
 
 
 def check_poisson(who: str, nu: float) -> None:
-    """Refuse Poisson's ratio of no isotropic solid: it lies in (-1, 0.5)."""
+    """Reject a Poisson's ratio outside (-1, 0.5), that of no isotropic solid."""
     if not -1.0 < nu < 0.5:
         raise BadInput(f"{who}: nu = {nu:g} must lie between -1.0 and 0.5")
 
 
 def check_positive(who: str, name: str, value: float) -> None:
-    """Refuse anything but a finite positive number."""
+    """Reject a number that is not finite and positive."""
     if not (math.isfinite(value) and value > 0):
         raise BadInput(f"{who}: {name} = {value:g} must be finite and > 0")
 
 
 def _check(**lengths: float) -> None:
-    """All lengths must be positive and finite."""
+    """Check that all lengths are positive and finite."""
     for name, value in lengths.items():
         if not 0 < value < float("inf"):
             raise BadInput(f"section: {name} = {value:g} m must be finite and > 0")

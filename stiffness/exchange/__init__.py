@@ -1,4 +1,5 @@
-"""Links of other finite-element programs, in and out: matrices of two interfaces.
+"""Import and export of links of other finite-element programs.
 
-Begin at ``import_link.py``; ``two_interfaces.py`` is what all of them mean.
+Begin at ``import_link.py``; ``two_interfaces.py`` defines the common matrix of two
+interfaces.
 """

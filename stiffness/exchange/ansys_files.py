@@ -1,11 +1,11 @@
-"""Files of Ansys: Harwell-Boeing matrices, and which freedom each row of a matrix is.
+"""Files of Ansys: Harwell-Boeing matrices, and the degrees of freedom of their rows.
 
-Rows of Ansys' assembled matrices are in an order of its own.  A mapping file says it,
-beside the matrix and of its name, ending in ``.mapping``:
+Rows of Ansys' assembled matrices are in an order of its own.  A mapping file gives the
+order.  It is next to the matrix and has its name, with the suffix ``.mapping``:
 
-- of ``HBMAT,name,,,ASCII,STIFF,NO,YES``: lines of row, node and label (``UX``..);
-- of ``*VEC,map,I,IMPORT,FULL,file.full,BACK`` and ``*EXPORT,map,MMF,name.mapping``: a
-  Matrix Market vector of the nodes, each with all its freedoms in turn.
+- from ``HBMAT,name,,,ASCII,STIFF,NO,YES``: lines of row, node and label (``UX``..);
+- from ``*VEC,map,I,IMPORT,FULL,file.full,BACK`` and ``*EXPORT,map,MMF,name.mapping``:
+  a Matrix Market vector of the nodes, each with all its degrees of freedom in turn.
 
 Sources:
     Ansys Command Reference, HBMAT, *EXPORT, *VEC; Duff, Grimes, Lewis (1992), Users'
@@ -22,27 +22,27 @@ from scipy.sparse import coo_array, csr_array, diags_array
 from forcefit.inputs.errors import BadInput, describe, nearest
 from forcefit.inputs.table import read_text
 
-LARGEST = 2_000_000  # rows
+LARGEST = 2_000_000  # largest number of rows
 LABELS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
 _FORMAT = re.compile(r"\(\s*(?:1P,?)?\s*(\d*)\s*([IEDFG])(\d+)(?:\.\d+\S*)?\s*\)", re.I)
 _NUMBER = re.compile(r"[+-]?\d+(?:\.\d*)?(?:[ED][+-]?\d+)?|[+-]?\.\d+(?:[ED][+-]?\d+)?")
 
 
 def harwell_boeing(path: Path, text: str) -> csr_array:
-    """Read an assembled real matrix; of a symmetric one (RSA) one half is stored.
+    """Read an assembled real matrix; a symmetric one (RSA) is stored as one half.
 
     SciPy's reader refuses what ``HBMAT`` writes: RSA, right-hand sides, and exponents
     with a D (SciPy 1.17).
 
     Args:
-        path: for messages.
-        text: of the file.
+        path: path of the file, for error messages.
+        text: text of the file.
 
     Returns:
-        (n, n) both halves.
+        (n, n) with both halves.
 
     Raises:
-        BadInput: it is of another kind, or not as long as it says.
+        BadInput: the file is of another kind, or its length differs from its header.
     """
     lines = text.split("\n")
     try:
@@ -86,12 +86,12 @@ def harwell_boeing(path: Path, text: str) -> csr_array:
 
 
 def both_halves(matrix: csr_array) -> csr_array:
-    """A matrix of which one half is stored, whole."""
+    """Return a symmetric matrix with both halves, from one half."""
     return csr_array(matrix + matrix.T - diags_array(matrix.diagonal()))
 
 
 def _fields(path: Path, lines: list[str], width: int) -> NDArray:
-    """Numbers in fields of one width."""
+    """Return the numbers in fields of one width."""
     words = [
         line[k : k + width].strip()
         for line in lines
@@ -104,7 +104,7 @@ def _fields(path: Path, lines: list[str], width: int) -> NDArray:
 
 
 def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
-    """Which freedom each row is.
+    """Return the degree of freedom of each row.
 
     Args:
         path: a mapping file.
@@ -113,7 +113,7 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
         Node and direction, 1 to 6, of each row; or the nodes in their order.
 
     Raises:
-        BadInput: it is neither.
+        BadInput: the file is of neither kind.
     """
     text = read_text(path)
     lines = [line for line in text.split("\n") if line.strip()]
@@ -131,7 +131,7 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
     for line in lines:
         words = line.split()
         if not words[0].isdecimal():
-            continue  # a head
+            continue  # a heading
         if len(words) != 3:
             raise BadInput(
                 f"{path}: found {describe(line.strip())}, expected row, node and label"
@@ -148,7 +148,7 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
 
 
 def _whole(path: Path, word: str) -> int:
-    """A number of a row or node."""
+    """Return the number of a row or node."""
     if not re.fullmatch("[0-9]{1,12}", word):
         raise BadInput(f"{path}: found {describe(word)}, expected a number of a node")
     return int(word)

@@ -1,4 +1,4 @@
-"""A full matrix condensed on two interfaces: nodes of six freedoms, or rigid faces.
+"""Condensation of a full matrix on two interfaces: nodes, or rigid faces.
 
 Sources:
     Guyan (1965), Reduction of stiffness and mass matrices, AIAA Journal 3, 380.
@@ -23,24 +23,24 @@ _GRID = re.compile(r"^GRID\*?[\s,]", re.M | re.I)
 _NODE = re.compile(r"^\*NODE\s*(?:,.*)?$", re.M | re.I)
 _WORKBENCH = re.compile(r"Node Number\tX Location \((\w+)\)")
 _LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
-_ON = 1e-6  # of the body's size: how near a node lies on its interface
+_ON = 1e-6  # relative to the body's size: largest distance of a node on its interface
 
 
 def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
-    """Places of nodes: lines of number, x, y, z between commas or blanks.
+    """Return the positions of nodes: lines of number, x, y, z between commas or blanks.
 
     Args:
-        path: the file; lines that begin with ``*`` or ``#`` are passed over. Of a deck
-            of Abaqus or CalculiX the lines after ``*NODE``, of Nastran's ``GRID``. Of
-            a named selection of Ansys' Workbench the lines below its head, whose
-            numbers may have decimal commas.
+        path: the file; lines that begin with ``*`` or ``#`` are ignored.  In a deck of
+            Abaqus or CalculiX the lines after ``*NODE`` are read, of Nastran ``GRID``.
+            In a named selection of Ansys' Workbench the lines below its heading are
+            read; their numbers may have decimal commas.
         unit: [m] of its lengths.
 
     Returns:
         (3,) [m] by number.
 
     Raises:
-        BadInput: a line of something else.
+        BadInput: a line has another form.
     """
     nodes: dict[int, NDArray] = {}
     text = read_text(path)
@@ -65,7 +65,7 @@ def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
 
 
 def _node_lines(text: str) -> Iterator[tuple[int, list[str], str]]:
-    """Lines that place a node: their number, number and coordinates, the line."""
+    """Yield lines with the position of a node: number, number and coordinates, line."""
     if _GRID.search(text):
         yield from _grids(text)
         return
@@ -85,7 +85,7 @@ def _node_lines(text: str) -> Iterator[tuple[int, list[str], str]]:
 
 
 def _grids(text: str) -> Iterator[tuple[int, list[str], str]]:
-    """Nastran's ``GRID``, on one line or, of wide fields, on two."""
+    """Yield Nastran's ``GRID``, on one line or, for wide fields, on two."""
     lines = text.split("\n")
     for number, line in enumerate(lines, 1):
         if _GRID.match(line):
@@ -93,27 +93,28 @@ def _grids(text: str) -> Iterator[tuple[int, list[str], str]]:
             if head.endswith("*") and number < len(lines):
                 fields = fields[:4] + bulk_fields(lines[number])[1]
             node, system, *place = [*fields, "", ""]
-            # another system of axes gives no place: refused
+            # a coordinate system other than the basic one is refused
             yield number, [node, *([] if system.strip("0") else place)], line
 
 
 def interface_rows(
     matrix: FileMatrix, asked: str, option: str, nodes: Mapping[int, NDArray] | None
 ) -> tuple[NDArray, NDArray, NDArray | None]:
-    """Rows of an interface, and how a screw of it moves them.
+    """Return the rows of an interface, and their motion for unit screws of it.
 
     Args:
-        matrix: with its freedoms.
-        asked: a node's number, or an interface as ``stiffness fea`` takes it.
-        option: whose it is, for messages.
-        nodes: (3,) [m] places by number, None where they are not known.
+        matrix: matrix with its degrees of freedom.
+        asked: a node's number, or an interface as in ``stiffness fea``.
+        option: name of the option, for messages.
+        nodes: (3,) [m] positions by number, None if unknown.
 
     Returns:
         (k,) rows, (k, 6) their motions for unit screws [R T] at the interface's point,
-        and (3,) [m] the point, None where it is not known.
+        and (3,) [m] the point, None if unknown.
 
     Raises:
-        BadInput: no such node, not its six freedoms, or nothing on the interface.
+        BadInput: no such node, a node without six degrees of freedom, or an empty
+            interface.
     """
     row = {freedom: k for k, freedom in enumerate(matrix.freedoms)}
     if asked.strip().isdigit():
@@ -156,7 +157,7 @@ def interface_rows(
 
 
 def _on(interface: Interface, places: NDArray) -> NDArray:
-    """(n,) bool: what lies on an interface."""
+    """Return (n,) bool: nodes on an interface."""
     size = float(np.ptp(places, axis=0).max(initial=0.0)) or 1.0
     near = interface.distance(places) < _ON * size
     if interface.kind == "disc":
@@ -168,7 +169,7 @@ def _on(interface: Interface, places: NDArray) -> NDArray:
 def condensed(
     matrix: FileMatrix, ends: tuple[tuple[NDArray, NDArray], tuple[NDArray, NDArray]]
 ) -> tuple[NDArray, NDArray]:
-    """The matrix of two interfaces, all other freedoms left to themselves.
+    """Return the matrix of two interfaces; other degrees of freedom are free.
 
     Args:
         matrix: (n, n).
@@ -178,7 +179,8 @@ def condensed(
         (12, 12) base first, and (n, 12) the motion of every row for unit screws.
 
     Raises:
-        BadInput: the interfaces share rows, or the other freedoms are loose.
+        BadInput: the interfaces share rows, or other degrees of freedom are not
+            connected.
     """
     from stiffness.fem.sparse_solver import solve
 
@@ -203,6 +205,6 @@ def condensed(
         fields[free] = solve(triu(inner, format="csr"), loads)
         if not np.isfinite(fields).all():
             raise BadInput(f"{matrix.file}: what lies between the interfaces is loose")
-    # energy of the fields: errors of the solution enter squared
+    # energy of the fields, in which errors of the solution are squared
     K12 = fields.T @ (K @ fields)
     return (K12 + K12.T) / 2, fields

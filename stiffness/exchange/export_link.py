@@ -14,11 +14,12 @@ from stiffness.exchange.two_interfaces import both_ends
 from stiffness.report.export import PROGRAMS, stiffness_for
 
 FORMATS = ("matrix-market", "abaqus", "calculix", "nastran", "numpy", *PROGRAMS)
-_FEM = [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]  # ours to shifts first, twice
+# forcefit's order, rearranged with translations first
+_FEM = [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]
 
 
 def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
-    """K_E and the base's point less the tip's, of what ``--json`` wrote of a link.
+    """Return K_E and the base's point less the tip's from a link's ``--json`` results.
 
     Args:
         path: the JSON file.
@@ -27,7 +28,7 @@ def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
         (6, 6) and (3,) [m].
 
     Raises:
-        BadInput: it is not such a file.
+        BadInput: the file is not of this kind.
     """
     try:
         content = json.loads(read_text(path))
@@ -41,7 +42,7 @@ def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
         ) from None
     if K.shape != (6, 6) or offset.shape != (3,) or not np.isfinite(K).all():
         raise BadInput(f"{path}: stiffness: expected 6 rows of 6 finite numbers")
-    # their products must be numbers
+    # their products must not overflow
     if not max(np.abs(K).max(), np.abs(offset).max()) < 1e100:
         raise BadInput(f"{path}: found numbers above 1e100, expected a link's, in SI")
     return K, offset
@@ -50,17 +51,17 @@ def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
 def link_file(
     stiffness: NDArray, base_from_tip: NDArray, to: str, unit: str = "m"
 ) -> bytes:
-    """A file's content.
+    """Return a file's content.
 
     Args:
         stiffness: (6, 6) K_E at the tip, SI, our order.
         base_from_tip: (3,) [m].
         to: one of ``FORMATS``.
-        unit: of lengths in the file; forces are N, turns rad.
+        unit: unit of lengths in the file; forces are in N, rotations in rad.
 
     Returns:
-        The content: shifts first at each node; of ``exudyn``, ``adams``, ``mapdl``
-        what :func:`stiffness.report.export.stiffness_for` gives.
+        The content: translations first at each node; for ``exudyn``, ``adams``,
+        ``mapdl`` the result of :func:`stiffness.report.export.stiffness_for`.
 
     Raises:
         BadInput: an unknown format or unit, or a unit with a format that has its own.
@@ -86,19 +87,19 @@ def link_file(
 
 
 def _lower(K: NDArray) -> list[tuple[int, int, float]]:
-    """Row, column, value of the lower half, column by column."""
+    """Return the row, column, value of the lower half, column by column."""
     return [(i, j, float(K[i, j])) for j in range(12) for i in range(j, 12)]
 
 
 def _matrix_market(K: NDArray) -> str:
-    """Matrix Market, symmetric."""
+    """Return the text of a symmetric Matrix Market file."""
     rows = [f"{i + 1} {j + 1} {v!r}" for i, j, v in _lower(K)]
     head = "%%MatrixMarket matrix coordinate real symmetric\n% X Y Z RX RY RZ, twice"
     return "\n".join([head, f"12 12 {len(rows)}", *rows]) + "\n"
 
 
 def _user_element(K: NDArray) -> str:
-    """Abaqus ``*USER ELEMENT``, four numbers a line."""
+    """Return the text of an Abaqus ``*USER ELEMENT``, four numbers a line."""
     lines = ["*USER ELEMENT,NODES=2,LINEAR", "** ELEMENT NODES", "** 1, 2",
              "1, 2, 3, 4, 5, 6", "*MATRIX,TYPE=STIFFNESS"]  # fmt: skip
     for i in range(12):
@@ -108,7 +109,7 @@ def _user_element(K: NDArray) -> str:
 
 
 def _five_columns(K: NDArray) -> str:
-    """Node, direction, node, direction, value."""
+    """Return lines of node, direction, node, direction, value."""
     return "".join(
         f"{i // 6 + 1},{i % 6 + 1},{j // 6 + 1},{j % 6 + 1},{v!r}\n"
         for i, j, v in _lower(K)
@@ -116,7 +117,7 @@ def _five_columns(K: NDArray) -> str:
 
 
 def _dmig(K: NDArray) -> str:
-    """Nastran DMIG in large fields, form 6; sixteen characters a number."""
+    """Return the text of a Nastran DMIG in large fields, form 6."""
     lines = ["DMIG    K2GG           0       6       2       0"]
     for j in range(12):
         lines.append(f"DMIG*   {'K2GG':16}{j // 6 + 1:16}{j % 6 + 1:16}")

@@ -27,24 +27,25 @@ def import_link(
     unit: str = "m",
     order: str = ORDERS[0],
 ) -> LinkStiffness:
-    """A link from a matrix of 6, 12 or more freedoms.
+    """Return a link from a matrix of 6, 12 or more degrees of freedom.
 
     Args:
-        path: of the stiffness, see :mod:`stiffness.exchange.matrix_file`.
-        mass: of the mass matrix of the same freedoms; None without one.
-        nodes: places of nodes, needed for interfaces of many; their order is that of
-            rows which the matrix' file does not name.
+        path: path of the stiffness, see :mod:`stiffness.exchange.matrix_file`.
+        mass: path of the mass matrix of the same degrees of freedom; None without one.
+        nodes: path of the positions of nodes, needed for interfaces of many nodes;
+            their order is that of rows which the matrix file does not name.
         base: node, or interface such as ``"z=0"`` [m], that is held.
-        tip: likewise, where the screw is read.
-        unit: of lengths in all files; forces are N, turns rad.
-        order: of the six freedoms of a node, where the file does not name them.
+        tip: node or interface at which the screw is read.
+        unit: unit of lengths in all files; forces are in N, rotations in rad.
+        order: order of the six degrees of freedom of a node, if the file does not name
+            them.
 
     Returns:
         The link, in the axes of the file.
 
     Raises:
-        BadInput: a file is not what it should be, or the matrix is not that of a free
-            elastic body between the two interfaces.
+        BadInput: a file is invalid, or the matrix is not that of a free elastic body
+            between the two interfaces.
     """
     for option, value, valid in (("--unit", unit, LENGTHS), ("--order", order, ORDERS)):
         if value not in valid:
@@ -80,7 +81,7 @@ def import_link(
     strange = [freedom for freedom in heavy.freedoms if freedom not in row]
     if strange or len(heavy.freedoms) < len(row) and not heavy.named:
         raise BadInput(f"{mass}: its freedoms are not those of {path}")
-    # a file of named freedoms leaves out those without mass
+    # a file of named degrees of freedom leaves out those without mass
     moved = fields[[row[freedom] for freedom in heavy.freedoms]]
     M12 = moved.T @ (heavy.matrix @ moved)
     kilograms, centre, inertia = mass_of_both_ends(M12, link.base - link.tip)
@@ -92,7 +93,7 @@ def import_link(
 def _ends(
     matrix: FileMatrix, base: str, tip: str, places: Mapping[int, NDArray] | None
 ) -> list[tuple[NDArray, NDArray, NDArray | None]]:
-    """Rows, motions and point of base and tip."""
+    """Return the rows, motions and point of base and tip."""
     return [
         interface_rows(matrix, asked, option, places)
         for asked, option in ((base, "--base"), (tip, "--tip"))
@@ -100,7 +101,7 @@ def _ends(
 
 
 def reordered(matrix: FileMatrix, order: str) -> FileMatrix:
-    """The matrix with freedoms named as its file orders them."""
+    """Return the matrix with degrees of freedom named in the order of its file."""
     if matrix.named or order == ORDERS[0]:
         return matrix
     freedoms = tuple((node, (d + 2) % 6 + 1) for node, d in matrix.freedoms)
@@ -108,15 +109,16 @@ def reordered(matrix: FileMatrix, order: str) -> FileMatrix:
 
 
 def in_metres(matrix: FileMatrix, length: float) -> FileMatrix:
-    """The matrix with shifts in metres and work in joules.
+    """Return the matrix with translations in metres and work in joules.
 
     Args:
-        matrix: with forces in N, turns in rad and shifts in ``length``.
-        length: [m] its unit.
+        matrix: matrix with forces in N, rotations in rad and translations in
+            ``length``.
+        length: [m] its unit of length.
 
     Returns:
-        The matrix in SI; a mass matrix likewise, if its unit is consistent (tonnes
-        beside mm, N and s).
+        The matrix in SI; for a mass matrix if its unit is consistent (tonnes with mm, N
+        and s).
     """
     turns = np.array([direction > 3 for _, direction in matrix.freedoms])
     scale = np.where(turns, 1.0, 1.0 / length)

@@ -1,4 +1,4 @@
-"""Matrices as other programs write them, each with the freedoms of its rows.
+"""Matrices in files of other programs, with the degrees of freedom of their rows.
 
 =================  ===============================================================
 file               written by
@@ -50,9 +50,10 @@ class FileMatrix:
 
     Attributes:
         file: its name, for messages.
-        matrix: (n, n) both halves.
-        freedoms: node and direction, 1 to 3 shifts and 4 to 6 turns, of each row.
-        named: whether the file says the freedoms itself.
+        matrix: (n, n) with both halves.
+        freedoms: node and direction, 1 to 3 translations and 4 to 6 rotations, of each
+            row.
+        named: whether the file itself names the degrees of freedom.
     """
 
     file: str
@@ -67,22 +68,22 @@ def read_matrix(
     nodes: Sequence[int] | None = None,
     mapped: Path | str | None = None,
 ) -> FileMatrix:
-    """A matrix of a file, its kind told by its content.
+    """Return a matrix of a file, whose kind is recognised by its content.
 
     Args:
         path: the file.
-        which: ``"stiffness"`` or ``"mass"``, where the file holds both.
+        which: ``"stiffness"`` or ``"mass"``, if the file holds both.
         nodes: in the order of rows that the file does not name; None: 1, 2, ..
-        mapped: a matrix of the same rows, whose ``.mapping`` counts where this one has
-            none beside it.
+        mapped: a matrix of the same rows, whose ``.mapping`` is used if this one has
+            none.
 
     Returns:
-        The matrix; rows that the file does not name are three a node of ``nodes``, as
-        of solids, where that is their number, else six.
+        The matrix; rows that the file does not name are three per node of ``nodes``, as
+        for solids, if their number fits, else six.
 
     Raises:
-        BadInput: the file is none of these, its matrix is not square, not finite or
-            not symmetric, or of no freedoms.
+        BadInput: the file is of no such kind; its matrix is not square, not finite or
+            not symmetric; or it has no degrees of freedom.
     """
     path = Path(path)
     ending = path.suffix.lower()
@@ -114,7 +115,7 @@ def read_matrix(
 
 
 def _mapped(path: Path, n: int) -> list[Freedom]:
-    """Freedoms of n rows by a mapping file."""
+    """Return the degrees of freedom of n rows by a mapping file."""
     given = read_mapping(path)
     freedoms: list[Freedom] = []
     each = n // len(given)
@@ -137,11 +138,11 @@ def _checked(
     freedoms: list[Freedom] | None,
     nodes: Sequence[int] | None,
 ) -> FileMatrix:
-    """The matrix, if it is square, finite and symmetric."""
+    """Return the matrix, if it is square, finite and symmetric."""
     n = matrix.shape[0]
     if matrix.shape != (n, n) or not n:
         raise BadInput(f"{path}: found {matrix.shape} numbers, expected a square")
-    if not (np.abs(matrix.data) < 1e100).all():  # products of them are numbers
+    if not (np.abs(matrix.data) < 1e100).all():  # their products must not overflow
         raise BadInput(f"{path}: found a number that is not finite, or above 1e100")
     given = freedoms or _in_order(path, n, nodes)
     size = np.sqrt(np.abs(matrix.diagonal()))
@@ -160,7 +161,7 @@ def _checked(
 
 
 def _in_order(path: Path, n: int, nodes: Sequence[int] | None) -> list[Freedom]:
-    """Freedoms of n rows without names: three or six a node."""
+    """Return the degrees of freedom of n rows without names: three or six a node."""
     numbers = range(1, n // 6 + 1) if nodes is None else nodes
     for each in (3, 6):
         if n == each * len(numbers):
@@ -175,7 +176,7 @@ def _in_order(path: Path, n: int, nodes: Sequence[int] | None) -> list[Freedom]:
 
 
 def _numpy(path: Path) -> csr_array:
-    """``.npy``, or a sparse ``.npz``; never a pickle."""
+    """Return a matrix of ``.npy``, or of a sparse ``.npz``; never a pickle."""
     from scipy.sparse import load_npz
 
     try:
@@ -190,14 +191,14 @@ def _numpy(path: Path) -> csr_array:
         raise BadInput(f"{path}: cannot be read: {reason}") from None
     except BadInput:
         raise
-    except Exception as error:  # of many kinds: a damaged archive
+    except Exception as error:  # a damaged archive raises various exceptions
         raise BadInput(
             f"{path}: no matrix of NumPy or SciPy: {one_line(str(error), 100)}"
         ) from None
 
 
 def _user_element(path: Path, text: str, which: str) -> tuple[csr_array, list[Freedom]]:
-    """``*USER ELEMENT``: nodes in comments, their freedoms, lower halves by rows."""
+    """Read ``*USER ELEMENT``: nodes in comments, degrees of freedom, lower halves."""
     nodes: list[int] = []
     lines: list[list[int]] = []
     values: dict[str, list[float]] = {"stiffness": [], "mass": []}
@@ -241,7 +242,7 @@ def _user_element(path: Path, text: str, which: str) -> tuple[csr_array, list[Fr
 
 
 def _columns(path: Path, text: str) -> tuple[csr_array, list[Freedom] | None]:
-    """Lines of node, direction, node, direction, value, or of row, column, value."""
+    """Read lines of node, direction, node, direction, value; or row, column, value."""
     named: dict[tuple[Freedom, Freedom], float] = {}
     unnamed: dict[tuple[int, int], float] = {}
     for number, line in enumerate(text.split("\n"), 1):
@@ -278,7 +279,7 @@ def _columns(path: Path, text: str) -> tuple[csr_array, list[Freedom] | None]:
 
 
 def _named_by(path: Path, n: int) -> list[Freedom]:
-    """CalculiX's ``.dof``: ``node.direction`` of each row."""
+    """Return degrees of freedom of CalculiX's ``.dof``, ``node.direction`` a row."""
     words = read_text(path).split()
     freedoms: list[Freedom] = []
     for word in words:
@@ -297,7 +298,7 @@ def _named_by(path: Path, n: int) -> list[Freedom]:
 def _from_entries(
     path: Path, entries: dict[tuple[Freedom, Freedom], float]
 ) -> tuple[csr_array, list[Freedom]]:
-    """A matrix from entries of one half or both."""
+    """Return a matrix from the entries of one half or both."""
     freedoms = sorted({freedom for pair in entries for freedom in pair})
     if not freedoms or len(freedoms) > LARGEST:
         raise BadInput(f"{path}: found no entries of a matrix")
@@ -308,8 +309,8 @@ def _from_entries(
 def _of_rows(
     entries: Mapping[tuple[Any, Any], float], row: Mapping[Any, int]
 ) -> csr_array:
-    """A matrix from entries by the names of their rows."""
-    # a half that is not there is the other one's
+    """Return a matrix from entries by the names of their rows."""
+    # a missing half is the transpose of the other one
     whole = {**{(b, a): v for (a, b), v in entries.items()}, **entries}
     i, j = [row[a] for a, _ in whole], [row[b] for _, b in whole]
     shape = (len(row), len(row))

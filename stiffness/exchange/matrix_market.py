@@ -24,19 +24,19 @@ _MARKET = (
 def matrix_market(path: Path, text: str) -> csr_array:
     """Read a square matrix.
 
-    SciPy's reader does not do: it reads 4D3 as 4 and an entry "2 1.5 1" as 0.5 in
-    column 1, without an error (SciPy 1.17), and a check of every line in front of it
-    takes as long as the reading here.
+    SciPy's reader is not used: it reads 4D3 as 4 and an entry "2 1.5 1" as 0.5 in
+    column 1, without an error (SciPy 1.17).  A check of every line before it takes as
+    long as this reader.
 
     Args:
-        path: for messages.
-        text: of the file.
+        path: path of the file, for error messages.
+        text: text of the file.
 
     Returns:
-        (n, n) both halves of a symmetric one, and where Ansys wrote one half.
+        (n, n) with both halves of a symmetric one, and where Ansys wrote one half.
 
     Raises:
-        BadInput: it is of another kind, or not as long as it says.
+        BadInput: the file is of another kind, or its length differs from its header.
     """
     head, *lines = text.split("\n")
     words = tuple(head.lower().split()[1:])
@@ -63,9 +63,9 @@ def matrix_market(path: Path, text: str) -> csr_array:
         expected = n * n if whole else n * (n + 1) // 2
         if len(rest) != expected:
             raise BadInput(f"{path}: found {len(rest)} numbers, expected {expected}")
-        j, i = np.indices((n, n)) if whole else np.triu_indices(n)  # by columns
+        j, i = np.indices((n, n)) if whole else np.triu_indices(n)  # column by column
         matrix = csr_array(coo_array((rest, (i.ravel(), j.ravel())), shape=(n, n)))
-    # Ansys writes one half, whatever its head says
+    # Ansys writes one half, whatever its header says
     half = not triu(matrix, 1).nnz or not tril(matrix, -1).nnz
     by_ansys = re.search(r"^%.*ANSYS", text, re.M | re.I)
     return (
@@ -75,7 +75,7 @@ def matrix_market(path: Path, text: str) -> csr_array:
 
 
 def _numbers(path: Path, lines: list[str]) -> NDArray:
-    """All numbers of some lines."""
+    """Return all numbers of the lines."""
     words = [word for line in lines for word in line.split()]
     try:
         return np.array(words, dtype=float)
@@ -84,7 +84,7 @@ def _numbers(path: Path, lines: list[str]) -> NDArray:
 
 
 def _size(path: Path, sizes: NDArray) -> int:
-    """Rows of a square, from the first numbers of a file."""
+    """Return number of rows of a square matrix, from the first numbers of a file."""
     rows, columns = (*sizes.tolist(), 0.0, 0.0)[:2]
     if not rows == columns == round(min(rows, 2.0 * LARGEST)) > 0 or rows > LARGEST:
         raise BadInput(

@@ -1,12 +1,13 @@
 """Nastran's bulk data: fields of a line, and matrices by ``DMIG``.
 
-Fields are eight characters wide, sixteen where the first ends in ``*``, between commas,
-or between blanks; between commas a line may have more than the eight of a card.
+Fields have eight characters, or sixteen if the first ends in ``*``; or they are
+separated by commas or blanks.  Between commas a line may have more than the eight of a
+card.
 
 Sources:
     MSC Nastran Quick Reference Guide: Bulk Data, free and fixed fields; DMIG (form 6
     gives one half); EXTSEOUT, whose punch file has KAAX, K4AAX (structural damping),
-    BAAX (viscous damping) and MAAX side by side.
+    BAAX (viscous damping) and MAAX together.
 """
 
 import re
@@ -19,21 +20,21 @@ from stiffness.exchange.real_numbers import real, whole
 Freedom = tuple[int, int]
 Entries = dict[tuple[Freedom, Freedom], float]
 DMIG = re.compile(r"^DMIG[*\s,]", re.M | re.I)
-# what names of Nastran's own say, whatever else the file holds
+# meaning of Nastran's own names
 _OWN_NAME = re.compile(r"(K4|K|B|M)2?(AAX?|GG|PP|LL|FF)")
 _WHAT = {"K": "stiffness", "M": "mass", "K4": "structural damping",
          "B": "viscous damping"}  # fmt: skip
 
 
 def bulk_fields(line: str) -> tuple[str, list[str]]:
-    """The fields of a line of bulk data.
+    """Return the fields of a line of bulk data.
 
     Args:
         line: with fields of fixed width, or between commas or blanks.
 
     Returns:
-        The first field in capitals, with its ``*``, and the others; of fixed width four
-        or eight, else as many as there are.
+        The first field in capitals, with its ``*``, and the others; four or eight of
+        fixed width, else all.
     """
     if "," in line:
         head, *fields = [word.strip() for word in line.split(",")]
@@ -48,15 +49,15 @@ def bulk_fields(line: str) -> tuple[str, list[str]]:
 
 
 def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
-    """Entries of the stiffness or mass matrix among those of a file.
+    """Return the entries of the stiffness or mass matrix among those of a file.
 
     Args:
-        path: for messages.
-        text: of the file.
+        path: path of the file, for error messages.
+        text: text of the file.
         which: ``"stiffness"`` or ``"mass"``.
 
     Returns:
-        Values by the freedoms of row and column, of one half or both.
+        Values by the degrees of freedom of row and column, of one half or both.
 
     Raises:
         BadInput: no matrix or several are of this kind, or it is not square and real.
@@ -93,22 +94,26 @@ def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
 def _terms(
     path: Path | str, fields: list[str], packed: bool
 ) -> list[tuple[Freedom, float]]:
-    """Rows and values of a column: node, direction, real part, imaginary part.
+    """Return rows and values of a column's terms.
+
+    A term has a node, direction, real part and imaginary part.
 
     Args:
-        path: for messages.
-        fields: of one line, after those that name the column.
-        packed: between blanks, where no field is empty: no imaginary part.
+        path: path of the file, for error messages.
+        fields: fields of a line, after those that name the column.
+        packed: whether fields are separated by blanks, so that no field is empty and
+            there is no imaginary part.
 
     Returns:
         Row and value of each term.
 
     Raises:
-        BadInput: the line ends within a term, a number is none, or a term is complex.
+        BadInput: the line ends within a term, a number is invalid, or a term is
+            complex.
     """
     terms, waiting = [], list(fields)
     while waiting:
-        if not waiting[0] or waiting[0].startswith(("+", "*")):  # goes on in a line
+        if not waiting[0] or waiting[0].startswith(("+", "*")):  # continued
             waiting.pop(0)
             continue
         if len(waiting) < 3:
@@ -133,7 +138,7 @@ def _terms(
 def _chosen(
     path: Path | str, names: Iterable[str], forms: Mapping[str, str], which: str
 ) -> str:
-    """The name of the one stiffness or mass matrix."""
+    """Return the name of the one stiffness or mass matrix."""
     names = list(names)
     initial = {kind: letter for letter, kind in _WHAT.items()}[which]
     found = [name for name in names if forms.get(name, "") in {"1", "6", ""}]
@@ -153,6 +158,6 @@ def _chosen(
 
 
 def _kind(name: str) -> str | None:
-    """What a matrix is by a name that Nastran itself gives, else None."""
+    """Return the kind of matrix that a Nastran name means, else None."""
     match = _OWN_NAME.fullmatch(name)
     return _WHAT[match[1]] if match else None

@@ -9,17 +9,17 @@ _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]?\d+))?")
 
 
 def real(path: Path | str, word: str) -> float:
-    """A number of a file.
+    """Return a number of a file.
 
     Args:
-        path: for messages.
+        path: path of the file, for error messages.
         word: the number, with blanks around it or none.
 
     Returns:
         Its value.
 
     Raises:
-        BadInput: it is no number.
+        BadInput: the text is not a number.
     """
     match = _REAL.fullmatch(word.strip())
     if not match:
@@ -29,17 +29,17 @@ def real(path: Path | str, word: str) -> float:
 
 
 def whole(path: Path | str, word: str) -> int:
-    """A whole number of a file.
+    """Return a whole number of a file.
 
     Args:
-        path: for messages.
+        path: path of the file, for error messages.
         word: the number, with blanks around it or none.
 
     Returns:
         Its value.
 
     Raises:
-        BadInput: it is no whole number.
+        BadInput: the text is not a whole number.
     """
     try:
         return int(word)

@@ -1,11 +1,11 @@
-"""A body between two interfaces: twelve freedoms, six of which move it rigidly.
+"""A body between two interfaces: twelve degrees of freedom, six of them rigid.
 
 ======  ============  =======================================================
 symbol  shape         meaning
 ======  ============  =======================================================
 K12     (12, 12)      stiffness of base and tip, [R T] of each
-K       (6, 6)        K_E: the tip's part of it, the base held
-X       (6, 6)        rigid motion carried from base to tip: K12 [s; X s] = 0
+K       (6, 6)        K_E: the tip's block of it, with the base held
+X       (6, 6)        rigid motion transferred from base to tip: K12 [s; X s] = 0
 ======  ============  =======================================================
 """
 
@@ -16,12 +16,12 @@ from forcefit.inputs.errors import BadInput
 from stiffness.link import LinkStiffness, check_definite, inverted
 from stiffness.screws import screw_map, skew
 
-_BALANCED = 1e-5  # of its scale: what text of seven digits leaves
-_FARTHEST = 1e6  # [m] of a base from its tip
+_BALANCED = 1e-5  # relative to its scale: residual due to text of seven digits
+_FARTHEST = 1e6  # [m] largest distance of a base from its tip
 
 
 def both_ends(stiffness: ArrayLike, base_from_tip: ArrayLike) -> NDArray:
-    """K12 of a link.
+    """Return K12 of a link.
 
     Args:
         stiffness: (6, 6) K_E at the tip.
@@ -42,20 +42,20 @@ def link_of_both_ends(
     base: ArrayLike | None = None,
     tip: ArrayLike | None = None,
 ) -> LinkStiffness:
-    """The link that a matrix of two interfaces is.
+    """Return the link of a matrix of two interfaces.
 
     Args:
         K12: (12, 12) in SI, in our order.
-        who: whose it is, for messages.
-        base: (3,) [m] its point, None to find it from the matrix.
-        tip: (3,) [m] likewise; both or neither.
+        who: name of the file, for messages.
+        base: (3,) [m] its point, None to compute it from the matrix.
+        tip: (3,) [m] its point; both or neither.
 
     Returns:
-        The link; with points unknown the tip is the origin.
+        The link; if the points are unknown the tip is the origin.
 
     Raises:
-        BadInput: K_E is no stiffness, or the body is held to something else: it has
-            a stiffness against its own rigid motions.
+        BadInput: K_E is no stiffness, or the body is connected to another one: it has a
+            stiffness against its own rigid motions.
     """
     K12 = np.asarray(K12, dtype=float)
     K = K12[6:, 6:]
@@ -90,7 +90,7 @@ def link_of_both_ends(
 def mass_of_both_ends(
     M12: ArrayLike, offset: ArrayLike
 ) -> tuple[float, NDArray, NDArray]:
-    """Mass, its centre and its moments from a mass matrix of two interfaces.
+    """Return the mass, its centre and its moments from a mass matrix of two interfaces.
 
     Args:
         M12: (12, 12) in SI, in our order.
@@ -100,7 +100,7 @@ def mass_of_both_ends(
         [kg], (3,) [m] the centre seen from the tip, (3, 3) [kg m^2] about it.
 
     Raises:
-        BadInput: its mass is not above zero.
+        BadInput: its mass is not positive.
     """
     rigid = np.vstack([screw_map(-np.asarray(offset, dtype=float)), np.eye(6)])
     M = rigid.T @ np.asarray(M12, dtype=float) @ rigid

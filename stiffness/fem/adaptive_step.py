@@ -4,9 +4,9 @@ The error indicator (:mod:`stiffness.fem.error_indicator`) is multiplied by an
 effectivity index: the change of the stiffness in the last refinement over that of the
 indicator.
 
-K_h is an upper bound of the exact stiffness and the error estimate E bounds how far
-above it may be, so that K lies between K_h - E and K_h.  The middle of this interval is
-returned: its error is half as large at most, on the same mesh.
+K_h is an upper bound of the exact stiffness, and the error estimate E bounds the
+difference.  So K lies between K_h - E and K_h.  The middle of this interval is
+returned: its error is at most half as large, on the same mesh.
 """
 
 from collections.abc import Callable, Sequence
@@ -74,7 +74,7 @@ class Level:
     volume_error: float = 0.0
 
     def totals(self) -> tuple[NDArray, NDArray, NDArray]:
-        """(6, 6) the stiffness, its indicated error and the geometry's."""
+        """Return the (6, 6) stiffness, its indicated error and that of the geometry."""
         return (
             self.solution.stiffness,
             self.errors.sum(axis=0),
@@ -89,7 +89,7 @@ def solve_level(
     interface: str,
     check: Callable[[int], None] | None = None,
 ) -> Level:
-    """Stiffness, fields and local error indicators of one mesh.
+    """Return the stiffness, fields and local error indicators of one mesh.
 
     Args:
         solid: straight tetrahedra; those that would be inverted when curved, or that
@@ -97,7 +97,7 @@ def solve_level(
         materials: the first fills the link, later ones where they say.
         centers: (2, 3) [m] of base and tip.
         interface: one of ``KINDS``.
-        check: called with the number of unknowns before they are solved for.
+        check: function called with the number of unknowns before the solution.
 
     Returns:
         The solution on cubic elements with a layer along the singular edges.
@@ -122,13 +122,13 @@ def solve_level(
     indicated = error_matrices(
         mesh, solution.fields, lam, mu, singular, solution.stiffness
     )
-    # at singular edges s_3 is reliable; tractions there overestimate by a factor of 2
+    # at singular edges s_3 is reliable, and tractions overestimate by a factor of 2
     free = np.flatnonzero((mesh.patch > max(ENDS)) & ~singular[mesh.owner])
     residual = np.zeros_like(indicated)
     tractions = traction_errors(mesh, solution.fields, lam, mu, free)
     np.add.at(residual, mesh.owner[free], tractions)
     sizes = 1 / np.diag(solution.stiffness)
-    # two indicators of the same error, inside and at the surface: the larger one
+    # the larger of two indicators of one error, inside and at the surface
     larger = np.einsum("tii,i->t", residual - indicated, sizes) > 0
     indicated[larger] = residual[larger]
     errors, geometry = np.zeros((2, len(solid.cells), 6, 6))
@@ -149,15 +149,16 @@ def solve_level(
 def estimated_error(
     history: Sequence[tuple[NDArray, NDArray, NDArray]],
 ) -> tuple[NDArray, float]:
-    """Error of the last mesh's stiffness: the indicator times an effectivity index.
+    """Estimate the error of the last mesh's stiffness, indicator times effectivity.
 
     Args:
-        history: of each mesh, finest last, the totals of its :class:`Level`.
+        history: totals of the :class:`Level` of each mesh, finest last.
 
     Returns:
-        (6, 6) estimate of K_h minus the exact stiffness but for the geometry, and the
-        effectivity index used, of the worst motion: the change of the stiffness in the
-        last refinement over that of the indicated error, times a safety factor.
+        (6, 6) estimate of K_h minus the exact stiffness, without the geometry's error,
+        and the effectivity index of the worst motion.  This is the change of the
+        stiffness in the last refinement over that of the indicated error, times a
+        safety factor.
     """
     K, indicated, _ = history[-1]
     factors = np.full(6, DEFAULT_EFFECTIVITY)
@@ -167,7 +168,7 @@ def estimated_error(
         effectivity = np.full(6, DEFAULT_EFFECTIVITY)
         np.divide(np.diag(coarse - K), drop, out=effectivity, where=drop > 0)
         factors = SAFETY_FACTOR * np.clip(effectivity, 1.0, 2 * DEFAULT_EFFECTIVITY)
-    # one index for each motion: torsion and bending err in different places
+    # one index per motion, because torsion and bending have errors in different places
     root = np.sqrt(factors)
     estimate = np.outer(root, root) * indicated
     worst = int(np.argmax(np.diag(estimate) / np.diag(K)))
@@ -177,16 +178,16 @@ def estimated_error(
 def middle_stiffness(
     K_h: NDArray, E: NDArray, geometry: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """The middle of the interval in which the exact stiffness lies.
+    """Return the middle of the interval in which the exact stiffness lies.
 
     Args:
-        K_h: (6, 6) of a mesh, an upper bound but for the geometry.
+        K_h: (6, 6) of a mesh, an upper bound except for the geometry.
         E: (6, 6) estimate of its error, positive semidefinite.
         geometry: (6, 6) indicated error of the geometry, of either sign.
 
     Returns:
-        (6, 6) K_h - E / 2, or less of E taken off where the result would not keep at
-        least half of K_h in every motion, and (6, 6) the size of its error.
+        (6, 6) K_h - E / 2, or with less of E subtracted if otherwise less than half of
+        K_h remained in a motion, and (6, 6) the size of its error.
     """
     largest = eigh(scaled(E, K_h), scaled(K_h, K_h), eigvals_only=True)[-1]
     part = 0.5 / max(1.0, largest)
@@ -199,8 +200,8 @@ def refine_level(level: Level, growth: float) -> Solid:
 
     Args:
         level: the mesh to refine.
-        growth: factor on the number of elements, before closure of the mesh by its
-            neighbours (with them it is about its square).
+        growth: factor on the number of elements, before neighbours are bisected for a
+            conforming mesh (with them it is about its square).
 
     Returns:
         The finer mesh.
@@ -213,7 +214,7 @@ def refine_level(level: Level, growth: float) -> Solid:
     shares = np.maximum(shares, 1e-12 * shares.max())
 
     def halvings(limit: float) -> NDArray:
-        # a share falls as h^4 to h^7: by at least 1.5 powers of two a bisection
+        # the error of an element falls as h^4 to h^7: by at least 2^1.5 a bisection
         return np.clip(np.round(np.log2(shares) / 1.5 - limit), 0, 6).astype(int)
 
     low, high = -200.0, 200.0

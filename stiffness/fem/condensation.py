@@ -1,11 +1,11 @@
 """Static condensation of a solid on two interfaces, six degrees of freedom each.
 
-``rigid`` (RBE2): every node of an interface moves with its joint, as when it is bolted
-to something much stiffer.  ``distributing`` (RBE3): the base is held like that, but the
-tip's wrench is spread over its interface as tractions that vary linearly, the interface
-is free to deform, and the tip's screw is the mean motion, the least-squares rigid one
-over the area.  ``distributing-both`` does the same at the base, so that the stiffness
-does not depend on which end is called the tip.  Each is softer than the one before.
+``rigid`` (RBE2): every node of an interface moves with its joint, as if bolted to a
+much stiffer part.  ``distributing`` (RBE3): the base is rigid, but the tip's wrench is
+distributed over its interface as tractions that vary linearly.  The interface is free
+to deform, and the tip's screw is the mean motion: the least-squares rigid motion over
+the area.  ``distributing-both`` does the same at the base, so that the stiffness does
+not depend on which end is the tip.  Each is softer than the one before.
 """
 
 from dataclasses import dataclass, replace
@@ -24,13 +24,13 @@ KINDS = ("rigid", "distributing", "distributing-both")
 
 @dataclass(frozen=True, eq=False)
 class Condensed:
-    """A link's stiffness on one mesh, and the fields behind it.
+    """A link's stiffness on one mesh, and its displacement fields.
 
     Attributes:
         stiffness: (6, 6) at the tip's centre, base held.
         fields: (n, 3, 6) [m] displacements for unit screws of the tip.
         unknowns: size of the system that was solved.
-        kind: of the interfaces, one of ``KINDS``.
+        kind: kind of the interfaces, one of ``KINDS``.
     """
 
     stiffness: NDArray
@@ -46,14 +46,14 @@ def condense(
     centers: NDArray,
     kind: str = "rigid",
 ) -> Condensed:
-    """Stiffness of a meshed link.
+    """Return the stiffness of a meshed link.
 
     Args:
         mesh: the tetrahedra; patch 0 is the base, 1 the tip.
         lam: (t,) [Pa] Lame's first constant.
         mu: (t,) [Pa] shear modulus.
         centers: (2, 3) [m] centres of base and tip.
-        kind: of the interfaces, one of ``KINDS``.
+        kind: kind of the interfaces, one of ``KINDS``.
 
     Returns:
         The stiffness and its fields.
@@ -67,7 +67,7 @@ def condense(
 
 
 def rigid_motions(points: NDArray, center: NDArray) -> NDArray:
-    """Displacements of points for unit screws at a centre.
+    """Return the displacements of points for unit screws at a centre.
 
     Args:
         points: (n, 3) [m].
@@ -81,12 +81,12 @@ def rigid_motions(points: NDArray, center: NDArray) -> NDArray:
 
 
 def _product(upper: csr_array, fields: NDArray) -> NDArray:
-    """K times fields, from K's upper triangle."""
+    """Return the product of K and fields, from K's upper triangle."""
     return upper @ fields + upper.T @ fields - upper.diagonal()[:, None] * fields
 
 
 def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
-    """Base nodes fixed, tip nodes moved by six unit screws."""
+    """Return the solution with base nodes fixed and tip nodes moved by unit screws."""
     fields = np.zeros((len(mesh.nodes), 3, 6))
     base = np.unique(mesh.faces[mesh.patch == 0])
     tip = np.unique(mesh.faces[mesh.patch == 1])
@@ -97,7 +97,7 @@ def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
     flat = fields.reshape(-1, 6)
     loads = -_product(upper, flat)[free]
     flat[free] = solve(upper[free][:, free], loads)
-    # energy of the fields: errors of the solution enter squared
+    # energy of the fields, in which errors of the solution are squared
     K = flat.T @ _product(upper, flat)
     return Condensed((K + K.T) / 2, fields, int(free.sum()))
 
@@ -105,7 +105,7 @@ def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
 def _distributing_tip(
     mesh: Elements, upper: csr_array, tip_center: NDArray
 ) -> Condensed:
-    """Base nodes fixed; wrenches distributed at the tip, its mean motion read."""
+    """Return the solution with base nodes fixed and wrenches distributed at the tip."""
     flat = _distributed_loads(mesh, 1, tip_center).reshape(-1, 6)
     free = np.ones(len(mesh.nodes), dtype=bool)
     free[np.unique(mesh.faces[mesh.patch == 0])] = False
@@ -114,7 +114,7 @@ def _distributing_tip(
 
 
 def _distributing_both(mesh: Elements, upper: csr_array, centers: NDArray) -> Condensed:
-    """Wrenches distributed at the tip, balanced at the base; mean motions read."""
+    """Return the solution with wrenches distributed at the tip and at the base."""
     base, tip = (_distributed_loads(mesh, k, centers[k]) for k in (0, 1))
     # unit wrenches at the tip and their reactions at the base
     to_base = screw_map(centers[0] - centers[1])
@@ -123,12 +123,12 @@ def _distributing_both(mesh: Elements, upper: csr_array, centers: NDArray) -> Co
     supports = _isostatic_supports(mesh)
     free = np.ones(len(flat), dtype=bool)
     free[supports] = False
-    # the tip's mean motion relative to the base's: the supports have no reactions
+    # the tip's mean motion relative to the base's; the supports have no reactions
     return _from_loads(upper, flat, free)
 
 
 def _from_loads(upper: csr_array, loads: NDArray, free: NDArray) -> Condensed:
-    """Stiffness from the work of six load cases on each other's displacements."""
+    """Return the stiffness from the work of six load cases on all displacements."""
     u = np.zeros_like(loads)
     u[free] = solve(upper[free][:, free], loads[free])
     C = loads.T @ u
@@ -138,7 +138,7 @@ def _from_loads(upper: csr_array, loads: NDArray, free: NDArray) -> Condensed:
 
 
 def _distributed_loads(mesh: Elements, patch: int, center: NDArray) -> NDArray:
-    """(n, 3, 6) nodal loads of unit wrenches; transposed, the mean of a field."""
+    """Return (n, 3, 6) nodal loads of unit wrenches; transposed, mean motions."""
     faces = mesh.faces[mesh.patch == patch]
     nodes, index = np.unique(faces, return_inverse=True)
     index = index.reshape(faces.shape)
@@ -155,7 +155,7 @@ def _distributed_loads(mesh: Elements, patch: int, center: NDArray) -> NDArray:
 
 
 def _isostatic_supports(mesh: Elements) -> NDArray:
-    """(6,) fixed unknowns of an isostatic support, at three nodes far apart."""
+    """Return (6,) fixed unknowns of an isostatic support, at three nodes far apart."""
     points = mesh.nodes
     first = int(np.argmin(points @ [1.0, 0.3, 0.1]))
     apart = np.linalg.norm(points - points[first], axis=1)
@@ -164,7 +164,8 @@ def _isostatic_supports(mesh: Elements) -> NDArray:
     off = np.linalg.norm(np.cross(points - points[first], line), axis=1)
     third = int(np.argmax(off))
     normal = np.abs(np.cross(points[third] - points[first], line))
-    # the second node is free along the line to it, the third fixed across the plane
+    # the second node is free along the line from the first to it; the third is fixed
+    # only across the plane of the three
     second_fixed = [3 * second + d for d in range(3) if d != np.argmax(np.abs(line))]
     third_fixed = 3 * third + int(np.argmax(normal))
     return np.array([*(3 * first + d for d in range(3)), *second_fixed, third_fixed])

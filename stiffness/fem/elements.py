@@ -8,11 +8,11 @@ G      their gradients in space                                   (t, q, m, 3)
 w      quadrature weights times the Jacobian's determinant        (t, q)
 ====== ========================================================== ==========
 
-An element's m nodes are its lattice's (:mod:`stiffness.mesh.lagrange`): 20 in a cubic
-tetrahedron, 10 in a quadratic one.  The stiffness is assembled from the scalar
-gradients, all elements at once, much faster than from a weak form:
-K[ai, bj] = sum_q w (lam G_ai G_bj + mu G_aj G_bi + mu d_ij G_a . G_b).
-Straight tetrahedra are integrated exactly; curved ones two degrees beyond.
+An element's m nodes are those of its lattice (:mod:`stiffness.mesh.lagrange`): 20 in a
+cubic tetrahedron, 10 in a quadratic one.  The stiffness is assembled from the scalar
+gradients of all elements together, much faster than from a weak form: K[ai, bj] = sum_q
+w (lam G_ai G_bj + mu G_aj G_bi + mu d_ij G_a . G_b). Straight tetrahedra are integrated
+exactly; curved ones with two more degrees.
 """
 
 from collections.abc import Iterator
@@ -35,10 +35,11 @@ from stiffness.mesh.lagrange import (
 from stiffness.mesh.quadrature import quadrature
 from stiffness.mesh.solid import Solid
 
-ORDER = 3  # cubic: quadratic elements need several times the unknowns for 0.1 %
+# cubic: quadratic elements need several times the unknowns for an error of 0.1 %
+ORDER = 3
 # derivatives of the barycentric coordinates by the reference element's
 _COORDINATES = np.vstack([-np.ones(3), np.eye(3)])
-_CHUNK = 3_600_000  # numbers of the elements' matrices at a time, 30 MB
+_CHUNK = 3_600_000  # numbers of the elements' matrices per chunk, 30 MB
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +47,12 @@ class Elements:
     """A solid's isoparametric tetrahedra.
 
     Attributes:
-        order: of the polynomials, 2 or 3.
+        order: order of the polynomials, 2 or 3.
         nodes: (n, 3) [m] corners first; those of the boundary on the exact shapes.
         cells: (t, m) nodes of each tetrahedron.
         faces: (f, k) nodes of each boundary triangle.
         patch: (f,) number of each face's patch; 0 is the base interface, 1 the tip.
-        owner: (f,) the tetrahedron each boundary triangle belongs to.
+        owner: (f,) tetrahedron of each boundary triangle.
         curved: (t,) whether the tetrahedron is curved.
     """
 
@@ -65,11 +66,11 @@ class Elements:
 
 
 class Chunk(NamedTuple):
-    """Some elements and their quadrature.
+    """A chunk of elements and their quadrature.
 
     Attributes:
         part: (c,) indices of the elements.
-        L: (q, 4) barycentric coordinates of the quadrature's points.
+        L: (q, 4) barycentric coordinates of the quadrature points.
         weights: (q,) on the reference element.
         N: (q, m) shape functions.
         G: (c, q, m, 3) [1/m] their gradients in space.
@@ -87,12 +88,12 @@ class Chunk(NamedTuple):
 def isoparametric(
     solid: Solid, order: int = ORDER, parts: Parts | None = None
 ) -> Elements:
-    """Elements whose boundary nodes lie on the exact shapes.
+    """Return the elements whose boundary nodes lie on the exact shapes.
 
     Args:
         solid: the straight tetrahedra.
-        order: of the polynomials, 2 or 3.
-        parts: of the tetrahedra, which become the elements.
+        order: order of the polynomials, 2 or 3.
+        parts: pieces of the tetrahedra, which become the elements.
 
     Returns:
         The elements.
@@ -101,7 +102,7 @@ def isoparametric(
     cells, count = numbered(parts.corners, order)
     nodes = np.zeros((count, 3))
     L = (lattice(order) / order) @ parts.places
-    # there are few different cuts: all parts of one cut at once
+    # there are few different cuts: all parts with the same cut are treated together
     cuts = parts.places.reshape(len(L), 16)
     _, first, cut = np.unique(cuts, axis=0, return_index=True, return_inverse=True)
     for k, example in enumerate(first):
@@ -109,7 +110,7 @@ def isoparametric(
         N, _ = shape_functions(order, L[example])
         corners = whole.nodes[whole.cells[parts.parent[members]]]
         nodes[cells[members]] = np.einsum("na,tax->tnx", N, corners)
-    # a part's face is on the boundary if it lies in a face there of its tetrahedron
+    # a part's face is on the boundary if it lies in a boundary face of its tetrahedron
     faces, patch, owner = [], [], []
     for side, on in zip(FACES, face_nodes(order), strict=True):
         for other, missing in enumerate((3, 2, 1, 0)):
@@ -131,11 +132,11 @@ def isoparametric(
 
 
 def integration(mesh: Elements, some: NDArray | None = None) -> Iterator[Chunk]:
-    """Quadrature of the elements, in chunks.
+    """Yield the quadrature of the elements, in chunks.
 
     Args:
         mesh: the tetrahedra.
-        some: (t,) which of them; all if absent.
+        some: (t,) bool, the elements chosen; all if absent.
 
     Yields:
         A :class:`Chunk`.
@@ -154,7 +155,7 @@ def integration(mesh: Elements, some: NDArray | None = None) -> Iterator[Chunk]:
 
 
 def _chunks(members: NDArray, nodes: int) -> Iterator[NDArray]:
-    """Groups of elements whose matrices fit the memory of a chunk."""
+    """Yield groups of elements whose matrices fit the memory of a chunk."""
     step = max(1, _CHUNK // (9 * nodes**2))
     for first in range(0, len(members), step):
         yield members[first : first + step]
@@ -163,15 +164,15 @@ def _chunks(members: NDArray, nodes: int) -> Iterator[NDArray]:
 def gradients_on_faces(
     mesh: Elements, faces: NDArray
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Quadrature of stresses over boundary triangles.
+    """Return the quadrature of stresses over boundary triangles.
 
     Args:
         mesh: the tetrahedra.
         faces: (f,) indices of boundary triangles.
 
     Returns:
-        Places (f, q, 3) [m], outward normals (f, q, 3), weights (f, q) [m^2], and
-        gradients (f, q, m, 3) [1/m] of the owners' shape functions.
+        Positions (f, q, 3) [m], outward normals (f, q, 3), weights (f, q) [m^2], and
+            gradients (f, q, m, 3) [1/m] of the owners' shape functions.
     """
     N, area = _face_vectors(mesh, mesh.faces[faces])
     size = np.linalg.norm(area, axis=2)
@@ -187,7 +188,8 @@ def gradients_on_faces(
         slope = shape_functions(mesh.order, L)[1]
         inverse = np.linalg.inv(_jacobians(slope, mesh.nodes[cells[members]]))
         G[members] = slope @ inverse
-        # the coordinate of the corner opposite grows inward, however bent the element
+        # the coordinate of the opposite corner increases inward, also in curved
+        # elements
         (opposite,) = set(range(4)) - set(side)
         inward[members] = _COORDINATES[opposite] @ inverse
     outward = -np.sign(np.einsum("tqx,tqx->tq", area, inward))
@@ -195,7 +197,7 @@ def gradients_on_faces(
 
 
 def _jacobians(dN: NDArray, corners: NDArray) -> NDArray:
-    """(c, q, 3, 3) derivatives of the place, reference coordinates first."""
+    """Return the (c, q, 3, 3) derivatives of position, reference coordinates first."""
     q, m, _ = dN.shape
     flat = dN.transpose(0, 2, 1).reshape(3 * q, m) @ corners
     return np.asarray(flat.reshape(len(corners), q, 3, 3)).swapaxes(2, 3)
@@ -204,11 +206,11 @@ def _jacobians(dN: NDArray, corners: NDArray) -> NDArray:
 def node_gradients(
     mesh: Elements, members: NDArray | None = None
 ) -> Iterator[tuple[NDArray, NDArray]]:
-    """Gradients of the shape functions at the nodes of each element.
+    """Yield gradients of the shape functions at the nodes of each element.
 
     Args:
         mesh: the tetrahedra.
-        members: (c,) indices of those that count; all if absent.
+        members: (c,) indices of the elements; all if absent.
 
     Yields:
         Indices (c,) of elements and gradients (c, m, m, 3) [1/m]: node, function,
@@ -221,10 +223,10 @@ def node_gradients(
 
 
 def triangle_areas(mesh: Elements, faces: NDArray) -> tuple[NDArray, NDArray]:
-    """Quadrature over curved triangles.
+    """Return the quadrature over curved triangles.
 
     Args:
-        mesh: whose nodes they have.
+        mesh: the mesh with the triangles' nodes.
         faces: (f, k) nodes of triangles.
 
     Returns:
@@ -235,17 +237,17 @@ def triangle_areas(mesh: Elements, faces: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _face_vectors(mesh: Elements, faces: NDArray) -> tuple[NDArray, NDArray]:
-    """Shape functions (q, k) and weights (f, q, 3) [m^2] along the normals."""
+    """Return shape functions (q, k) and weights (f, q, 3) [m^2] along the normals."""
     N, dN, weights = triangle_rule(mesh.order)
     J = np.einsum("qai,tax->tqix", dN, mesh.nodes[faces])
     return N, np.cross(J[:, :, 0], J[:, :, 1]) * weights[:, None]
 
 
 def triangle_rule(order: int) -> tuple[NDArray, NDArray, NDArray]:
-    """Quadrature on a triangle that integrates products of two shape functions.
+    """Return a quadrature on a triangle, exact for products of two shape functions.
 
     Args:
-        order: of the polynomials.
+        order: order of the polynomials.
 
     Returns:
         Shape functions (q, k), their gradients (q, k, 2) and weights (q,).
@@ -256,7 +258,7 @@ def triangle_rule(order: int) -> tuple[NDArray, NDArray, NDArray]:
 
 
 def lame(E: float, nu: float) -> tuple[float, float]:
-    """Lame's constants.
+    """Return Lame's constants.
 
     Args:
         E: [Pa] Young's modulus.
@@ -269,7 +271,7 @@ def lame(E: float, nu: float) -> tuple[float, float]:
 
 
 def assemble(mesh: Elements, lam: NDArray, mu: NDArray) -> csr_array:
-    """The stiffness of all elements together.
+    """Return the stiffness of all elements together.
 
     Args:
         mesh: the tetrahedra.
@@ -300,7 +302,7 @@ def assemble(mesh: Elements, lam: NDArray, mu: NDArray) -> csr_array:
 def _node_blocks(
     mesh: Elements, lam: NDArray, mu: NDArray, a: NDArray, b: NDArray
 ) -> Iterator[tuple[NDArray, NDArray]]:
-    """Indices (c,) of elements and stiffness (c, 9, p) of pairs a, b (p,) of nodes."""
+    """Yield indices (c,) of elements and stiffness (c, 9, p) of pairs a, b of nodes."""
     L, weights = quadrature(2 * (mesh.order - 1))
     _, dN = shape_functions(mesh.order, L)
     # integrals of products of derivatives in a straight element's own coordinates
@@ -321,7 +323,7 @@ def _node_blocks(
 
 
 def _hooke(S: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
-    """(c, 9, p) lam S_ij + mu S_ji + mu d_ij S_kk of S (c, 3, 3, p)."""
+    """Return the (c, 9, p) lam S_ij + mu S_ji + mu d_ij S_kk of S (c, 3, 3, p)."""
     m = mu[:, None, None, None]
     block = lam[:, None, None, None] * S + m * S.swapaxes(1, 2)
     block[:, range(3), range(3)] += m[:, 0] * np.trace(S, axis1=1, axis2=2)[:, None]
@@ -329,7 +331,7 @@ def _hooke(S: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
 
 
 def _upper(values: NDArray, row: NDArray, column: NDArray, count: int) -> csr_array:
-    """The upper triangle from blocks (9, k) of nodes' pairs, row by row in order."""
+    """Return the upper triangle from blocks (9, k) of nodes' pairs, row by row."""
     start = np.searchsorted(row, np.arange(count + 1))
     width = np.diff(start)
     # a node's own block comes first: its second row lacks one entry, its third two

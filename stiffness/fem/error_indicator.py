@@ -2,19 +2,18 @@ r"""A posteriori error indicator of a finite element stiffness, element by eleme
 
 The stiffness of cubic elements is too large by the energy of the discretisation error.
 Their stresses are quadratic.  In every element they are split into the best linear part
-and a remainder, and the linear part into its mean and a remainder: s_3 and s_2 are the
-energies of the two remainders.  If an error e falls with the polynomial degree p as
-p^-b, the decay s_3 / s_2 = (e_2 - e_3) / (e_1 - e_2) determines b, and with it the
-ratio e_3 / (e_2 - e_3) of the remaining error to s_3: zero where the field is smooth,
-one and more where it is not.  Elements on a singular edge are always of the second
-kind; 1.2 s_3 is taken there.
+and a remainder, and the linear part into its mean and a remainder.  s_3 and s_2 are the
+energies of these two remainders.  If an error e falls with the polynomial degree p as
+p^-b, the decay s_3 / s_2 = (e_2 - e_3) / (e_1 - e_2) determines b.  With b follows the
+ratio e_3 / (e_2 - e_3) of the remaining error to s_3: nearly zero in a smooth field,
+one and more otherwise.  For elements on a singular edge it is set to 1.2.
 
 At the free edge of a twisted plate the stresses change direction within a boundary
-layer of a third of the wall.  An element much wider than the wall does not resolve it,
-and s_2, dominated by the plate's linear stresses, makes the field look smooth.  But
-residual tractions t remain on the free surface.  They are balanced by a surface wave of
-half wavelength l, the smallest height of the face, that decays as exp(-pi x / l): its
-energy, the integral of t^2 / (2 mu) l / pi, is taken where it is the larger one.
+layer of a third of the wall.  An element much wider than the wall does not resolve it.
+There s_2, dominated by the plate's linear stresses, makes the field look smooth, but
+residual tractions t remain on the free surface.  A surface wave of half wavelength l,
+the smallest height of the face, balances them and decays as exp(-pi x / l).  Its
+energy, the integral of t^2 / (2 mu) l / pi, is used if it is larger.
 
 The indicator does not contain the error of the geometry, the distance of curved
 elements from their shapes: see :func:`geometry_errors`.
@@ -36,8 +35,9 @@ from stiffness.surface.true_surface import TrueSurface
 
 VOIGT = np.array([[0, 0], [1, 1], [2, 2], [1, 2], [0, 2], [0, 1]])
 _SAME_MODULUS = 1e-6  # relative difference
-_CHUNK = 1024  # faces at a time
-_SINGULAR_SHARE = 1.2  # e_3 / s_3 at a singular edge, set by the links of meshes/
+_CHUNK = 1024  # number of faces per chunk
+# e_3 / s_3 at a singular edge, calibrated on the links of meshes/
+_SINGULAR_SHARE = 1.2
 # remaining error over s_3 as a function of s_3 / s_2, for rates from p^-0.1 to p^-40
 _RATES = np.geomspace(40.0, 0.1, 400)
 _DECAY = (2**-_RATES - 3**-_RATES) / (1 - 2**-_RATES)
@@ -52,7 +52,7 @@ def error_matrices(
     singular: NDArray,
     stiffness: NDArray,
 ) -> NDArray:
-    """Estimated error of the stiffness, element by element.
+    """Return the estimated error of the stiffness, element by element.
 
     Args:
         mesh: cubic tetrahedra.
@@ -60,7 +60,8 @@ def error_matrices(
         lam: (t,) [Pa] Lame's first constant.
         mu: (t,) [Pa] shear modulus.
         singular: (t,) whether an element touches a singular edge.
-        stiffness: (k, k) of the cases, by which their energies are compared.
+        stiffness: (k, k) stiffness of the unit cases, which makes their energies
+            comparable.
 
     Returns:
         (t, k, k) [unit of the stiffness]; their sum estimates K_h - K.
@@ -89,7 +90,7 @@ def error_matrices(
 def traction_errors(
     mesh: Elements, fields: NDArray, lam: NDArray, mu: NDArray, free: NDArray
 ) -> NDArray:
-    """Energies of the fields that balance residual tractions on free faces.
+    """Return the energies of the fields that balance residual tractions on free faces.
 
     Args:
         mesh: the tetrahedra.
@@ -119,7 +120,7 @@ def traction_errors(
 
 
 def _smallest_height(mesh: Elements, faces: NDArray) -> NDArray:
-    """(f,) [m] the smaller of triangles' heights and their elements' depths."""
+    """Return the (f,) [m] smaller of triangles' heights and their elements' depths."""
     a, b, c = np.moveaxis(mesh.nodes[mesh.faces[faces, :3]], 1, 0)
     across = np.cross(b - a, c - a)
     twice = np.linalg.norm(across, axis=1)
@@ -138,20 +139,21 @@ def geometry_errors(
     mu: NDArray,
     surface: TrueSurface | None = None,
 ) -> NDArray:
-    """Error of the stiffness because elements deviate from the exact shapes.
+    """Return the error of the stiffness because elements deviate from the exact shapes.
 
     Args:
         mesh: the tetrahedra.
-        shapes: of the patches.
+        shapes: shapes of the patches.
         fields: (n, 3, k) [m] displacements of the unit cases.
         lam: (t,) [Pa] Lame's first constant.
         mu: (t,) [Pa] shear modulus.
-        surface: by which patches are judged that meet others smoothly: an element may
-            lie across their border; if absent, each face by its own patch's shape.
+        surface: surface for patches that meet others smoothly, since an element may lie
+            across their border; if absent, each face is compared with its own patch's
+            shape.
 
     Returns:
-        (f, k, k) [unit of the stiffness] each boundary triangle's share, the energy
-        density times the thickness of what is outside the shape; to first order.
+        (f, k, k) [unit of the stiffness] share of each boundary triangle: the energy
+        density times the distance to the shape, to first order.
 
     Sources:
         Hadamard (1908): the energy's derivative when a free surface moves.
@@ -191,7 +193,7 @@ def material_errors(
     mu: NDArray,
     shear_at: Callable[[NDArray], NDArray],
 ) -> NDArray:
-    """Error of the stiffness because elements lie across a face between materials.
+    """Return the error of the stiffness by elements across a face between materials.
 
     Args:
         mesh: the tetrahedra.
@@ -202,7 +204,7 @@ def material_errors(
 
     Returns:
         (t, k, k) [unit of the stiffness] positive where an element is too stiff: the
-        energy of what is of another material, times the ratio of the moduli.
+        energy of its part in another material, times the ratio of the moduli.
     """
     cases = fields.shape[2]
     errors = np.zeros((len(mesh.cells), cases, cases))
@@ -210,7 +212,7 @@ def material_errors(
         places = np.einsum("qa,tax->tqx", N, mesh.nodes[mesh.cells[part]])
         own = mu[part][:, None]
         true = shear_at(places.reshape(-1, 3)).reshape(w.shape)
-        # tractions go on across the face: what is softer has the more energy there
+        # tractions are continuous across the face; the softer side has more energy
         ratio = np.maximum(own / true, true / own)
         sign = np.where(own > true, 1.0, -1.0) * (np.abs(ratio - 1) > _SAME_MODULUS)
         some = np.flatnonzero(sign.any(axis=1))
@@ -224,7 +226,7 @@ def material_errors(
 
 
 def _energy_roots(G: NDArray, u: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
-    """(c, q, k, 7) stresses whose products are energies: six deviatoric, one bulk."""
+    """Return (c, q, k, 7) stresses whose products are energies: deviatoric and bulk."""
     count, points, nodes, _ = G.shape
     cases = u.shape[3]
     slope = u.transpose(0, 3, 2, 1).reshape(count, 1, 3 * cases, nodes) @ G
@@ -240,7 +242,7 @@ def _energy_roots(G: NDArray, u: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
 
 
 def _energy_products(roots: NDArray, w: NDArray) -> NDArray:
-    """(c, k, k) integrals of products of energy roots, case by case."""
+    """Return the (c, k, k) integrals of products of energy roots, case by case."""
     count, _, cases, _ = roots.shape
     flat = (
         (roots * np.sqrt(w)[:, :, None, None]).swapaxes(1, 2).reshape(count, cases, -1)

@@ -1,8 +1,8 @@
 """A link's stiffness from its surface, by finite elements, with its error.
 
-The surface becomes tetrahedra, the tetrahedra a stiffness and an estimate of its error
-(:mod:`stiffness.fem.adaptive_step`); elements that contribute most are refined until
-the asked accuracy is reached or the budget is used.
+A surface is meshed into tetrahedra, and these yield a stiffness and an estimate of its
+error (:mod:`stiffness.fem.adaptive_step`).  The elements that contribute most are
+refined until the required accuracy is reached or the budget is used.
 """
 
 import logging
@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, describe, nearest
+from forcefit.results.display import html_table, short_repr
 from stiffness.fem.adaptive_step import (
     Level,
     estimated_error,
@@ -48,18 +48,18 @@ from stiffness.surface.patches import (
 from stiffness.surface.surface import Surface, read_surface
 
 _LOG = logging.getLogger(__name__)
-_SETUP = 2.0  # [s] of a solution that do not grow with its mesh
-_MESHER = 0.6  # of the budget's seconds are the mesher's, the others the solver's
+_SETUP = 2.0  # [s] time of a solution that does not depend on its mesh
+_MESHER = 0.6  # share of the budget's seconds for the mesher; the solver has the others
 
 
 @dataclass(frozen=True)
 class Budget:
-    """What a solution may cost.
+    """Limits of the cost of a solution.
 
     Attributes:
         seconds: [s] after which no finer mesh is begun.
-        unknowns: [1] of the largest system; memory grows with it.
-        levels: [1] meshes at most, the first included.
+        unknowns: [-] of the largest system; the memory grows with it.
+        levels: [-] largest number of meshes, with the first.
     """
 
     seconds: float = 300.0
@@ -69,13 +69,13 @@ class Budget:
 
 @dataclass(frozen=True)
 class FemOptions:
-    """How exactly a link is solved, held by which interfaces, at what cost.
+    """Options of the solution of a link: accuracy, interfaces, cost.
 
     Attributes:
-        accuracy: [1] wanted largest error, entries scaled by sqrt(K_ii K_jj).
+        accuracy: [-] required largest error, entries scaled by sqrt(K_ii K_jj).
         interface: ``"rigid"``, ``"distributing"`` (the tip) or ``"distributing-both"``,
             see :mod:`stiffness.fem.condensation`.
-        budget: what it may cost.
+        budget: limits of the cost.
         cache: folder of meshes; the user's cache if absent.
     """
 
@@ -104,8 +104,8 @@ class MeshedLink:
 
     Attributes:
         link: the stiffness, with error, mesh report, mass.
-        level: the finest mesh, its own stiffness, fields and materials.
-        centers: (2, 3) [m] of the base and the tip interface.
+        level: the finest mesh, its stiffness, fields and materials.
+        centers: (2, 3) [m] centres of the base and the tip interface.
     """
 
     link: LinkStiffness
@@ -124,22 +124,22 @@ def mesh_link(
     unit: str = "m",
     options: FemOptions = _STANDARD,
 ) -> LinkStiffness:
-    """Stiffness of a link of one material, from a surface file.
+    """Return the stiffness of a link of one material, from a surface file.
 
     Args:
         surface: file of the closed surface (STL, OBJ, PLY, VTK, MSH, STEP).
         base: the held interface, in metres, in the surface's axes.
         tip: the interface that moves.
-        material: of the link; without a density mass and inertia are left out.
-        unit: of the surface file's coordinates.
-        options: how it is solved.
+        material: material of the link; without a density mass and inertia are left out.
+        unit: unit of the surface file's coordinates.
+        options: options of the solution.
 
     Returns:
         The stiffness at the tip's centre, in the surface's axes; its ``mesh`` says
-        whether the asked accuracy was ``reached``.
+        whether the required accuracy was ``reached``.
 
     Raises:
-        BadInput: the file or an interface is not proper.
+        BadInput: the file or an interface is invalid.
 
     Sources:
         Rivara (1984) for the bisection; :mod:`stiffness.fem.error_indicator` for the
@@ -158,23 +158,23 @@ def solve_link(
     options: FemOptions = _STANDARD,
     point_masses: Sequence[PointMass] = (),
 ) -> MeshedLink:
-    """Solve a link to an asked accuracy.
+    """Solve a link to a required accuracy.
 
     Args:
-        surface: of the link.
+        surface: surface of the link.
         base: the held interface.
         tip: the interface that moves.
-        materials: the first fills the link, later ones where they say; or one for each
-            solid of a STEP file.
-        options: how it is solved.
+        materials: the first fills the link, later ones fill their regions; or one for
+            each solid of a STEP file.
+        options: options of the solution.
         point_masses: added to mass, centre and inertia.
 
     Returns:
         The link and its finest mesh.
 
     Raises:
-        BadInput: an interface is not proper, the two share an edge, there is no
-            material, or a solid that has one does not exist.
+        BadInput: an interface is invalid, the two share an edge, there is no material,
+            or a solid with a material does not exist.
     """
     start, busy = time.monotonic(), _processor_seconds()
     check_materials(materials)
@@ -200,13 +200,13 @@ def solve_link(
 def solve_bar(
     section: Mapping[str, float], material: Material, options: FemOptions = _STANDARD
 ) -> MeshedLink:
-    """Solve a straight bar of unit length along z to an asked accuracy.
+    """Solve a straight bar of unit length along z to a required accuracy.
 
     Args:
-        section: its lengths over the bar's, see
+        section: its lengths relative to the bar's, see
             :func:`stiffness.mesh.straight_bar.straight_bar`.
-        material: of the bar.
-        options: how it is solved; no mesher runs.
+        material: material of the bar.
+        options: options of the solution; no mesher runs.
 
     Returns:
         The bar and its finest mesh; base at z = 0, tip at z = 1, its section's y and z
@@ -226,18 +226,18 @@ def _refined(
     start: float,
     pace: float = 1.0,
 ) -> tuple[Level, NDArray, NDArray, dict[str, Any]]:
-    """Solve on ever finer meshes until the error is small enough, or the budget used.
+    """Solve on finer meshes until the error is small enough, or the budget used.
 
     Args:
         first: the mesh to begin with.
-        materials: the first fills the link, later ones where they say.
+        materials: the first fills the link, later ones fill their regions.
         centers: (2, 3) [m] of the base and the tip interface.
-        options: how it is solved.
-        start: [s] since when the budget's seconds count.
-        pace: [1] how much slower than alone this machine is now.
+        options: options of the solution.
+        start: [s] time from which the budget's seconds count.
+        pace: [-] present slowness of this machine, relative to an idle one.
 
     Returns:
-        The finest mesh, the (6, 6) stiffness, the size of its error, what it took.
+        The finest mesh, the (6, 6) stiffness, the size of its error, the cost.
     """
     accuracy, interface, budget = options.accuracy, options.interface, options.budget
     begun = time.monotonic()
@@ -250,7 +250,8 @@ def _refined(
     while True:
         E, factor = estimated_error(history)
         K, error = middle_stiffness(history[-1][0], E, history[-1][2])
-        # a volume that is off by a share may be off in K by as much, in every motion
+        # a relative volume error may cause the same relative error of K, in every
+        # motion
         error = error + level.volume_error * np.diag(np.diag(K))
         worst = float(np.abs(scaled(error, K)).max())
         _LOG.info("%d unknowns, error %.2g", level.solution.unknowns, worst)
@@ -280,11 +281,11 @@ def _refined(
 
 
 def interface_center(surface: Surface, interface: Interface, name: str) -> NDArray:
-    """Where an interface's screws are read.
+    """Return the point at which an interface's screws are read.
 
     Args:
-        surface: of the link.
-        interface: on it.
+        surface: surface of the link.
+        interface: interface of the link.
         name: base or tip, for messages.
 
     Returns:
@@ -299,7 +300,7 @@ def interface_center(surface: Surface, interface: Interface, name: str) -> NDArr
     areas = np.linalg.norm(surface.normals()[members], axis=1)
     corners = surface.points[surface.triangles[members]]
     center = np.average(corners.mean(axis=1), axis=0, weights=areas)
-    # single precision of STL: exactly onto the plane that was asked for
+    # single precision of STL: exactly onto the requested plane
     height = (center - interface.point) @ interface.direction
     center = center - height * interface.direction
     return np.where(np.abs(center) < 1e-12 * surface.diagonal, 0.0, center)
@@ -312,10 +313,10 @@ def first_mesh(
     budget: Budget,
     cache: Path | str | None = None,
 ) -> Solid:
-    """A coarse mesh to refine from, fine enough for the part's walls.
+    """Return a coarse mesh to refine from, fine enough for the part's walls.
 
     Args:
-        surface: of the link.
+        surface: surface of the link.
         base: the held interface.
         tip: the interface that moves.
         budget: its seconds limit the mesher.
@@ -326,7 +327,7 @@ def first_mesh(
 
     Raises:
         BadInput: an interface has no part of the surface.
-        MeshFailed: three tries gave nothing usable, or the time is up.
+        MeshFailed: three attempts gave no usable mesh, or the time is up.
     """
     wall = 2 * surface.volume / surface.area / surface.diagonal
     envelope, edge = min(2e-3, wall / 8), 0.1 * surface.diagonal
@@ -334,7 +335,7 @@ def first_mesh(
     start = time.monotonic()
     if (bar := slender_bar(surface, base, tip)) is not None:
         return bar
-    patches = find_patches(surface, base, tip)  # 3 s for a part with 70 of them
+    patches = find_patches(surface, base, tip)  # 3 s for a part with 70 patches
 
     def mesh(share: float) -> Solid:
         left = budget.seconds - (time.monotonic() - start)
@@ -360,18 +361,18 @@ def first_mesh(
 
 
 def _pace(unknowns: int, seconds: float) -> float:
-    """How much slower than expected a mesh was solved; at least 1."""
+    """Return the slowness of a solution relative to the expected cost; at least 1."""
     return max(1.0, (seconds - _SETUP) / expected_cost(unknowns)[1])
 
 
 def _processor_seconds() -> float:
-    """[s] of this process and of those it has waited for."""
+    """Return the processor time [s] of this process and of finished child processes."""
     return sum(os.times()[:4])
 
 
 def _pace_so_far(elapsed: float, busy: float) -> float:
-    """How much slower than alone work was, by its processor time; at least 1."""
-    # what takes a moment only says little; Windows does not count the mesher's time
+    """Return elapsed over processor time, at least 1."""
+    # short times are unreliable; Windows does not count the mesher's time
     if elapsed < _SETUP or os.name == "nt":
         return 1.0
     return max(1.0, elapsed / max(busy, 0.1 * elapsed))
@@ -380,7 +381,7 @@ def _pace_so_far(elapsed: float, busy: float) -> float:
 def _refuse_cost(
     unknowns: int, budget: Budget, spent: float, pace: float = 1.0
 ) -> None:
-    """Refuse a first mesh whose solution the budget does not allow."""
+    """Reject a first mesh whose solution the budget does not allow."""
     memory, seconds = expected_cost(unknowns)
     seconds *= pace
     if unknowns > budget.unknowns or spent + seconds > budget.seconds:
@@ -395,7 +396,7 @@ def _refuse_cost(
 def _wanted_growth(
     history: Sequence[tuple[NDArray, ...]], sizes: Sequence[int], excess: float
 ) -> float:
-    """Factor on the number of elements that should reduce the error by an excess."""
+    """Return the factor on the number of elements that divides the error by excess."""
     rate = 1.3  # of convergence in the number of elements; 2 for a smooth field
     if len(history) > 1:
         before, now = (np.max(np.diag(e) / np.diag(K)) for K, e, _ in history[-2:])
@@ -407,7 +408,7 @@ def _wanted_growth(
 def _affordable_mesh(
     level: Level, growth: float, budget: Budget, start: float, pace: float = 1.0
 ) -> Solid | None:
-    """A finer mesh within the budget, its number of elements grown as wanted."""
+    """Return a finer mesh within the budget, with the wanted growth of elements."""
     part = growth**0.55 - 1  # neighbours add about as many elements again
     solid = refine_level(level, 1 + part)
     added = len(solid.cells) / len(level.solid.cells) - 1
@@ -437,7 +438,7 @@ def _meshed(
     options: FemOptions,
     point_masses: Sequence[PointMass],
 ) -> MeshedLink:
-    """Everything known of the link, with its finest mesh."""
+    """Return the link with all results of its finest mesh."""
     density = level.material[:, 2]
     mass, center, inertia = mass_properties(level.mesh, density, point_masses)
     link = LinkStiffness(

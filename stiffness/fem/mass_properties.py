@@ -1,4 +1,4 @@
-"""A meshed link as a rigid body: mass, centre, inertia."""
+"""Mass, centre and inertia of a meshed link as a rigid body."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from stiffness.fem.elements import Elements, integration
 
 @dataclass(frozen=True, eq=False)
 class PointMass:
-    """A point mass on the link, which adds no stiffness.
+    """A point mass on the link, without stiffness.
 
     Attributes:
         mass: [kg].
@@ -25,7 +25,7 @@ class PointMass:
 def mass_properties(
     mesh: Elements, density: NDArray, point_masses: Sequence[PointMass] = ()
 ) -> tuple[float, NDArray, NDArray]:
-    """Mass, centre and inertia of elements and added points.
+    """Return the mass, centre and inertia of elements and added points.
 
     Args:
         mesh: the tetrahedra.

@@ -1,4 +1,4 @@
-"""What a link is made of, and where."""
+"""Materials of a link, and their regions."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -16,17 +16,18 @@ from stiffness.mesh.regions import Region, region_of_places
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """An isotropic solid, and where in the link it is.
+    """An isotropic material, and its region in the link.
 
     Attributes:
         E: [Pa] Young's modulus.
         nu: [-] Poisson's ratio.
         density: [kg/m^3], 0 for a link without mass.
-        where: which of the points (n, 3) [m], in the mesh's axes, are of this material;
-            the last material that contains an element's centre applies.
-        faces: of where it is; the mesh is cut along them.
-        solid: of a STEP file of several, the solid that is of this material, or
-            ``one+other``, in place of ``where`` and ``faces``.
+        where: function that selects the points (n, 3) [m], in the mesh's axes, of this
+            material; for an element, the last material that contains its centre
+            applies.
+        faces: faces of its region; the mesh is cut along them.
+        solid: name of the solid of a STEP file with this material, or ``one+other``, in
+            place of ``where`` and ``faces``.
     """
 
     E: float
@@ -45,19 +46,19 @@ class Material:
 def material_of_elements(
     mesh: Elements, materials: Sequence[Material], cut_region: NDArray | None = None
 ) -> NDArray:
-    """Material of each element, taken at its centre.
+    """Return the material of each element, taken at its centre.
 
     Args:
         mesh: the tetrahedra.
-        materials: the first fills the link, later ones where they say.
-        cut_region: (t,) region of each element, of those whose faces the mesh was cut
-            along; None if it was not cut.
+        materials: the first fills the link, later ones fill their regions.
+        cut_region: (t,) region of each element, among those whose faces the mesh was
+            cut along; None if it was not cut.
 
     Returns:
         (t, 3) lambda [Pa], mu [Pa] and density [kg/m^3].
 
     Raises:
-        BadInput: there is none, or the first does not fill the link.
+        BadInput: there is no material, or the first does not fill the link.
     """
     check_materials(materials)
     centers = mesh.nodes[mesh.cells[:, :4]].mean(axis=1)
@@ -69,11 +70,11 @@ def material_of_elements(
 
 
 def material_at(points: NDArray, materials: Sequence[Material]) -> NDArray:
-    """Material at points of a link.
+    """Return the material at points of a link.
 
     Args:
         points: (n, 3) [m].
-        materials: the first fills the link, later ones where they say.
+        materials: the first fills the link, later ones fill their regions.
 
     Returns:
         (n, 3) lambda [Pa], mu [Pa] and density [kg/m^3].
@@ -82,18 +83,18 @@ def material_at(points: NDArray, materials: Sequence[Material]) -> NDArray:
 
 
 def _constants(materials: Sequence[Material]) -> NDArray:
-    """(m, 3) lambda [Pa], mu [Pa] and density [kg/m^3]."""
+    """Return the (m, 3) lambda [Pa], mu [Pa] and density [kg/m^3]."""
     return np.array([(*lame(m.E, m.nu), m.density) for m in materials])
 
 
 def regions_of(materials: Sequence[Material]) -> tuple[Region, ...]:
-    """Where the materials after the first are.
+    """Return the regions of the materials after the first.
 
     Args:
-        materials: the first fills the link, later ones where they say.
+        materials: the first fills the link, later ones fill their regions.
 
     Returns:
-        The regions, later ones count more.
+        The regions; later ones have precedence.
     """
     return tuple(
         Region(material.where or _everywhere, material.faces)
@@ -106,10 +107,10 @@ def _everywhere(points: NDArray) -> NDArray:
 
 
 def check_materials(materials: Sequence[Material]) -> None:
-    """Refuse a link without a material.
+    """Reject a link without a material.
 
     Args:
-        materials: of a link.
+        materials: materials of a link.
 
     Raises:
         BadInput: there is none.

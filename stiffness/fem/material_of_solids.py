@@ -1,4 +1,4 @@
-"""Materials that are given by the solids of a STEP file: where those are."""
+"""Regions of materials that are given by the solids of a STEP file."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,14 +19,14 @@ from stiffness.surface.triangle_graph import TriangleGraph
 def placed_materials(
     surface: Surface, materials: Sequence[Material]
 ) -> tuple[Material, ...]:
-    """Give the materials of solids their places.
+    """Assign their regions to the materials of solids.
 
     Args:
-        surface: of the link, with its solids.
+        surface: surface of the link, with its solids.
         materials: the first fills the link, or each solid has one.
 
     Returns:
-        The materials, of which none names a solid any more.
+        The materials, none of which names a solid any more.
 
     Raises:
         BadInput: the surface has no such solid, solids overlap, or one has no material.
@@ -58,13 +58,13 @@ def placed_materials(
         _placed(solids, names, material) if material.solid else material
         for names, material in zip(members, materials, strict=True)
     ]
-    # each solid has a material: what later ones do not take is the first one's
+    # each solid has a material: the first one has all that later ones do not take
     first = replace(materials[0], solid="") if materials[0].solid else materials[0]
     return first, *placed[1:]
 
 
 def _members(name: str, solids: FilledSolids, material: Material) -> tuple[str, ...]:
-    """Names of the solids of a material."""
+    """Return the names of the solids of a material."""
     text = material.solid
     names = (text,) if text in solids.names or not text else tuple(text.split("+"))
     for one in names if text else ():
@@ -77,7 +77,7 @@ def _members(name: str, solids: FilledSolids, material: Material) -> tuple[str, 
 def _placed(
     solids: FilledSolids, names: tuple[str, ...], material: Material
 ) -> Material:
-    """A material with the place and the faces of its solids."""
+    """Return a material with the region and the faces of its solids."""
     triangles, within = solids.around(names)
     triangles = orient_shells(triangles)[0]
     used, index = np.unique(triangles, return_inverse=True)
@@ -94,7 +94,7 @@ def _placed(
 
 
 def _enclosed(bound: Surface, points: NDArray) -> NDArray:
-    """Whether points are inside a closed surface."""
+    """Return whether points are inside a closed surface."""
     import pyvista
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkFiltersModeling import vtkSelectEnclosedPoints

@@ -13,7 +13,7 @@ from stiffness.link import inverted
 
 
 def with_own_weight(solved: MeshedLink) -> MeshedLink:
-    """Add the fields of the link's own weight to those of its tip's motions.
+    """Add displacement fields of the link's own weight to those of its tip's motions.
 
     Args:
         solved: on its finest mesh, with a density.
@@ -46,7 +46,7 @@ def with_own_weight(solved: MeshedLink) -> MeshedLink:
     upper = assemble(mesh, lam, mu)
     flat[free] = solve(upper[free][:, free], loads.reshape(-1, 3)[free])
     fields = flat.reshape(-1, 3, 3)
-    if held.kind == "rigid":  # the tip is let go: what held it does work on its motions
+    if held.kind == "rigid":  # with the tip free, its support does work on its motions
         at_tip = np.einsum("nxk,nxg->kg", held.fields, loads)
         fields = fields + held.fields @ (inverted(held.stiffness) @ at_tip)
     both = np.concatenate([held.fields, fields], axis=2)
@@ -55,7 +55,7 @@ def with_own_weight(solved: MeshedLink) -> MeshedLink:
 
 
 def _nodal_masses(mesh: Elements, density: NDArray) -> NDArray:
-    """(n,) [kg] the integral of density times each shape function."""
+    """Return the (n,) [kg] integrals of density times each shape function."""
     masses = np.zeros(len(mesh.nodes))
     for part, _, _, N, _, w in integration(mesh, density > 0):
         share = (w * density[part, None]) @ N

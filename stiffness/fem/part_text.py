@@ -22,10 +22,10 @@ _MASS = '"1.5/0,0,0.452", kilograms and a place in metres'
 
 
 def parse_part(option: str, text: str) -> Material:
-    """A material inside a box along the mesh's axes, or of solids of a STEP file.
+    """Return a material inside a box, or of solids of a STEP file, from text.
 
     Args:
-        option: for the message.
+        option: name of the option, for the error message.
         text: ``x=a..b,y=a..b,z=a..b/young=..,poisson=..,density=..``, where axes not
             named are unbounded, or ``solid=one+other/young=..``; the density may be
             left out.
@@ -34,7 +34,7 @@ def parse_part(option: str, text: str) -> Material:
         The material.
 
     Raises:
-        BadInput: it is not that.
+        BadInput: the text is not of this form.
     """
     region, slash, constants = text.rpartition("/")
     values = parse_assignments([constants], option) if slash else {}
@@ -56,7 +56,7 @@ def parse_part(option: str, text: str) -> Material:
 
 
 def _box(option: str, text: str, region: str) -> tuple[NDArray, NDArray]:
-    """Lower and upper corner of a box, infinite where an axis is not named."""
+    """Return lower and upper corner of a box, infinite on axes that are not named."""
     low, high = np.full(3, -np.inf), np.full(3, np.inf)
     for part in region.split(","):
         axis, _, span = (word.strip() for word in part.partition("="))
@@ -74,10 +74,10 @@ def read_parts(link: Table) -> tuple[str, ...]:
         link: the table.
 
     Returns:
-        The texts; none where there is no list.
+        The texts; none if there is no list.
 
     Raises:
-        BadInput: it is not a list of such texts.
+        BadInput: the value is not a list of such texts.
     """
     given = link.get("parts", [])
     if not isinstance(given, list) or not all(isinstance(t, str) for t in given):
@@ -92,7 +92,7 @@ def scaled_part(text: str, factor: float) -> str:
     """Scale the modulus of a part.
 
     Args:
-        text: of :func:`parse_part`.
+        text: text of :func:`parse_part`.
         factor: [1].
 
     Returns:
@@ -105,17 +105,17 @@ def scaled_part(text: str, factor: float) -> str:
 
 
 def parse_mass(option: str, text: str) -> PointMass:
-    """A mass at a point, ``1.5/0,0,0.452``.
+    """Return a mass at a point, ``1.5/0,0,0.452``.
 
     Args:
-        option: for the message.
-        text: what was given.
+        option: name of the option, for the error message.
+        text: the text.
 
     Returns:
         The mass.
 
     Raises:
-        BadInput: it is not that.
+        BadInput: the text is not of this form.
     """
     mass, _, place = text.partition("/")
     weight, point = comma_numbers(mass), comma_numbers(place)
@@ -125,7 +125,7 @@ def parse_mass(option: str, text: str) -> PointMass:
 
 
 def _planes(low: NDArray, high: NDArray) -> tuple[CutFace, ...]:
-    """Of a box's faces, unless they are at infinity."""
+    """Return the faces of a box, except those at infinity."""
     axes = np.eye(3)
     return tuple(
         CutFace(Plane(end[k] * axes[k], axes[k]))
@@ -136,5 +136,5 @@ def _planes(low: NDArray, high: NDArray) -> tuple[CutFace, ...]:
 
 
 def _inside(low: NDArray, high: NDArray, points: NDArray) -> NDArray:
-    """Whether points are in a box."""
+    """Return whether points are in a box."""
     return np.asarray(((points >= low) & (points <= high)).all(axis=-1))

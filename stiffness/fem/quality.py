@@ -10,11 +10,11 @@ from stiffness.mesh.lagrange import EDGES
 from stiffness.mesh.solid import Solid, element_quality
 from stiffness.surface.surface import directed_edges
 
-_FLAT = 0.01  # quality of a tetrahedron that says little and conditions badly
+_FLAT = 0.01  # lower quality of a tetrahedron: inaccurate and badly conditioned
 
 
 def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
-    """Counts, size and shape of a mesh.
+    """Return the counts, size and shape of a mesh.
 
     Args:
         solid: the straight tetrahedra.
@@ -23,11 +23,11 @@ def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
     Returns:
         ``nodes``, ``elements``; ``volume`` [m^3] and ``area`` [m^2] of the curved
         elements; ``closed``, whether every edge of the boundary has two faces;
-        ``worst_quality`` and ``mean_quality``; ``smallest_angle`` and
-        ``largest_angle`` [rad] between two faces of a tetrahedron; ``flat_elements``,
-        how many have a quality below 0.01; ``drawn_out``, whether a bar's section was
-        drawn out in long elements, of which none counts as flat.  Quality and angles
-        are those of the tetrahedra before graded layers are cut off, thin on purpose.
+        ``worst_quality`` and ``mean_quality``; ``smallest_angle`` and ``largest_angle``
+        [rad] between two faces of a tetrahedron; ``flat_elements``, the number with a
+        quality below 0.01; ``drawn_out``, whether a bar's section was extruded in long
+        elements, none of which counts as flat.  Quality and angles are those of the
+        tetrahedra before graded layers are cut off, which are thin on purpose.
     """
     quality, angles = element_quality(solid), dihedral_angles(solid)
     edges = np.sort(directed_edges(solid.faces), axis=1)
@@ -48,14 +48,14 @@ def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
 
 
 def volume_error(solid: Solid, mesh: Elements) -> float:
-    """How far the volume of a mesh may be from that of the part.
+    """Return the largest possible difference of the volumes of mesh and part.
 
     Args:
         solid: the straight tetrahedra.
         mesh: its elements.
 
     Returns:
-        [1] relative to the part's; zero where the surface is not known.
+        [-] relative to the part's; zero if the surface is unknown.
     """
     if solid.surface is None:
         return 0.0
@@ -65,7 +65,7 @@ def volume_error(solid: Solid, mesh: Elements) -> float:
 
 
 def dihedral_angles(solid: Solid) -> NDArray:
-    """Angles between the faces of tetrahedra.
+    """Return the angles between the faces of tetrahedra.
 
     Args:
         solid: straight tetrahedra.

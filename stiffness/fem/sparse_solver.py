@@ -1,7 +1,7 @@
-"""One factorisation of a symmetric positive definite matrix, many right-hand sides.
+"""Solution of a symmetric positive definite system, with many right-hand sides.
 
-MKL's PARDISO where its package is installed, else SciPy's SuperLU, which always works
-but needs about ten times the time and twice the memory.
+The solver is MKL's PARDISO if its package is installed, otherwise SciPy's SuperLU,
+which needs about ten times the time and twice the memory.
 """
 
 import os
@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, csr_matrix, triu
 from scipy.sparse.linalg import splu
 
-# PARDISO's iparm: the defaults of symmetric matrices; 8: no iterative refinement, the
-# solution's error enters the energy squared; 24: two-level factorisation, an eighth of
-# the time saved; 37: rows whose patterns agree to 90 %, as the three of a node do, form
-# one block, which halves the analysis
+# PARDISO's iparm: the defaults of symmetric matrices; 8: no iterative refinement, since
+# the solution's error is squared in the energy; 24: two-level factorisation, which
+# saves an eighth of the time; 37: rows whose patterns agree to 90 %, such as the three
+# of a node, form one block, which halves the analysis
 _SETTINGS = {1: 1, 2: 2, 8: 0, 10: 8, 18: -1, 24: 1, 37: -90}
 
 
@@ -29,10 +29,10 @@ class FactorisationFailed(RuntimeError):
 
 @cache
 def solver_name() -> str:
-    """``"PARDISO"`` or ``"SuperLU"``: what :func:`solve` uses on this machine."""
+    """Return the name of the solver on this machine, ``"PARDISO"`` or ``"SuperLU"``."""
     if find_spec("pypardiso") is None:
         return "SuperLU"
-    # pypardiso looks for MKL in every folder below Python's, seconds at each solver
+    # pypardiso searches MKL in every folder of Python, which takes seconds per solver
     if library := _mkl():
         os.environ.setdefault("PYPARDISO_MKL_RT", library)
     try:
@@ -43,7 +43,7 @@ def solver_name() -> str:
 
 
 def _mkl() -> str | None:
-    """MKL's library as its package lists it."""
+    """Return the path of MKL's library from the files of its package."""
     try:
         listed = files("mkl") or []
     except PackageNotFoundError:
@@ -86,13 +86,13 @@ def solve(upper: csr_array, loads: NDArray, solver: str | None = None) -> NDArra
 
 
 def _solve_with_pardiso(upper: csr_array, loads: NDArray) -> NDArray:
-    """PARDISO's symmetric positive definite path."""
+    """Solve by PARDISO for symmetric positive definite matrices."""
     import pypardiso
 
     solver = pypardiso.PyPardisoSolver(mtype=2)
     for number, value in _SETTINGS.items():
         solver.set_iparm(number, value)
-    # pypardiso asks for csr_matrix, not csr_array, and sorted 32 bit indices
+    # pypardiso needs csr_matrix, not csr_array, and sorted 32 bit indices
     matrix = csr_matrix(upper)
     matrix.sort_indices()
     try:
@@ -107,7 +107,7 @@ def _solve_with_pardiso(upper: csr_array, loads: NDArray) -> NDArray:
 
 
 def expected_cost(unknowns: int) -> tuple[float, float]:
-    """Rough cost of a mesh of cubic elements, from measured ones of 40 k to 850 k.
+    """Return the rough cost of a mesh, from measured ones of 40 k to 850 k unknowns.
 
     Args:
         unknowns: rows of the matrix.

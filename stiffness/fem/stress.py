@@ -1,11 +1,10 @@
-"""Stress that a tip wrench causes in a link.
+"""Stress in a link under a wrench at its tip.
 
-Six fields, one for each component of the wrench, are enough: stresses superpose.
-At the edge of a rigid interface the elastic solution is singular: the peak there grows
-without bound as the mesh is refined and means nothing.  Stresses are therefore reported
-only at some distance from the interfaces, one interface radius by default,
-and the report says so.  What happens inside that distance, and how a real joint holds
-the link, is left out.
+Stresses superpose, so six fields are enough, one for each component of the wrench.  At
+the edge of a rigid interface the elastic solution is singular: the peak there grows
+without bound as the mesh is refined and has no meaning.  So stresses are reported only
+at some distance from the interfaces, one interface radius by default, and the report
+says so.  The stress within that distance, and the effect of a real joint, are left out.
 """
 
 from collections.abc import Mapping
@@ -14,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput
+from forcefit.results.display import html_table, short_repr
 from stiffness.beam.beam import section_axes
 from stiffness.beam.beam_stress import peak_beam_stress
 from stiffness.fem.adaptive_step import Level
@@ -34,20 +33,21 @@ from stiffness.fem.stress_error import (
 )
 from stiffness.link import inverted
 
-_CHUNK = 4096  # elements at a time: 4096 x 20 x 36 numbers are 24 MB
+_CHUNK = 4096  # elements per chunk: 4096 x 20 x 36 numbers are 24 MB
 
 
 @dataclass(frozen=True, eq=False)
 class StressSource:
-    """The mesh that stresses are of.
+    """The mesh of a stress field.
 
     Attributes:
         level: the solved mesh, of n nodes by
             :func:`stiffness.fem.stress_error.nodes_by_material`.
-        far: (n,) nodes whose stresses count.
-        singular: (n,) nodes on re-entrant edges without a fillet.
-        faceted: (n,) nodes on a surface of no recognised shape.
-        left_out: (n,) nodes that would count if the mesh followed the surface there.
+        far: (n,) bool, nodes far enough from the interfaces.
+        singular: (n,) bool, nodes on re-entrant edges without a fillet.
+        faceted: (n,) bool, nodes on a surface of no recognised shape.
+        left_out: (n,) bool, nodes left out because the mesh does not follow the surface
+            there.
     """
 
     level: Level
@@ -63,15 +63,15 @@ class StressInfluence:
 
     Attributes:
         places: (p, 3) [m] nodes, in the link's axes.
-        influence: (p, 6, 6) [Pa/(N m), Pa/N] stress xx yy zz yz xz xy of each component
-            of the tip's wrench; (p, 9, 6) with those [Pa per m/s^2] of gravity, where
-            the link was solved under its own weight
-            (:func:`stiffness.fem.own_weight.with_own_weight`): a wrench then has
-            gravity's three components behind its six.
-        away: [m] nothing nearer than this to an interface is here.
+        influence: (p, 6, 6) [Pa/(N m), Pa/N] stress xx yy zz yz xz xy for each
+            component of the tip's wrench.  If the link was solved under its own weight
+            (:func:`stiffness.fem.own_weight.with_own_weight`), (p, 9, 6), the last
+            three [Pa per m/s^2] for gravity; a wrench then has nine numbers, with
+            gravity's components last.
+        away: [m] smallest distance of these nodes from an interface.
         reentrant_edges: whether some of the nodes lie on re-entrant edges without a
             fillet, where the elastic stress is singular too.
-        source: the mesh that they are of; without it errors are unknown.
+        source: the mesh of the stresses; without it errors are unknown.
     """
 
     places: NDArray
@@ -84,7 +84,7 @@ class StressInfluence:
 
     @property
     def region(self) -> str:
-        """Where the stresses are from, in words."""
+        """Description of the nodes in words."""
         words = (
             f"{len(self.places)} nodes at least {self.away:.4g} m away from both "
             "interfaces, whose clamped edges are singular"
@@ -103,7 +103,7 @@ class StressInfluence:
         return words
 
     def stresses(self, wrench: ArrayLike) -> NDArray:
-        """Stresses of a tip wrench.
+        """Return the stresses of a tip wrench.
 
         Args:
             wrench: (6,) [N m, N] at the tip, in the link's axes.
@@ -114,7 +114,7 @@ class StressInfluence:
         return np.einsum("pws,w->ps", self.influence, np.asarray(wrench, dtype=float))
 
     def peak(self, wrench: ArrayLike) -> tuple[float, NDArray]:
-        """Largest von Mises stress of a tip wrench, and where.
+        """Return the largest von Mises stress of a tip wrench, and its position.
 
         Args:
             wrench: (6,) [N m, N] at the tip, in the link's axes.
@@ -127,13 +127,13 @@ class StressInfluence:
         return float(values[worst]), self.places[worst]
 
     def peak_error(self, wrench: ArrayLike) -> float:
-        """Estimated error of the peak of a tip wrench, that of the mesh.
+        """Return the estimated error of the peak stress of a tip wrench, by the mesh.
 
         Args:
             wrench: (6,) [N m, N] at the tip, in the link's axes.
 
         Returns:
-            [Pa] infinite where the stress is singular, NaN where the mesh is not known.
+            [Pa] infinite where the stress is singular, NaN if the mesh is unknown.
         """
         if self.source is None:
             return float("nan")
@@ -149,7 +149,7 @@ class StressInfluence:
         return estimated_error(level, motion, node, zone, self.source.left_out)
 
     def relative_error(self) -> float:
-        """Largest estimated error of the six unit wrenches' peaks, relative to them."""
+        """Return largest estimated relative error of the six unit wrenches' peaks."""
         unit = np.eye(6, self.influence.shape[1])
         return max(self.peak_error(w) / self.peak(w)[0] for w in unit)
 
@@ -161,12 +161,12 @@ class PeakStress:
     Attributes:
         wrench: (6,) [N m, N] at the tip, in the link's axes.
         von_mises: [Pa].
-        error: [Pa] estimated, of the mesh; infinite where the stress is singular.
-        place: (3,) [m] of it.
-        region: where stresses were evaluated, in words.
-        away: [m] nothing nearer than this to an interface was evaluated.
-        beam: [Pa] and (3,) [m] by the beam formula, between the sections that are so
-            far from base and tip; None without a section.
+        error: [Pa] estimated error of the mesh; infinite where the stress is singular.
+        place: (3,) [m] position of the peak.
+        region: description of the points evaluated, in words.
+        away: [m] smallest distance of these points from an interface.
+        beam: [Pa] and (3,) [m] by the beam formula, between the sections at this
+            distance from base and tip; None without a section.
         beam_whole: [Pa] by the beam formula over the whole length; NaN without.
     """
 
@@ -189,23 +189,23 @@ def peak_stress(
     away: float | None = None,
     gravity: ArrayLike | None = None,
 ) -> PeakStress:
-    """Largest von Mises stress of a tip wrench, with the beam formula beside it.
+    """Return largest von Mises stress of a tip wrench, and that by the beam formula.
 
     Args:
-        solved: from :func:`stiffness.fem.fea.solve_link`.
+        solved: result of :func:`stiffness.fem.fea.solve_link`.
         wrench: (6,) [N m, N] at the tip, in the link's axes.
-        section: of a straight beam from base to tip, as for
+        section: section of a straight beam from base to tip, as for
             :func:`stiffness.beam.beam_stress.peak_beam_stress`.
         up: (3,) the section's z, in the link's axes.
-        away: [m] from the interfaces; one interface radius if absent.
+        away: [m] distance from the interfaces; one interface radius if absent.
         gravity: (3,) [m/s^2] in the link's axes, for its own weight.
 
     Returns:
         The peak, its place and region.
 
     Raises:
-        BadInput: nothing of the link is so far away, the section has no formula, or
-            gravity acts on a link without a density.
+        BadInput: no node is so far away, the section has no formula, or gravity acts on
+            a link without a density.
     """
     w = np.asarray(wrench, dtype=float)
     if section is not None:
@@ -230,7 +230,7 @@ def peak_stress(
     whole, _ = peak_beam_stress(section, length, in_beam, weight)
     near_tip = in_beam.copy()
     near_tip[:3] += np.cross([field.away, 0, 0], in_beam[3:])
-    beyond = weight * field.away / length  # of the piece that is not looked at
+    beyond = weight * field.away / length  # of the piece that is not evaluated
     near_tip[:3] += np.cross([field.away / 2, 0, 0], beyond)
     near_tip[3:] += beyond
     rest = length - 2 * field.away
@@ -250,18 +250,18 @@ def peak_stress(
 
 
 def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInfluence:
-    """Stresses of the six unit tip wrenches of a solved link.
+    """Return the stresses of the six unit tip wrenches of a solved link.
 
     Args:
-        solved: from :func:`stiffness.fem.fea.solve_link`; where two materials meet, a
-            node counts once for each.
-        away: [m] from the interfaces; one interface radius if absent.
+        solved: result of :func:`stiffness.fem.fea.solve_link`; where two materials
+            meet, a node counts once for each.
+        away: [m] distance from the interfaces; one interface radius if absent.
 
     Returns:
         The influence.
 
     Raises:
-        BadInput: nothing of the link is so far away.
+        BadInput: no node is so far away.
     """
     from scipy.spatial import cKDTree
 
@@ -271,7 +271,7 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     distance = max(radii) if away is None else away
     clamped = np.unique(mesh.faces[mesh.patch <= 1])
     gap = cKDTree(mesh.nodes[clamped]).query(mesh.nodes[node])[0]
-    far = gap >= distance * (1 - 1e-9)  # a layer of nodes at just that distance
+    far = gap >= distance * (1 - 1e-9)  # with nodes at just that distance
     if not far.any():
         raise BadInput(
             f"stress: nothing of the link is {distance:.4g} m away from its "
@@ -291,7 +291,7 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
 
 
 def _peaks_on_facets(field: StressInfluence, wrench: NDArray) -> bool:
-    """Whether the peak lies on a surface of no recognised shape."""
+    """Return whether the peak lies on a surface of no recognised shape."""
     if field.source is None:
         return False
     worst = int(np.argmax(von_mises(field.stresses(wrench))))
@@ -299,15 +299,15 @@ def _peaks_on_facets(field: StressInfluence, wrench: NDArray) -> bool:
 
 
 def _motions(level: Level) -> NDArray:
-    """(k, k) of the tip's unit wrenches and, where there are its fields, of gravity."""
-    # the fields' own: they balance the wrench exactly
+    """Return (k, k) motions of the tip's unit wrenches and, if solved, of gravity."""
+    # from the fields' own stiffness, so they balance the wrench exactly
     motions = np.eye(level.solution.fields.shape[2])
     motions[:6, :6] = inverted(level.solution.stiffness)
     return motions
 
 
 def _interface_radius(mesh: Elements, patch: int) -> float:
-    """[m] largest distance of an interface's nodes from its centroid."""
+    """Return the [m] largest distance of an interface's nodes from its centroid."""
     faces = mesh.faces[mesh.patch == patch]
     N, area = triangle_areas(mesh, faces)
     first = np.einsum("tq,qa,tax->x", area, N, mesh.nodes[faces])
@@ -316,7 +316,7 @@ def _interface_radius(mesh: Elements, patch: int) -> float:
 
 
 def _nodal_stresses(level: Level) -> NDArray:
-    """(n, k, 6) stress of each unit screw at each node, averaged over elements."""
+    """Return the (n, k, 6) stress of each unit screw at each node, averaged."""
     cells, nodes = nodes_by_material(level)
     screws = np.eye(level.solution.fields.shape[2])
     total = np.zeros((len(nodes), len(screws), 6))

@@ -1,12 +1,12 @@
-r"""Estimated error of a peak stress, by how much elements around it disagree.
+r"""Estimated error of a peak stress, from the disagreement of elements around it.
 
-Stresses of neighbouring elements differ at their common nodes by as much as the mesh
-leaves open; at a node their mean is taken.  The estimate is the root mean square of
-the largest deviations from the mean, at the nodes of the elements that touch the peak
-and at all nodes where the stress is nearly as large, times a factor: the peak is the
-largest of many values that err.  Where the mesh does not follow the part's surface,
-stresses are left out; what is larger there counts as error.  Where
-the stress is singular there is no error because there is no value.
+Stresses of neighbouring elements differ at their common nodes by about the mesh's
+error; their mean is the stress at a node.  The estimate is a root mean square of the
+largest deviations from the mean, times a factor.  It is taken at the nodes of the
+elements at the peak, and at all nodes where the stress is nearly as large.  The factor
+is needed because the peak is the largest of many values with errors.  Where the mesh
+does not follow the part's surface stresses are left out; larger ones there add to the
+error.  Where the stress is singular there is neither a value nor an error.
 
 Sources:
     Zienkiewicz & Zhu (1987), A simple error estimator, for recovered stresses as the
@@ -28,15 +28,17 @@ if TYPE_CHECKING:
     from stiffness.fem.adaptive_step import Level
 
 # error of a peak over the disagreement around it: at most 1.6 for 9 shouldered bars in
-# tension, torsion and bending on their first meshes, 0.3 on the median
+# tension, torsion and bending on their first meshes, 0.3 in the median
 SAFETY_FACTOR = 1.6
-_SMOOTH = np.cos(np.radians(5.0))  # patches that meet at less are one smooth surface
+_SMOOTH = np.cos(
+    np.radians(5.0)
+)  # patches that meet at a smaller angle form a smooth surface
 _OFF = 5e-3  # of a face's size; cubic faces follow a fillet to 1e-4
-ZONE = 0.9  # of the peak: stresses that are nearly as large
+ZONE = 0.9  # relative to the peak: larger stresses count as nearly as large
 
 
 def von_mises(stress: ArrayLike) -> NDArray:
-    """Equivalent stress.
+    """Return the equivalent stress.
 
     Args:
         stress: (..., 6) [Pa] xx yy zz yz xz xy.
@@ -51,7 +53,7 @@ def von_mises(stress: ArrayLike) -> NDArray:
 
 
 def element_stresses(level: "Level", members: NDArray, motion: NDArray) -> NDArray:
-    """Stresses of elements at their nodes.
+    """Return the stresses of elements at their nodes.
 
     Args:
         level: a solved mesh.
@@ -82,7 +84,7 @@ def element_stresses(level: "Level", members: NDArray, motion: NDArray) -> NDArr
 
 
 def nodes_by_material(level: "Level") -> tuple[NDArray, NDArray]:
-    """Number the nodes of each material by themselves: stresses jump between them.
+    """Number the nodes of each material separately: stresses jump between them.
 
     Args:
         level: a solved mesh of n nodes.
@@ -103,14 +105,15 @@ def nodes_by_material(level: "Level") -> tuple[NDArray, NDArray]:
 def estimated_error(
     level: "Level", motion: NDArray, node: int, zone: NDArray, left_out: NDArray
 ) -> float:
-    """Estimated error of a peak stress.
+    """Return the estimated error of a peak stress.
 
     Args:
         level: a solved mesh of n nodes, by :func:`nodes_by_material`.
         motion: (6,) [rad, m] screw of the tip.
         node: index of the peak.
-        zone: (n,) nodes where the stress is nearly as large.
-        left_out: (n,) nodes where it may be larger, but the mesh is not the part.
+        zone: (n,) bool, nodes where the stress is nearly as large.
+        left_out: (n,) bool, nodes where it may be larger, but the mesh is off the
+            surface.
 
     Returns:
         [Pa].
@@ -124,7 +127,7 @@ def estimated_error(
 
 
 def _means_and_deviations(level: "Level", motion: NDArray) -> tuple[NDArray, NDArray]:
-    """(n, 6) [Pa] stresses at nodes, and (n,) the largest deviation from them."""
+    """Return (n, 6) [Pa] stresses at nodes, and (n,) largest deviations from them."""
     cells, nodes = nodes_by_material(level)
     count = len(nodes)
     total, largest = np.zeros((count, 6)), np.zeros(count)
@@ -137,19 +140,20 @@ def _means_and_deviations(level: "Level", motion: NDArray) -> tuple[NDArray, NDA
 
 
 def on_inner_edges(level: "Level") -> NDArray:
-    """Nodes of elements at re-entrant edges without a fillet, or between materials.
+    """Return nodes of elements at re-entrant edges or between materials.
 
     Args:
         level: a solved mesh of n nodes.
 
     Returns:
-        (n,) whether an element there touches an edge at which the shapes themselves
-        meet at an angle, or at which two regions of the link come to its surface.
+        (n,) bool, whether an element of the node touches an edge at which the shapes
+        meet at an angle, without a fillet, or at which two materials meet at the
+        surface.
     """
     edges, cells = singular_edges(level.solid, ()), level.mesh.cells
     on = np.zeros(len(level.mesh.nodes), dtype=bool)
     if len(edges):
-        # coarse faces of a fillet meet at an angle too, its shapes do not
+        # coarse faces of a fillet meet at an angle, its shapes do not
         on[edges[_meet_at_an_angle(level, edges)]] = True
     if level.solid.region is not None:
         on[edges_between(level.solid, level.solid.region)] = True
@@ -158,7 +162,7 @@ def on_inner_edges(level: "Level") -> NDArray:
 
 
 def _meet_at_an_angle(level: "Level", edges: NDArray) -> NDArray:
-    """(e,) whether the shapes on both sides of edges have different normals there."""
+    """Return (e,) bool: edges at which the shapes on both sides meet at an angle."""
     solid = level.solid
     count = np.int64(len(solid.points))
     pairs = np.sort(solid.faces[:, [[0, 1], [1, 2], [0, 2]]], axis=2)
@@ -178,7 +182,7 @@ def _meet_at_an_angle(level: "Level", edges: NDArray) -> NDArray:
 
 
 def off_shapes(level: "Level") -> NDArray:
-    """Nodes where the mesh does not follow the part's surface.
+    """Return the nodes where the mesh does not follow the part's surface.
 
     Args:
         level: a solved mesh of n nodes.
@@ -204,7 +208,7 @@ def off_shapes(level: "Level") -> NDArray:
 
 
 def on_facets(level: "Level") -> NDArray:
-    """Nodes on a surface of no recognised shape.
+    """Return the nodes on a surface of no recognised shape.
 
     Args:
         level: a solved mesh of n nodes.

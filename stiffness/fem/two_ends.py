@@ -1,9 +1,9 @@
-"""A meshed link against motions of both its ends: stiffness and consistent mass.
+"""Stiffness and consistent mass of a meshed link for motions of both its ends.
 
-Held at neither end, rigid at both: between them the solid follows without inertia of
-its own (Guyan), so that the mass is exact for motions as a whole and as good as a
-beam's cubic for bending.  A motion of the base is one of the whole link less what that
-does to the tip, so that the fields of the held base tell everything.
+Both ends are rigid and free to move.  Between them the solid follows without inertia of
+its own (Guyan), so that the mass is exact for rigid motions, and as accurate as a
+beam's cubic for bending.  A motion of the base is a motion of the whole link minus the
+resulting motion of the tip, so the fields with the base held suffice.
 """
 
 from dataclasses import dataclass
@@ -19,10 +19,10 @@ from stiffness.screws import screw_map
 
 @dataclass(frozen=True, eq=False)
 class TwoEnds:
-    """A link between two rigid ends; rows base then tip, each read at its centre.
+    """A link with two rigid ends; rows of base then tip, each read at its centre.
 
     Attributes:
-        stiffness: (12, 12) [N m/rad .. N/m]; moving as a whole costs nothing.
+        stiffness: (12, 12) [N m/rad .. N/m]; zero for rigid motions.
         mass: (12, 12) [kg m^2 .. kg], zero without a density.
     """
 
@@ -47,7 +47,7 @@ def two_ends(solved: MeshedLink) -> TwoEnds:
     if held.kind != "rigid":
         held = condense(mesh, constants[:, 0], constants[:, 1], solved.centers)
     base, tip = solved.centers
-    # motion of the tip against where the base takes it
+    # motion of the tip relative to the rigid motion of the base
     against = np.hstack([-screw_map(base - tip), np.eye(6)])
     K = against.T @ held.stiffness @ against
     fields = np.einsum("nik,kj->nij", held.fields, against)

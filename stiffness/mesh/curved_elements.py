@@ -1,10 +1,11 @@
-"""Nodes of a solid's elements, on the exact shapes its boundary stands for.
+"""Nodes of a solid's elements, on the exact shapes of its boundary.
 
 The nodes of straight elements lie on their lattices.  Those on the boundary's edges are
-moved onto the shapes of the patches there; the faces inside follow their edges, and the
+moved onto the shapes of their patches.  Inner faces follow their edges, and the
 boundary's faces are then moved onto their own shapes.  The mesh is conforming, and the
-geometry's error is that of interpolating the shapes.  Cubic edges and faces interpolate
-where the error has zero mean: a volume's error falls with the sixth power of h.
+geometry's error is that of interpolating the shapes.  Cubic edges and faces are
+interpolated at points where the error has zero mean: a volume's error falls with the
+sixth power of h.
 """
 
 from collections.abc import Callable
@@ -27,9 +28,9 @@ from stiffness.mesh.refine import refine
 from stiffness.mesh.solid import Solid, node_patches, on_shapes
 from stiffness.surface.primitives import Shape
 
-_LARGEST_MOVE = 0.05  # of a node, relative to the part's size
+_LARGEST_MOVE = 0.05  # largest motion of a node, relative to the part's size
 _INVERTED = 0.05  # smallest over largest Jacobian determinant of an element
-_PASSES = 3  # of bisecting inverted elements
+_PASSES = 3  # largest number of passes that bisect inverted elements
 _SAMPLE = 0.2128543571118083  # solves 9 t^3 - 10 t^2 + 3.6 t = 0.4: two of three L
 
 
@@ -53,11 +54,11 @@ class CurvedElements:
 
 
 def curved_elements(solid: Solid, order: int) -> CurvedElements:
-    """Curved elements of a solid.
+    """Return the curved elements of a solid.
 
     Args:
         solid: straight tetrahedra.
-        order: of the elements, 2 or 3.
+        order: order of the elements, 2 or 3.
 
     Returns:
         The elements; inverted ones are straightened in steps.
@@ -103,7 +104,7 @@ def curved_elements(solid: Solid, order: int) -> CurvedElements:
 
 
 def patches_of_cells(faces: NDArray, patch: NDArray, corners: NDArray) -> NDArray:
-    """Patches of tetrahedra's faces.
+    """Return the patches of tetrahedra's faces.
 
     Args:
         faces: (f, 3) corners of the triangles that are on patches.
@@ -134,7 +135,7 @@ def refine_inverted(solid: Solid, order: int) -> Solid:
 
     Args:
         solid: straight tetrahedra.
-        order: of the elements to be made of them.
+        order: order of the elements to be made of them.
 
     Returns:
         The solid, finer where a wall is thin compared with its curvature.
@@ -150,7 +151,7 @@ def refine_inverted(solid: Solid, order: int) -> Solid:
 def _cubic_edges(
     ends: NDArray, pairs: NDArray, moved_nodes: Callable[[NDArray, NDArray], NDArray]
 ) -> NDArray:
-    """(t, 6, 2, 3) displacements of edges' nodes, which lie at their thirds."""
+    """Return (t, 6, 2, 3) displacements of edges' nodes, which lie at their thirds."""
     # interpolated at the Lobatto points, where a cubic's error against an arc has zero
     # mean, then evaluated at the thirds
     s = (1 + np.array([-1, 1]) / np.sqrt(5)) / 2
@@ -164,7 +165,7 @@ def _cubic_edges(
 
 
 def _face_nodes_by_edges(moved: NDArray) -> NDArray:
-    """(t, 4, 3) displacement of cubic faces' nodes by those (t, 20, 3) of edges."""
+    """Return (t, 4, 3) displacement of face nodes from those (t, 20, 3) of edges."""
     # along an edge it is L_a L_b (c_0 + c_1 (L_b - L_a)), extended over the faces: at a
     # face's middle each of its edges adds c_0 / 9
     carried = np.zeros((len(moved), 4, 3))
@@ -179,10 +180,10 @@ def _face_nodes_by_edges(moved: NDArray) -> NDArray:
 def _cubic_faces(
     corners: NDArray, patch: NDArray, shapes: tuple[Shape | None, ...], reach: float
 ) -> NDArray:
-    """(f, 3) displacements of faces' middle nodes; their other nodes are in place."""
-    # interpolated at three points at which the cubic that agrees with the quartic x^2,
-    # x = L_1 L_2 + L_2 L_3 + L_3 L_1, along the edges also has its integral: the error
-    # of a shape then has zero mean
+    """Return (f, 3) displacements of faces' middle nodes; other nodes are in place."""
+    # interpolated at three points.  There the cubic that agrees with the quartic x^2, x
+    # = L_1 L_2 + L_2 L_3 + L_3 L_1, along the edges also has its integral, so that the
+    # error of a shape has zero mean
     L = np.full((3, 3), _SAMPLE) + (1 - 3 * _SAMPLE) * np.eye(3)
     N, _ = shape_functions(3, L)
     places = N @ corners
@@ -197,7 +198,7 @@ def _cubic_faces(
 def _straightened(
     straight: NDArray, curved: NDArray, cells: NDArray, order: int
 ) -> tuple[NDArray, NDArray]:
-    """Curved nodes, straightened in steps where an element is inverted, and which."""
+    """Return curved nodes, straightened in steps at inverted elements, and which."""
     nodes = curved.copy()
     suspects = np.flatnonzero((curved != straight)[cells].any(axis=(1, 2)))
     places = np.concatenate([quadrature(6)[0], lattice(order) / order])

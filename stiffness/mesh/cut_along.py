@@ -1,9 +1,9 @@
 """A mesh cut along the smooth outline of an interface.
 
-The mesher knows sharp edges only.  Where an interface goes over into a rounding, mesh
-triangles lie across the outline, and the interface would be wider or narrower by parts
-of them.  Corners near the outline are taken for corners on it, and the edges that still
-cross it are split there.
+The mesher keeps only sharp edges.  Where an interface continues in a fillet, mesh
+triangles lie across the outline, and the interface would be too wide or too narrow by
+parts of them.  Corners near the outline count as corners on it, and the edges that
+still cross it are split there.
 """
 
 from dataclasses import replace
@@ -16,8 +16,9 @@ from stiffness.mesh.solid import Solid
 from stiffness.mesh.split_crossing import split_crossing
 from stiffness.surface.smooth_outline import SmoothOutline
 
-_NEAR = 0.3  # of the shortest edge at a corner: it is moved onto the outline
-_REACH = 0.005  # of the part's size: a corner is moved by no more
+# of the shortest edge at a corner: nearer corners are moved onto the outline
+_NEAR = 0.3
+_REACH = 0.005  # relative to the part's size: largest motion of a corner
 
 
 def cut_along(solid: Solid, outline: SmoothOutline) -> Solid:
@@ -25,7 +26,7 @@ def cut_along(solid: Solid, outline: SmoothOutline) -> Solid:
 
     Args:
         solid: boundary corners near the surface, on its shapes or not yet.
-        outline: of an interface.
+        outline: outline of an interface.
 
     Returns:
         The solid; its triangles at the outline belong to the side on which they lie.
@@ -39,19 +40,19 @@ def cut_along(solid: Solid, outline: SmoothOutline) -> Solid:
 
 
 def _members(solid: Solid, outline: SmoothOutline) -> NDArray:
-    """(f,) boundary triangles of the two patches."""
+    """Return the (f,) boundary triangles of the two patches."""
     return np.isin(solid.patch, outline.patches)
 
 
 def _boundary_edges(solid: Solid, outline: SmoothOutline) -> NDArray:
-    """(k, 2) edges of the two patches' triangles, in order."""
+    """Return the (k, 2) edges of the two patches' triangles, in order."""
     faces = solid.faces[_members(solid, outline)]
     pairs = np.sort(faces[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
     return np.unique(pairs, axis=0)
 
 
 def _corners_on(solid: Solid, outline: SmoothOutline) -> NDArray:
-    """(n,) whether a corner is so near the outline that it is taken to be on it."""
+    """Return (n,) bool: corners so near the outline that they count as on it."""
     pairs = _boundary_edges(solid, outline)
     length = np.linalg.norm(
         solid.points[pairs[:, 0]] - solid.points[pairs[:, 1]], axis=1
@@ -73,11 +74,11 @@ def _corners_on(solid: Solid, outline: SmoothOutline) -> NDArray:
 def _crossing_edges(
     solid: Solid, outline: SmoothOutline, on: NDArray, ends: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """(e,) whether an edge crosses the outline, and at which share of it."""
+    """Return (e,) whether an edge crosses the outline, and at which share of it."""
     pairs = _boundary_edges(solid, outline)
     index = np.searchsorted(
         edge_code(ends, len(on)), edge_code(pairs, len(on))
-    )  # both in order
+    )  # both are sorted
     start, end = solid.points[pairs].swapaxes(0, 1)
     low, high = outline.outside(start), outline.outside(end)
     across = (low * high < 0) & ~on[pairs].any(axis=1)
@@ -93,7 +94,7 @@ def _crossing_edges(
 
 
 def _sides(solid: Solid, outline: SmoothOutline, on: NDArray) -> NDArray:
-    """(f,) patches, those of triangles at the outline by the side they lie on."""
+    """Return (f,) patches, with triangles at the outline assigned by their side."""
     patch = solid.patch.copy()
     near = np.flatnonzero(_members(solid, outline) & on[solid.faces].any(axis=1))
     corners = solid.points[solid.faces[near]]

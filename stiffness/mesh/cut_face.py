@@ -22,13 +22,15 @@ from stiffness.mesh.split_crossing import one_of_each, split_crossing
 from stiffness.surface.facets import Facets
 from stiffness.surface.primitives import Plane, Shape, project
 
-_NEAR = 0.3  # of the shortest edge at a corner: it is moved onto the face
-_REACH = 0.005  # of the part's size: a corner is moved by no more
-_LEAST = 0.2  # of a tetrahedron's volume that is left when its corners are moved
-ON_FACE = 1e-6  # of the part's size: a corner on the face; shapes are known to 2e-6
-_TURN = np.cos(np.radians(35.0))  # of a curved face along an edge
-_PASSES = 12  # of bisecting what is too large
-_HALVINGS = 12  # of an edge, to find where it crosses a curved face
+_NEAR = 0.3  # relative to its shortest edge: a nearer corner is moved onto the face
+_REACH = 0.005  # relative to the part's size: largest motion of a corner
+# least volume of a tetrahedron after motion of its corners, relative to before
+_LEAST = 0.2
+# relative to the part's size: a corner on the face; shapes are known to 2e-6
+ON_FACE = 1e-6
+_TURN = np.cos(np.radians(35.0))  # largest rotation of a curved face along an edge
+_PASSES = 12  # most rounds of bisection of too large tetrahedra
+_HALVINGS = 12  # bisections of an edge, to find where it crosses a curved face
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +38,8 @@ class CutFace:
     """A face inside a link.
 
     Attributes:
-        shape: that it lies on.
-        facets: of the face; None for all of the shape.
+        shape: shape of the face.
+        facets: facets of the face; None for the whole shape.
     """
 
     shape: Shape
@@ -60,7 +62,7 @@ class CutFace:
 
 
 def faces_inside(cells: NDArray) -> tuple[NDArray, NDArray]:
-    """Faces that two tetrahedra have in common.
+    """Return the faces that two tetrahedra have in common.
 
     Args:
         cells: (t, 4).
@@ -76,11 +78,11 @@ def faces_inside(cells: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def face_code(corners: NDArray, points: int) -> NDArray:
-    """Number triangles by their corners.
+    """Return a number of each triangle, from its corners.
 
     Args:
         corners: (..., 3), in any order.
-        points: how many there are.
+        points: number of points of the mesh.
 
     Returns:
         (...) one number for each set of three.
@@ -94,7 +96,7 @@ def cut(solid: Solid, face: CutFace) -> Solid:
     """Cut a mesh along a face.
 
     Args:
-        solid: any.
+        solid: any solid.
         face: inside it.
 
     Returns:
@@ -114,7 +116,7 @@ def without_chords(solid: Solid) -> Solid:
     """Split edges that join two corners of a curved face but are not on it.
 
     Args:
-        solid: with its ``inner`` triangles.
+        solid: solid with its ``inner`` triangles.
 
     Returns:
         The solid; no tetrahedron has two sides on a curved face, between which it
@@ -164,7 +166,7 @@ def _resolved(solid: Solid, face: CutFace) -> Solid:
 def _crossing(
     solid: Solid, face: CutFace, on: NDArray, ends: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """(e,) whether an edge crosses the face, and at which share of it."""
+    """Return (e,) whether edges cross the face, and at which share of the edge."""
     value = np.where(on, 0.0, face.shape.signed(solid.points)[0])
     low, high = value[ends].T
     across = low * high < 0
@@ -190,7 +192,7 @@ def _crossing(
 def _share_of_crossing(
     shape: Shape, start: NDArray, end: NDArray, low: NDArray, high: NDArray
 ) -> NDArray:
-    """(e,) share of edges at which they cross a shape, by bisection, then a secant."""
+    """Return (e,) share of edges where they cross a shape, by bisection and secant."""
     left, right = np.zeros(len(low)), np.ones(len(low))
     for _ in range(0 if isinstance(shape, Plane) else _HALVINGS):
         middle = (left + right) / 2
@@ -203,7 +205,7 @@ def _share_of_crossing(
 
 
 def _with_cut(solid: Solid, on: NDArray, face: CutFace) -> Solid:
-    """A solid with the triangles on a face among those inside it."""
+    """Return a solid with the triangles on a face among those inside it."""
     number, count = len(solid.shapes), len(solid.points)
     solid = replace(solid, shapes=(*solid.shapes, face.shape))
     faces, owners = faces_inside(solid.cells)
@@ -223,7 +225,7 @@ def _with_cut(solid: Solid, on: NDArray, face: CutFace) -> Solid:
 
 
 def _onto(solid: Solid, face: CutFace) -> tuple[Solid, NDArray]:
-    """Corners near a face moved onto it, and which lie on it."""
+    """Return the corners near a face moved onto it, and which lie on it."""
     size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     height = np.abs(face.shape.signed(solid.points)[0])
     ends, _ = edges_of(solid.cells, len(solid.points))
@@ -249,8 +251,8 @@ def _onto(solid: Solid, face: CutFace) -> tuple[Solid, NDArray]:
 def _targets(
     solid: Solid, shape: Shape, near: NDArray, reach: NDArray, close: float
 ) -> tuple[NDArray, NDArray]:
-    """(n, 3) [m] where corners near a shape are to be, and which can be there."""
-    # those of the boundary, or of other faces inside, stay on their shapes
+    """Return (n, 3) [m] positions of corners near a shape on it, and which can move."""
+    # corners of the boundary or of other faces inside stay on their shapes
     target, on = solid.points.copy(), np.zeros(len(near), dtype=bool)
     free = near.copy()
     groups = [(key, group[near[group]]) for key, group in corner_groups(solid)]

@@ -1,16 +1,16 @@
 r"""Thin elements along the edges where stress is singular.
 
 Near an edge that is clamped on one side and free on the other, or near a re-entrant
-edge of the part, strains grow like r^(a - 1) with a below 1, and polynomials on
-elements of one size converge slowly whatever their degree.  A layer of elements that is
-thin across the edge and as long as its neighbours along it costs little and removes
+edge of the part, strains grow like r^(a - 1) with a below 1.  There polynomials on
+elements of one size converge slowly, whatever their degree.  A layer of elements that
+is thin across the edge and as long as its neighbours along it costs little and removes
 most of that error.
 
-A tetrahedron with an edge on a singular one is cut, at the same share of all its other
-edges from the singular edge, into a wedge along the edge and a remainder; one with a
-corner there into a small tetrahedron and a remainder.  Neighbours cut their common face
-at the same points.  The cuts are made in the coordinates of the curved element, so that
-layers follow a round edge however thin they are.
+A tetrahedron with an edge on a singular edge is cut at the same share of its other
+edges, measured from there.  It becomes a wedge along the edge and a remainder.  One
+with a corner there becomes a small tetrahedron and a remainder.  Neighbours cut their
+common face at the same points.  The cuts are made in the coordinates of the curved
+element, so that thin layers follow a round edge.
 """
 
 from dataclasses import dataclass
@@ -29,15 +29,16 @@ from stiffness.mesh.regions import Region, material_edges
 from stiffness.mesh.solid import Solid, moved_onto_shapes
 
 ENDS = (0, 1)  # patches of base and tip; distributed tractions end at their outlines
-LAYER_SHARE = 0.25  # thickness of the layer over the element's; 0.15 to 0.3 do as well
-_PASSES = 100  # of splitting joining edges; 3 to 12 do for the links of meshes/
+LAYER_SHARE = 0.25  # layer's thickness over the element's; 0.15 to 0.3 are as good
+_PASSES = 100  # passes that split joining edges; 3 to 12 suffice for meshes/
 _REENTRANT = np.cos(np.radians(35.0))  # a flatter re-entrant edge is hardly singular
-# edges that are cut where a corner is singular, or an edge: singular corners first
+# edges that are cut where a corner or an edge is singular; singular corners come first
 _CUT_EDGES = {1: [[0, 1], [0, 2], [0, 3]], 2: [[0, 2], [0, 3], [1, 2], [1, 3]]}
 # parts by corners, 0 to 3, and cuts in this order, from 4 on.  A small tetrahedron and
-# a prism, or two prisms; each is three tetrahedra by the diagonals that start at its
-# sides' smallest numbers, so that neighbours agree (Dompierre et al. 1999).  Corners'
-# numbers rise and cuts' follow them: the diagonals are the same in all tetrahedra.
+# a prism, or two prisms; each prism becomes three tetrahedra by the diagonals that
+# start at its sides' smallest numbers, so that neighbours agree (Dompierre et al.
+# 1999).  Corners' numbers increase and cuts' numbers follow them: the diagonals are the
+# same in all tetrahedra.
 _PARTS = {
     1: np.array([[0, 4, 5, 6], [1, 3, 2, 6], [1, 6, 2, 5], [1, 6, 5, 4]]),
     2: np.array([
@@ -54,9 +55,9 @@ class Parts:
     Attributes:
         corners: (t, 4) numbers of the parts' corners, rising in each row; below the
             solid's count they are its own.
-        places: (t, 4, 4) barycentric coordinates of the corners in the tetrahedron
-            they are part of, whose own corners are taken in rising order.
-        parent: (t,) the tetrahedron of the solid each is part of.
+        places: (t, 4, 4) barycentric coordinates of the corners in their parent
+            tetrahedron, whose own corners are taken in rising order.
+        parent: (t,) the tetrahedron of the solid that contains each part.
     """
 
     corners: NDArray
@@ -65,17 +66,17 @@ class Parts:
 
 
 def whole_elements(solid: Solid) -> Parts:
-    """Each tetrahedron as its own only part."""
+    """Return each tetrahedron as a single part."""
     count = len(solid.cells)
     places = np.broadcast_to(np.eye(4), (count, 4, 4))
     return Parts(np.sort(solid.cells, axis=1), places, np.arange(count))
 
 
 def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
-    """Edges of a solid at which stresses are singular.
+    """Return the edges of a solid at which stresses are singular.
 
     Args:
-        solid: any.
+        solid: any solid.
         held: patches that are clamped or loaded.
 
     Returns:
@@ -87,7 +88,7 @@ def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
     code = edge_code(pairs, count).ravel()
     order = np.argsort(code, kind="stable")
     code, owner = code[order], order // 3
-    # at an edge of four faces two bodies touch: any pairing of its faces will do
+    # two bodies touch at an edge of four faces: any pairing of its faces is valid
     code, left, right = code[::2], owner[::2], owner[1::2]
     border = solid.patch[left] != solid.patch[right]
     clamped = np.isin(solid.patch[left], held) | np.isin(solid.patch[right], held)
@@ -104,12 +105,12 @@ def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
 def graded_edges(
     solid: Solid, held: tuple[int, ...], regions: tuple[Region, ...]
 ) -> NDArray:
-    """Singular edges, and where regions of different materials meet the boundary.
+    """Return singular edges, and edges between materials at the boundary.
 
     Args:
-        solid: any.
+        solid: any solid.
         held: patches that are clamped or loaded.
-        regions: of the link.
+        regions: regions of the link.
 
     Returns:
         (e, 2) corners.
@@ -124,9 +125,9 @@ def split_joining_edges(
     """Split edges that join singular edges.
 
     Args:
-        solid: any.
+        solid: any solid.
         held: patches that are clamped or loaded.
-        regions: of the link.
+        regions: regions of the link.
 
     Returns:
         A solid whose tetrahedra have at most a corner or an edge on the singular
@@ -141,7 +142,7 @@ def split_joining_edges(
         ends, of_cell = edges_of(solid.cells, count)
         joining = touched[ends].all(axis=1)
         rank = length_ranks(solid.points, ends)
-        # a triangle of singular edges only: its longest is split as well
+        # a triangle of only singular edges: its longest edge is split as well
         triangle = joining[of_cell].sum(axis=1) > 2
         longest = np.where(joining, rank, -1)[of_cell].argmax(axis=1)
         longest = of_cell[np.arange(len(of_cell)), longest]
@@ -153,7 +154,7 @@ def split_joining_edges(
                 return solid
             solid, settled = moved_onto_shapes(solid), True
             continue
-        # the longest first: one that is the longest joining edge of all its tetrahedra
+        # first an edge that is the longest joining edge of all its tetrahedra
         rank[~joining] = -1
         highest = rank[of_cell].max(axis=1)
         own = rank[of_cell] == np.maximum(highest, 0)[:, None]
@@ -172,10 +173,10 @@ def layered(
     """Cut a layer of thin parts along the singular edges.
 
     Args:
-        solid: of :func:`split_joining_edges`.
+        solid: solid of :func:`split_joining_edges`.
         held: patches that are clamped or loaded.
-        share: of each edge, from the singular end, that is the layer's.
-        regions: of the link.
+        share: share of each edge, from its singular end: thickness of the layer.
+        regions: regions of the link.
 
     Returns:
         The parts; tetrahedra that touch no singular edge stay whole.
@@ -184,11 +185,11 @@ def layered(
     count = len(solid.points)
     touched = np.zeros(count, dtype=bool)
     touched[graded_edges(solid, held, regions)] = True
-    # should a tetrahedron touch more than an edge after all, its corners get no layer
+    # if a tetrahedron still touches more than an edge, its corners get no layer
     while (several := touched[parts.corners].sum(axis=1) > 2).any():
         touched[parts.corners[several]] = False
     on = touched[parts.corners]
-    # the singular corners first; a right-hand order is not needed
+    # singular corners come first; the orientation does not matter
     order = np.argsort(~on, axis=1, kind="stable")
     corners = np.take_along_axis(parts.corners, order, axis=1)
     places = np.take_along_axis(parts.places, order[:, :, None], axis=1)

@@ -14,7 +14,7 @@ from stiffness.surface.true_surface import TrueSurface
 
 
 class MeshFailed(BadInput):
-    """The mesher gave nothing usable for a surface that is in order."""
+    """The mesher made no usable mesh of a valid surface."""
 
 
 def fit_to_patches(
@@ -25,15 +25,15 @@ def fit_to_patches(
     Args:
         points: (n, 3) [m].
         cells: (t, 4) tetrahedra of either orientation.
-        surface: what they were made from.
+        surface: the surface that was meshed.
         patches: its patches and shapes.
 
     Returns:
         The solid; moves of corners that would invert a tetrahedron are shortened.
 
     Raises:
-        MeshFailed: the mesh is not the part: its volume is off by more than 2 %, it has
-            other holes, or an interface has no face.
+        MeshFailed: the mesh differs from the part: its volume by more than 2 %, by the
+            number of holes, or an interface has no face.
     """
     points, cells = _positive_cells(points, cells)
     faces = boundary_faces(cells)
@@ -66,7 +66,7 @@ def fit_to_patches(
 
 
 def _positive_cells(points: NDArray, cells: NDArray) -> tuple[NDArray, NDArray]:
-    """Points that are used, and cells turned to positive volume."""
+    """Return the points that are used, and cells reoriented to positive volume."""
     used, cells = np.unique(cells, return_inverse=True)
     points, cells = points[used], cells.reshape(-1, 4)
     a, b, c, d = np.moveaxis(points[cells], 1, 0)
@@ -78,7 +78,7 @@ def _positive_cells(points: NDArray, cells: NDArray) -> tuple[NDArray, NDArray]:
 def _nearest_patch(
     points: NDArray, faces: NDArray, surface: Surface, patches: Patches
 ) -> NDArray:
-    """Patch of each boundary face: the nearest one of about the same normal."""
+    """Return patch of each boundary face: the nearest one of about the same normal."""
     import pyvista
 
     mesh = pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)

@@ -1,8 +1,8 @@
-"""Badly shaped tetrahedra mended: corners moved, edges inside split.
+"""Improvement of badly shaped tetrahedra: corners moved, inner edges split.
 
-Corners that were moved onto the part's shapes may flatten tetrahedra, most of all where
-two shapes meet tangentially and all corners of one lie on the boundary.  An edge of
-such a one that runs inside the part is split, and corners are moved, on their shapes or
+Corners moved onto the part's shapes may flatten tetrahedra.  This happens most where
+two shapes meet tangentially and all corners of a tetrahedron lie on the boundary.  An
+inner edge of such a tetrahedron is split, and corners are moved, on their shapes or
 inside, to where the worst tetrahedron around them is best.
 
 Source: Freitag & Ollivier-Gooch (1997), local optimisation of the worst element.
@@ -28,23 +28,23 @@ from stiffness.mesh.solid import (
 from stiffness.mesh.split_crossing import one_of_each
 from stiffness.surface.primitives import project
 
-POOR = 0.08  # quality below which a tetrahedron is to be mended; pytetwild's are better
+POOR = 0.08  # lower quality of a tetrahedron is improved; pytetwild's are better
 _ROUNDS = 4
-_STEPS = 10  # of a corner's search, each half as long as the last that did not help
+_STEPS = 10  # steps of a corner's search; a step without improvement is halved
 _DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 
 
 def fitted(solid: Solid, limit: float | None = None) -> Solid:
-    """Corners on their shapes, and tetrahedra mended that this flattened.
+    """Move corners onto their shapes, and improve tetrahedra that become flat.
 
     Args:
-        solid: whose corners may be off the shapes of their patches.
-        limit: [1] quality below which tetrahedra are mended; :data:`POOR` if absent,
-            or less where the solid's own are worse.
+        solid: its corners may be off the shapes of their patches.
+        limit: [-] quality below which tetrahedra are improved; :data:`POOR` if absent,
+            or less if the solid's own are worse.
 
     Returns:
-        The solid, with more tetrahedra where some had to be split; where mending fails,
-        corners that stay off their shapes, as :func:`moved_onto_shapes` leaves them.
+        The solid, with more tetrahedra where some had to be split.  Where this fails,
+        corners stay off their shapes, as :func:`moved_onto_shapes` leaves them.
     """
     least = float(element_quality(solid).min())
     # elements of a structured bar are long on purpose
@@ -67,7 +67,7 @@ def fitted(solid: Solid, limit: float | None = None) -> Solid:
 
 
 def _split_inside(solid: Solid, limit: float) -> Solid:
-    """Split an edge inside the part of each poor tetrahedron with no corner inside."""
+    """Split an inner edge of each poor tetrahedron that has no inner corner."""
     boundary = np.zeros(len(solid.points), dtype=bool)
     boundary[solid.faces] = True
     ends, of_cell = edges_of(solid.cells, len(solid.points))
@@ -87,7 +87,7 @@ def _split_inside(solid: Solid, limit: float) -> Solid:
 
 
 def _relaxed(solid: Solid, limit: float) -> Solid:
-    """Move the corners of poor tetrahedra, those inside the part first."""
+    """Move the corners of poor tetrahedra, inner corners first."""
     points = solid.points.copy()
     shapes_of: dict[int, tuple[int, ...]] = {}
     for key, group in corner_groups(solid):
@@ -103,7 +103,7 @@ def _relaxed(solid: Solid, limit: float) -> Solid:
 def _best_place(
     solid: Solid, points: NDArray, star: NDArray, corner: int, key: tuple[int, ...]
 ) -> NDArray:
-    """(3,) [m] where the worst tetrahedron around a corner is best."""
+    """Return the (3,) [m] position of a corner with the best worst tetrahedron."""
     place = points[corner]
     around = points[star]
     mine = star == corner

@@ -10,9 +10,9 @@ dN     their derivatives, L_1 .. L_(c-1) independent              (q, m, c-1)
 
 c is 4 for a tetrahedron, 3 for a triangle.  The lattice of degree p holds all points
 whose coordinates are multiples of 1 / p: corners first, then along the edges, in the
-faces, inside.  An element's corners are always in the rising order of their numbers, so
-that two elements see the nodes of a common edge or face in the same order; half of the
-elements are therefore left-handed.
+faces, inside.  An element's corners are always in rising order of their numbers, so
+that two elements have the nodes of a common edge or face in the same order.  Half of
+the elements are therefore left-handed.
 """
 
 from functools import lru_cache
@@ -22,16 +22,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 EDGES = np.array(list(combinations(range(4), 2)))
-FACES = np.array(list(combinations(range(4), 3)))  # the k-th lacks corner 3 - k
+FACES = np.array(list(combinations(range(4), 3)))  # face k is opposite to corner 3 - k
 
 
 @lru_cache(maxsize=16)
 def lattice(degree: int, corners: int = 4) -> NDArray:
-    """Barycentric coordinates of a lattice, as multiples of 1 / degree.
+    """Return the barycentric coordinates of a lattice, as multiples of 1 / degree.
 
     Args:
-        degree: of the polynomials, >= 1.
-        corners: 4 of a tetrahedron, 3 of a triangle.
+        degree: degree of the polynomials, >= 1.
+        corners: 4 for a tetrahedron, 3 for a triangle.
 
     Returns:
         (m, corners) integers: the corners, then edge by edge, face by face, inside.
@@ -47,7 +47,7 @@ def lattice(degree: int, corners: int = 4) -> NDArray:
 
 
 def _partitions(total: int, parts: int) -> list[tuple[int, ...]]:
-    """Ways to share a total among parts that all get some; the first falls slowest."""
+    """Return the ways to split a total into positive parts; the first falls slowest."""
     if parts == 1:
         return [(total,)]
     return [
@@ -58,10 +58,10 @@ def _partitions(total: int, parts: int) -> list[tuple[int, ...]]:
 
 
 def shape_functions(degree: int, L: NDArray) -> tuple[NDArray, NDArray]:
-    """Polynomials that are 1 at one point of the lattice and 0 at the others.
+    """Return polynomials that are 1 at one point of the lattice and 0 at the others.
 
     Args:
-        degree: of the polynomials.
+        degree: degree of the polynomials.
         L: (q, c) barycentric coordinates.
 
     Returns:
@@ -88,14 +88,14 @@ def shape_functions(degree: int, L: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def numbered(corners: NDArray, degree: int) -> tuple[NDArray, int]:
-    """Numbers of the lattices' points, shared by the elements that share them.
+    """Return the numbers of lattice points, equal for points that elements share.
 
     Args:
         corners: (t, 4) numbers of the corners, rising in each row.
-        degree: of the polynomials.
+        degree: degree of the polynomials.
 
     Returns:
-        (t, m) numbers, the corners' own first, and how many there are.
+        (t, m) numbers, the corners' own first, and their count.
     """
     total = int(corners.max()) + 1
     parts = [corners]
@@ -120,10 +120,10 @@ def numbered(corners: NDArray, degree: int) -> tuple[NDArray, int]:
 
 @lru_cache(maxsize=8)
 def face_nodes(degree: int) -> NDArray:
-    """Which of a tetrahedron's lattice points lie on its faces.
+    """Return the lattice points on the faces of a tetrahedron.
 
     Args:
-        degree: of the polynomials.
+        degree: degree of the polynomials.
 
     Returns:
         (4, k) one row for each of ``FACES``, in the order of a triangle's lattice.

@@ -1,11 +1,11 @@
-"""Surfaces to tetrahedra, with exact interfaces and curved faces kept curved.
+"""Tetrahedra from surfaces, with exact interfaces and curved faces.
 
 Pytetwild makes the tetrahedra, in a separate process with a time limit, from a surface
 with fewer triangles (:mod:`stiffness.surface.decimate`).  The mesh's boundary follows
-the surface to within an envelope only, so every boundary triangle is then assigned to a
-patch of the surface, and the nodes are projected onto the patches' exact shapes.
-Meshes are kept in a cache by the content they were made from: pytetwild is slow, and
-never makes the same mesh twice.
+the surface only to within an envelope.  So every boundary triangle is assigned to a
+patch of the surface, and the nodes are projected onto the patches' exact shapes. Meshes
+are cached by their input, because pytetwild is slow and never makes the same mesh
+twice.
 """
 
 import hashlib
@@ -34,9 +34,9 @@ from stiffness.surface.surface import Surface, read_surface
 __all__ = ["Interface", "Solid", "mesh_solid", "parse_interface", "read_surface"]
 
 _WORKER = Path(__file__).with_name("mesh_worker.py")
-# makes meshes reproducible; there is none where the C++ library is not GNU's
+# makes meshes reproducible; absent where the C++ library is not GNU's
 _SAME_NUMBERS = Path(__file__).with_name("same_random_numbers.so")
-_FORMAT = 4  # of the cached meshes; raised when what they hold changes
+_FORMAT = 4  # version of the cached meshes; increased when their content changes
 
 
 def mesh_solid(
@@ -50,26 +50,27 @@ def mesh_solid(
     cache: Path | str | None = None,
     patches: Patches | None = None,
 ) -> Solid:
-    """Tetrahedra of a surface, from the cache if they were made before.
+    """Return the tetrahedra of a surface, from the cache if meshed before.
 
     Args:
-        surface: of the link.
+        surface: surface of the link.
         base: the held interface.
         tip: the loaded interface.
         edge: [m] wanted length of edges; a 20th of the diagonal if absent.
-        envelope: [1] share of the diagonal by which the mesher may leave a surface
-            that has fewer triangles than this one and leaves it by as much.
+        envelope: [-] share of the diagonal by which the mesher may deviate from a
+            surface with fewer triangles, which itself deviates from this one by as
+            much.
         time_limit: [s] for the mesher.
         cache: folder; that of :func:`forcefit.inputs.cache_folder.cache_folder` if
             absent.
-        patches: of the surface and these interfaces; found if absent.
+        patches: patches of the surface and these interfaces; computed if absent.
 
     Returns:
         The solid.
 
     Raises:
         BadInput: an interface has no part of the surface.
-        MeshFailed: the mesher ran out of time or gave nothing.
+        MeshFailed: the mesher ran out of time or made no mesh.
     """
     patches = patches or find_patches(surface, base, tip)
     edge = surface.diagonal / 20 if edge is None else edge
@@ -86,7 +87,7 @@ def mesh_solid(
 
 
 def _from_cache(path: Path) -> tuple[NDArray, NDArray] | None:
-    """Points and cells of a cached mesh; None if absent or damaged."""
+    """Return the points and cells of a cached mesh; None if absent or damaged."""
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
             points, cells = stored["points"], stored["cells"]
@@ -97,7 +98,7 @@ def _from_cache(path: Path) -> tuple[NDArray, NDArray] | None:
 
 
 def _to_cache(path: Path, points: NDArray, cells: NDArray) -> None:
-    """Write a mesh whole or not at all; a full or read-only disk is no error."""
+    """Write a mesh completely or not at all; a full or read-only disk is no error."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(path) as part, part.open("wb") as file:
@@ -109,18 +110,18 @@ def _to_cache(path: Path, points: NDArray, cells: NDArray) -> None:
 def _tetrahedralize(
     surface: Surface, edge: float, envelope: float, time_limit: float
 ) -> tuple[NDArray, NDArray]:
-    """Run the mesher in a process of its own."""
+    """Run the mesher in a separate process."""
     need("pytetwild")
     with tempfile.TemporaryDirectory(prefix="forcefit-") as folder:
         given, made = Path(folder, "surface.npz"), Path(folder, "mesh.npz")
         points, triangles = coarser_surface(surface, envelope * surface.diagonal)
         np.savez(given, points=points, triangles=triangles, settings=[edge, envelope])
-        # -P: our modules' names are not to be taken for others'
+        # -P: modules of the current folder must not replace others of the same name
         command = [sys.executable, "-P", str(_WORKER), str(given), str(made)]
         if _SAME_NUMBERS.exists():
             command.append(str(_SAME_NUMBERS))
         try:
-            # the mesher leaves a file in the folder it runs in
+            # the mesher leaves a file in its current folder
             run = subprocess.run(
                 command,
                 timeout=time_limit,

@@ -1,8 +1,8 @@
-"""The mesher's own process: pytetwild on a stored surface.
+"""Process of the mesher: pytetwild on a stored surface.
 
 ``python stiffness/mesh/mesh_worker.py SURFACE.npz MESH.npz [LIBRARY]``
 
-The library is of ``same_random_numbers.cpp``.
+The library is built from ``same_random_numbers.cpp``.
 """
 
 import ctypes
@@ -12,7 +12,7 @@ from types import ModuleType
 
 import numpy as np
 
-# of the mesher's optimisation: simple parts need fewer, and where walls meet at acute
+# of the mesher's optimisation.  Simple parts need fewer; where walls meet at acute
 # angles its goal is never reached, while ten passes are as good as eighty
 _PASSES = 12
 
@@ -24,12 +24,12 @@ def main(given: Path, made: Path, library: str | None = None) -> None:
         given: ``points`` (n, 3) [m], ``triangles`` (m, 3), ``settings``: edge length
             [m] and envelope as a share of the diagonal.
         made: ``points`` (n, 3) [m] and ``cells`` (t, 4).
-        library: with it the same surface and settings give the same mesh.
+        library: if given, the same surface and settings yield the same mesh.
     """
-    if library is not None:  # before the mesher is: the first definition counts
+    if library is not None:  # before the mesher: the first definition is used
         ctypes.CDLL(library, mode=ctypes.RTLD_GLOBAL)
-    # pytetwild loads pyvista, half a second, to give its classes a method: here it
-    # finds an empty one instead
+    # pytetwild imports pyvista, half a second, to add a method to its classes: here it
+    # finds an empty module
     sys.modules["pyvista"] = ModuleType("pyvista")
     import pytetwild
 

@@ -1,9 +1,9 @@
-"""Rules of integration over the reference triangle and the reference tetrahedron.
+"""Quadrature rules on the reference triangle and the reference tetrahedron.
 
-A rule's points are written as words, a letter for each barycentric coordinate: ``aab``
-is the point (a, a, b).  Points whose letters are the same in another order share a
-weight.  All weights are positive: a rule with others would let rounding grow, and a
-stress could then count as less than none.
+A rule's points are written as words, with a letter for each barycentric coordinate:
+``aab`` is the point (a, a, b).  Points with the same letters in another order share a
+weight.  All weights are positive: negative ones would amplify rounding, and could make
+an energy of stresses negative.
 
 Sources: Hammer and Stroud (1956) for degree 2; Radon (1948) for 5 and Dunavant (1985)
 for 4 and 6 in the triangle; Keast (1986) for 4, 5 and 6 in the tetrahedron.
@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 
 class _Rule(NamedTuple):
-    """Exact to a degree.
+    """A quadrature rule, exact to a degree.
 
     Attributes:
-        degree: of polynomials.
+        degree: degree of the polynomials integrated exactly.
         points: words, in the order in which they are summed.
         coordinates: a, b, c and so on.
-        weights: of the points with these letters.
+        weights: weights of the points with these letters.
     """
 
     degree: int
@@ -105,10 +105,10 @@ _TETRAHEDRON = (
 
 @lru_cache(maxsize=16)
 def quadrature(degree: int, corners: int = 4) -> tuple[NDArray, NDArray]:
-    """A rule on the reference element, exact to at least a degree.
+    """Return a rule on the reference element, exact to at least a degree.
 
     Args:
-        degree: of polynomials, up to 6.
+        degree: degree of polynomials, up to 6.
         corners: 4 of a tetrahedron, 3 of a triangle.
 
     Returns:

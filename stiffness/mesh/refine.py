@@ -1,9 +1,9 @@
 """Local refinement of tetrahedra by longest-edge bisection (Rivara).
 
 An edge is split only when it is the longest of every tetrahedron around it, so the mesh
-stays conforming at every step; neighbours are split first where it is not.  Boundary
-triangles are split with their tetrahedra and keep their patch, and new corners are
-moved onto the patch's shape.
+stays conforming at every step.  Otherwise neighbours are split first.  Boundary
+triangles are split with their tetrahedra and keep their patch.  New corners are moved
+onto the patch's shape.
 """
 
 from dataclasses import dataclass, replace
@@ -22,8 +22,8 @@ class Refined:
     """A refined solid.
 
     Attributes:
-        solid: the finer one.
-        parent: (t,) tetrahedron of the coarser one that each came from.
+        solid: the finer solid.
+        parent: (t,) index of the coarser tetrahedron that contains each.
     """
 
     solid: Solid
@@ -31,11 +31,11 @@ class Refined:
 
 
 def refine(solid: Solid, halvings: NDArray) -> Refined:
-    """Bisect tetrahedra as often as asked, and neighbours for a conforming mesh.
+    """Bisect tetrahedra as requested, and neighbours for a conforming mesh.
 
     Args:
         solid: to refine.
-        halvings: (t,) how many times each tetrahedron's volume is to be halved.
+        halvings: (t,) number of times each tetrahedron's volume is halved.
 
     Returns:
         The finer solid.
@@ -57,7 +57,7 @@ def split_edges(
     split: NDArray,
     places: NDArray | None = None,
 ) -> tuple[Solid, NDArray]:
-    """Split some edges and the tetrahedra at them, at most one edge of each.
+    """Split edges and the tetrahedra at them, at most one edge per tetrahedron.
 
     Args:
         solid: to refine; new corners are not yet moved onto its shapes.
@@ -68,7 +68,7 @@ def split_edges(
 
     Returns:
         The solid, and the tetrahedra (r,) that were halved: their first halves keep
-        their indices, the second ones are appended in this order.
+        their indices, the second halves are appended in this order.
     """
     count = len(solid.points)
     middle = np.full(len(ends), -1)
@@ -102,11 +102,11 @@ def split_edges(
 
 
 def edges_of(cells: NDArray, points: int) -> tuple[NDArray, NDArray]:
-    """Edges of tetrahedra.
+    """Return the edges of tetrahedra.
 
     Args:
         cells: (t, 4) corners.
-        points: how many corners there are.
+        points: number of corners in all.
 
     Returns:
         Ends (e, 2), the smaller number first, in order; the edges (t, 6) of each cell.
@@ -118,11 +118,11 @@ def edges_of(cells: NDArray, points: int) -> tuple[NDArray, NDArray]:
 
 
 def edge_code(ends: NDArray, points: int) -> NDArray:
-    """One number for each pair of corners, whose order counts.
+    """Return one number for each ordered pair of corners.
 
     Args:
         ends: (..., 2) corners.
-        points: how many corners there are.
+        points: number of corners in all.
 
     Returns:
         (...) ; pairs in order have rising numbers.
@@ -131,14 +131,14 @@ def edge_code(ends: NDArray, points: int) -> NDArray:
 
 
 def length_ranks(points: NDArray, ends: NDArray) -> NDArray:
-    """Ranks of edges by length.
+    """Return the ranks of edges by length.
 
     Args:
         points: (n, 3) [m].
         ends: (e, 2) corners.
 
     Returns:
-        (e,) each edge's rank, 0 the shortest; of equal ones the first is lower.
+        (e,) rank of each edge, 0 for the shortest; of equal ones the first is lower.
     """
     length = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
     rank = np.empty(len(ends), dtype=int)
@@ -147,12 +147,12 @@ def length_ranks(points: NDArray, ends: NDArray) -> NDArray:
 
 
 def chosen_by_all(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
-    """Edges that all tetrahedra around them have chosen.
+    """Return the edges that all tetrahedra around them choose.
 
     Args:
         of_cell: (t, 6) of :func:`edges_of`.
         chosen: one edge of each tetrahedron that chooses.
-        edges: how many there are.
+        edges: number of edges.
 
     Returns:
         (e,) booleans.
@@ -164,7 +164,7 @@ def chosen_by_all(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
 def _terminal_edges(
     points: NDArray, ends: NDArray, of_cell: NDArray, wanted: NDArray
 ) -> NDArray:
-    """(e,) edges to split now: longest of all their cells, on a wanted cell's path."""
+    """Return (e,) edges to split now: longest of all their cells, near wanted cells."""
     rank = length_ranks(points, ends)
     longest = np.take_along_axis(
         of_cell, rank[of_cell].argmax(axis=1)[:, None], axis=1
@@ -180,7 +180,7 @@ def _terminal_edges(
 
 
 def _halved(cells: NDArray, middle: NDArray, pairs: NDArray) -> tuple[NDArray, NDArray]:
-    """Cells with a split edge become two, the second ones appended; and which did."""
+    """Return cells with a split edge as two, second ones appended; and indices."""
     row, which = np.nonzero(middle >= 0)
     new = middle[row, which]
     first, second = cells[row].copy(), cells[row].copy()

@@ -1,7 +1,7 @@
 """Regions of different materials, and a mesh cut along the faces between them.
 
-Faces of known places, planes of a box or faces between two solids, become faces of
-tetrahedra; in what follows, corners on them stay on their shapes.
+Known faces, such as planes of a box or faces between two solids, become faces of
+tetrahedra.  In later steps their corners stay on their shapes.
 """
 
 from collections.abc import Callable
@@ -23,18 +23,18 @@ from stiffness.mesh.lagrange import FACES
 from stiffness.mesh.refine import edge_code
 from stiffness.mesh.solid import Solid
 
-_POOR = 0.2  # quality of tetrahedra that bend with a curved face and stay proper
-_AGREED = 0.9  # of a piece's volume in one region: all of it is
+_POOR = 0.2  # quality of tetrahedra that stay valid when they follow a curved face
+# relative to a piece's volume in one region: then the whole piece belongs to it
+_AGREED = 0.9
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Part of a link of one material.
+    """Region of a link with one material.
 
     Attributes:
-        where: which of the points (n, 3) [m] are in it.
-        faces: along which the mesh is cut; a region without is as jagged as the
-            elements.
+        where: function that selects the points (n, 3) [m] in it.
+        faces: along which the mesh is cut; a region without faces follows the elements.
     """
 
     where: Callable[[NDArray], NDArray]
@@ -42,11 +42,11 @@ class Region:
 
 
 def region_of_cells(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
-    """The region of each tetrahedron.
+    """Return the region of each tetrahedron.
 
     Args:
-        solid: any.
-        regions: later ones count more.
+        solid: any solid.
+        regions: later ones have precedence.
 
     Returns:
         (t,) 1 for the first region, and so on; 0 outside all.
@@ -58,13 +58,13 @@ def region_of_cells(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
 def region_of_places(
     places: NDArray, regions: tuple[Region, ...], cut_region: NDArray | None
 ) -> NDArray:
-    """The region of places inside tetrahedra.
+    """Return the region of places inside tetrahedra.
 
     Args:
         places: (n, 3) [m].
-        regions: later ones count more.
-        cut_region: (n,) of the regions whose faces the mesh was cut along, the one that
-            the tetrahedron of each place is in; None if it was not cut.
+        regions: later ones have precedence.
+        cut_region: (n,) region of the tetrahedron at each position, among the regions
+            whose faces the mesh was cut along; None if it was not cut.
 
     Returns:
         (n,) 1 for the first region, and so on; 0 outside all.
@@ -81,8 +81,8 @@ def cut_by_regions(solid: Solid, regions: tuple[Region, ...]) -> Solid:
     """Cut a mesh so that regions' faces are faces of tetrahedra.
 
     Args:
-        solid: any.
-        regions: of the link.
+        solid: any solid.
+        regions: regions of the link.
 
     Returns:
         The solid, with the region of each tetrahedron and the triangles between them.
@@ -107,14 +107,14 @@ def cut_by_regions(solid: Solid, regions: tuple[Region, ...]) -> Solid:
 
 
 def is_jagged(solid: Solid, regions: tuple[Region, ...]) -> bool:
-    """Whether a face between regions runs through tetrahedra.
+    """Return whether a face between regions runs through tetrahedra.
 
     Args:
-        solid: any.
-        regions: of the link.
+        solid: any solid.
+        regions: regions of the link.
 
     Returns:
-        True if a region has no faces, or cutting along them did not succeed.
+        True if a region has no faces, or cutting along them failed.
     """
     if not regions:
         return False
@@ -126,11 +126,11 @@ def is_jagged(solid: Solid, regions: tuple[Region, ...]) -> bool:
 
 
 def material_edges(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
-    """Edges of the boundary between two regions, at which stresses are singular.
+    """Return boundary edges between two regions, at which stresses are singular.
 
     Args:
-        solid: any.
-        regions: of the link.
+        solid: any solid.
+        regions: regions of the link.
 
     Returns:
         (e, 2) corners.
@@ -141,10 +141,10 @@ def material_edges(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
 
 
 def edges_between(solid: Solid, region: NDArray) -> NDArray:
-    """Edges of the boundary at which two regions meet.
+    """Return the edges of the boundary at which two regions meet.
 
     Args:
-        solid: any.
+        solid: any solid.
         region: (t,) of each tetrahedron.
 
     Returns:
@@ -161,7 +161,7 @@ def edges_between(solid: Solid, region: NDArray) -> NDArray:
 
 
 def _owners(solid: Solid) -> NDArray:
-    """(f,) the tetrahedron of each boundary triangle."""
+    """Return the (f,) tetrahedron of each boundary triangle."""
     known = face_code(solid.cells[:, FACES], len(solid.points)).ravel()
     order = np.argsort(known)
     wanted = face_code(solid.faces, len(solid.points))
@@ -170,7 +170,7 @@ def _owners(solid: Solid) -> NDArray:
 
 
 def _places_inside(solid: Solid) -> NDArray:
-    """(t, 3) [m] places in tetrahedra, away from the faces they were cut along."""
+    """Return (t, 3) [m] positions in tetrahedra, away from the faces of cuts."""
     on = np.zeros(len(solid.points), dtype=bool)
     on[solid.inner] = True
     off = ~on[solid.cells]
@@ -180,7 +180,7 @@ def _places_inside(solid: Solid) -> NDArray:
 
 
 def _pieces(solid: Solid) -> NDArray:
-    """(t,) the piece of each tetrahedron, between the faces the mesh was cut along."""
+    """Return the (t,) piece of each tetrahedron; cuts separate the pieces."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -194,7 +194,7 @@ def _pieces(solid: Solid) -> NDArray:
 
 
 def _between_regions(solid: Solid) -> Solid:
-    """Keep those cuts only that lie between two regions, and all of these."""
+    """Keep exactly the cuts between two regions."""
     assert solid.region is not None
     faces, owners = faces_inside(solid.cells)
     one, other = solid.region[owners].T

@@ -1,8 +1,8 @@
-"""Slender and thin-walled straight bars recognised in their surfaces.
+"""Meshes of slender and thin-walled straight bars, recognised from their surfaces.
 
-The mesher makes elements as wide as they are long: a rod a thousand times as long as
-thick, or a tube with a wall of a hundredth of its radius, takes it minutes, or never
-ends.  Drawn out from their sections such bars take a few thousand elements.
+The mesher makes elements as wide as they are long.  For a rod a thousand times as long
+as thick, or a tube with a wall of a hundredth of its radius, it needs minutes or does
+not end.  Extruded from their sections such bars need a few thousand elements.
 """
 
 import math
@@ -19,26 +19,27 @@ from stiffness.surface.primitives import Cone, Plane, Shape
 from stiffness.surface.surface import Surface
 from stiffness.surface.true_surface import TrueSurface
 
-_SLENDER = 50.0  # length over the section's width
-_THIN = 0.04  # wall over the section's width: a tube's over its diameter
-_LAYERS = 60.0  # of elements along a bar, but for those that are thin at its ends
-_LONGEST = 2.0  # a layer in widths of the section, of a bar that is not slender
+_SLENDER = 50.0  # length over the section's width, of a slender bar
+_THIN = 0.04  # wall over width of a thin-walled section; for a tube over its diameter
+_LAYERS = 60.0  # number of element layers along a bar, without those at its ends
+# length of a layer over the section's width, for a bar that is not slender
+_LONGEST = 2.0
 _PARALLEL = 1e-6  # [rad]
-_SAME = 1e-6  # of the length: two places that agree
+_SAME = 1e-6  # relative to the length: difference of two positions that agree
 _SAME_VOLUME = 1e-3
 
 
 def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | None:
-    """The mesh of a slender or thin-walled straight bar.
+    """Return the mesh of a slender or thin-walled straight bar.
 
     Args:
-        surface: of the link.
+        surface: surface of the link.
         base: the held interface.
         tip: the loaded interface.
 
     Returns:
         A mesh to refine from, in the surface's axes; None if the link is no round bar,
-        tube, rectangle or box between base and tip, or neither slender nor thin.
+        tube, rectangle or box between base and tip, or is neither slender nor thin.
 
     Raises:
         BadInput: an interface has no part of the surface.
@@ -52,7 +53,7 @@ def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | No
         return None
     along = (surface.points - base.point) @ axis
     off = np.minimum(np.abs(along), np.abs(along - length))
-    # a bar has all its corners at its ends: cheaper than looking for its shapes
+    # all corners of a bar are at its ends: a cheaper test than recognising shapes
     if off.max() > 10 * _SAME * length:
         return None
     patches = find_patches(surface, base, tip)
@@ -75,7 +76,7 @@ def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | No
 def _section(
     shapes: tuple[Shape, ...], axis: NDArray
 ) -> tuple[dict[str, float], NDArray, NDArray] | None:
-    """Lengths of a bar's section, a point on its axis, and its first direction."""
+    """Return lengths of a bar's section, a point on its axis, its first direction."""
     if all(isinstance(shape, Cone) for shape in shapes):
         return _round_section([s for s in shapes if isinstance(s, Cone)], axis)
     if all(isinstance(shape, Plane) for shape in shapes) and len(shapes) in (4, 8):
@@ -86,7 +87,7 @@ def _section(
 def _round_section(
     cones: list[Cone], axis: NDArray
 ) -> tuple[dict[str, float], NDArray, NDArray] | None:
-    """Of a disc or a ring."""
+    """Return the section of a disc or a ring."""
     if len(cones) > 2 or not cones:
         return None
     largest = max(cones, key=lambda cone: cone.radius)
@@ -108,7 +109,7 @@ def _round_section(
 def _angular_section(
     planes: list[Plane], axis: NDArray
 ) -> tuple[dict[str, float], NDArray, NDArray] | None:
-    """Of a rectangle, or a box whose walls are equally thick."""
+    """Return the section of a rectangle, or of a box of one wall thickness."""
     first = planes[0].normal
     second = np.cross(axis, first)
     middle = np.mean([plane.point for plane in planes], axis=0)
@@ -132,7 +133,7 @@ def _angular_section(
 
 
 def _wall(lengths: dict[str, float]) -> float:
-    """[m] the thinnest wall; infinite in a solid section."""
+    """Return the thinnest wall [m]; infinite in a solid section."""
     if "radius" in lengths:
         inner = lengths.get("inner_radius")
         return math.inf if inner is None else lengths["radius"] - inner
@@ -140,7 +141,7 @@ def _wall(lengths: dict[str, float]) -> float:
 
 
 def _area(lengths: dict[str, float]) -> float:
-    """[m^2] of a section."""
+    """Return the area [m^2] of a section."""
     if "radius" in lengths:
         return math.pi * (
             lengths["radius"] ** 2 - lengths.get("inner_radius", 0.0) ** 2
@@ -151,7 +152,7 @@ def _area(lengths: dict[str, float]) -> float:
 
 
 def _placed(bar: Solid, frame: NDArray, foot: NDArray, length: float) -> Solid:
-    """A bar of unit length along z, turned, scaled and moved."""
+    """Return a bar of unit length along z, rotated, scaled and moved."""
 
     def moved(shape: Shape | None) -> Shape | None:
         if isinstance(shape, Plane):

@@ -6,31 +6,31 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 from stiffness.mesh.lagrange import EDGES
 from stiffness.surface.primitives import Shape, project
 from stiffness.surface.true_surface import TrueSurface
 
-FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward
+FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward orientation
 
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A link as tetrahedra with straight edges, and what its boundary stands for.
+    """A link as tetrahedra with straight edges, and the shapes of its boundary.
 
     Attributes:
         points: (n, 3) [m] corners, on the exact shapes where those are known.
         cells: (t, 4) corners of tetrahedra, of positive volume.
         faces: (f, 3) corners of boundary triangles, outward.
         patch: (f,) number of each face's patch; 0 is the base interface, 1 the tip.
-        shapes: of the patches; None leaves a patch's nodes where they are.
-        walls: of pairs of an interface and a patch that it goes over into smoothly,
-            the wall on their common line, see :mod:`stiffness.surface.smooth_outline`.
-        surface: that the boundary is to have; None if its patches' shapes are all.
+        shapes: shapes of the patches; None leaves a patch's nodes unchanged.
+        walls: walls by pair of an interface and a patch that continues it smoothly, the
+            wall on their common line, see :mod:`stiffness.surface.smooth_outline`.
+        surface: surface to be approximated; None if its patches' shapes suffice.
         inner: (k, 3) corners of triangles inside, between regions of the link.
-        inner_patch: (k,) number of the shape that each of them lies on.
-        region: (t,) of each tetrahedron, the region of
-            :mod:`stiffness.mesh.regions` it is in; None if the mesh was not cut.
+        inner_patch: (k,) index of the shape of each of them.
+        region: (t,) region of each tetrahedron, see :mod:`stiffness.mesh.regions`; None
+            if the mesh was not cut.
     """
 
     points: NDArray
@@ -47,7 +47,7 @@ class Solid:
     __repr__, _repr_html_ = short_repr, html_table
 
     def volumes(self) -> NDArray:
-        """(t,) [m^3] of the straight tetrahedra."""
+        """Return the (t,) [m^3] volumes of the straight tetrahedra."""
         a, b, c, d = np.moveaxis(self.points[self.cells], 1, 0)
         return np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)) / 6
 
@@ -55,27 +55,27 @@ class Solid:
 def meeting_shapes(
     solid: Solid, key: tuple[int, ...], points: NDArray
 ) -> tuple[Shape, ...]:
-    """Shapes that corners are to lie on.
+    """Return the shapes on which corners must lie.
 
     Args:
-        solid: any.
-        key: the patches they lie on; none for corners inside.
+        solid: any solid.
+        key: the patches of the corners; none for inner corners.
         points: (n, 3) [m] the corners' places.
 
     Returns:
-        The patches' shapes, or what takes their place where two meet smoothly.
+        The patches' shapes, or their replacement where two meet smoothly.
     """
     return _meeting_shapes(key, solid.shapes, solid.walls, points) if key else ()
 
 
 def corner_groups(solid: Solid) -> list[tuple[tuple[int, ...], NDArray]]:
-    """Corners of a solid that are to lie on shapes.
+    """Return the corners of a solid that must lie on shapes.
 
     Args:
-        solid: any.
+        solid: any solid.
 
     Returns:
-        As of :func:`node_patches`, of the boundary and of faces between regions.
+        As :func:`node_patches`, for the boundary and for faces between regions.
     """
     faces = np.concatenate([solid.faces, solid.inner])
     patch = np.r_[solid.patch, solid.inner_patch]
@@ -88,8 +88,8 @@ def _meeting_shapes(
     walls: Mapping[tuple[int, int], Shape],
     points: NDArray,
 ) -> tuple[Shape, ...]:
-    """Shapes whose intersection points with some patches are to lie on."""
-    # tangent shapes do not determine their common line: the wall on it does
+    """Return the shapes whose intersection contains points of some patches."""
+    # tangent shapes do not determine their common line; the wall on it does
     standing = {pair: wall for pair, wall in walls.items() if set(pair) <= set(key)}
     replaced = {other for _, other in standing}
     known = [s for p in key if p not in replaced and (s := shapes[p]) is not None]
@@ -100,7 +100,7 @@ def _meeting_shapes(
 
 
 def _tangent(one: Shape | None, other: Shape, points: NDArray) -> bool:
-    """Whether two shapes have the same normal near some points."""
+    """Return whether two shapes have the same normal near some points."""
     if one is None:
         return False
     along = np.einsum("ni,ni->n", one.signed(points)[1], other.signed(points)[1])
@@ -108,19 +108,19 @@ def _tangent(one: Shape | None, other: Shape, points: NDArray) -> bool:
 
 
 def element_quality(solid: Solid) -> NDArray:
-    """How well shaped tetrahedra are.
+    """Return the quality of tetrahedra.
 
     Args:
         solid: straight tetrahedra.
 
     Returns:
-        (t,) [1] 1 for a regular one, 0 for a flat one, negative for an inverted one.
+        (t,) [-] 1 for a regular one, 0 for a flat one, negative for an inverted one.
     """
     return tetrahedra_quality(solid.points[solid.cells])
 
 
 def tetrahedra_quality(corners: NDArray) -> NDArray:
-    """Shape of tetrahedra: 6 sqrt(2) volume over the cube of the rms edge.
+    """Return the quality of tetrahedra: 6 sqrt(2) volume over the cubed rms edge.
 
     Args:
         corners: (t, 4, 3) [m].
@@ -136,7 +136,7 @@ def tetrahedra_quality(corners: NDArray) -> NDArray:
 
 
 def boundary_faces(cells: NDArray) -> NDArray:
-    """Faces that belong to one tetrahedron only.
+    """Return the faces that belong to one tetrahedron only.
 
     Args:
         cells: (t, 4) of positive volume.
@@ -156,10 +156,10 @@ def boundary_faces(cells: NDArray) -> NDArray:
 def node_patches(
     nodes: int, members: NDArray, patch: NDArray
 ) -> list[tuple[tuple[int, ...], NDArray]]:
-    """Nodes grouped by the set of patches they lie on.
+    """Return the nodes grouped by the set of patches they lie on.
 
     Args:
-        nodes: how many there are.
+        nodes: number of nodes.
         members: (f, k) nodes of each boundary face.
         patch: (f,) the faces' patches.
 
@@ -183,14 +183,14 @@ def on_shapes(
     reach: float,
     walls: Mapping[tuple[int, int], Shape] | None = None,
 ) -> NDArray:
-    """Points moved onto the shapes of their patches.
+    """Return the points moved onto the shapes of their patches.
 
     Args:
         points: (n, 3) [m].
-        groups: which points lie on which patches.
-        shapes: of the patches.
-        reach: [m] a point is never moved further than this.
-        walls: of a :class:`Solid`; none if absent.
+        groups: points by their patches.
+        shapes: shapes of the patches.
+        reach: [m] largest motion of a point.
+        walls: walls of a :class:`Solid`; none if absent.
 
     Returns:
         (n, 3) [m].
@@ -206,14 +206,14 @@ def on_shapes(
 
 
 def corners_on_shapes(solid: Solid) -> NDArray:
-    """Where a solid's corners are to be.
+    """Return the positions of a solid's corners on its shapes.
 
     Args:
-        solid: whose corners may be off the shapes of their patches.
+        solid: its corners may be off the shapes of their patches.
 
     Returns:
-        (n, 3) [m] those on the boundary projected, unless it is a hundredth of the
-        part's size away.
+        (n, 3) [m], boundary corners projected unless that is farther than a hundredth
+        of the part's size.
     """
     size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     groups = corner_groups(solid)
@@ -221,10 +221,10 @@ def corners_on_shapes(solid: Solid) -> NDArray:
 
 
 def moved_onto_shapes(solid: Solid) -> Solid:
-    """Corners projected onto their shapes; moves that invert tetrahedra are shortened.
+    """Move corners onto their shapes; shorten moves that invert tetrahedra.
 
     Args:
-        solid: whose corners may be off the shapes of their patches.
+        solid: its corners may be off the shapes of their patches.
 
     Returns:
         The solid with its corners moved.

@@ -1,4 +1,4 @@
-"""Edges split where they cross a surface, until no edge does."""
+"""Splitting of edges that cross a surface, until none does."""
 
 from collections.abc import Callable
 
@@ -20,8 +20,9 @@ def split_crossing(
     Args:
         solid: to split.
         on: (n,) whether a corner is on the surface.
-        crossing: of a solid, its corners on the surface and its edges (e, 2): which of
-            the edges cross it, and at which share of their length.
+        crossing: function of a solid, its corners on the surface and its edges (e, 2);
+            it returns which edges cross the surface, and at which share of their
+            length.
 
     Returns:
         The solid, and which of its corners are on the surface.
@@ -40,14 +41,14 @@ def split_crossing(
 
 
 def one_of_each(wanted: NDArray, of_cell: NDArray) -> NDArray:
-    """Edges to split at once: at most one of each tetrahedron.
+    """Return the edges to split together: at most one of each tetrahedron.
 
     Args:
-        wanted: (e,) edges that are to be split.
+        wanted: (e,) bool, edges to be split.
         of_cell: (t, 6) edges of each tetrahedron.
 
     Returns:
-        (e,) some of them, at least one if any is wanted.
+        (e,) bool, a part of them, at least one if any is wanted.
     """
     order = np.where(wanted, np.arange(len(wanted), 0, -1), 0)
     first = of_cell[np.arange(len(of_cell)), order[of_cell].argmax(axis=1)]

@@ -1,11 +1,11 @@
 """Tetrahedra of straight bars from their sections, without a mesher.
 
-A section of triangles is drawn out along z in layers, thin at both ends, where they are
-held, and longer between, where the field is a beam's.  The prism of a triangle and a
-layer is three tetrahedra, the diagonal of each side from its smaller number, so that
-neighbours cut their common side alike (Dompierre et al. 1999).  One element goes
-through a wall however thin it is; elements that are long along the bar and around a
-tube number thousands where a mesher of equal edges needs millions.
+A section of triangles is extruded along z in layers.  The layers are thin at both ends,
+which are held, and longer between them, where the field is a beam's.  The prism of a
+triangle and a layer is split into three tetrahedra.  The diagonal of each side starts
+at its smallest number, so that neighbours split their common side alike (Dompierre et
+al. 1999).  One element spans a wall of any thickness.  Elements that are long along the
+bar and around a tube number thousands, while a mesher of equal edges needs millions.
 """
 
 import math
@@ -17,22 +17,22 @@ from numpy.typing import NDArray
 from stiffness.mesh.solid import Solid, boundary_faces
 from stiffness.surface.primitives import Cone, Plane, Shape
 
-_AROUND = 8  # elements around a full circle at least
-_OFF = 0.008  # of an arc from its chord, in lengths: refinement moves no corner further
-_IN_WALL = 1.0  # angle of an element squared, over wall by radius: chords stay inside
-_FLAT = 4.0  # width of an element over its height, in a section
-_GROWTH = 2.0  # from one layer to the next
-_LONGEST = 2.0  # of a layer, in widths of the section
+_AROUND = 8  # smallest number of elements around a full circle
+_OFF = 0.008  # largest distance of arc and chord, in lengths: limits refinement
+_IN_WALL = 1.0  # squared angle of an element over wall by radius: chords stay inside
+_FLAT = 4.0  # largest width of an element over its height, in a section
+_GROWTH = 2.0  # ratio of the thicknesses of consecutive layers
+_LONGEST = 2.0  # thickness of the longest layer, in widths of the section
 _UP = np.array([0.0, 0.0, 1.0])
 
 
 def straight_bar(section: Mapping[str, float], longest: float = _LONGEST) -> Solid:
-    """A bar of unit length along z, its section's y and z along x and y.
+    """Return a bar of unit length along z, its section's y and z along x and y.
 
     Args:
         section: lengths of :func:`stiffness.beam.sections.declared_section`, per length
             of the bar.
-        longest: layer, in widths of the section.
+        longest: thickness of the longest layer, in widths of the section.
 
     Returns:
         A mesh to refine from: patch 0 at z = 0, patch 1 at z = 1.
@@ -61,14 +61,14 @@ def straight_bar(section: Mapping[str, float], longest: float = _LONGEST) -> Sol
 
 
 def _thinnest(section: Mapping[str, float]) -> float:
-    """The smallest thickness of a section."""
+    """Return the smallest thickness of a section."""
     if "radius" in section:
         return section["radius"] - section.get("inner_radius", 0.0)
     return min(section.values())
 
 
 def _heights(first: float, longest: float) -> NDArray:
-    """From 0 to 1, layers growing from both ends to the middle."""
+    """Return heights from 0 to 1, in layers that grow from both ends to the middle."""
     steps = [min(first, 0.25)]
     while sum(steps) < 0.5:
         steps.append(min(_GROWTH * steps[-1], longest))
@@ -77,7 +77,7 @@ def _heights(first: float, longest: float) -> NDArray:
 
 
 def _round(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
-    """Triangles of a disc or a ring: points and corners."""
+    """Return the triangles of a disc or a ring: points and corners."""
     radius, inner = section["radius"], section.get("inner_radius", 0.0)
     angle = min(
         2 * np.pi / _AROUND, math.sqrt(_IN_WALL * (radius - inner) / radius),
@@ -98,7 +98,7 @@ def _round(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
 
 
 def _angular(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
-    """Triangles of a rectangle, a box or an I: points and corners."""
+    """Return the triangles of a rectangle, a box or an I: points and corners."""
     width, height = section["width"], section["height"]
     x_cuts, y_cuts = [width / 2], [height / 2]
     if "wall" in section:
@@ -127,7 +127,7 @@ def _angular(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
 
 
 def _divided(cuts: NDArray, longest: float) -> NDArray:
-    """The same cuts with others between, none further apart than that."""
+    """Return the cuts with further ones between, no farther apart than ``longest``."""
     parts = [
         np.linspace(low, high, math.ceil((high - low) / longest - 1e-9) + 1)[:-1]
         for low, high in zip(cuts, cuts[1:], strict=False)
@@ -138,10 +138,10 @@ def _divided(cuts: NDArray, longest: float) -> NDArray:
 def _sides(
     section: Mapping[str, float], corners: NDArray
 ) -> tuple[NDArray, tuple[Shape | None, ...]]:
-    """Which side (f,) faces (f, 3, 3) lie on, and the sides' shapes."""
+    """Return the side (f,) of each face (f, 3, 3), and the sides' shapes."""
     if "radius" in section:
         radii = [r for r in (section["radius"], section.get("inner_radius")) if r]
         off = np.linalg.norm(corners[:, 0, :2], axis=1)[:, None] - radii
         return np.abs(off).argmin(axis=1), tuple(Cone(0 * _UP, _UP, r) for r in radii)
-    # those across x and those across y: flat, and where they meet there is an edge
+    # sides across x and across y are flat, and meet at an edge
     return np.ptp(corners[:, :, :2], axis=1).argmin(axis=1), (None, None)

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput
+from forcefit.results.display import html_table, short_repr
 from stiffness.link import LinkStiffness, scaled
 from stiffness.screws import rotation_matrix, screw_map
 

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, nearest, read_text
+from forcefit.results.display import html_table, short_repr
 from stiffness.link import check_definite, inverted, scaled
 from stiffness.screws import SCREW, WRENCH
 

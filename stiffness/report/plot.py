@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from forcefit.results.text import value_text
 from stiffness.beam.beam import section_axes
 from stiffness.beam.beam_stress import peak_beam_stress
 from stiffness.fem.stress import PeakStress, StressInfluence, von_mises
@@ -146,7 +147,7 @@ def plot_stress(
     for low, high in ((along.min(), peak.away), (length - peak.away, along.max())):
         axes.axvspan(1e3 * low, 1e3 * high, color="C3", alpha=0.12, lw=0)
     where = 1e3 * float((peak.place - p) @ (q - p)) / length
-    label = f"peak {peak.von_mises / 1e6:.4g} MPa"
+    label = f"peak {value_text('von_mises', peak.von_mises)}"
     axes.plot(where, peak.von_mises / 1e6, "o", color="C3", label=label)
     top = peak.von_mises / 1e6
     if section is not None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from forcefit.results.text import in_unit, value_text
 from stiffness.link import LinkStiffness
 from stiffness.report.compare import LinkComparison, entries_that_matter
 from stiffness.screws import SCREW, WRENCH
@@ -227,7 +228,7 @@ def stress_text(peak: "PeakStress") -> str:
     if peak.beam is not None:
         lines += [
             f"beam, same region: {_megapascals(*peak.beam)}",
-            f"beam, whole length: {peak.beam_whole / 1e6:.4g} MPa",
+            f"beam, whole length: {value_text('von_mises', peak.beam_whole)}",
         ]
     return "\n".join(lines)
 
@@ -237,13 +238,13 @@ def _stress_error(peak: "PeakStress") -> str:
     if not math.isfinite(peak.error):
         return "none, the peak lies on an inner edge where stress has no finite value"
     share = peak.error / peak.von_mises if peak.von_mises else 0.0
-    return f"{peak.error / 1e6:.2g} MPa ({100 * share:.2g} %)"
+    return f"{in_unit(peak.error, 'MPa', 2)} ({100 * share:.2g} %)"
 
 
 def _megapascals(stress: float, place: NDArray) -> str:
     """A stress and where it is."""
     where = ", ".join(f"{v:.4g}" for v in np.where(np.abs(place) < 1e-9, 0, place))
-    return f"{stress / 1e6:.4g} MPa at ({where}) m"
+    return f"{value_text('von_mises', stress)} at ({where}) m"
 
 
 def matrix_text(stiffness: NDArray) -> str:

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput
+from forcefit.results.display import html_table, short_repr
 from stiffness.beam.beam import beam_compliance
 from stiffness.beam.sections import declared_section
 from stiffness.link import LinkStiffness

@@ -1,4 +1,4 @@
-"""A part's surface: read, checked, cut at its two interfaces.
+"""A part's surface: read, checked, divided at its two interfaces.
 
-Begin at ``surface.py``; ``interface.py`` says where a part is held and moved.
+Begin at ``surface.py``; ``interface.py`` defines where a part is held and moved.
 """

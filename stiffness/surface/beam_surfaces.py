@@ -10,7 +10,7 @@ from stiffness.beam.curve import Piece, straight_piece
 from stiffness.beam.sections import Section, declared_section, round_section
 from stiffness.surface.surface import Surface, check_surface
 
-# what each shape needs; an optional length stands with its default
+# lengths of each shape; an optional length has a default
 SHAPES: dict[str, dict[str, float | None]] = {
     "round": {"length": None, "radius": None},
     "tube": {"length": None, "radius": None, "inner_radius": None},
@@ -22,11 +22,11 @@ _FACETS = 64
 
 
 def check_shape(shape: str, lengths: Mapping[str, float]) -> None:
-    """Refuse an unknown shape, or lengths that are not its own.
+    """Reject an unknown shape, or names of lengths that it lacks.
 
     Args:
         shape: one of ``SHAPES``.
-        lengths: by name [m].
+        lengths: lengths by name [m].
 
     Raises:
         BadInput: an unknown name, a missing one, or one that is not > 0.
@@ -51,23 +51,23 @@ def check_shape(shape: str, lengths: Mapping[str, float]) -> None:
 
 
 def shape_surface(shape: str, lengths: Mapping[str, float]) -> Surface:
-    """Closed surface of a shape.
+    """Return the closed surface of a shape.
 
     Args:
         shape: one of ``SHAPES``.
-        lengths: by name [m].
+        lengths: lengths by name [m].
 
     Returns:
-        The surface, facets' corners on the true one.
+        The surface; its facets' corners lie on the exact shape.
 
     Raises:
-        BadInput: the shape or a length is not proper.
+        BadInput: the shape or a length is invalid.
     """
     check_shape(shape, lengths)
     L = lengths["length"]
     if shape in {"rectangle", "box"}:
         corner = np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]]) / 2
-        # the height stands along y: `up` of a beam along z
+        # the height is along y: `up` of a beam along z
         sides = np.array([lengths["width"], lengths["height"]])
         hole = corner * (sides - 2 * lengths["wall"]) if shape == "box" else None
         return _prism(corner * sides, corner * sides, L, shape, hole)
@@ -88,7 +88,7 @@ def _prism(
     name: str,
     hole: NDArray | None = None,
 ) -> Surface:
-    """Two outlines joined, closed by fans, or by rings around a hole."""
+    """Return surface between two outlines, closed by fans, or by rings at a hole."""
     count = len(base)
     inner = np.zeros((1, 2)) if hole is None else hole
     layers = [base, tip, inner, inner]
@@ -111,18 +111,18 @@ def _prism(
 
 
 def shape_beam(shape: str, lengths: Mapping[str, float], nu: float) -> list[Piece]:
-    """The same shape as a beam along z, height along y.
+    """Return the same shape as a beam along z, height along y.
 
     Args:
         shape: one of ``SHAPES``.
-        lengths: by name [m].
+        lengths: lengths by name [m].
         nu: [-] Poisson's ratio, for the shear factors.
 
     Returns:
         Its one piece.
 
     Raises:
-        BadInput: the shape or a length is not proper.
+        BadInput: the shape or a length is invalid.
     """
     check_shape(shape, lengths)
     top = [0.0, 0.0, lengths["length"]]

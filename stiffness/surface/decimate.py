@@ -1,8 +1,8 @@
 """A surface with fewer triangles for the mesher, whose time grows with their number.
 
-Long thin triangles, as CAD programs make them of bars and bores, cost pytetwild most:
-it cuts its first tetrahedra along all of them.  Corners of the mesh are projected onto
-the part's exact shapes afterwards, so the mesher's surface may be coarser.
+Long thin triangles, which CAD programs make for bars and bores, cost pytetwild most
+time, because it cuts its first tetrahedra along all of them.  Corners of the mesh are
+later projected onto the part's exact shapes, so the mesher's surface may be coarser.
 """
 
 import numpy as np
@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from stiffness.surface.surface import Surface, directed_edges, signed_volume
 
-_VOLUME = 0.01  # relative difference of the enclosed volumes
-_PARTS = 0.01 * 1.4 ** np.arange(13)  # of the triangles, tried one after the other
+_VOLUME = 0.01  # accepted relative difference of the enclosed volumes
+_PARTS = 0.01 * 1.4 ** np.arange(13)  # shares of the triangles, tried in this order
 
 
 def coarser_surface(surface: Surface, tolerance: float) -> tuple[NDArray, NDArray]:
-    """The fewest triangles within a tolerance of a surface, among a dozen tries.
+    """Return the coarsest surface within a tolerance, of a dozen attempts.
 
     Args:
         surface: closed.
@@ -23,8 +23,8 @@ def coarser_surface(surface: Surface, tolerance: float) -> tuple[NDArray, NDArra
             surface's corners and at the coarser one's corners, edges and centres.
 
     Returns:
-        Points (n, 3) [m] and triangles (m, 3) of a closed surface of the same
-        genus and a volume within 1 %; the surface's own if no try gives one.
+        Points (n, 3) [m] and triangles (m, 3) of a closed surface of the same genus and
+        a volume within 1 %; those of the surface itself if no attempt succeeds.
 
     Sources:
         Garland & Heckbert (1997) for the quadric decimation, as VTK has it.
@@ -57,19 +57,19 @@ def coarser_surface(surface: Surface, tolerance: float) -> tuple[NDArray, NDArra
 
 
 def _distance(mesh: object, points: NDArray) -> float:
-    """[m] of the point farthest from a mesh."""
+    """Return the distance [m] of the point farthest from a mesh."""
     _, near = mesh.find_closest_cell(points, return_closest_point=True)  # type: ignore[attr-defined]
     return float(np.linalg.norm(near - points, axis=1).max())
 
 
 def _closed(triangles: NDArray) -> bool:
-    """Whether every edge has two triangles."""
+    """Return whether every edge has two triangles."""
     edges = np.sort(directed_edges(triangles), axis=1)
     return bool((np.unique(edges, axis=0, return_counts=True)[1] == 2).all())
 
 
 def euler_characteristic(triangles: NDArray) -> int:
-    """Corners less edges plus triangles: 2 - 2 genus for each closed shell.
+    """Return corners less edges plus triangles: 2 - 2 genus for each closed shell.
 
     Args:
         triangles: (m, 3) corners.

@@ -1,9 +1,9 @@
 """A curved patch of no known shape, smoothed by Phong tessellation.
 
 Between the corners a facet is lifted by half of the mean of the projections onto the
-corners' tangent planes (Boubekeur & Alexa 2008, Phong tessellation), along each edge by
-the lower of the two.  On an arc of half-angle a this leaves a^4 of the radius where a
-flat facet leaves a^2.
+corners' tangent planes (Boubekeur & Alexa 2008, Phong tessellation).  Along each edge
+the smaller of the two projections is used.  On an arc of half-angle a the error is a^4
+of the radius, while it is a^2 for a flat facet.
 """
 
 from dataclasses import dataclass, field
@@ -17,12 +17,12 @@ from stiffness.surface.surface import area_vectors
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """A patch of triangles, lifted.
+    """A patch of lifted triangles.
 
     Attributes:
         points: (n, 3) [m].
         triangles: (m, 3) indices, outward.
-        normals: (n, 3) unit normals at the points, filled in from this patch alone.
+        normals: (n, 3) unit normals at the points, computed from this patch alone.
     """
 
     points: NDArray
@@ -38,7 +38,7 @@ class Facets:
         object.__setattr__(self, "normals", self._corner_normals())
 
     def _corner_normals(self) -> NDArray:
-        """Facets' normals averaged at corners, weighted by the angle there."""
+        """Return normals at corners: the facets', weighted by their angles."""
         facing = area_vectors(self.points, self.triangles)
         facing /= np.maximum(np.linalg.norm(facing, axis=1), 1e-300)[:, None]
         corners = self.points[self.triangles]
@@ -52,22 +52,22 @@ class Facets:
         return total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
 
     def edge_lifts(self, edges: NDArray) -> NDArray:
-        """(e,) [m] lifts at the middles of edges (e, 2), by both ends' planes."""
+        """Return (e,) [m] lifts at the middles of edges (e, 2), by its end planes."""
         rises = _rises(self.points[edges], self.normals[edges], limited=False)
         return np.asarray(np.linalg.norm(rises, axis=1) / 4)
 
     def lifts(self) -> NDArray:
-        """(m,) [m] the largest lift of each facet at the middles of its edges."""
+        """Return (m,) [m] largest lift of each facet at the middles of its edges."""
         sides = [self.edge_lifts(self.triangles[:, [k, k - 1]]) for k in range(3)]
         return np.asarray(np.max(sides, axis=0))
 
     def distance(self, points: NDArray) -> NDArray:
-        """(n,) [m] of points from the flat facets."""
+        """Return the (n,) [m] distances of points from the flat facets."""
         _, foot = self._mesh.find_closest_cell(points, return_closest_point=True)
         return np.asarray(np.linalg.norm(points - np.atleast_2d(foot), axis=1))
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
-        """Signed distances (n,) [m] from the lifted facets, and unit gradients."""
+        """Return signed distances (n,) [m] from the lifted facets, and gradients."""
         cell, foot = self._mesh.find_closest_cell(points, return_closest_point=True)
         members = self.triangles[np.atleast_1d(cell)]
         foot = np.atleast_2d(foot)
@@ -84,9 +84,9 @@ class Facets:
 
 
 def _rises(corners: NDArray, normals: NDArray, limited: bool) -> NDArray:
-    """(e, 3) [m] 4 times the lifts of edges' middles, by planes at their corners."""
-    # limited to the smaller one where the planes at both ends differ, and to none
-    # where one rises and one falls: there a flat side meets a rounding
+    """Return (e, 3) [m] 4 times the lifts of edges' middles, by planes at corners."""
+    # limited to the smaller one if the planes at both ends differ, and to zero if one
+    # rises and one falls: there a flat side meets a fillet
     along = corners[:, 0] - corners[:, 1]
     heights = np.stack([
         np.einsum("ei,ei->e", sign * along, normals[:, k])
@@ -99,7 +99,7 @@ def _rises(corners: NDArray, normals: NDArray, limited: bool) -> NDArray:
 
 
 def _barycentric(corners: NDArray, points: NDArray) -> NDArray:
-    """(p, 3) shares of the corners (p, 3, 3) in points of their planes."""
+    """Return the (p, 3) barycentric coordinates of points in triangles (p, 3, 3)."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.maximum(np.einsum("pi,pi->p", normal, normal), 1e-300)
     shares = [

@@ -1,4 +1,4 @@
-"""The solids of a STEP file that one link is made of, and the faces between them."""
+"""Solids of a STEP file that form one link, and the faces between them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class FilledSolids:
-    """Solids that touch, with the triangles around each.
+    """Touching solids, with the triangles around each.
 
     Attributes:
-        names: of the solids.
+        names: names of the solids.
         points: (n, 3) [m].
         triangles: (m, 3) indices of points; two solids that touch have the same ones.
-        sides: (m, 2) the solids on both sides, by their place in ``names``; -1 outside.
-        overlaps: pairs of them that fill the same place, one line each.
+        sides: (m, 2) the solids on both sides, by their index in ``names``; -1 outside.
+        overlaps: pairs of solids that overlap, one line each.
     """
 
     names: tuple[str, ...]
@@ -26,13 +26,13 @@ class FilledSolids:
     overlaps: tuple[str, ...] = ()
 
     def around(self, members: Sequence[str]) -> tuple[NDArray, NDArray]:
-        """Bound some of the solids.
+        """Return the boundary of some of the solids.
 
         Args:
             members: their names.
 
         Returns:
-            (k, 3) triangles around them, and (k,) which of these are inside the link.
+            (k, 3) triangles around them, and (k,) whether each is inside the link.
         """
         chosen = [number for number, name in enumerate(self.names) if name in members]
         one, other = (np.isin(side, chosen) for side in self.sides.T)

@@ -1,4 +1,4 @@
-"""Where a link meets its joints: a plane of its surface, a disc, a bearing bore."""
+"""Interfaces of a link and its joints: a plane of its surface, a disc, a bore."""
 
 import math
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from forcefit.inputs.table import BadInput, describe, nearest
 from stiffness.beam.beam import unit_vector
 from stiffness.screws import UNIT_VECTORS
 
-_FARTHEST = 1e6  # [m] of a point or radius: the square of much more is no number
+_FARTHEST = 1e6  # [m] largest coordinate or radius: much larger squares overflow
 _EXPECTED = '"z=0.452", "bore=px,py,pz/ax,ay,az/r", a table {plane, radius} or {bore}'
 
 
@@ -21,10 +21,10 @@ class Interface:
     """The part of a link's surface that a joint holds, in the mesh's axes.
 
     Attributes:
-        kind: ``"plane"`` all of the surface on a plane; ``"disc"`` what lies on the
-            plane within a radius of the point; ``"bore"`` a cylindrical seat.
-        point: (3,) [m] on the plane; the disc's centre; on the bore's axis, where its
-            screws are read.
+        kind: ``"plane"``: all of the surface on a plane; ``"disc"``: the part of the
+            plane within a radius of the point; ``"bore"``: a cylindrical seat.
+        point: (3,) [m] on the plane; the disc's centre; or, on the bore's axis, the
+            point at which screws are read.
         direction: (3,) unit normal of the plane, or axis of the bore.
         radius: [m] of the disc or the bore; infinite for a plane.
     """
@@ -57,7 +57,7 @@ class Interface:
         return f"{self.kind}={p}/{d}{radius}"
 
     def distance(self, points: ArrayLike) -> NDArray:
-        """Distance of points from the interface's plane or cylinder.
+        """Return the distance of points from the interface's plane or cylinder.
 
         Args:
             points: (..., 3) [m].
@@ -74,20 +74,20 @@ class Interface:
 
 
 def parse_interface(text: object, place: str = "interface") -> Interface:
-    """An interface as people write it, on the command line or in a robot file.
+    """Return an interface from its text, as on the command line or in a robot file.
 
     Args:
         text: ``"z=0.452"`` (also x, y), ``"bore=px,py,pz/ax,ay,az/r"``,
             ``"disc=px,py,pz/nx,ny,nz/r"``, ``"plane=px,py,pz/nx,ny,nz"``, or a table
             ``{plane = {point, normal}, radius}`` or ``{bore = {point, axis, radius}}``.
             All in metres, in the mesh's axes.
-        place: where it stands, for the message.
+        place: name of the option or key, for the message.
 
     Returns:
         The interface.
 
     Raises:
-        BadInput: it is none of these.
+        BadInput: the value has none of these forms.
     """
     try:
         if isinstance(text, str):
@@ -100,7 +100,7 @@ def parse_interface(text: object, place: str = "interface") -> Interface:
 
 
 def _from_text(text: str) -> Interface:
-    """An interface of one line."""
+    """Return an interface from one line of text."""
     kind, equals, value = (part.strip() for part in text.partition("="))
     parts = [comma_numbers(part) for part in value.split("/")]
     lengths = [len(part) for part in parts]
@@ -115,7 +115,7 @@ def _from_text(text: str) -> Interface:
 
 
 def _from_table(table: Mapping) -> Interface:
-    """An interface from a table of a robot file."""
+    """Return an interface from a table of a robot file."""
     kind = "bore" if "bore" in table else "plane"
     known = {"bore"} if kind == "bore" else {"plane", "radius"}
     _refuse_unknown(table, known, "")
@@ -136,14 +136,14 @@ def _from_table(table: Mapping) -> Interface:
 
 
 def _refuse_unknown(table: Mapping, known: set[str], place: str) -> None:
-    """One error for a key that does not belong there."""
+    """Reject a table with an unknown key."""
     for key in table:
         if key not in known:
             raise BadInput(f'{place}unknown key "{key}"{nearest(str(key), known)}')
 
 
 def _vector(table: Mapping, key: str) -> NDArray:
-    """Three finite numbers of a table."""
+    """Return three finite numbers of a table."""
     value = table.get(key)
     array = number_array(value.tolist() if isinstance(value, np.ndarray) else value)
     if array is None or array.shape != (3,) or not np.isfinite(array).all():
@@ -153,7 +153,7 @@ def _vector(table: Mapping, key: str) -> NDArray:
 
 
 def _length(table: Mapping, key: str, name: str) -> float:
-    """A positive length of a table."""
+    """Return a positive length of a table."""
     value = table.get(key)
     array = number_array([value])
     if array is None or not (np.isfinite(array[0]) and array[0] > 0):

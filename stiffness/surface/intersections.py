@@ -5,15 +5,15 @@ from numpy.typing import NDArray
 
 
 def crossing_triangles(points: NDArray, triangles: NDArray) -> NDArray:
-    """Pairs of triangles without a common vertex that intersect.
+    """Return the pairs of triangles without a common vertex that intersect.
 
     Args:
         points: (n, 3) [m].
         triangles: (m, 3) indices.
 
     Returns:
-        (k, 2) indices of triangles; an edge of one goes through the inside of the
-        other.  Triangles that only touch are not counted.
+        (k, 2) indices of triangles; an edge of one passes through the inside of the
+        other.  Triangles that only touch do not count.
     """
     pairs = _near_pairs(points, triangles)
     shared = (
@@ -26,7 +26,7 @@ def crossing_triangles(points: NDArray, triangles: NDArray) -> NDArray:
 
 
 def _near_pairs(points: NDArray, triangles: NDArray) -> NDArray:
-    """Pairs (i, j) of triangles whose bounding boxes overlap, by sweep and prune."""
+    """Return pairs (i, j) of triangles with overlapping bounding boxes, by sweeping."""
     corners = points[triangles]
     low, high = corners.min(axis=1), corners.max(axis=1)
     axis = int(np.argmax(np.ptp(points, axis=0)))
@@ -49,7 +49,7 @@ def _near_pairs(points: NDArray, triangles: NDArray) -> NDArray:
 
 
 def _edge_through(points: NDArray, triangles: NDArray, pairs: NDArray) -> NDArray:
-    """Whether an edge of the first triangle goes through the second."""
+    """Return whether an edge of the first triangle passes through the second."""
     a, b, c = np.moveaxis(points[triangles[pairs[:, 1]]], 1, 0)
     normal = np.cross(b - a, c - a)
     size = np.linalg.norm(normal, axis=1)
@@ -57,7 +57,8 @@ def _edge_through(points: NDArray, triangles: NDArray, pairs: NDArray) -> NDArra
     for k in range(3):
         p = points[triangles[pairs[:, 0], k]]
         q = points[triangles[pairs[:, 0], (k + 1) % 3]]
-        # signed volumes: on which side of the plane, and of each edge, the line passes
+        # signed volumes: the side of the plane, and of each edge, on which the line
+        # passes
         dp = np.einsum("ij,ij->i", normal, p - a)
         dq = np.einsum("ij,ij->i", normal, q - a)
         tiny = 1e-9 * size * np.linalg.norm(q - p, axis=1)

@@ -1,7 +1,7 @@
 """Reader of Wavefront OBJ files: points and polygons.
 
-Texture coordinates, normals, groups and materials say nothing of the shape and are not
-read, so that faces may name some that are absent.
+Texture coordinates, normals, groups and materials do not define the shape.  They are
+not read, so faces may refer to absent ones.
 """
 
 from collections.abc import Iterator
@@ -14,17 +14,16 @@ from forcefit.inputs.table import BadInput, describe
 
 
 def read_obj(path: Path) -> tuple[NDArray, list[list[int]]]:
-    """Points and polygons of an OBJ file.
+    """Return the points and polygons of an OBJ file.
 
     Args:
-        path: of an existing file.
+        path: path of an existing file.
 
     Returns:
-        (n, 3) points in the file's unit, and of each polygon the indices of its
-        corners.
+        (n, 3) points in the file's unit, and the corner indices of each polygon.
 
     Raises:
-        BadInput: a line is not proper, or a face has a corner that is not among the
+        BadInput: a line is invalid, or a face has a corner that is not among the
             points.
     """
     points: list[list[float]] = []
@@ -56,7 +55,7 @@ def read_obj(path: Path) -> tuple[NDArray, list[list[int]]]:
 
 
 def _statements(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Numbers of lines and their words; a line that ends in a backslash goes on."""
+    """Yield numbers of lines and their words; a backslash continues a line."""
     text = path.read_bytes().removeprefix(b"\xef\xbb\xbf").decode("latin-1")
     words: list[str] = []
     for number, line in enumerate(text.split("\n"), 1):
@@ -68,6 +67,6 @@ def _statements(path: Path) -> Iterator[tuple[int, list[str]]]:
 
 
 def _corner(word: str, points: int) -> int:
-    """Index of a corner: from 1, or below zero from the last point so far."""
+    """Return the index of a corner: from 1, or negative from the last point so far."""
     index = int(word.partition("/")[0])
     return index - 1 if index >= 0 else points + index

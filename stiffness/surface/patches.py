@@ -20,8 +20,8 @@ class Patches:
 
     Attributes:
         patch: (m,) number of each triangle's patch; 0 is the base interface, 1 the tip.
-        shapes: of each patch; lifted facets where no simpler one is known.
-        outlines: of the interfaces, where the surface goes on smoothly.
+        shapes: shapes of each patch; lifted facets where no simpler one is known.
+        outlines: outlines of the interfaces, where the surface continues smoothly.
     """
 
     patch: NDArray
@@ -30,7 +30,7 @@ class Patches:
 
 
 def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
-    """Cut a surface at its sharp edges and recognise the shapes.
+    """Divide a surface at its sharp edges, and recognise the shapes.
 
     Args:
         surface: the link's.
@@ -41,7 +41,7 @@ def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
         The patches.
 
     Raises:
-        BadInput: an interface has no part of the surface, or both have the same.
+        BadInput: an interface has no part of the surface, or both have the same part.
     """
     patch = np.full(len(surface.triangles), -1)
     shapes: list[Shape] = []
@@ -62,7 +62,7 @@ def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
 def _outlines(
     graph: TriangleGraph, patch: NDArray, shapes: list[Shape]
 ) -> list[SmoothOutline]:
-    """Where an interface meets another patch without a sharp edge."""
+    """Return outlines at which an interface meets another patch smoothly."""
     one, other = patch[graph.left], patch[graph.right]
     smooth = (graph.cosine > SHARP) & (one != other)
     found = []
@@ -80,7 +80,7 @@ def _outlines(
 
 
 def interface_shape(interface: Interface) -> Shape:
-    """The plane or cylinder of an interface.
+    """Return the plane or cylinder of an interface.
 
     Args:
         interface: plane, disc or bore.
@@ -94,7 +94,7 @@ def interface_shape(interface: Interface) -> Shape:
 
 
 def refuse_common_edges(surface: Surface, base: Interface, tip: Interface) -> None:
-    """Refuse rigid interfaces that share an edge: their stiffness has no finite value.
+    """Reject rigid interfaces that share an edge: their stiffness has no finite value.
 
     Args:
         surface: the link's.
@@ -102,7 +102,8 @@ def refuse_common_edges(surface: Surface, base: Interface, tip: Interface) -> No
         tip: the loaded interface.
 
     Raises:
-        BadInput: they share an edge, or an interface has no part of the surface.
+        BadInput: the interfaces share an edge, or an interface has no part of the
+            surface.
     """
     codes: list[NDArray] = []
     for name, interface in (("base", base), ("tip", tip)):
@@ -121,7 +122,7 @@ def refuse_common_edges(surface: Surface, base: Interface, tip: Interface) -> No
 
 
 def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:
-    """Triangles of a surface that lie on an interface.
+    """Return the triangles of a surface that lie on an interface.
 
     Args:
         surface: the link's.

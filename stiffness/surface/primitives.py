@@ -1,8 +1,9 @@
-"""Smooth shapes a surface's patches are recognised as, so that curves stay curved.
+"""Smooth shapes that are recognised in a surface's patches.
 
-A faceted surface is thinner than the part it stands for.  Its vertices lie on the true
-surface, so a patch whose vertices all lie on a plane, a cone (cylinders included), a
-sphere or a torus is taken for one, and the mesh's nodes are moved onto it.
+A faceted surface is thinner than the part it approximates.  Its vertices lie on the
+true surface.  So a patch whose vertices all lie on a plane, a cone (cylinders
+included), a sphere or a torus is replaced by this shape, and the mesh's nodes are moved
+onto it.
 
 Every shape has ``signed(points)``: distances (n,) [m] and their gradients (n, 3).
 """
@@ -15,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 S = TypeVar("S", bound="Shape")
-_CALLS = (25, 100)  # of the residual in a fit, and in one that may still succeed
-_MAY_FIT = 0.02  # of the points' size: the largest residual then
-_FITS = 1e-9  # of it: a shape that has been found
+# residual evaluations of a fit, and of one that may still succeed
+_CALLS = (25, 100)
+_MAY_FIT = 0.02  # relative to the points' size: largest residual of such a fit
+_FITS = 1e-9  # relative to the points' size: residual of a shape that fits
 _TINY = 1e-300  # keeps a division at a shape's own axis finite
 
 
@@ -25,7 +27,7 @@ class Shape(Protocol):
     """A surface that points can be projected onto."""
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
-        """Signed distances (n,) [m] and unit gradients (n, 3)."""
+        """Return signed distances (n,) [m] and unit gradients (n, 3)."""
         ...
 
 
@@ -37,7 +39,7 @@ class Plane:
     normal: NDArray
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
-        """Signed distances (n,) [m] and unit gradients (n, 3)."""
+        """Return the signed distances (n,) [m] and unit gradients (n, 3)."""
         distances = (points - self.point) @ self.normal
         return distances, np.broadcast_to(self.normal, points.shape)
 
@@ -52,7 +54,7 @@ class Cone:
     slope: float = 0.0
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
-        """Signed distances (n,) [m] and unit gradients (n, 3)."""
+        """Return the signed distances (n,) [m] and unit gradients (n, 3)."""
         offset = points - self.point
         along = offset @ self.axis
         across = offset - along[:, None] * self.axis
@@ -71,7 +73,7 @@ class Sphere:
     radius: float
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
-        """Signed distances (n,) [m] and unit gradients (n, 3)."""
+        """Return the signed distances (n,) [m] and unit gradients (n, 3)."""
         offset = points - self.point
         radius = np.linalg.norm(offset, axis=1)
         return radius - self.radius, offset / np.maximum(radius, _TINY)[:, None]
@@ -87,7 +89,7 @@ class Torus:
     tube: float
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
-        """Signed distances (n,) [m] and unit gradients (n, 3)."""
+        """Return the signed distances (n,) [m] and unit gradients (n, 3)."""
         offset = points - self.point
         along = offset @ self.axis
         across = offset - along[:, None] * self.axis
@@ -98,22 +100,22 @@ class Torus:
 
 
 def project(points: NDArray, shapes: tuple[Shape, ...]) -> NDArray:
-    """Points projected onto one shape, or onto the intersection of several.
+    """Return the points projected onto one shape, or onto the intersection of several.
 
     Args:
         points: (n, 3) [m] near the shapes.
         shapes: one to three, or more if they share a point.
 
     Returns:
-        (n, 3) [m]; Newton's method, each step the shortest that closes all distances
-        to first order.
+        (n, 3) [m], by Newton's method; each step is the shortest that removes all
+        distances to first order.
     """
     points = points.copy()
     for _ in range(12):
         pairs = [shape.signed(points) for shape in shapes]
         distances = np.stack([d for d, _ in pairs], axis=1)
         gradients = np.stack([g for _, g in pairs], axis=1)
-        # tangent shapes: the cutoff drops directions in which they contradict
+        # tangent shapes: the cutoff drops directions in which they are inconsistent
         inverse = np.linalg.pinv(gradients, rcond=0.05)
         step = np.einsum("nij,nj->ni", inverse, distances)
         points -= step
@@ -123,7 +125,7 @@ def project(points: NDArray, shapes: tuple[Shape, ...]) -> NDArray:
 
 
 def fit_plane(points: NDArray, normals: NDArray) -> Plane:
-    """The plane nearest to points.
+    """Return the plane nearest to points.
 
     Args:
         points: (n, 3) [m].
@@ -139,7 +141,7 @@ def fit_plane(points: NDArray, normals: NDArray) -> Plane:
 
 
 def fit_sphere(points: NDArray, normals: NDArray) -> Sphere:
-    """The sphere nearest to points.
+    """Return the sphere nearest to points.
 
     Args:
         points: (n, 3) [m].
@@ -154,8 +156,8 @@ def fit_sphere(points: NDArray, normals: NDArray) -> Sphere:
 
 
 def _circle(points: NDArray) -> tuple[NDArray, float]:
-    """Centre and radius of the circle (n, 2) or the sphere (n, 3) nearest to points."""
-    # |x|^2 = 2 x . c + (r^2 - |c|^2) is linear in c and the bracket
+    """Return centre and radius of the circle or sphere nearest to points."""
+    # |x|^2 = 2 x . c + (r^2 - |c|^2) is linear in c and in the bracket
     system = np.column_stack([2 * points, np.ones(len(points))])
     squares = np.sum(points**2, axis=1)
     center = np.linalg.lstsq(system, squares, rcond=None)[0][:-1]
@@ -163,7 +165,7 @@ def _circle(points: NDArray) -> tuple[NDArray, float]:
 
 
 def fit_cone(points: NDArray, normals: NDArray) -> Cone:
-    """The cone or cylinder nearest to points.
+    """Return the cone or cylinder nearest to points.
 
     Args:
         points: (n, 3) [m].
@@ -187,7 +189,7 @@ def fit_cone(points: NDArray, normals: NDArray) -> Cone:
 
 
 def fit_torus(points: NDArray, normals: NDArray) -> Torus:
-    """The torus nearest to points, if they cover part of one.
+    """Return the torus nearest to points that cover a part of it.
 
     Args:
         points: (n, 3) [m].
@@ -222,7 +224,7 @@ def fit_torus(points: NDArray, normals: NDArray) -> Torus:
 def _refined_fit(
     shape: Callable[[NDArray], S], start: NDArray, points: NDArray, size: float
 ) -> S:
-    """Nonlinear least squares over a shape's parameters."""
+    """Return the shape with the least squared residuals, by nonlinear least squares."""
     from scipy.optimize import least_squares
 
     if len(points) < len(start):

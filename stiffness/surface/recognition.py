@@ -1,9 +1,9 @@
-"""Smooth parts of a faceted surface as planes, cones, spheres and tori.
+"""Recognition of planes, cones, spheres and tori in a faceted surface.
 
-A part between sharp edges is one shape, or several that meet tangentially.  Candidates
-are fitted to a few facets around a seed; one is accepted if connected facets lie on it
-and if these are the facets of a curved shape: corners of a few flat faces of different
-widths may lie on a circle as well.
+A part between sharp edges is one shape, or several that meet tangentially. Candidates
+are fitted to a few facets around a seed.  A candidate is accepted if connected facets
+lie on it, and if these are facets of a curved shape: corners of a few flat faces of
+different widths may lie on a circle too.
 """
 
 from collections.abc import Callable
@@ -22,29 +22,33 @@ from stiffness.surface.primitives import (
 )
 from stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
-_MISSES = (60, 20)  # seeds of a part without a shape of strips, of any
-_CONGRUENT = 1e-6  # relative difference of facets' areas, and of their evenness
-_CONE = 10  # points that tell a cone; fewer lie on one that is not there
-_CYLINDER = 1e-4  # slope below which a cone is a cylinder, which seven points tell
-_FEW = 12  # flat faces; a part of fewer is no faceted curve
+# largest number of failed seeds of a part: for shapes from strips, for any shape
+_MISSES = (60, 20)
+# accepted relative difference of facets' areas, and of their evenness
+_CONGRUENT = 1e-6
+_CONE = 10  # least number of points that identify a cone
+# slope below which a cone is a cylinder, for which seven points suffice
+_CYLINDER = 1e-4
+_FEW = 12  # least number of flat faces of a faceted curve
 _STEP = 2e-3  # [rad] between two angles that count as different
-_MANY = 5  # steps between angles; more are on one circle by no coincidence
-_EVEN = 0.75  # facets this share of the widest are as wide
-_LIFT = 4.0  # times the usual lift of a part's facets: a face or edge is straight
-_RULING = 2.0  # times it: a ruling of a cone, no edge of a facet that is bent
-_NO_LIFT = 0.01  # times it: straight as well
+_MANY = 5  # number of different angles above which points lie on a circle
+_EVEN = 0.75  # least share of the widest facet that counts as equally wide
+# times the usual lift of a part's facets: above it a face or edge is straight
+_LIFT = 4.0
+_RULING = 2.0  # times the usual lift: above it an edge is a ruling, not a bent edge
+_NO_LIFT = 0.01  # times the usual lift: below it an edge is straight as well
 
 
 def recognise(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]]:
-    """Shapes of a smooth part.
+    """Return the shapes of a smooth part.
 
     Args:
-        graph: of the surface.
+        graph: graph of the surface.
         part: (k,) triangles between sharp edges.
 
     Returns:
-        Triangles and shape of each patch: one shape for all of the part, else those
-        that were found in it; what is left is flat, or lifted facets.
+        Triangles and shape of each patch: one shape for the whole part, or the shapes
+        recognised in it; the other triangles are flat, or lifted facets.
     """
     shape = fitted_shape(graph, part)
     if shape is not None and graph.fits(shape, part).all():
@@ -66,7 +70,7 @@ def recognise(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]
 
 
 class _Lifts:
-    """By how much the edges of a part would be lifted if it were one curved shape."""
+    """Lifts that the edges of a part would have if it were one curved shape."""
 
     def __init__(self, graph: TriangleGraph, part: NDArray) -> None:
         self._facets = graph.lifted(part)
@@ -76,21 +80,21 @@ class _Lifts:
         self._usual = max(float(np.median(self._facets.lifts())), 1e-300)
 
     def share(self, edges: NDArray) -> float:
-        """Median lift of edges (e, 2) over the part's usual one."""
+        """Return the median lift of edges (e, 2) relative to the part's usual one."""
         own = self._facets.edge_lifts(self._place[edges])
         return float(np.median(own)) / self._usual
 
 
 def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape | None:
-    """The simplest shape all corners of a part lie on, as facets of it would.
+    """Return the simplest shape on which a part's corners lie as those of its facets.
 
     Args:
-        graph: of the surface.
+        graph: graph of the surface.
         part: (k,) triangles.
-        kinds: how many of plane, cone, sphere and torus are tried.
+        kinds: number of plane, cone, sphere and torus that are tried.
 
     Returns:
-        The shape; None if there is none, or the corners cannot tell.
+        The shape; None if no shape fits, or too few corners identify it.
     """
     points = graph.points[np.unique(graph.triangles[part])]
     normals = graph.normals[part]
@@ -99,7 +103,7 @@ def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape |
     tries: list[tuple[Callable[[NDArray, NDArray], Shape], int]] = [
         (fit_plane, 3),
         (fit_cone, 7),
-        (fit_sphere, 9),  # a frustum of four sides has eight on one
+        (fit_sphere, 9),  # eight corners of a four-sided frustum lie on a sphere
         (fit_torus, 12),
     ]
     for fit, least in tries[:kinds]:
@@ -117,14 +121,14 @@ def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape |
 
 
 def _lies_on(shape: Shape, points: NDArray, graph: TriangleGraph) -> bool:
-    """Whether points are on a shape, to the tolerance of the surface."""
+    """Return whether points are on a shape, to the tolerance of the surface."""
     return bool(np.abs(shape.signed(points)[0]).max() < graph.tolerance)
 
 
 def _is_faceted(shape: Shape, points: NDArray) -> bool:
-    """Whether points on a shape are corners of facets that follow its curvature."""
-    # a circle goes through the corners of any two flat faces that meet, and of three in
-    # symmetry: three facets as wide as the widest are needed, or many
+    """Return whether points on a shape are corners of facets along its curvature."""
+    # a circle passes through the corners of any two flat faces that meet, and of three
+    # symmetric ones: three facets as wide as the widest are needed, or many facets
     if not isinstance(shape, Cone | Torus):
         return True
     offset = points - shape.point
@@ -143,7 +147,7 @@ def _is_faceted(shape: Shape, points: NDArray) -> bool:
 
 
 def _even(angles: NDArray) -> bool:
-    """Whether there are many different angles, or three steps as wide as the widest."""
+    """Return whether there are many different angles, or three equally wide steps."""
     angles = np.sort(angles)
     gaps = np.diff(np.r_[angles, angles[0] + 2 * np.pi])
     if gaps[-1] > _STEP:  # the longest gap lies outside an arc that is not closed
@@ -159,7 +163,7 @@ def _even(angles: NDArray) -> bool:
 def _pieces(
     graph: TriangleGraph, lifts: _Lifts, part: NDArray, strips: bool, most: int
 ) -> list[tuple[NDArray, Shape]]:
-    """Pieces of a part that are shapes; with ``strips`` planes and cones alone."""
+    """Return pieces of a part that are shapes; for ``strips`` only planes and cones."""
     inside = np.zeros(len(graph.triangles), dtype=bool)
     inside[part] = True
     waiting, flat = inside.copy(), graph.flat_faces(part)
@@ -179,7 +183,7 @@ def _pieces(
         if not shapes and not strips:
             missed.append(seed)
             if misses == most and (kinds := _kinds(missed, order, area)) is not None:
-                # congruent ones, as around a shaft, come after all others
+                # facets congruent with failed seeds, as around a shaft, come last
                 order, misses, missed = np.where(kinds, order - 2.0, order), 0, []
         if shapes:
             best = max(shapes, key=lambda s: float(graph.areas[s[0]].sum()))
@@ -189,7 +193,7 @@ def _pieces(
 
 
 def _kinds(missed: list[int], order: NDArray, area: NDArray) -> NDArray | None:
-    """(m,) facets congruent with those that told no shape; None if these are many."""
+    """Return (m,) facets congruent with failed seeds; None if these are many."""
     kinds = np.zeros(len(order), dtype=bool)
     count = 0
     for seed in missed:
@@ -204,7 +208,7 @@ def _kinds(missed: list[int], order: NDArray, area: NDArray) -> NDArray | None:
 def _evenness(
     graph: TriangleGraph, inside: NDArray, flat: NDArray, area: NDArray
 ) -> NDArray:
-    """(m,) least ratio of a face's area to those around: 1 far from other shapes."""
+    """Return the (m,) least ratio of a face's area to its neighbours', at most 1."""
     touch = inside[graph.left] & inside[graph.right] & (graph.cosine > SHARP)
     left, right = graph.left[touch], graph.right[touch]
     ratio = np.minimum(area[left], area[right]) / np.maximum(area[left], area[right])
@@ -220,7 +224,7 @@ def _evenness(
 def _shapes_around(
     graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int, strips: bool
 ) -> list[tuple[NDArray, Shape]]:
-    """Shapes of facets around a seed, with all connected facets that lie on them."""
+    """Return shapes of facets around a seed, with the connected facets on them."""
     part = np.flatnonzero(inside)
     if strips:
         near = [ring(graph, inside, flat, seed, 0), _chain(graph, inside, flat, seed)]
@@ -241,7 +245,7 @@ def _shapes_around(
 def _is_proper(
     graph: TriangleGraph, lifts: _Lifts, piece: NDArray, shape: Shape
 ) -> bool:
-    """Whether a piece is a shape of its own, no facets of another curved one."""
+    """Return whether a piece is a separate shape, not facets of another curved one."""
     # two coplanar triangles may be a facet
     straight = not isinstance(shape, Cone) or _is_straight(graph, lifts, piece, shape)
     return len(piece) > 2 and straight
@@ -250,8 +254,8 @@ def _is_proper(
 def _is_straight(
     graph: TriangleGraph, lifts: _Lifts, piece: NDArray, shape: Cone
 ) -> bool:
-    """Whether a cone's rulings are straight, not facets of a shape bent there."""
-    # two rings of corners on any surface of revolution are on a cone
+    """Return whether a cone's rulings are straight, not facets of a bent shape."""
+    # two rings of corners on any surface of revolution lie on a cone
     inside = np.zeros(len(graph.triangles), dtype=bool)
     inside[piece] = True
     both = np.flatnonzero(inside[graph.left] & inside[graph.right])
@@ -269,14 +273,14 @@ def _is_straight(
 def ring(
     graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int, rings: int
 ) -> NDArray:
-    """A seed's flat face, grown by rings of faces that meet it smoothly.
+    """Return a seed's flat face, grown by rings of faces that meet it smoothly.
 
     Args:
-        graph: of the surface.
+        graph: graph of the surface.
         inside: (m,) triangles that may be taken.
         flat: (m,) number of each triangle's flat face.
         seed: a triangle.
-        rings: how many times it is grown.
+        rings: number of rings.
 
     Returns:
         (k,) triangles.
@@ -291,8 +295,8 @@ def ring(
 
 
 def _chain(graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int) -> NDArray:
-    """A seed's flat face and two to each side, across the longest common edges."""
-    # strips of a cylinder or a cone follow each other so, whatever meets their ends
+    """Return a seed's flat face and two on each side, across the longest edges."""
+    # strips of a cylinder or a cone are adjacent in this way, whatever is at their ends
     touch = inside[graph.left] & inside[graph.right] & (graph.cosine > SHARP)
     left, right = flat[graph.left[touch]], flat[graph.right[touch]]
     length = np.linalg.norm(np.diff(graph.points[graph.ends[touch]], axis=1), axis=2)
@@ -312,10 +316,10 @@ def _chain(graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int) -> N
 
 
 def _flat_or_lifted(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]]:
-    """A part of no known shape: flat faces by themselves, the rest lifted."""
-    # facets of a curved surface have lifts of one order, since programs that make them
-    # keep a tolerance; one that would be lifted by many times as much is a flat face
-    # that meets a rounding
+    """Return a part of no known shape: single flat faces, and lifted facets."""
+    # facets of a curved surface have lifts of similar size, because programs that make
+    # them keep a tolerance; one with a much larger lift is a flat face that meets a
+    # fillet
     flat = graph.flat_faces(part)
     faces = np.unique(flat[part])
     if len(faces) < _FEW:

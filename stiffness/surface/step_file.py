@@ -1,7 +1,7 @@
-"""STEP files, read by gmsh: their solids, and some of them cut into fine triangles.
+"""STEP files, read by gmsh: their solids, and fine triangles of them.
 
-A damaged file can end gmsh together with its process, so these run in one of their own
-(:mod:`stiffness.surface.surface_worker`).
+A damaged file can crash gmsh and its process, so these functions run in a separate
+process (:mod:`stiffness.surface.surface_worker`).
 """
 
 from collections.abc import Generator, Mapping
@@ -16,16 +16,17 @@ from numpy.typing import NDArray
 from forcefit.inputs.packages import naming_packages
 from forcefit.inputs.table import BadInput, nearest, quoted
 
-_FACETS = 48  # of a full circle
-_TOUCHING = 1e-6  # of a solid's volume: less in common is rounding of the file
-_ALL, _AND = "*", "+"  # all solids of a file, several, as one
+_FACETS = 48  # facets around a full circle
+# relative to a solid's volume: a smaller overlap is rounding of the file
+_TOUCHING = 1e-6
+_ALL, _AND = "*", "+"  # all solids of a file; several solids as one
 
 
 def read_solids(path: Path) -> tuple[list[str], list[float], list[list[float]]]:
     """Read the names, volumes and bounding boxes of the solids of a STEP file.
 
     Args:
-        path: of the file.
+        path: path of the file.
 
     Returns:
         Names; volumes [m^3]; lower and upper corner of each box [m].
@@ -42,7 +43,7 @@ def read_solids(path: Path) -> tuple[list[str], list[float], list[list[float]]]:
 
 @contextmanager
 def _gmsh_model(path: Path) -> Generator[Any, None, None]:
-    """Gmsh's model of a STEP file, in metres."""
+    """Provide gmsh's model of a STEP file, in metres."""
     try:
         with naming_packages(f"{path}: STEP", "export the surface as STL"):
             import gmsh
@@ -50,7 +51,7 @@ def _gmsh_model(path: Path) -> Generator[Any, None, None]:
         gmsh.initialize(interruptible=False)
     except BadInput:
         raise
-    except Exception as error:  # its Python file without its library
+    except Exception as error:  # gmsh's Python file without its library
         raise BadInput(
             f"{path}: STEP needs the package gmsh, which does not start: {error}"
         ) from None
@@ -60,7 +61,7 @@ def _gmsh_model(path: Path) -> Generator[Any, None, None]:
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _FACETS)
         try:
             gmsh.open(str(path))
-        except Exception as error:  # gmsh has no class of its own for what it refuses
+        except Exception as error:  # gmsh's only class for files that it refuses
             raise BadInput(f"{path}: not a readable STEP file") from error
         yield gmsh.model
     finally:
@@ -69,14 +70,14 @@ def _gmsh_model(path: Path) -> Generator[Any, None, None]:
 
 @dataclass(frozen=True, eq=False)
 class StepTriangles:
-    """Triangles of the solids that are meant, which share those between them.
+    """Triangles of the chosen solids, which share those between them.
 
     Attributes:
         points: (n, 3) [m].
         triangles: (m, 3) indices of points.
-        sides: (m, 2) the solids on both sides, by their place in ``names``; -1 outside.
-        names: of the solids; none where the file's faces belong to no solid.
-        overlaps: pairs of them that fill the same place, one line each.
+        sides: (m, 2) the solids on both sides, by their index in ``names``; -1 outside.
+        names: names of the solids; none if the file's faces belong to no solid.
+        overlaps: pairs of solids that overlap, one line each.
     """
 
     points: NDArray
@@ -87,10 +88,10 @@ class StepTriangles:
 
 
 def read_step(path: Path, solid: str) -> StepTriangles:
-    """Cut solids of a STEP file into fine triangles, in metres by its own unit.
+    """Return fine triangles of solids of a STEP file, in metres by its own unit.
 
     Args:
-        path: of the file.
+        path: path of the file.
         solid: its name, ``one+other`` of several or ``*`` of all as one; may be empty
             where the file holds one.
 
@@ -131,7 +132,7 @@ def read_step(path: Path, solid: str) -> StepTriangles:
 
 
 def _solids(model: Any) -> dict[str, int]:
-    """Tags of a model's solids by name."""
+    """Return the tags of a model's solids by name."""
     solids = dict[str, int]()
     for _, tag in model.getEntities(3):
         own = model.getEntityName(3, tag).rpartition("/")[2] or f"solid{tag}"
@@ -140,18 +141,18 @@ def _solids(model: Any) -> dict[str, int]:
 
 
 def chosen_solids(model: Any, path: Path, solid: str) -> dict[str, int]:
-    """Find the solids that are meant.
+    """Return the chosen solids.
 
     Args:
         model: gmsh's, of the file.
-        path: for messages.
-        solid: as in :func:`read_step`; must be given where there are several.
+        path: path of the file, for error messages.
+        solid: see :func:`read_step`; required if there are several.
 
     Returns:
-        Their tags by name; none where the file's faces belong to no solid.
+        Their tags by name; none if the file's faces belong to no solid.
 
     Raises:
-        BadInput: no such solid, or which one is not said.
+        BadInput: no such solid, or none is chosen of several.
     """
     solids = _solids(model)
     several = list(solids) if solid == _ALL else solid.split(_AND)
@@ -164,7 +165,7 @@ def chosen_solids(model: Any, path: Path, solid: str) -> dict[str, int]:
         raise BadInput(
             f"{path}: found {len(solids)} solids ({names}), expected which one, such "
             f"as {path.name}#{next(iter(solids))}, or {path.name}#{_ALL} for all of "
-            f"them as one; forcefit stiffness solids {path.name} lists them"
+            f"them as one; forcefit stiffness fea {path.name} --part list lists them"
         )
     if not solid:
         return solids
@@ -172,14 +173,15 @@ def chosen_solids(model: Any, path: Path, solid: str) -> dict[str, int]:
 
 
 def sides(model: Any, owners: Mapping[int, int]) -> dict[int, tuple[int, int]]:
-    """Find the faces of solids, and the solids on both sides.
+    """Return the faces of solids, and the solids on both sides.
 
     Args:
         model: gmsh's.
         owners: number of the solid that each volume belongs to.
 
     Returns:
-        By the faces' tags; -1 outside.  All faces of a model where none is a volume's.
+        By the faces' tags; -1 outside.  All faces of a model if none belongs to a
+        volume.
     """
     found: dict[int, list[int]] = {}
     for volume, owner in owners.items():
@@ -194,7 +196,7 @@ def sides(model: Any, owners: Mapping[int, int]) -> dict[int, tuple[int, int]]:
 def _fragments(
     model: Any, path: Path, chosen: Mapping[str, int]
 ) -> tuple[dict[int, int], tuple[str, ...]]:
-    """Solids cut at their common faces: the solid of each volume, and overlaps."""
+    """Split solids at common faces; return the solid of each volume, and overlaps."""
     solids, names = [(3, tag) for tag in chosen.values()], list(chosen)
     volume = [float(model.occ.getMass(*solid)) for solid in solids]
     _, made = model.occ.fragment(solids[:1], solids[1:])
@@ -220,7 +222,7 @@ def _fragments(
 
 
 def _bodies(model: Any, volumes: list[int]) -> int:
-    """How many bodies volumes are that are joined at common faces."""
+    """Return the number of bodies that volumes form, joined at common faces."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

@@ -1,7 +1,8 @@
 """Reader of STL files, text and binary, in NumPy alone.
 
-What other programs read is read too: keywords in capitals, a last line that is cut or
-missing, bytes after the last triangle, a count of triangles that was never filled in.
+The reader accepts what other programs accept: keywords in capitals, a last line that is
+cut or missing, bytes after the last triangle, a count of triangles that was not filled
+in.
 """
 
 import re
@@ -12,18 +13,18 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput, describe
 
-_HEAD = 84  # bytes of a binary file before its triangles: text and their count
+_HEAD = 84  # bytes of a binary file before its triangles: header text and count
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("tag", "<u2")])
-_UNKNOWN_COUNTS = (0, 2**32 - 1)  # of writers that never return to the count
+_UNKNOWN_COUNTS = (0, 2**32 - 1)  # of writers that do not fill in the count
 # the name of a solid: up to its first facet or the end of the line
 _NAME = re.compile(rb"(?im)^[ \t]*(?:end)?solid\b.*?(?=\bfacet\s+normal\b|\r|\n|\Z)")
 
 
 def read_stl(path: Path) -> tuple[NDArray, NDArray]:
-    """Points and triangles of an STL file; no points are merged.
+    """Return the points and triangles of an STL file; no points are merged.
 
     Args:
-        path: of an existing file.
+        path: path of an existing file.
 
     Returns:
         (3 m, 3) points in the file's unit and (m, 3) indices of them.
@@ -39,12 +40,12 @@ def read_stl(path: Path) -> tuple[NDArray, NDArray]:
 
 
 def _count(content: bytes) -> int:
-    """Number of triangles that a binary file states."""
+    """Return the number of triangles that a binary file states."""
     return int.from_bytes(content[_HEAD - 4 : _HEAD], "little")
 
 
 def _is_text(content: bytes) -> bool:
-    """Whether a file is of words; the head of a binary one may begin with solid too."""
+    """Return whether a file is text; a binary header may also begin with solid."""
     size = _HEAD + _TRIANGLE.itemsize * _count(content)
     if len(content) >= _HEAD and len(content) == size:
         return False
@@ -53,14 +54,14 @@ def _is_text(content: bytes) -> bool:
 
 
 def _binary(path: Path, content: bytes) -> NDArray:
-    """(m, 3, 3) corners of a binary file's triangles."""
+    """Return the (m, 3, 3) corners of a binary file's triangles."""
     stated, size = _count(content), _TRIANGLE.itemsize
     body = content[_HEAD:]
     if len(content) < _HEAD:
         raise BadInput(f"{path}: not a readable STL file")
     if stated in _UNKNOWN_COUNTS:
         stated = len(body) // size
-    if len(body) < size * stated - 2:  # the last two bytes are a tag
+    if len(body) < size * stated - 2:  # the last two bytes are an unused tag
         raise BadInput(
             f"{path}: found {len(body) // size} whole triangles, expected {stated}, "
             "the number in the file's head; the file is cut, or is not STL"
@@ -70,9 +71,9 @@ def _binary(path: Path, content: bytes) -> NDArray:
 
 
 def _text(path: Path, content: bytes) -> NDArray:
-    """(m, 3, 3) corners of a text file's triangles."""
+    """Return the (m, 3, 3) corners of a text file's triangles."""
     words = _NAME.sub(b" ", content.removeprefix(b"\xef\xbb\xbf")).lower().split()
-    found = np.array(words, dtype=object)  # as text, one long word would widen them all
+    found = np.array(words, dtype=object)  # as text one long word would widen all
     facets = np.flatnonzero(found == b"facet")
     vertices = np.flatnonzero(found == b"vertex")
     owner = np.searchsorted(facets, vertices)  # 0: before the first facet

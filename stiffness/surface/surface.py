@@ -1,4 +1,4 @@
-"""A link's surface from a file: read, checked, repaired with the repair named."""
+"""A link's surface from a file: read, checked, and repaired with a report."""
 
 import hashlib
 import math
@@ -8,18 +8,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, describe, nearest
+from forcefit.results.display import html_table, short_repr
 from stiffness.surface.filled_solids import FilledSolids
 from stiffness.surface.surface_files import STEP, named_solid, read_triangles
 
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 UNITS |= {"in": 0.0254, "inch": 0.0254, "ft": 0.3048}
 FORMATS = (".stl", ".obj", ".ply", ".vtk", ".vtp", ".msh", ".step", ".stp")
-_LARGEST_LINK = 20.0  # [m] diagonal; beyond it the unit is taken to be wrong
+_LARGEST_LINK = 20.0  # [m] largest diagonal; a larger one means a wrong unit
 _SMALLEST_LINK = 1e-3  # [m]
 _STATED = "stated in the file"
-_CROWD = 100  # vertices within 1e-7 of the size of one, on the mean; memory grows so
+# mean number of vertices within 1e-7 of the size of each; memory grows with it
+_CROWD = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +30,9 @@ class Surface:
     Attributes:
         points: (n, 3) [m].
         triangles: (m, 3) indices of points.
-        name: of the file, for messages.
-        repairs: what was repaired, in words.
-        solids: of a STEP file, where they are several.
+        name: name of the file, for messages.
+        repairs: the repairs made, in words.
+        solids: solids of a STEP file that has several.
     """
 
     points: NDArray
@@ -43,17 +44,17 @@ class Surface:
     __repr__, _repr_html_ = short_repr, html_table
 
     def normals(self) -> NDArray:
-        """(m, 3) [m^2] outward, as long as the triangle's area."""
+        """Return the (m, 3) [m^2] outward normals, as long as the triangles' areas."""
         return area_vectors(self.points, self.triangles)
 
     @property
     def volume(self) -> float:
-        """[m^3] inside."""
+        """[m^3] enclosed volume."""
         return signed_volume(self.points, self.triangles)
 
     @property
     def area(self) -> float:
-        """[m^2]."""
+        """[m^2] total area."""
         return float(np.linalg.norm(self.normals(), axis=1).sum())
 
     @property
@@ -62,14 +63,14 @@ class Surface:
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
     def digest(self) -> str:
-        """Digest of the geometry alone, to the last bit."""
+        """Return the digest of the geometry alone, exact to the last bit."""
         content = hashlib.sha256(np.ascontiguousarray(self.points).tobytes())
         content.update(np.ascontiguousarray(self.triangles, dtype=np.int64).tobytes())
         return content.hexdigest()
 
 
 def area_vectors(points: NDArray, triangles: NDArray) -> NDArray:
-    """Normals of triangles, as long as their areas.
+    """Return the normals of triangles, as long as their areas.
 
     Args:
         points: (n, 3) [m].
@@ -83,7 +84,7 @@ def area_vectors(points: NDArray, triangles: NDArray) -> NDArray:
 
 
 def signed_volume(points: NDArray, triangles: NDArray) -> float:
-    """Volume inside a closed surface, negative when it is inside out.
+    """Return the volume inside a closed surface, negative when it is inside out.
 
     Args:
         points: (n, 3) [m].
@@ -98,7 +99,7 @@ def signed_volume(points: NDArray, triangles: NDArray) -> float:
 
 
 def directed_edges(triangles: NDArray) -> NDArray:
-    """Edges of triangles, each in the direction in which its triangle runs.
+    """Return the edges of triangles, each in the direction in which its triangle runs.
 
     Args:
         triangles: (m, 3) indices.
@@ -113,10 +114,10 @@ def read_surface(path: Path | str, unit: str = "m") -> Surface:
     """Read a surface and refuse one that bounds no solid.
 
     Args:
-        path: STL, OBJ, PLY, VTK, VTP, MSH, or STEP where gmsh is installed; of several
-            solids in a STEP file one, ``part.step#name``.
-        unit: of the file's coordinates: m, cm, mm, um or inch; a STEP file states its
-            own, which counts.
+        path: STL, OBJ, PLY, VTK, VTP, MSH, or STEP if gmsh is installed;
+            ``part.step#name`` for one of several solids in a STEP file.
+        unit: unit of the file's coordinates: m, cm, mm, um or inch; a STEP file states
+            its own unit, which is used.
 
     Returns:
         The surface in metres, closed and outward.
@@ -139,7 +140,7 @@ def read_surface(path: Path | str, unit: str = "m") -> Surface:
 def _read_triangles(
     path: Path, solid: str
 ) -> tuple[NDArray, NDArray, FilledSolids | None]:
-    """Points and triangles of a file, in its unit, and its solids."""
+    """Return the points and triangles of a file, in its unit, and its solids."""
     if path.suffix.lower() not in FORMATS:
         hint = nearest(path.suffix, FORMATS)
         raise BadInput(f"{path}: unknown kind of surface file{hint}")
@@ -160,15 +161,16 @@ def check_surface(
     Args:
         points: (n, 3) [m].
         triangles: (m, 3) indices.
-        name: for messages.
-        unit: the unit that was stated, for messages.
+        name: name for error messages.
+        unit: the stated unit, for messages.
 
     Returns:
-        The surface: vertices merged, degenerate triangles dropped, turned outward.
+        The surface: vertices merged, degenerate triangles dropped, oriented outward.
 
     Raises:
-        BadInput: nothing there, not finite, of an implausible size, open, with edges
-            shared by more than two triangles, self-intersecting, or of several bodies.
+        BadInput: the surface is empty, not finite, of an implausible size, open,
+            self-intersecting, of several bodies, or has edges shared by more than two
+            triangles.
     """
     if len(triangles) == 0:
         raise BadInput(f"{name}: holds no triangles")
@@ -193,14 +195,14 @@ def check_surface(
 
 
 def _place(point: NDArray) -> str:
-    """A point for a message."""
+    """Return a point for a message."""
     return "(" + ", ".join(f"{v:.4g}" for v in point) + ") m"
 
 
 def _check_coordinates(
     points: NDArray, triangles: NDArray, name: str, unit: str
 ) -> None:
-    """Refuse coordinates that are not finite, or a size that betrays the unit."""
+    """Reject coordinates that are not finite, or a size that shows a wrong unit."""
     used = points[np.unique(triangles)]
     wrong = ~np.isfinite(used).all(axis=1)
     if wrong.any():
@@ -251,7 +253,7 @@ def _merge(
 
 
 def _check_closed(points: NDArray, triangles: NDArray, name: str) -> None:
-    """Every edge must be shared by exactly two triangles."""
+    """Check that exactly two triangles share every edge."""
     edges = np.sort(directed_edges(triangles), axis=1)
     edges, count = np.unique(edges, axis=0, return_counts=True)
     if (count == 1).any():
@@ -271,7 +273,7 @@ def _check_closed(points: NDArray, triangles: NDArray, name: str) -> None:
 def _orient(
     points: NDArray, triangles: NDArray, name: str
 ) -> tuple[NDArray, list[str]]:
-    """Orient all triangles outward; refuse several bodies."""
+    """Orient all triangles outward; reject several bodies."""
     triangles, shell, flipped = orient_shells(triangles)
     repairs = [f"{flipped} triangles turned to agree with the rest"] if flipped else []
     shells = [triangles[shell == k] for k in range(shell.max() + 1)]
@@ -294,13 +296,13 @@ def _orient(
 
 
 def orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
-    """Turn the triangles of closed shells so that neighbours agree.
+    """Reorient the triangles of closed shells so that neighbours agree.
 
     Args:
         triangles: (m, 3) indices of points.
 
     Returns:
-        The triangles, (m,) the shell of each, and how many were turned.
+        The triangles, (m,) the shell of each, and the number reoriented.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order, connected_components
@@ -309,7 +311,7 @@ def orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
     directed = directed_edges(triangles)
     owner = np.repeat(np.arange(count), 3)
     order = np.lexsort(np.sort(directed, axis=1).T)
-    first, second = order[::2], order[1::2]  # closed: edges come in pairs
+    first, second = order[::2], order[1::2]  # a closed surface: edges come in pairs
     left, right = owner[first], owner[second]
     same = directed[first, 0] == directed[second, 0]  # neighbours that disagree
     ends = (np.r_[left, right], np.r_[right, left])
@@ -332,7 +334,7 @@ def orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
 
 
 def _inside(point: NDArray, points: NDArray, triangles: NDArray) -> bool:
-    """Whether a surface encloses a point (its solid angle is 4 pi)."""
+    """Return whether a surface encloses a point (its solid angle is 4 pi)."""
     a, b, c = np.moveaxis(points[triangles] - point, 1, 0)
     la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
     top = np.einsum("ij,ij->i", a, np.cross(b, c))

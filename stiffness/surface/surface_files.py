@@ -1,7 +1,7 @@
 """Readers of surface files.
 
-STL is read here.  The other kinds need VTK, meshio or gmsh, which a damaged file can
-end together with their process: they run in a process of their own
+STL is read here.  The other kinds need VTK, meshio or gmsh.  A damaged file can crash
+these with their process, so they run in a separate process
 (:mod:`stiffness.surface.surface_worker`).
 """
 
@@ -22,18 +22,18 @@ from stiffness.surface.filled_solids import FilledSolids
 from stiffness.surface.stl_file import read_stl
 
 STEP = (".step", ".stp")
-_TIME_LIMIT = 300.0  # [s] of one reader; gmsh takes 1 s for 35 000 triangles
+_TIME_LIMIT = 300.0  # [s] time limit of a reader; gmsh takes 1 s for 35 000 triangles
 
 
 def named_solid(path: Path | str) -> tuple[Path, str]:
-    """A surface file, and which of the solids of a STEP file is meant.
+    """Return a surface file, and the chosen solid of a STEP file.
 
     Args:
-        path: of a file, or ``part.step#name``; ``part.step#one+other`` or
+        path: path of a file, or ``part.step#name``; ``part.step#one+other`` or
             ``part.step#*`` of several solids as one.
 
     Returns:
-        The file, and the name; empty where none is given.
+        The file, and the name; empty if none is given.
     """
     file, mark, name = str(path).rpartition("#")
     if mark and Path(file).suffix.lower() in STEP:
@@ -44,19 +44,19 @@ def named_solid(path: Path | str) -> tuple[Path, str]:
 def read_triangles(
     path: Path | str, solid: str = ""
 ) -> tuple[NDArray, NDArray, FilledSolids | None]:
-    """Points and triangles of a surface file, in the file's unit; STEP in metres.
+    """Return points and triangles of a surface file, in its unit; STEP in metres.
 
     Args:
         path: an existing file of a known kind.
-        solid: of a STEP file with several, by its name.
+        solid: name of one of several solids of a STEP file.
 
     Returns:
-        (n, 3) points and (m, 3) indices of points, and the solids they bound where a
-        STEP file has several.
+        (n, 3) points and (m, 3) indices of points, and the solids they bound if a STEP
+        file has several.
 
     Raises:
-        BadInput: the content is not what the name says, or the package that reads it
-            is not installed.
+        BadInput: the content does not match the file's suffix, or the package that
+            reads it is not installed.
     """
     path = Path(path)
     if path.suffix.lower() == ".stl":
@@ -81,10 +81,10 @@ class StepSolid:
     """A solid of a STEP file.
 
     Attributes:
-        name: as ``part.step#name`` takes it.
+        name: name after ``#``, as in ``part.step#name``.
         volume: [m^3].
-        low: (3,) [m] the bounding box's lower corner.
-        high: (3,) [m] its upper one.
+        low: (3,) [m] lower corner of the bounding box.
+        high: (3,) [m] upper corner of the bounding box.
     """
 
     name: str
@@ -97,10 +97,10 @@ def step_solids(path: Path | str) -> list[StepSolid]:
     """List the solids of a STEP file.
 
     Args:
-        path: of the file.
+        path: path of the file.
 
     Returns:
-        The solids in the file's order, in metres by its own unit.
+        The solids in the file's order, converted to metres.
 
     Raises:
         BadInput: the file cannot be read, holds no solid, or gmsh is not installed.
@@ -117,11 +117,11 @@ def step_solids(path: Path | str) -> list[StepSolid]:
 
 
 def _in_own_process(wanted: str, path: Path, solid: str = "") -> dict[str, NDArray]:
-    """Arrays by a reader that may crash, hang or want all memory."""
+    """Return arrays from a reader that may crash, hang or exhaust the memory."""
     kind = path.suffix[1:].upper()
     with tempfile.TemporaryDirectory(prefix="forcefit-") as folder:
         made = Path(folder, "read.npz")
-        # -P: modules of the folder it runs in are not to be taken for others'
+        # -P: modules of the current folder must not replace others of the same name
         module = "stiffness.surface.surface_worker"
         command = [sys.executable, "-P", "-m", module, wanted, str(path), str(made)]
         search = {"PYTHONPATH": os.pathsep.join(sys.path)}

@@ -1,9 +1,9 @@
-"""The readers that may end their process: VTK, meshio and gmsh on a file of a user.
+"""Readers that may crash their process: VTK, meshio and gmsh on a user's file.
 
 ``python -m stiffness.surface.surface_worker triangles|solids FILE READ.npz [SOLID]``
 
-:mod:`stiffness.surface.surface_files` runs this in a process of its
-own; a damaged file ends that one alone.
+:mod:`stiffness.surface.surface_files` runs this in a separate process; a damaged file
+ends only that one.
 """
 
 import sys
@@ -20,16 +20,16 @@ from stiffness.surface.step_file import read_solids, read_step
 
 
 def main(wanted: str, path: Path, made: Path, solid: str = "") -> None:
-    """Read a file and write what is wanted of it, or why it is refused.
+    """Read a file and write the requested data, or why it is refused.
 
     Args:
         wanted: "triangles", or "solids" of a STEP file.
-        path: of an existing file.
+        path: path of an existing file.
         made: ``points`` (n, 3) and ``faces`` (m, 3), of STEP also ``sides`` (m, 2),
             ``names`` and ``overlaps``, see
             :class:`stiffness.surface.step_file.StepTriangles`; or ``names`` (n,),
             ``volumes`` (n,) and ``boxes`` (n, 6); or ``refused``, one line.
-        solid: of a STEP file with several, by its name.
+        solid: name of one of several solids of a STEP file.
     """
     _limit_memory()
     try:
@@ -41,7 +41,7 @@ def main(wanted: str, path: Path, made: Path, solid: str = "") -> None:
 
 
 def _solids(path: Path) -> dict[str, Any]:
-    """Names, volumes and boxes of a STEP file's solids."""
+    """Return the names, volumes and boxes of a STEP file's solids."""
     names, volumes, boxes = read_solids(path)
     return {
         "names": np.array(names, dtype=str),
@@ -51,7 +51,7 @@ def _solids(path: Path) -> dict[str, Any]:
 
 
 def _triangles(path: Path, solid: str) -> dict[str, Any]:
-    """Points and triangles, of STEP also what is known of its faces."""
+    """Return the points and triangles, and for STEP the data of its faces."""
     if path.suffix.lower() in {".step", ".stp"}:
         step = read_step(path, solid)
         return {
@@ -67,7 +67,7 @@ def _triangles(path: Path, solid: str) -> dict[str, Any]:
 
 
 def _limit_memory() -> None:
-    """Let a file that states a size beyond the memory fail here, and nothing else."""
+    """Limit the memory, so that a file with an excessive size fails here alone."""
     try:
         import os
         import resource
@@ -81,7 +81,7 @@ def _limit_memory() -> None:
 
 
 def _with_vtk(path: Path) -> tuple[NDArray, NDArray]:
-    """What VTK reads: PLY, VTK, VTP."""
+    """Return a surface read by VTK: PLY, VTK, VTP."""
     import pyvista
     from vtkmodules.vtkCommonCore import vtkObject
 
@@ -90,7 +90,7 @@ def _with_vtk(path: Path) -> tuple[NDArray, NDArray]:
 
 
 def _obj(path: Path) -> tuple[NDArray, NDArray]:
-    """An OBJ file; VTK cuts its polygons into triangles, concave ones too."""
+    """Return an OBJ file; VTK splits its polygons into triangles, also concave ones."""
     import pyvista
 
     points, faces = read_obj(path)
@@ -101,7 +101,7 @@ def _obj(path: Path) -> tuple[NDArray, NDArray]:
 
 
 def _check_points(path: Path, mesh: Any) -> None:
-    """Refuse cells of points that are not there: VTK's filters die of them."""
+    """Reject cells with points that do not exist, on which VTK's filters crash."""
     import pyvista
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
@@ -121,7 +121,7 @@ def _check_points(path: Path, mesh: Any) -> None:
 
 
 def _boundary(path: Path, mesh: Any) -> tuple[NDArray, NDArray]:
-    """Points and triangles of a VTK mesh, the boundary of its volume if it has one."""
+    """Return points and triangles of a VTK mesh, or of its volume's boundary."""
     import pyvista
 
     _check_points(path, mesh)
@@ -133,7 +133,7 @@ def _boundary(path: Path, mesh: Any) -> tuple[NDArray, NDArray]:
 
 
 def _msh(path: Path) -> tuple[NDArray, NDArray]:
-    """Gmsh's MSH 2.2 and 4.1: its surface elements, else the volume's boundary."""
+    """Return gmsh's MSH 2.2 or 4.1: surface elements, else the volume's boundary."""
     import meshio
     import pyvista
 

@@ -8,8 +8,10 @@ from stiffness.surface.primitives import Shape
 from stiffness.surface.surface import Surface, directed_edges
 
 SHARP = np.cos(np.radians(35.0))  # a sharper edge separates two patches
-_ON_SHAPE = 2e-6  # of the part's size: STL's single precision leaves 1e-7
-_TRIES = 500  # seeds on one surface; what is left then keeps its facets
+# relative to the part's size: points nearer are on a shape; STL leaves 1e-7
+_ON_SHAPE = 2e-6
+# largest number of seeds on one surface; other triangles keep their facets
+_TRIES = 500
 
 
 class TriangleGraph:
@@ -32,7 +34,7 @@ class TriangleGraph:
         )
 
     def connected_parts(self, members: NDArray, bend: float) -> NDArray:
-        """Component of each member; cut where the cosine is below ``bend``."""
+        """Return component of each member; cut where the cosine is below ``bend``."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
@@ -44,32 +46,32 @@ class TriangleGraph:
         return connected_components(graph, directed=False)[1]
 
     def smooth_parts(self, members: NDArray) -> list[NDArray]:
-        """Indices of the triangles of each part between sharp edges."""
+        """Return the indices of the triangles of each part between sharp edges."""
         label = self.connected_parts(members, SHARP)
         return [
             np.flatnonzero(members & (label == k)) for k in np.unique(label[members])
         ]
 
     def directed(self, edges: NDArray, owner: NDArray) -> NDArray:
-        """(e, 2) ends of edges, in the direction in which a triangle has them."""
+        """Return (e, 2) ends of edges, in the direction of the triangle."""
         ends = self.ends[edges]
         first = (self.triangles[owner] == ends[:, :1]).argmax(axis=1)
         follows = self.triangles[owner, (first + 1) % 3] == ends[:, 1]
         return np.where(follows[:, None], ends, ends[:, ::-1])
 
     def flat_faces(self, part: NDArray) -> NDArray:
-        """Number of the coplanar face of each triangle; meaningless outside a part."""
+        """Return number of each triangle's coplanar face; invalid outside the part."""
         inside = np.zeros(len(self.triangles), dtype=bool)
         inside[part] = True
         return self.connected_parts(inside, 1 - 1e-10)
 
     def lifted(self, part: NDArray) -> Facets:
-        """A part of no known shape."""
+        """Return a part of no known shape as lifted facets."""
         used, index = np.unique(self.triangles[part], return_inverse=True)
         return Facets(self.points[used], index.reshape(-1, 3))
 
     def fits(self, shape: Shape, part: NDArray) -> NDArray:
-        """Which triangles of a part lie on a shape, corners and direction."""
+        """Return which triangles of a part lie on a shape, by corners and direction."""
         corners = self.points[self.triangles[part]].reshape(-1, 3)
         distances = np.abs(shape.signed(corners)[0]).reshape(-1, 3).max(axis=1)
         centers = corners.reshape(-1, 3, 3).mean(axis=1)

@@ -1,7 +1,7 @@
-"""The surface that the facets of a file stand for, and what a mesh misses of it.
+"""The exact surface that the facets of a file approximate, and a mesh's error.
 
-The shape of a patch goes on beyond its border, where it meets the next one smoothly.
-What a place of a mesh's boundary is compared with is the patch of the nearest facet.
+The shape of a patch continues beyond its border, where it meets the next one smoothly.
+A point of a mesh's boundary is compared with the patch of the nearest facet.
 """
 
 from functools import cached_property
@@ -15,8 +15,8 @@ from stiffness.surface.patches import Patches
 from stiffness.surface.surface import Surface
 from stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
-_UNSURE = 0.3  # share of the lift of facets of no known shape that may be wrong
-# on a triangle, exact to degree 4 (Dunavant 1985): two triples of places
+_UNSURE = 0.3  # share of the lift of facets of no known shape that counts as uncertain
+# points on a triangle, exact to degree 4 (Dunavant 1985): two triples
 _NEAR, _FAR = 0.445948490915965, 0.091576213509771
 _PLACES = np.concatenate([np.full((3, 3), a) + (1 - 3 * a) * np.eye(3)
                           for a in (_NEAR, _FAR)])  # fmt: skip
@@ -24,12 +24,12 @@ _WEIGHTS = np.repeat([0.223381589678011, 0.109951743655322], 3)
 
 
 class TrueSurface:
-    """Facets with the shapes they were recognised as.
+    """Facets with their recognised shapes.
 
     Attributes:
         volume: [m^3] inside the shapes.
-        unsure_volume: [m^3] of it that depends on how facets of no known shape are
-            smoothed.
+        unsure_volume: [m^3] part of it that depends on the smoothing of facets of no
+            known shape.
     """
 
     def __init__(self, surface: Surface, patches: Patches) -> None:
@@ -41,7 +41,7 @@ class TrueSurface:
 
     @cached_property
     def tangent(self) -> NDArray:
-        """(p,) whether a patch meets another one without a sharp edge."""
+        """(p,) bool, whether a patch meets another one without a sharp edge."""
         graph, patch = TriangleGraph(self._surface), self._patches.patch
         one, other = patch[graph.left], patch[graph.right]
         smooth = (graph.cosine > SHARP) & (one != other)
@@ -57,7 +57,7 @@ class TrueSurface:
         return pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)
 
     def outside(self, points: NDArray, normals: NDArray) -> NDArray:
-        """How far places of a mesh's boundary are outside the surface.
+        """Return the distance of points of a mesh's boundary from the surface.
 
         Args:
             points: (n, 3) [m].
@@ -77,7 +77,7 @@ class TrueSurface:
         return away
 
     def _volumes_between(self) -> NDArray:
-        """(p,) [m^3] between the facets of each patch and its shape."""
+        """Return (p,) [m^3] volumes between the facets of each patch and its shape."""
         surface, patches = self._surface, self._patches
         areas = surface.normals()
         volumes = np.zeros(len(patches.shapes))
@@ -87,7 +87,8 @@ class TrueSurface:
             places = np.einsum("qk,mkx->mqx", _PLACES, corners)
             distance, slope = shape.signed(places.reshape(-1, 3))
             slope = slope.reshape(places.shape)
-            # along the facet's normal: (distance) times the slope's component there
+            # along the facet's normal: distance times the normal component of the
+            # gradient
             flux = np.einsum("mqx,mx->mq", slope, areas[members])
             gap = -distance.reshape(flux.shape) * flux
             volumes[number] = float((gap @ _WEIGHTS).sum())

@@ -7,12 +7,17 @@ import xarray
 import forcefit as ff
 from assembly.sweeps.selection import BY_CLEARANCE, FINITE
 
+ERRORS = """
+[[errors]]
+frames = ["leg1.link_a"]
+most = [1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5]
+"""
 LOAD = [0, 0, 0, 0, 0, -100.0]
 
 
 @pytest.fixture(scope="module")
 def posture():
-    return ff.home_posture(ff.load_robot("irsbot2"))
+    return ff.place_robot(ff.load_robot("irsbot2"))
 
 
 @pytest.mark.parametrize("old", sorted(ff._RENAMED))
@@ -24,6 +29,15 @@ def test_an_old_public_name_works_and_names_the_new_one(old):
     assert elsewhere or found is getattr(ff, new)
     assert old not in ff.__all__
     assert new in ff.__all__
+
+
+@pytest.mark.parametrize("name", sorted(ff._MOVED_TO))
+def test_a_name_that_left_the_public_ones_works_and_says_where_it_is(name):
+    with pytest.warns(FutureWarning, match=rf"forcefit\.{name} is now [\w.]+\.{name}$"):
+        found = getattr(ff, name)
+    assert callable(found)
+    assert found.__name__ == name
+    assert name not in ff.__all__
 
 
 @pytest.mark.parametrize(
@@ -38,12 +52,22 @@ def test_an_old_state_is_the_new_one(posture, old, new):
 
 
 def test_modes_of_the_exact_state_by_the_old_flag():
-    posture = ff.home_posture(ff.load_robot("delta"))
+    posture = ff.place_robot(ff.load_robot("delta"))
     with pytest.warns(FutureWarning, match="state='exact'") as caught:
         found = ff.natural_modes(posture, 2, LOAD, exact=True)
     assert caught[0].filename == __file__
     expected = ff.natural_modes(posture, 2, LOAD, state="exact")
     np.testing.assert_array_equal(found.frequencies, expected.frequencies)
+
+
+def test_a_deflection_curve_of_the_exact_state_by_the_old_flag():
+    posture = ff.place_robot(ff.load_robot("four_bar"))
+    with pytest.warns(FutureWarning, match="state='exact'"):
+        found = ff.deflection_curve(posture, 3, [0.0, 10.0], exact=True)
+    expected = ff.deflection_curve(posture, 3, [0.0, 10.0], state="exact")
+    np.testing.assert_array_equal(found.screws, expected.screws)
+    with pytest.raises(ValueError, match="no state 'nominal'"):
+        ff.deflection_curve(posture, 3, [0.0, 10.0], state="nominal")
 
 
 def test_a_data_set_of_an_older_release_has_the_present_names(tmp_path):
@@ -91,3 +115,15 @@ def test_a_sweep_in_the_words_of_the_last_release(tmp_path):
     assert SweepOptions(linearisation=True).quantities == ("default", *FINITE)
     assert SweepOptions(stiffness=True).state == "nominal"
     assert SweepOptions(stiffness=False).state is None
+
+
+def test_an_experiment_by_the_old_word_for_its_clearance(posture, tmp_path):
+    file = tmp_path / "errors.toml"
+    file.write_text(ERRORS)
+    sources = ff.read_sources(file, posture.robot)
+    with pytest.warns(FutureWarning, match=r"is now Experiment.clearance='least'") as c:
+        found = ff.Experiment(posture, sources, clearance_model="least")
+    assert c[0].filename == __file__
+    assert found.clearance == "least"
+    with pytest.warns(FutureWarning, match=r"is now Experiment\.clearance"):
+        assert found.clearance_model == "least"

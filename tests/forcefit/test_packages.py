@@ -56,7 +56,7 @@ def files(tmp_path):
          ("assembly", "statistics", "irsbot2", *POSE, "--draws", "10", "--errors",
           ROOT / "examples/irsbot2_errors.toml")),
         ("xarray", "xarray", "forcefit[sweeps]",
-         ("assembly", "table", "a.nc", "-o", "b.csv")),
+         ("assembly", "plot", "a.nc", "--csv", "b.csv")),
         ("matplotlib", "matplotlib", "forcefit[report]",
          ("assembly", "plot", "a.nc", "--figure", "b.png")),
         ("matplotlib", "matplotlib", "forcefit[report]",

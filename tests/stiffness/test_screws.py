@@ -13,11 +13,6 @@ from stiffness.screws import (
 )
 
 
-@pytest.fixture
-def rng():
-    return np.random.default_rng(1)
-
-
 def test_skew_is_the_cross_product(rng):
     a, b = rng.normal(size=(2, 7, 3))
     np.testing.assert_allclose(
@@ -60,13 +55,6 @@ def test_small_screws_are_derivatives_of_finite_motions(rng, size):
     screw = screw_map(-point) @ np.r_[turn, 0, 0, 0]
     angle = np.linalg.norm(turn)
     assert np.linalg.norm(moved - screw[3:]) <= angle**2 * np.linalg.norm(point)
-
-
-def test_rotation_vectors_return(rng):
-    vectors = rng.normal(size=(2, 5, 3)) / 2
-    matrices = rotation_matrix(vectors)
-    assert matrices.shape == (2, 5, 3, 3)
-    np.testing.assert_allclose(rotation_vector(matrices), vectors, atol=1e-14)
 
 
 @pytest.mark.parametrize("angle", [1e-14, 1e-7, 1e-3, 0.5, 2.1, 3.1, np.pi - 1e-9])

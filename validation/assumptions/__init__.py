@@ -1,4 +1,4 @@
-"""What each assumption of the model costs a robot at a pose.
+"""Errors that each assumption of the model causes at a robot's pose.
 
-Begin at ``assumptions.py``.
+Begin with ``assumptions.py``.
 """

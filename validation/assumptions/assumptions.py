@@ -1,4 +1,4 @@
-"""All assumptions of ``validity.py`` at one posture."""
+"""Errors of all assumptions of ``validity.py`` at one configuration of a robot."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -38,18 +38,18 @@ def assumption_costs(
     gravity: ArrayLike | None = None,
     solids: bool = False,
 ) -> dict[str, Cost | str]:
-    """Costs of all assumptions at one posture.
+    """Return the costs of all assumptions at one posture.
 
     Closures are compared without clearances, where the pose is unique.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes; none if absent.
-        solids: whether beams are meshed, some seconds a shape.
+        solids: whether beams are meshed, which takes some seconds for each shape.
 
     Returns:
-        By assumption its cost, or why it is not known.
+        For each assumption its error, or the reason why it is not known.
     """
     tight = replace(posture, robot=without_clearance(posture.robot))
     computed: dict[str, Callable[[], Cost]] = {
@@ -70,13 +70,13 @@ def assumption_costs(
 
 
 class _NotApplicable(Exception):
-    """An assumption that the robot does not make, or that is not computed."""
+    """Error: the robot does not make an assumption, or its error is not computed."""
 
 
 def _pieces_cost(
     posture: Posture, load: ArrayLike | None, gravity: ArrayLike | None
 ) -> Cost:
-    """Of beams that are one spring."""
+    """Return the error of beams that are one spring each."""
     if not any(isinstance(frame.link, BeamLink) for frame in posture.robot.frames):
         raise _NotApplicable("no beam")
     if load is None and gravity is None and not posture.robot.errors.any():
@@ -87,14 +87,14 @@ def _pieces_cost(
 def _weight_cost(
     posture: Posture, gravity: ArrayLike | None, load: ArrayLike | None
 ) -> Cost:
-    """Of weights at the links' ends."""
+    """Return the error of weights that act at the links' ends."""
     if gravity is None or not energy_between_ends(posture, gravity):
         raise _NotApplicable("no gravity, or no beam with a density")
     return spread_cost(posture, gravity, load)
 
 
 def _solid_cost(posture: Posture, load: ArrayLike | None, solids: bool) -> Cost:
-    """Of beams against solids."""
+    """Return the error of beams compared with solids."""
     beams = [f for f in posture.robot.frames if isinstance(f.link, BeamLink)]
     if beams and not solids:
         raise _NotApplicable(_NOT_MESHED)
@@ -108,14 +108,14 @@ def _solid_cost(posture: Posture, load: ArrayLike | None, solids: bool) -> Cost:
 def stiffness_costs(
     postures: Sequence[Posture], solids: bool = False
 ) -> PlatformCosts | str:
-    """What links as beams, acting at their ends, cost the platform's stiffness.
+    """Return errors of the platform's stiffness with beams that act at their ends.
 
     Args:
-        postures: of one robot, at least one.
+        postures: at least one, all of one robot.
         solids: whether links are meshed.
 
     Returns:
-        The costs, or why they are not known.
+        The errors, or the reason why they are not known.
 
     Raises:
         BadInput: a surface or an interface is not usable.

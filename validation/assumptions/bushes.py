@@ -1,4 +1,4 @@
-"""Pins held in two bushes each, instead of a disc for shifts and a cone for tilts.
+"""Pins held in two bushes each, instead of bounds of translation and tilt.
 
 The paper bounds a pin's radial clearance |(TX, TY)| <= c and its tilt |(RX, RY)| <= t
 independently.  A pin in two bushes of clearance c, at z = +-h with h = c / t, is
@@ -6,10 +6,11 @@ bounded by the position of its axis there:
 
     |(TX + h RY, TY - h RX)| <= c   and   |(TX - h RY, TY + h RX)| <= c,
 
-two discs again, in other coordinates: shifted by c it cannot tilt at all.  With all
-clearances halved, disc and cone lie inside the two bushes; the two bushes lie inside
-disc and cone.  So bushes cost at least as much energy as disc and cone, at most as much
-as these with half the clearance, and the zone's margin is at most doubled.
+These are two circular bounds again, in other coordinates: a pin translated by c cannot
+tilt.  The paper's bounds with half the clearances are inside the bushes' bounds; these
+are inside the paper's bounds.  So the energy with bushes is at least that with the
+paper's bounds, and at most that with half the clearance.  The zone's margin is at most
+doubled.
 """
 
 from dataclasses import replace
@@ -25,13 +26,13 @@ from assembly.linear.reference.energy import solve_with
 
 
 def bush_joints(joints: VirtualJoints) -> VirtualJoints:
-    """Two bushes for every pin that has both radial clearance and tilt.
+    """Return two bushes for every pin that has both radial clearance and tilt.
 
     Args:
-        joints: with discs and cones.
+        joints: virtual joints with the paper's bounds.
 
     Returns:
-        The same with other columns in place of each such disc and cone.
+        The virtual joints with the bushes' columns instead of the paper's.
     """
     cones = joints.cones.copy()
     # each column of a bounded clearance has one entry, its bound
@@ -51,19 +52,19 @@ def bush_joints(joints: VirtualJoints) -> VirtualJoints:
 
 
 def solve_bushes(posture: Posture, load: ArrayLike | None = None) -> Assembly:
-    """Close a manipulator with pins in two bushes each at least energy.
+    """Return the assembly of least energy with pins in two bushes each.
 
     Args:
-        posture: where the robot stands; bounds of passive joints' own motion are left
-            out.
+        posture: the robot's configuration; bounds of the motions of passive joints are
+            left out.
         load: (6,) [N m, N] on the platform at its origin, base axes.
 
     Returns:
-        The assembled manipulator; its ``clearance_excess`` is against disc and cone.
+        The assembly; its ``clearance_excess`` compares with the paper's bounds.
 
     Raises:
-        CannotAssemble: a closure is open that nothing can close.
-        FreeMotion: a load drives a motion that nothing resists.
+        CannotAssemble: no motion of the virtual joints can close a closure.
+        FreeMotion: the load acts along a motion without stiffness.
         SolverFailed: the cone solver failed.
     """
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)

@@ -1,4 +1,4 @@
-"""What the model's assumptions cost a robot over many poses."""
+"""Errors that the model's assumptions cause at many poses of a robot."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from assembly.kinematics.posture import Posture, place_many, place_many_joints
 from assembly.kinematics.verdict import limits_passed
 from assembly.model.robot import Robot
 from assembly.sweeps.targets import Targets, goals_of, of_joints
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 from validation.assumptions.assumptions import assumption_costs, stiffness_costs
 from validation.assumptions.platform_cost import PlatformCosts
 from validation.assumptions.validity import Cost
@@ -18,14 +18,15 @@ from validation.assumptions.validity import Cost
 
 @dataclass(frozen=True, eq=False)
 class CostsOverPoses:
-    """Costs of all assumptions at the poses that are reached.
+    """Errors of all assumptions at the poses that the robot reaches.
 
     Attributes:
-        robot: with its errors.
-        asked: of all k poses, the components given [m or rad].
-        unreached: (k,) why there is no posture, empty where there is one.
-        costs: of the r postures reached, by assumption its cost or why it is not known.
-        platform: of its stiffness at these, or why it is not known.
+        robot: robot with its errors.
+        asked: required components of each of the k poses [m or rad].
+        unreached: (k,) reason why the robot does not reach a pose; empty if it does.
+        costs: for each of the r reached poses, an assumption's error or why it is not
+            known.
+        platform: errors of the platform's stiffness at them, or why they are not known.
     """
 
     robot: Robot
@@ -38,7 +39,7 @@ class CostsOverPoses:
 
     @property
     def reached(self) -> tuple[Mapping[str, float], ...]:
-        """(r,) what was asked of the postures that are."""
+        """(r,) required components of the reached poses."""
         return tuple(
             asked
             for asked, why in zip(self.asked, self.unreached, strict=True)
@@ -47,12 +48,12 @@ class CostsOverPoses:
 
     @property
     def assumptions(self) -> tuple[str, ...]:
-        """Their names."""
+        """Names of the assumptions."""
         return tuple(self.costs[0]) if self.costs else ()
 
     @property
     def known(self) -> bool:
-        """Whether anything could be compared anywhere."""
+        """Whether the error of any assumption is known at any pose."""
         return isinstance(self.platform, PlatformCosts) or any(
             isinstance(cost, Cost) for at in self.costs for cost in at.values()
         )
@@ -66,18 +67,18 @@ def costs_over_poses(
     solids: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> CostsOverPoses:
-    """Costs of all assumptions at many poses.
+    """Return the errors of all assumptions at many poses.
 
     Args:
-        robot: with its errors.
-        targets: its poses or joint coordinates.
+        robot: robot with its errors.
+        targets: poses or joint coordinates.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes; none if absent.
         solids: whether links are meshed, once for all poses.
         progress: called after each pose with the number done and the total.
 
     Returns:
-        The costs.
+        The errors.
 
     Raises:
         BadInput: the closures do not hold in the home pose, or a surface is not usable.
@@ -113,7 +114,7 @@ def costs_at(
     gravity: ArrayLike | None = None,
     solids: bool = False,
 ) -> CostsOverPoses:
-    """Costs of all assumptions at one posture; see :func:`costs_over_poses`."""
+    """Return errors of all assumptions at one pose; see :func:`costs_over_poses`."""
     costs = assumption_costs(posture, load, gravity, solids)
     platform = stiffness_costs([posture], solids)
     asked = (posture.pose(),)

@@ -1,4 +1,4 @@
-r"""What links as beams, and links that act at ends, cost the platform's stiffness.
+r"""Errors of the platform's stiffness with links as beams that act at their ends.
 
 Four models of one robot at many postures, clearances at zero, without errors:
 
@@ -12,11 +12,11 @@ solids          the finite elements themselves, both ends free to move: the
 spread          virtual joints with K_E of the same mesh, wrenches spread over ends
 ==============  ==================================================================
 
-Meshed and solids must agree to rounding: condensation leaves nothing out where joints
-are rigid at their ends.  Spread against meshed is what that assumption is worth: real
-seats lie between the two.  A difference is the largest relative one of the compliance
-along any wrench, which depends on no choice of point or length.  Links do not change
-with the pose: they are meshed once, and a posture costs milliseconds.
+The results of meshed and solids must agree to rounding: condensation is exact where
+joints hold the ends rigidly.  The difference of spread from meshed is the error of that
+assumption: real seats are between the two.  A difference is the largest relative one of
+the compliance along any wrench, which depends on no choice of point or length. Links do
+not change with the pose: they are meshed once, and a pose needs milliseconds.
 """
 
 from collections.abc import Mapping, Sequence
@@ -34,28 +34,28 @@ from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from stiffness.screws import screw_map
 from validation.assumptions.solid_links import SolidLink, solid_links
 
-_RANK = 1e-9  # of the largest singular value: less counts as zero
+_RANK = 1e-9  # relative to the largest singular value: smaller ones count as zero
 
 
 class NoSolids(Exception):
-    """No link of the robot has a shape that could be meshed."""
+    """Error: no link of the robot has a shape that can be meshed."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlatformCosts:
-    """Relative errors of the platform's compliance at k postures.
+    """Relative errors of the platform's compliance at k poses.
 
-    Rows are NaN where a motion of the platform is free.
+    Rows are NaN where the platform has a motion without stiffness.
 
     Attributes:
-        beams: (k,) [-] of beams against solids.
-        meshed: (k,) [-] of meshed K_E against solids: rounding.
-        ends: (k,) [-] of rigid ends against wrenches spread over them.
-        by_link: (k,) [-] of each link alone a beam, against all as solids, the link of
-            the largest first.
-        left: links without a shape, the same in all models.
+        beams: (k,) [-] beams compared with solids.
+        meshed: (k,) [-] meshed K_E compared with solids; the error of rounding.
+        ends: (k,) [-] rigid ends compared with wrenches spread over the ends.
+        by_link: (k,) [-] one link as a beam compared with all links as solids; the link
+            with the largest error first.
+        left: links without a shape, which all models take as declared.
         mesh_error: [-] estimate of the largest error of a solid's K_E, entries over
-            sqrt(K_ii K_jj): differences below it are the mesh's.
+            sqrt(K_ii K_jj); smaller differences may be errors of the mesh.
     """
 
     beams: NDArray
@@ -70,15 +70,15 @@ def platform_costs(postures: Sequence[Posture]) -> PlatformCosts:
     """Compare the platform's stiffness by beams and by solids.
 
     Args:
-        postures: of one robot, at least one.
+        postures: at least one, all of one robot.
 
     Returns:
-        The differences at each.
+        The relative errors at each pose.
 
     Raises:
         BadInput: a link cannot be meshed.
-        FreeMotion: at every posture a motion of the platform is resisted by nothing.
-        NoSolids: no link has a shape.
+        FreeMotion: at every pose the platform has a motion without stiffness.
+        NoSolids: no link has a shape that can be meshed.
     """
     robot, declared = postures[0].robot, _compliances(postures, {})
     known = np.isfinite(declared).all(axis=(1, 2))
@@ -112,7 +112,7 @@ def platform_costs(postures: Sequence[Posture]) -> PlatformCosts:
 def _compliances(
     postures: Sequence[Posture], stiffness: Mapping[str, NDArray]
 ) -> NDArray:
-    """(k, 6, 6) by virtual joints, some links with another K_E."""
+    """Return (k, 6, 6) compliances by virtual joints, some links with another K_E."""
     links = {name: MatrixLink(K) for name, K in stiffness.items()}
     robot = postures[0].robot.with_links({**links})
     linked = [replace(posture, robot=robot) for posture in postures]
@@ -120,7 +120,7 @@ def _compliances(
 
 
 def _differences(C: NDArray, other: NDArray) -> NDArray:
-    """(k,) largest relative differences; NaN where either is not known."""
+    """Return the (k,) largest relative differences; NaN where either is not known."""
     known = np.isfinite(C).all(axis=(1, 2)) & np.isfinite(other).all(axis=(1, 2))
     values = np.full(len(C), np.nan)
     for i in np.flatnonzero(known):
@@ -129,14 +129,14 @@ def _differences(C: NDArray, other: NDArray) -> NDArray:
 
 
 def difference(C: NDArray, other: NDArray) -> float:
-    """Largest relative difference of two compliances along any wrench.
+    """Return the largest relative difference of two compliances along any wrench.
 
     Args:
         C: (6, 6) symmetric, positive semidefinite.
-        other: (6, 6) the one that counts as right.
+        other: (6, 6) reference compliance.
 
     Returns:
-        [-] the largest of abs(w.C w / w.C_other w - 1).
+        [-] the largest of abs(w.C w / w.C_other w - 1) over wrenches w.
     """
     size = np.sqrt(np.diag(other))
     size = np.where(size > 0.0, size, 1.0)
@@ -148,14 +148,15 @@ def difference(C: NDArray, other: NDArray) -> float:
 
 
 def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArray:
-    """The platform's compliance with links as solids, by the displacement method.
+    """Return platform's compliance with links as solids, by the displacement method.
 
-    Unknowns are the motions of every link's end against its base, of joints' springs
-    and of free joints; a solid's energy is that of both its ends' motions in space.
+    Unknowns are the motions of each link's end relative to its base, of the joints'
+    springs and of free joints.  A solid's energy depends on the motions of both its
+    ends.
 
     Args:
-        posture: where the robot stands; clearances are held at zero.
-        solids: by frame; other links are springs with their K_E.
+        posture: the robot's configuration; clearances are held at zero.
+        solids: solids by frame; other links are springs with their K_E.
 
     Returns:
         (6, 6) [rad/(N m) .. m/N] at the platform's origin, base axes.
@@ -168,7 +169,7 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
     other = np.ones(joints.elastic.shape[1], dtype=bool)
     owner = np.abs(joints.elastic).argmax(axis=0) // 6
     other[joints.links & np.isin(owner, rows)] = False
-    # [springs that are none of the solids', free joints, motions of the solids' ends]
+    # columns: springs other than solids, free joints, motions of the solids' ends
     columns = np.hstack([joints.elastic[:, other], joints.free])
     steps = columns.reshape(count, 6, columns.shape[1])
     first = steps.shape[2]
@@ -185,7 +186,7 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
     springs = int(other.sum())
     K[:springs, :springs] = np.eye(springs)
     for i, solid in zip(rows, solids.values(), strict=True):
-        # of a solid's frame its own joint's motion comes after its end
+        # the motion of the frame's own joint is added beyond the end of the solid
         own = steps[i].copy()
         own[:, :first] = 0.0
         turn = T[i, :3, :3] @ solid.turn
@@ -201,7 +202,7 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
 
 
 def _closed(robot: Robot, ends: NDArray) -> NDArray:
-    """Motions that keep the closures, as orthonormal columns."""
+    """Return the motions that keep the closures closed, as orthonormal columns."""
     pairs = [
         ends[robot.index(one)] - ends[robot.index(two)] for one, two in robot.closures
     ]
@@ -216,7 +217,7 @@ def _closed(robot: Robot, ends: NDArray) -> NDArray:
 
 
 def _loaded(K: NDArray, basis: NDArray, platform: NDArray) -> NDArray:
-    """(6, 6) motions of the platform under unit wrenches, those that cost left out."""
+    """Return (6, 6) compliance of the platform, without the motions of no stiffness."""
     H, moved = basis.T @ K @ basis, platform @ basis
     size = np.sqrt(np.diag(H))
     size[size == 0.0] = 1.0

@@ -1,4 +1,4 @@
-"""Plots of what assumptions cost.  Functions take a result and return a figure."""
+"""Plots of the assumptions' errors; functions take a result and return a figure."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -12,22 +12,23 @@ from validation.assumptions.report import COMPARED
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_BARS = 12  # links; the others cost less
+_BARS = 12  # most links shown; the errors of the others are smaller
 
 
 def platform_cost_figure(
     costs: PlatformCosts, asked: Sequence[Mapping[str, float]], robot: str
 ) -> "Figure":
-    """Errors of the platform's compliance over poses, and the links that cause them.
+    """Return a figure of the platform's errors over poses, and of the links' parts.
 
     Args:
-        costs: of k postures.
-        asked: (k,) the components given of each [m or rad].
-        robot: its name.
+        costs: errors at k poses.
+        asked: (k,) required components of each pose [m or rad].
+        robot: name of the robot.
 
     Returns:
-        Lines over the one component that changes, or over the poses' numbers, and bars
-        for the links, median and largest; the bars alone of one posture.
+        Lines over the one component that changes, or over the numbers of the poses;
+        bars of the links' median and largest errors.  For one pose there are only the
+        bars.
     """
     from matplotlib.figure import Figure
 

@@ -1,10 +1,9 @@
 """Links as solids of cubic finite elements, free at both rigid ends.
 
 A beam's solid is a straight bar of its section.  In units of its length and modulus it
-depends on the section's proportions and Poisson's ratio alone, so links of one shape
-are solved once; K_E does not change with the pose.  Ends are held rigidly, as a virtual
-joint does; how stiff the same solid is with wrenches spread over its ends is known
-beside it.
+depends only on the section's proportions and Poisson's ratio, so links of one shape are
+solved once.  K_E does not change with the pose.  Virtual joints hold the ends rigidly;
+the stiffness with wrenches spread over the ends is computed too.
 """
 
 from collections.abc import Mapping
@@ -23,24 +22,25 @@ from stiffness.fem.material import Material
 from stiffness.fem.two_ends import two_ends
 from stiffness.link import scaled
 
-_KEPT = 32  # shapes
+_KEPT = 32  # most shapes in the cache
 _OPTIONS = FemOptions(
-    accuracy=5e-4,  # the mesh's own K_E is then known to 1e-3 of sqrt(K_ii K_jj)
+    # the error of the mesh's own K_E is then below 1e-3 of sqrt(K_ii K_jj)
+    accuracy=5e-4,
     budget=Budget(seconds=40.0, unknowns=250_000),
 )
 
 
 @dataclass(frozen=True, eq=False)
 class SolidLink:
-    """A link as a solid, in its own mesh's axes.
+    """A link as a solid, in the axes of its mesh.
 
     Attributes:
         ends: (12, 12) [N m/rad .. N/m] wrenches that hold unit screws of base and tip,
-            each read at its end's centre.
+            each at the centre of its end.
         distributing: (6, 6) K_E at the tip with wrenches spread over both ends.
-        span: (3,) [m] from base to tip.
-        turn: (3, 3) from the mesh's axes to the frame's.
-        error: [-] estimate of the largest error of the mesh's own K_E, over
+        span: (3,) [m] vector from base to tip.
+        turn: (3, 3) rotation from the mesh's axes to the frame's.
+        error: [-] estimate of the largest error of the mesh's K_E, entries over
             sqrt(K_ii K_jj).
     """
 
@@ -52,12 +52,12 @@ class SolidLink:
 
     @property
     def condensed(self) -> NDArray:
-        """(6, 6) K_E at the frame in its axes: the base held."""
+        """(6, 6) K_E at the frame in its axes, with the base held."""
         return self._in_frame(self.ends[6:, 6:])
 
     @property
     def spread(self) -> NDArray:
-        """(6, 6) K_E at the frame in its axes, wrenches spread over both ends."""
+        """(6, 6) K_E at the frame in its axes, with wrenches spread over both ends."""
         return self._in_frame(self.distributing)
 
     def _in_frame(self, K: NDArray) -> NDArray:
@@ -66,17 +66,17 @@ class SolidLink:
 
 
 def solid_link(frame: Frame) -> SolidLink | None:
-    """A frame's link as a solid.
+    """Return a frame's link as a solid.
 
     Args:
-        frame: any.
+        frame: any frame.
 
     Returns:
-        The solid; None of a link without a shape: none, a matrix, a library's, or a
-        beam given by the constants of its section.
+        The solid; None for a link without a shape: no link, a matrix, a link of a
+        library, or a beam given by the constants of its section.
 
     Raises:
-        BadInput: a mesh was not solved when the robot was loaded, or none can be made.
+        BadInput: a mesh was not solved when the robot was loaded, or cannot be made.
     """
     link = frame.link
     if isinstance(link, MeshLink):
@@ -107,24 +107,24 @@ def solid_link(frame: Frame) -> SolidLink | None:
 
 
 def solid_links(robot: Robot) -> Mapping[str, SolidLink]:
-    """The links of a robot that have a shape, as solids.
+    """Return the links of a robot that have a shape, as solids.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
-        By frame.
+        The solids by frame.
 
     Raises:
-        BadInput: a mesh was not solved when the robot was loaded, or none can be made.
+        BadInput: a mesh was not solved when the robot was loaded, or cannot be made.
     """
     solids = {frame.name: solid_link(frame) for frame in robot.frames}
     return {name: solid for name, solid in solids.items() if solid is not None}
 
 
 def _mesh_error(solved: MeshedLink) -> float:
-    """[-] estimate of the largest error of the mesh's own K_E."""
-    # of the interval whose middle is the link's K_E, the mesh's own is the upper end
+    """Return the [-] estimate of the largest error of the mesh's own K_E."""
+    # the link's K_E is the middle of an interval; the mesh's own is its upper end
     K = solved.link.stiffness
     above = np.abs(scaled(solved.level.solution.stiffness - K, K))
     return float((above + solved.link.relative_errors).max())
@@ -132,13 +132,13 @@ def _mesh_error(solved: MeshedLink) -> float:
 
 @lru_cache(maxsize=_KEPT)
 def _bar(shape: tuple[tuple[str, float], ...], poisson: float) -> MeshedLink:
-    """A bar of unit length and modulus."""
+    """Return the solved bar of unit length and modulus."""
     return solve_bar(dict(shape), Material(1.0, poisson), _OPTIONS)
 
 
 @lru_cache(maxsize=_KEPT)
 def _stiffnesses(solved: MeshedLink) -> tuple[NDArray, NDArray]:
-    """K between both ends, and K_E with wrenches spread over both."""
+    """Return K between both ends, and K_E with wrenches spread over both."""
     lam, mu = solved.level.material[:, :2].T
     kind = "distributing-both"
     spread = condense(solved.level.mesh, lam, mu, solved.centers, kind).stiffness

@@ -1,6 +1,6 @@
 """The error of each assumption of the virtual-joint model at a posture.
 
-Five assumptions, each against a model without it, all else being equal:
+Each of five assumptions is compared with a model that differs only by it:
 
 ==================  ==================================================================
 assumption          instead of
@@ -12,12 +12,13 @@ disc and cone       a pin in two bushes, :mod:`validation.assumptions.bushes`
 one spring a beam   the same beam in ever more pieces, finite motions
 ==================  ==================================================================
 
-A cost is a difference of the platform's pose and a relative difference of the energy.
-It counts where it exceeds one per cent or 20 um, the paper's robot's own target.
-Where neither model stores energy or moves the platform there is nothing to compare.
+An error is a difference of the platform's pose and a relative difference of the energy.
+It is significant above one per cent or 20 um, the accuracy required of the paper's
+robot. If neither model stores energy or moves the platform, there is nothing to
+compare.
 
 Poses are compared at the solution of least energy.  Where no load acts on a clearance
-the minimum is not unique in the pose; ``docs/validity.md`` says where.
+the pose of least energy is not unique; see ``docs/validity.md``.
 """
 
 import math
@@ -35,20 +36,20 @@ from validation.assumptions.bushes import solve_bushes
 from validation.crosscheck.limits import FLOOR, HALVES, energy_floor
 from validation.crosscheck.spread_weight import energy_between_ends
 
-POSITION_LIMIT = 20e-6  # [m]
-ENERGY_LIMIT = 0.01  # [-]
+POSITION_LIMIT = 20e-6  # [m] required accuracy of the paper's robot
+ENERGY_LIMIT = 0.01  # [-] relative error of the energy that is significant
 
 
 @dataclass(frozen=True)
 class Cost:
-    """The error of an assumption; NaN where both models give nothing but rounding.
+    """The error of an assumption; NaN where both models give only rounding errors.
 
     Attributes:
-        rotation: [rad] by which the platform's orientation is off.
-        position: [m] by which its origin is off.
-        energy: [-] by which the elastic energy is off, relative to the better model's.
-        pieces: of every beam with which less than the limits is left, where pieces are
-            what is compared.
+        rotation: [rad] error of the platform's orientation.
+        position: [m] error of the position of its origin.
+        energy: [-] error of the elastic energy, relative to that of the better model.
+        pieces: number of pieces of every beam with errors below the limits; None for
+            other assumptions.
     """
 
     rotation: float
@@ -58,28 +59,28 @@ class Cost:
 
     @property
     def matters(self) -> bool:
-        """Whether it costs more than one per cent or 20 um."""
+        """Whether the error exceeds one per cent or 20 um."""
         return self.position > POSITION_LIMIT or self.energy > ENERGY_LIMIT
 
     @property
     def known(self) -> bool:
-        """Whether there was anything to compare."""
+        """Whether the models could be compared."""
         return not (math.isnan(self.position) and math.isnan(self.energy))
 
 
 def cost_between(
     model: Assembly, better: Assembly | ExactAssembly, missing: float = 0.0
 ) -> Cost:
-    """Difference of a solution from a better one.
+    """Return the difference of a solution from a better one.
 
     Args:
-        model: the solution with the assumption.
-        better: the one without.
-        missing: [J] energy that neither counts but the better one has.
+        model: solution with the assumption.
+        better: solution without the assumption.
+        missing: [J] energy of the better model that neither solution contains.
 
     Returns:
-        The cost.  Without loads, energies below 1e-6 of that of closing without
-        clearances count as that: inside an assembly zone both are rounding.
+        The error.  Without loads, energies below 1e-6 of the energy without clearances
+        are taken as that: inside an assembly zone both are rounding errors.
     """
     energy = better.energy + missing
     least = 0.0 if model.frame_loads else 1e-6 * model.energy_without_clearance
@@ -100,17 +101,17 @@ def cost_between(
 
 
 def closure_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
-    """What closures linear in the screws cost, against finite motions.
+    """Return error of closures linear in the screws, compared with finite motions.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         load: (6,) [N m, N] on the platform at its origin, base axes.
 
     Returns:
-        The cost.
+        The error.
 
     Raises:
-        CannotAssemble: it cannot be assembled.
+        CannotAssemble: the robot cannot be assembled.
         SolverFailed: no solution was found.
     """
     exact = solve_exact(posture, load)
@@ -122,18 +123,18 @@ def link_cost(
     stiffness: Mapping[str, NDArray],
     load: ArrayLike | None = None,
 ) -> Cost:
-    """What it costs that links are beams.
+    """Return error of links as beams, compared with given stiffnesses.
 
     Args:
-        posture: where the robot stands.
-        stiffness: by frame, the K_E (6, 6) [N m/rad .. N/m] they should have.
+        posture: the robot's configuration.
+        stiffness: reference K_E (6, 6) [N m/rad .. N/m] by frame.
         load: (6,) [N m, N] on the platform at its origin, base axes.
 
     Returns:
-        The cost.
+        The error.
 
     Raises:
-        CannotAssemble: it cannot be assembled.
+        CannotAssemble: the robot cannot be assembled.
         SolverFailed: no solution was found.
     """
     links = {name: MatrixLink(K) for name, K in stiffness.items()}
@@ -144,21 +145,21 @@ def link_cost(
 def spread_cost(
     posture: Posture, gravity: ArrayLike, load: ArrayLike | None = None
 ) -> Cost:
-    """What it costs that weights act at the links' ends.
+    """Return error of weights that act at the links' ends.
 
-    The ends' equivalents of :mod:`assembly.linear.load` leave the pose as it is, and
-    miss what the beams store between their ends.
+    The equivalents at the ends, :mod:`assembly.linear.load`, do not change the pose;
+    they lack the energy that the beams store between their ends.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         gravity: (3,) [m/s^2] base axes.
         load: (6,) [N m, N] on the platform at its origin, base axes.
 
     Returns:
-        The cost; no pose difference to first order.
+        The error; to first order the poses are equal.
 
     Raises:
-        CannotAssemble: it cannot be assembled.
+        CannotAssemble: the robot cannot be assembled.
         SolverFailed: no solution was found.
     """
     ends = solve_assembly(posture, load, gravity=gravity)
@@ -166,17 +167,17 @@ def spread_cost(
 
 
 def bush_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
-    """What disc and cone cost, against pins in two bushes.
+    """Return error of the paper's bounds, compared with pins in two bushes.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         load: (6,) [N m, N] on the platform at its origin, base axes.
 
     Returns:
-        The cost.
+        The error.
 
     Raises:
-        CannotAssemble: it cannot be assembled.
+        CannotAssemble: the robot cannot be assembled.
         SolverFailed: no solution was found.
     """
     return cost_between(solve_assembly(posture, load), solve_bushes(posture, load))
@@ -185,21 +186,22 @@ def bush_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
 def pieces_cost(
     posture: Posture, load: ArrayLike | None = None, gravity: ArrayLike | None = None
 ) -> Cost:
-    """What it costs that a beam is one spring at any deformation.
+    """Return error of a beam as one spring, compared with many pieces.
 
-    The error of n pieces falls as 1 / n^2 (``docs/proofs.md``): one and two pieces tell
-    what none would leave, and how many leave less than the limits.
+    The error of n pieces falls as 1 / n^2 (``docs/proofs.md``).  The solutions of one
+    and two pieces give the limit of many, and the number of pieces with errors below
+    the limits.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
 
     Returns:
-        The cost, with the pieces that every beam needs.
+        The error, with the number of pieces that every beam needs.
 
     Raises:
-        CannotAssemble: it cannot be assembled.
+        CannotAssemble: the robot cannot be assembled.
         SolverFailed: no solution was found.
     """
     one, two = (
@@ -216,7 +218,7 @@ def pieces_cost(
 
 
 def _in_pieces(posture: Posture, count: int) -> Posture:
-    """The same with every beam cut."""
+    """Return the configuration with every beam cut into pieces."""
     links = {
         frame.name: replace(frame.link, pieces=count)
         for frame in posture.robot.frames

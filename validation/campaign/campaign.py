@@ -1,4 +1,4 @@
-"""Measured deviations of a machine: one row a measurement, checked at the door."""
+"""Measured deviations of a machine, one row a measurement, with checks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -7,9 +7,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.model.robot import Robot
-from forcefit.inputs.display import Figures, html_table, short_repr
+from forcefit.results.display import Figures, html_table, short_repr
+from forcefit.results.text import in_unit
 
-READING = ("rx", "ry", "rz", "tx", "ty", "tz")  # of a deviation, as in a screw
+# components of a deviation, in a screw's order
+READING = ("rx", "ry", "rz", "tx", "ty", "tz")
 LOAD = ("mx", "my", "mz", "fx", "fy", "fz")
 
 
@@ -17,17 +19,17 @@ LOAD = ("mx", "my", "mz", "fx", "fy", "fz")
 class Campaign:
     """Measured deviations of a machine, in the order of the file.
 
-    R rows, one a measurement; n frames.  It exists only if every commanded
-    configuration can be reached by the nominal robot.
+    R rows, one per measurement; n frames.  It exists only if the nominal robot can
+    reach every commanded configuration.
 
     Attributes:
-        name: of the campaign: its folder's.
-        robot: as declared.
+        name: name of the campaign, that of its folder.
+        robot: robot as declared.
         ids: R labels, unique.
         coordinates: (R, n) [rad or m] of every joint, nominal closure solved.
         transforms: (R, n, 4, 4) frames seen from the base, without imperfections.
-        mismatch: (R,) [rad, m] nominal closure error left (rounded files); dropped.
-        commanded: ``"joints"`` or ``"pose"``: what the file gives.
+        mismatch: (R,) [rad, m] nominal closure error (rounded files); it is ignored.
+        commanded: ``"joints"`` or ``"pose"``, as in the file.
         loads: (R, 6) [N m, N] on the platform at the reference point, base axes.
         measured: (R, 6) [rad, m] rx ry rz tx ty tz at the reference point, base axes;
             NaN is not measured.
@@ -35,21 +37,22 @@ class Campaign:
             nothing was measured and none is stated.
         covariates: (R,) each, by name without ``cov.``.
         reference_point: (3,) [m] the point that was measured, platform axes.
-        registration: ``"known"``, or ``"unknown"`` if the measuring device stands
-            somewhere in the room.
+        registration: ``"known"``, or ``"unknown"`` if the pose of the measuring device
+            is unknown.
         configuration: (R,) number of the commanded configuration, from 0 by first use.
         repeat: (R,) number of the configuration under one load, from 0 by first use:
-            rows that share it were measured twice.
-        session: (R,) names of sessions; None where the file has none.
+            rows with the same number are repeats.
+        session: (R,) names of sessions; None if the file has none.
         motion_units: ``rad`` or ``m`` of covariates that are measured motions, by name.
-        points: (3,) [m] each, further points measured, platform axes, by name.
+        points: (3,) [m] by name, further points measured, platform axes.
         per_session: names of further effects that may differ from session to session.
-        partial: (R,) each, further covariates that some sessions lack: NaN there.
-        point: (R,) names of the points that rows read, ``""`` for the reference
-            point; None where all are that.  A row of the file is a row for each point.
-        common: (R, 6, k) [rad, m] noise that all readings of one row of the file have
-            in common, beside that of ``sigma``: change of each per standard deviation
-            of k independent numbers, drawn once for the row; None is none.
+        partial: (R,) by name, further covariates that some sessions lack: NaN there.
+        point: (R,) names of the points read, ``""`` for the reference point; None if
+            all rows read that.  A row of the file becomes a row for each point.
+        common: (R, 6, k) [rad, m] noise that all readings of one row of the file share,
+            in addition to that of ``sigma``: change of each reading per standard
+            deviation of k independent numbers, drawn once for the row; None if there is
+            none.
     """
 
     name: str
@@ -78,12 +81,12 @@ class Campaign:
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
     def _figures(self) -> Figures:
-        """What was measured, how often, and how well."""
+        """Return the size of the campaign, and its noise."""
         cells, sizes = self.cells, []
         for unit, part in (("urad", slice(3)), ("um", slice(3, 6))):
             sigma = self.sigma[:, part][cells[:, part]]
             if sigma.size:
-                sizes.append(f"{1e6 * np.sqrt(np.mean(sigma**2)):.3g} {unit}")
+                sizes.append(in_unit(np.sqrt(np.mean(sigma**2)), unit, 3))
         return {
             "robot": self.robot.name,
             "rows": f"{len(self)}, of {len(set(self.configuration.tolist()))} "
@@ -122,25 +125,25 @@ class Campaign:
 
     @property
     def cells(self) -> NDArray:
-        """(R, 6) bool: what was measured."""
+        """(R, 6) bool, True where measured."""
         return np.isfinite(self.measured)
 
     @property
     def not_measured(self) -> list[str]:
-        """Components of a reading that no row has."""
+        """Components of a reading that no row has measured."""
         seen = zip(READING, self.cells.T, strict=True)
         return [name for name, cells in seen if not cells.any()]
 
     @property
     def sessions(self) -> tuple[str, ...]:
-        """Names of its sessions in the order of first use; none where it has none."""
+        """Names of its sessions in the order of first use; empty without sessions."""
         return (
             () if self.session is None else tuple(dict.fromkeys(self.session.tolist()))
         )
 
     @property
     def targets(self) -> NDArray:
-        """(R, 3) [m] the points that rows read, platform axes."""
+        """(R, 3) [m] the points read in the rows, platform axes."""
         if self.point is None:
             return np.broadcast_to(self.reference_point, (len(self), 3))
         places = {**self.points, "": self.reference_point}
@@ -148,7 +151,7 @@ class Campaign:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """R labels of rows of the file; rows that read points of one share it."""
+        """R labels of rows of the file, common to rows that read points of one."""
         if self.point is None:
             return self.ids
         pairs = zip(self.ids, self.point.tolist(), strict=True)
@@ -156,18 +159,18 @@ class Campaign:
 
     @property
     def measured_at_once(self) -> NDArray:
-        """(R,) int, the same for rows that read several points of one row of a file."""
+        """(R,) int, equal for rows that read several points of one row of a file."""
         number = dict[str, int]()
         rows = [number.setdefault(label, len(number)) for label in self.labels]
         return np.array(rows, dtype=int)
 
     def in_session(self, session: str | None) -> NDArray:
-        """(R,) bool, rows of a session; of None all."""
+        """Return the (R,) bool of a session's rows; all for None."""
         every = np.ones(len(self), dtype=bool)
         return every if session is None else np.asarray(self.session == session)
 
     def take(self, rows: ArrayLike | slice) -> "Campaign":
-        """Some of the rows; ``configuration`` and ``repeat`` keep their numbers.
+        """Return selected rows; ``configuration`` and ``repeat`` keep their numbers.
 
         Args:
             rows: their numbers, a mask (R,), or a slice.
@@ -197,7 +200,7 @@ def number_rows(*columns: ArrayLike, step: float = 1e-9) -> NDArray:
 
     Args:
         columns: (R,) or (R, k) each; NaN equals NaN.
-        step: differences below it are none.
+        step: smaller differences count as zero.
 
     Returns:
         (R,) int.
@@ -213,13 +216,13 @@ def number_rows(*columns: ArrayLike, step: float = 1e-9) -> NDArray:
 
 
 def _index(rows: ArrayLike) -> NDArray:
-    """Numbers of rows, or a mask, as an index; an empty list is no rows."""
+    """Return the numbers of rows, or a mask, as an index; an empty list is no rows."""
     index = np.asarray(rows)
     return index.astype(int) if index.size == 0 else index
 
 
 def _locked(campaign: Campaign, name: str, shape: tuple[int, ...]) -> NDArray:
-    """A read-only copy of the right shape."""
+    """Return a read-only copy of the right shape."""
     array = np.array(getattr(campaign, name))
     if array.shape != shape:
         whose = f"campaign '{campaign.name}': {name}"
@@ -229,7 +232,7 @@ def _locked(campaign: Campaign, name: str, shape: tuple[int, ...]) -> NDArray:
 
 
 def _column(values: ArrayLike, rows: int, name: str) -> NDArray:
-    """A read-only covariate."""
+    """Return a read-only covariate."""
     array = np.array(values, dtype=float)
     if array.shape != (rows,) or not np.isfinite(array).all():
         raise ValueError(f"covariate '{name}': expected {rows} finite numbers")

@@ -1,4 +1,4 @@
-"""Campaign folders in: ``campaign.toml`` and its table, whole and sound or not at all.
+"""Reader of campaign folders: ``campaign.toml`` and its table, completely checked.
 
 The format is that of ``docs/campaigns.md``.
 """
@@ -40,12 +40,12 @@ from validation.campaign.measurement_table import (
     read_table,
 )
 
-_CLOSED = 1e-6  # [rad, m] what rounded robot files may leave open
+_CLOSED = 1e-6  # [rad, m] accepted mismatch of rounded robot files
 
 
 @dataclass(frozen=True, eq=False)
 class _Declared:
-    """What ``campaign.toml`` says of its table, or stands for it without one."""
+    """The content of ``campaign.toml``, or its defaults for a table alone."""
 
     root: Table
     name: str
@@ -59,17 +59,18 @@ class _Declared:
 
 
 def read_campaign(folder: Path | str) -> Campaign:
-    """The campaign of a folder.
+    """Return the campaign of a folder.
 
     Args:
-        folder: with ``campaign.toml`` in it, or that file.
+        folder: folder with ``campaign.toml`` in it, or that file.
 
     Returns:
         The campaign, every configuration placed.
 
     Raises:
-        BadInput: something in it breaks a rule of the format, is not plausible, or a
-            configuration is out of reach; file, place, found and expected are named.
+        BadInput: part of it breaks a rule of the format, is not plausible, or a
+            configuration is unreachable; the message has file, place, found and
+            expected.
     """
     root = read_toml(_declaration(folder))
     robot_name = root.text("robot", expected="a built-in robot or a robot file")
@@ -78,15 +79,16 @@ def read_campaign(folder: Path | str) -> Campaign:
 
 
 def read_commands(source: Path | str, robot: Robot) -> Campaign:
-    """What is, or was, commanded to a machine; readings may be missing.
+    """Return the commands of a machine as a campaign; readings may be missing.
 
     Args:
-        source: a campaign, or a table of the same columns alone, in SI: then of the
-            point at which the robot was identified, or of the platform's origin.
-        robot: that is to answer, instead of the campaign's.
+        source: a campaign, or a table of the same columns alone, in SI.  Its readings
+            are those of the point of the robot's identification, or of the platform's
+            origin.
+        robot: the robot that replaces the campaign's.
 
     Returns:
-        A campaign with a row for each point of each row, NaN where nothing is measured.
+        A campaign with a row for each point of each row, NaN where not measured.
 
     Raises:
         BadInput: as :func:`read_campaign`.
@@ -103,13 +105,13 @@ def read_commands(source: Path | str, robot: Robot) -> Campaign:
 
 
 def _declaration(folder: Path | str) -> Path:
-    """The file ``campaign.toml`` of a folder, or the file given."""
+    """Return the file ``campaign.toml`` of a folder, or the file given."""
     file = Path(folder)
     return file if os.path.isfile(file) else file / "campaign.toml"
 
 
 def _declared(root: Table) -> _Declared:
-    """All of ``campaign.toml`` but its robot."""
+    """Return the content of ``campaign.toml`` except its robot."""
     folder = Path(root.file).parent
     declared = _Declared(
         root=root,
@@ -127,7 +129,7 @@ def _declared(root: Table) -> _Declared:
 
 
 def _per_session(root: Table) -> tuple[str, ...]:
-    """Effects that may differ from session to session."""
+    """Return the effects that may differ from session to session."""
     given = root.get("per_session", [])
     valid = [name for name, effect in LIBRARY.items() if effect.by_row]
     if not isinstance(given, list):
@@ -141,7 +143,7 @@ def _per_session(root: Table) -> tuple[str, ...]:
 
 
 def _table_names(root: Table) -> list[str]:
-    """One table, or one for each session."""
+    """Return the name of one table, or names by session."""
     given = root.get("measurements")
     if not isinstance(given, list):
         return [root.text("measurements", expected="a CSV file")]
@@ -153,12 +155,12 @@ def _table_names(root: Table) -> list[str]:
 
 
 def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Campaign:
-    """The campaign of a declaration, with a robot.
+    """Return the campaign of a declaration, with a robot.
 
     Args:
-        declared: what the file says.
-        robot: that is to be commanded.
-        measured: whether something must have been measured in every row.
+        declared: value in the file.
+        robot: the robot for the commands.
+        measured: whether every row must have a measurement.
 
     Returns:
         The campaign, a row for each point read.
@@ -183,7 +185,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
     _check_points(declared, extent)
     if measured:
         check_measured(table, points)
-    # readings and their sigma by point, the reference point's first
+    # readings and their sigma by point, first those of the reference point
     every: dict[str, tuple[NDArray, NDArray]] = {}
     for name, at in {"": point, **points}.items():
         every[name] = _readings(table, name, declared.noise)
@@ -227,7 +229,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
 
 
 def _check_points(declared: _Declared, extent: float) -> None:
-    """Refuse points measured that lie far from a robot of an extent [m]."""
+    """Reject measured points that are far from a robot of an extent [m]."""
     points = {f"points.{name}": at for name, at in declared.points.items()}
     for place, at in ({"reference_point": declared.point} | points).items():
         if np.linalg.norm(at) > 10 * extent:
@@ -239,7 +241,7 @@ def _check_points(declared: _Declared, extent: float) -> None:
 def _labels(
     ids: Sequence[str], points: Sequence[str], row: NDArray, which: NDArray
 ) -> tuple[str, ...]:
-    """Names of rows of points: the row's own, and the point's if it has a name."""
+    """Return labels of rows of points: the row's, and the point's if it has a name."""
     return tuple(
         f"{ids[i]}:{points[k]}" if points[k] else ids[i]
         for i, k in zip(row, which, strict=True)
@@ -249,12 +251,12 @@ def _labels(
 def _rows_of_points(
     every: dict[str, tuple[NDArray, NDArray]], measured: bool
 ) -> tuple[NDArray, NDArray]:
-    """Rows of the file, each once for every point that it reads.
+    """Return the rows of the file, each once for every point that it reads.
 
     Args:
         every: readings (R, 6) and their sigma, by point.
-        measured: whether only what was measured is kept; otherwise a row without a
-            reading stays, for all points that are declared.
+        measured: whether only measurements are kept; otherwise a row without a reading
+            stays, for all declared points.
 
     Returns:
         (C,) rows of the file, ascending, and (C,) number of the point.
@@ -263,7 +265,7 @@ def _rows_of_points(
         np.isfinite(readings).any(axis=1) for readings, _ in every.values()
     ])
     if not measured:
-        alone = not taken.any() and len(every) > 1  # points, and none measured yet
+        alone = not taken.any() and len(every) > 1  # points, none of them measured yet
         taken[~taken.any(axis=1)] = taken.any(axis=0) if taken.any() else True
         taken[:, 0] &= not alone
     rows, which = np.nonzero(taken)
@@ -271,7 +273,7 @@ def _rows_of_points(
 
 
 def _read_points(root: Table) -> dict[str, NDArray]:
-    """(3,) [m] each of ``[points]`` by name, platform axes; none if absent."""
+    """Return (3,) [m] of ``[points]`` by name, platform axes; empty if absent."""
     if not root.has("points"):
         return {}
     table = root.table("points")
@@ -285,7 +287,7 @@ def _read_points(root: Table) -> dict[str, NDArray]:
 def _readings(
     table: MeasurementTable, point: str, noise: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """(R, 6) readings of a point, and [rad, m] sigma as stated or of the device."""
+    """Return (R, 6) readings of a point, and sigma [rad, m], stated or the device's."""
     at = f".{point}" if point else ""
     stated = table.stack(f"sigma{at}", READING, np.nan)
     sigma = np.where(np.isnan(stated), noise, stated)
@@ -293,7 +295,7 @@ def _readings(
 
 
 def _read_noise(root: Table) -> NDArray:
-    """(6,) [rad, m] one standard deviation of the device, NaN where not stated."""
+    """Return (6,) [rad, m] standard deviations of the device, NaN if not stated."""
     noise = np.full(6, np.nan)
     if root.has("noise"):
         table = root.table("noise")
@@ -306,7 +308,7 @@ def _read_noise(root: Table) -> NDArray:
 
 
 def _read_robot(root: Table, name: str) -> Robot:
-    """The robot: built in, or a file beside the campaign's."""
+    """Return the robot: built in, or a file next to the campaign's."""
     if name in BUILT_IN:
         return BUILT_IN[name]()
     path = Path(root.file).parent / name
@@ -319,7 +321,7 @@ def _read_robot(root: Table, name: str) -> Robot:
 
 
 def _commanded(table: MeasurementTable, robot: Robot) -> str:
-    """What the table commands; all of the joints or some of the pose."""
+    """Return names of the table's commands: all joints, or components of the pose."""
     actuated = [f"q.{f.name}" for f in robot.frames if f.actuated]
     given = [name for name in table.columns if name.startswith("q.")]
     pose = [name for name in table.columns if name.startswith("pose.")]
@@ -345,7 +347,7 @@ def _commanded(table: MeasurementTable, robot: Robot) -> str:
 
 
 def _command(table: MeasurementTable, robot: Robot, commanded: str) -> NDArray:
-    """(R, 6) poses ``[t r]``, or (R, n) joint coordinates; NaN where free."""
+    """Return (R, 6) poses ``[t r]``, or (R, n) joint coordinates; NaN where free."""
     if commanded == "pose":
         return table.stack("pose", POSE, np.nan)
     return table.stack("q", tuple(f.name for f in robot.frames), np.nan)
@@ -353,7 +355,7 @@ def _command(table: MeasurementTable, robot: Robot, commanded: str) -> NDArray:
 
 def _place(table: MeasurementTable, robot: Robot, commanded: str,
            rows: NDArray) -> list[Posture]:  # fmt: skip
-    """The posture of each of these rows, or an error that names the first missed."""
+    """Return posture of each row, or raise an error on the first unreachable one."""
     place = place_many if commanded == "pose" else place_many_joints
     postures, reasons = place(robot, _command(table, robot, commanded)[rows])
     placed = []

@@ -1,7 +1,7 @@
-"""Is a campaign plausible?  A deviation of 153 m is a unit mistake and is refused.
+"""Plausibility checks of a campaign: a deviation of 153 m is a mistake of the unit.
 
-Everything checked here is a well-formed number; what is refused is one that no machine
-gives, with the mistake that usually makes it.
+All values checked here are well-formed numbers.  Refused are values that are impossible
+for a machine, with the likely mistake in the message.
 """
 
 from collections.abc import Iterable
@@ -14,24 +14,25 @@ from assembly.model.robot import Robot
 from validation.campaign.campaign import LOAD, READING
 from validation.campaign.measurement_table import MeasurementTable
 
-_TURNS = 8 * np.pi  # [rad] no joint is commanded further; 25 or more is degrees
-_FORCE = 1e7  # [N], [N m] no platform carries more
-_WARMEST = 250.0  # [K] from calibration; 293 is an absolute temperature
-_LATEST = 3e8  # [s] ten years; more is a date
-_ROOM = 1000.0  # [m] where a measuring device may stand
-_FINEST = 1e-15  # [rad, m] no device reads finer
+_TURNS = 8 * np.pi  # [rad] largest command of a joint; 25 or more is in degrees
+_FORCE = 1e7  # [N], [N m] larger than any platform's load
+# [K] largest difference from calibration; 293 is an absolute temperature
+_WARMEST = 250.0
+_LATEST = 3e8  # [s] ten years; larger is a date
+_ROOM = 1000.0  # [m] largest distance of a measuring device
+_FINEST = 1e-15  # [rad, m] finer than any device
 _UNITS = "; if it is in other units say so in [units] of campaign.toml"
 
 
 def check_commands(table: MeasurementTable, robot: Robot) -> None:
-    """Refuse commands, loads and covariates that no machine sees.
+    """Reject impossible commands, loads and covariates.
 
     Args:
-        table: as read.
-        robot: of the campaign.
+        table: the table as read.
+        robot: robot of the campaign.
 
     Raises:
-        BadInput: the first such cell, with what it may be.
+        BadInput: the first such cell, with its likely meaning.
     """
     reach = _body_length(robot)
     for name, values in table.columns.items():
@@ -52,7 +53,7 @@ def check_commands(table: MeasurementTable, robot: Robot) -> None:
 
 
 def _check_covariates(table: MeasurementTable) -> None:
-    """Temperature, time and approach mean something; other covariates may be all."""
+    """Check temperature, time and approach; other covariates may have any value."""
     columns = table.columns
     if "cov.temperature" in columns:
         what = "the deviation from the temperature of calibration, in K"
@@ -71,10 +72,10 @@ def _check_covariates(table: MeasurementTable) -> None:
 
 
 def check_measured(table: MeasurementTable, points: Iterable[str]) -> None:
-    """Refuse a row in which nothing was measured.
+    """Reject a row without any measurement.
 
     Args:
-        table: as read.
+        table: the table as read.
         points: names of further points measured.
 
     Raises:
@@ -89,17 +90,17 @@ def check_measured(table: MeasurementTable, points: Iterable[str]) -> None:
 
 def check_readings(table: MeasurementTable, point: str, sigma: NDArray,
                    registration: str, extent: float) -> None:  # fmt: skip
-    """Refuse deviations larger than the robot, and sigma that is none.
+    """Reject deviations larger than the robot, and invalid sigma.
 
     Args:
-        table: as read.
+        table: the table as read.
         point: name of the point read, ``""`` for the reference point.
         sigma: (R, 6) [rad, m] of each reading, NaN where none is stated.
-        registration: ``"unknown"`` lets the device stand anywhere in a room.
+        registration: for ``"unknown"`` the device may be anywhere in a room.
         extent: [m] of the robot over all configurations.
 
     Raises:
-        BadInput: the first such reading, with what it may be.
+        BadInput: the first such reading, with its likely meaning.
     """
     at = f".{point}" if point else ""
     measured = table.stack(f"meas{at}", READING, np.nan)
@@ -129,14 +130,14 @@ def check_readings(table: MeasurementTable, point: str, sigma: NDArray,
 
 
 def extent_of(transforms: NDArray, reference_points: NDArray) -> float:
-    """[m] diagonal of the box around all origins, the base and the points measured.
+    """Return the diagonal [m] of the box around all origins, base and measured points.
 
     Args:
         transforms: (k, n, 4, 4) frames of the configurations.
         reference_points: (k, 3) [m] base axes.
 
     Returns:
-        The diagonal; 1 if all of them are one point.
+        The diagonal; 1 if all of these coincide.
     """
     origins = transforms[..., :3, 3].reshape(-1, 3)
     points = np.concatenate([np.zeros((1, 3)), origins, reference_points])
@@ -144,7 +145,7 @@ def extent_of(transforms: NDArray, reference_points: NDArray) -> float:
 
 
 def _body_length(robot: Robot) -> float:
-    """[m] length of all bodies together, at least the largest travel at home."""
+    """Return length [m] of all bodies together, at least the largest travel at home."""
     lengths = np.linalg.norm(robot.fixed_transforms[:, :3, 3], axis=1).sum()
     slides = [abs(f.position) for f in robot.frames if f.joint == "prismatic"]
     return float(lengths + sum(slides)) or 1.0
@@ -152,7 +153,7 @@ def _body_length(robot: Robot) -> float:
 
 def _within(table: MeasurementTable, name: str, values: NDArray, largest: float,
             expected: str) -> None:  # fmt: skip
-    """Refuse the first value whose size is larger than any sound one."""
+    """Reject the first value whose size exceeds the largest valid one."""
     for i in np.flatnonzero(np.abs(values) > largest * (1 + 1e-9))[:1]:
         message = f"found {values[i]:g}, expected {expected}"
         raise table.bad(int(i), name, message)

@@ -1,6 +1,6 @@
-"""How the table of a campaign is written: delimiter, decimal mark and units.
+"""Format of a campaign's table: delimiter, decimal mark and units.
 
-All of it is declared in ``campaign.toml`` or is the default: comma, point, SI.
+It is declared in ``campaign.toml``; the defaults are comma, point, SI.
 """
 
 import math
@@ -31,12 +31,12 @@ MOTIONS = _ANGLES | _LENGTHS
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a table is written.
+    """Format of a table.
 
     Attributes:
         delimiter: between cells.
         decimal: the decimal mark.
-        units: unit by key, those not given are SI.
+        units: unit by key; SI for others.
         motions: unit of each covariate that is a measured motion, by name.
     """
 
@@ -46,30 +46,31 @@ class Dialect:
     motions: dict[str, str] = field(default_factory=dict)
 
     def unit(self, key: str) -> str:
-        """The unit a key stands for."""
+        """Return the unit of a key."""
         return self.units.get(key) or next(iter(UNITS[key]))
 
     def factor(self, key: str) -> float:
-        """What a number in that unit is times in SI."""
+        """Return the factor from a key's unit to SI."""
         return UNITS[key][self.unit(key)]
 
     @property
     def motion_units(self) -> dict[str, str]:
-        """``rad`` or ``m``: what each measured motion is, in SI."""
+        """``rad`` or ``m``: the SI unit of each measured motion."""
         return {n: "m" if u in _LENGTHS else "rad" for n, u in self.motions.items()}
 
 
 def read_dialect(root: Table) -> Dialect:
-    """What ``campaign.toml`` says about the way its table is written.
+    """Return the format of the table from ``campaign.toml``.
 
     Args:
-        root: of ``campaign.toml``; its optional ``[table]`` and ``[units]`` are read.
+        root: root of ``campaign.toml``; its optional ``[table]`` and ``[units]`` are
+            read.
 
     Returns:
-        The dialect.
+        The format.
 
     Raises:
-        BadInput: a value or unit that is not known.
+        BadInput: an unknown value or unit.
     """
     delimiter, decimal, units = ",", ".", {}
     motions: dict[str, str] = {}
@@ -92,7 +93,7 @@ def read_dialect(root: Table) -> Dialect:
 
 
 def parse_number(cell: str, decimal: str) -> float:
-    """The number a cell holds; NaN if it is none ("nan" and "1_000" are none)."""
+    """Return the number in a cell; NaN if it is none ("nan" and "1_000" are none)."""
     if decimal != ".":
         cell = cell.replace(".", "?").replace(decimal, ".")
     return float(cell) if _NUMBER.fullmatch(cell) else math.nan

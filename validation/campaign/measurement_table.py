@@ -1,8 +1,8 @@
-"""The table of a campaign: text to numbers, every cell accounted for.
+"""The table of a campaign: text to numbers, with every cell checked.
 
-The reader understands what is declared and nothing else: delimiter, decimal mark and
-units come from ``campaign.toml``; a table that looks like another dialect is refused
-with the key that would declare it.
+The reader accepts only the declared format: delimiter, decimal mark and units come from
+``campaign.toml``.  A table in another format is refused, with the key that would
+declare it.
 """
 
 import csv
@@ -29,7 +29,7 @@ from forcefit.inputs.table import read_text
 from validation.campaign.campaign import LOAD, READING
 from validation.campaign.dialect import DELIMITERS, MOTIONS, Dialect, parse_number
 
-_TEXTS = ("id", "session")  # columns that are no numbers
+_TEXTS = ("id", "session")  # columns that are not numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,9 +42,9 @@ class MeasurementTable:
         lines: line of the file on which each row ends, for messages.
         columns: (R,) by name, in the order of the file, without ``id``; NaN where a
             cell is empty.
-        dialect: how it was written.
-        sessions: name of the session of each row; none where the file has none.
-        files: of each row, where there are several.
+        dialect: format of the table.
+        sessions: name of the session of each row; empty if the file has none.
+        files: file of each row, if there are several.
     """
 
     file: str
@@ -59,14 +59,14 @@ class MeasurementTable:
         return len(self.ids)
 
     def bad(self, row: int, column: str, message: str) -> BadInput:
-        """The error for a cell, to be raised by the caller."""
+        """Return the error for a cell, to be raised by the caller."""
         place = f"line {self.lines[row]} (id {quoted(self.ids[row])})"
         where = f"{place}, {column}" if column else place
         file = self.files[row] if self.files else self.file
         return BadInput(f"{file}: {where}: {message}")
 
     def stack(self, prefix: str, names: tuple[str, ...], absent: float) -> NDArray:
-        """(R, k) the columns of a group; ``absent`` where there is no such column."""
+        """Return the (R, k) columns of a group; ``absent`` for a missing column."""
         empty = np.full(len(self), absent)
         return np.column_stack([
             self.columns.get(f"{prefix}.{n}", empty) for n in names
@@ -76,19 +76,19 @@ class MeasurementTable:
 def read_table(
     path: Path | str, robot: Robot, dialect: Dialect, points: Iterable[str] = ()
 ) -> MeasurementTable:
-    """A table of measurements.
+    """Return a table of measurements.
 
     Args:
         path: a CSV file with a header.
-        robot: whose actuated joints may be columns.
-        dialect: how it is written.
+        robot: robot with actuated joints that may be columns.
+        dialect: format of the table.
         points: names of further points measured.
 
     Returns:
         The table in SI.
 
     Raises:
-        BadInput: not such a table; the line and the column are named.
+        BadInput: no such table; the message has line and column.
     """
     path = Path(path)
     lines, rows = _cells(path, dialect)
@@ -114,22 +114,22 @@ def read_table(
     for k, name in enumerate(header):
         if name not in _TEXTS:
             table.columns[name] = _numbers(table, robot, name, [row[k] for row in rows])
-    _check_labels(table)  # after the numbers: a table of another dialect is that first
+    _check_labels(table)  # after the numbers, which show a wrong format first
     return table
 
 
 def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
-    """Tables one below the other, each a session unless it says otherwise.
+    """Join tables of rows, each a session unless it says otherwise.
 
     Args:
-        tables: of one campaign, at least one.
+        tables: tables of one campaign, at least one.
 
     Returns:
-        The only one as it is; of several, labels begin with the file's name.
+        A single table unchanged; for several, labels begin with the file's name.
 
     Raises:
-        BadInput: one lacks a column of the others that may not be empty; a covariate
-            may be, in a whole table, and is NaN there.
+        BadInput: a table lacks a column of the others.  Only covariates may be absent
+            from a whole table; they are NaN there.
     """
     if len(tables) == 1:
         return tables[0]
@@ -161,7 +161,7 @@ def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
 
 
 def _cells(path: Path, dialect: Dialect) -> tuple[list[int], list[list[str]]]:
-    """Cells without the blanks around them, and the line each row ends on."""
+    """Return cells without blanks around them, and the line at each row's end."""
     lines, rows = [], []
     text = io.StringIO(read_text(path), newline="")
     reader = csv.reader(text, delimiter=dialect.delimiter, strict=True)
@@ -177,7 +177,7 @@ def _cells(path: Path, dialect: Dialect) -> tuple[list[int], list[list[str]]]:
 
 
 def _check_printable(path: Path, line: int, rows: list[list[str]]) -> None:
-    """Refuse control characters, NUL among them, in the last row read."""
+    """Reject control characters, including NUL, in the last row read."""
     header, row = rows[0], rows[-1]
     for k, cell in enumerate(row):
         if not cell.isprintable() and not printable(cell):
@@ -192,7 +192,7 @@ def _check_printable(path: Path, line: int, rows: list[list[str]]) -> None:
 def _header(
     path: Path, names: list[str], robot: Robot, points: tuple[str, ...]
 ) -> list[str]:
-    """The first line, if every name in it is a column's."""
+    """Return the first line, if every name in it is that of a column."""
     q = [f"q.{f.name}" for f in robot.frames if f.actuated]
     groups: dict[str, tuple[str, ...]] = {
         "pose": POSE, "load": LOAD, "meas": READING, "sigma": READING,
@@ -202,7 +202,7 @@ def _header(
     known = [*_TEXTS, *q, *(f"{g}.{c}" for g, cs in groups.items() for c in cs)]
     known += ["cov.temperature", "cov.time", "cov.approach"]
     if not any(name in known or name.startswith("cov.") for name in names):
-        # not printed: it may be a file that was never meant to be read
+        # not printed: the file may be no table at all
         raise BadInput(
             f"{path}: line 1 names no column of a table of measurements"
             f"{_other(names)}; expected id, q.<frame> or pose.tx ..., meas.tx ..."
@@ -224,7 +224,7 @@ def _header(
 
 
 def _passive(name: str, robot: Robot) -> str:
-    """Why a joint of the robot cannot be commanded, if that is the matter."""
+    """Return why a joint of the robot cannot be commanded, if that is the error."""
     frames = {f"q.{f.name}": f for f in robot.frames}
     if name not in frames:
         return ""
@@ -233,7 +233,7 @@ def _passive(name: str, robot: Robot) -> str:
 
 
 def _other(names: list[str]) -> str:
-    """Which key would make a header of one cell readable."""
+    """Return the key that would make a header of one cell readable."""
     for word, mark in DELIMITERS.items():
         if len(names) == 1 and mark in names[0]:
             return f'; it has {word} in it: if that parts the cells, say [table] ' \
@@ -242,7 +242,7 @@ def _other(names: list[str]) -> str:
 
 
 def _dialect_hint(row: list[str], expected: int, dialect: Dialect) -> str:
-    """What a row with another number of cells may be."""
+    """Return the likely cause of a row with another number of cells."""
     if dialect.delimiter == "," and len(row) > expected:
         return (
             '; if decimals are written with a comma, part cells by ";" and say '
@@ -252,7 +252,7 @@ def _dialect_hint(row: list[str], expected: int, dialect: Dialect) -> str:
 
 
 def _check_labels(table: MeasurementTable) -> None:
-    """Refuse an id that is missing or another row's."""
+    """Reject a missing id, or one that another row has."""
     seen: dict[str, int] = {}
     for label, line in zip(table.ids, table.lines, strict=True):
         where = f"{table.file}: line {line}, id"
@@ -269,7 +269,7 @@ def _check_labels(table: MeasurementTable) -> None:
 def _numbers(
     table: MeasurementTable, robot: Robot, name: str, cells: list[str]
 ) -> NDArray:
-    """A column in SI; a reading not taken is NaN."""
+    """Return a column in SI; a reading not taken is NaN."""
     key = _unit_key(name, robot)
     unit = table.dialect.unit(key) if key else ""
     factor = table.dialect.factor(key) if key else 1.0
@@ -292,12 +292,12 @@ def _numbers(
 
 
 def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
-    """What a cell that is no number may have been meant to be."""
+    """Return the likely meaning of a cell that is no number."""
     other = "," if dialect.decimal == "." else "."
     if math.isfinite(parse_number(cell, other)):
         written = quoted(cell.replace(other, dialect.decimal))
         setting = f'decimal = "{other}" in campaign.toml'
-        if other == dialect.delimiter:  # in quotes: the comma cannot part cells too
+        if other == dialect.delimiter:  # in quotes: the comma would also separate cells
             setting = f'delimiter = ";", {setting} and part cells by ";"'
         return (
             f'; a decimal "{other}" is not read here: write {written}, or say [table] '
@@ -310,7 +310,7 @@ def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
 
 
 def _unit_key(name: str, robot: Robot) -> str:
-    """Which key of ``[units]`` a column follows, empty for none."""
+    """Return the key of ``[units]`` for a column, empty for none."""
     group, _, rest = name.partition(".")
     if group in {"meas", "sigma"}:
         turns = rest.rpartition(".")[2][0] == "r"

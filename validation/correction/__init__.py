@@ -1,4 +1,4 @@
-"""A corrected robot at work: readings predicted, commands corrected, sessions carried.
+"""Use of a corrected robot: predicted readings, corrected commands, new sessions.
 
 Begin at ``prediction.py``; the docs are ``docs/correction.md``.
 """

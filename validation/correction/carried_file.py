@@ -1,4 +1,4 @@
-"""A robot carried to new sessions as a file, its covariance beside it."""
+"""A robot fitted to new sessions as a file, with its covariance in another file."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -21,11 +21,11 @@ from validation.diagnosis.saved_covariance import (
 
 
 def save(carried: CarriedRobot, path: Path | str) -> None:
-    """Write the robot in its new sessions, and the covariance beside it.
+    """Write the robot in its new sessions, and its covariance to another file.
 
     Args:
-        carried: to these sessions.
-        path: of the robot file; the covariance gets the ending ``.npz``.
+        carried: the robot in these sessions.
+        path: path of the robot file; the covariance has the suffix ``.npz``.
 
     Raises:
         BadInput: a file cannot be written.
@@ -41,14 +41,14 @@ def save(carried: CarriedRobot, path: Path | str) -> None:
 
 
 def covariance_of(carried: CarriedRobot, robot: Robot) -> SavedCovariance:
-    """The covariance of the numbers that were fitted to the set-up rows.
+    """Return the covariance of the numbers that were fitted to the set-up rows.
 
     Args:
-        carried: to these sessions.
-        robot: as it is written.
+        carried: the robot in these sessions.
+        robot: the robot as written.
 
     Returns:
-        That of the numbers of its file.
+        The covariance of the numbers in its file.
     """
     fit, rows = carried.fit, dict[Number, NDArray]()
     count, machine = len(fit.x), fit.machine
@@ -70,7 +70,7 @@ def covariance_of(carried: CarriedRobot, robot: Robot) -> SavedCovariance:
 
 
 def _with_std(robot: Robot, known: SavedCovariance) -> Robot:
-    """The robot whose functions say how uncertain their numbers are now."""
+    """Return the robot with the present uncertainty of its functions' numbers."""
     functions = list(robot.functions)
     for number, sigma in zip(known.numbers, known.std.tolist(), strict=True):
         if number.kind == FUNCTION:

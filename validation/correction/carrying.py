@@ -1,13 +1,13 @@
-r"""A saved robot in a new session, by set-up rows: what is the session's, what changed.
+r"""A saved robot in a new session, fitted to set-up rows and judged on the others.
 
-Of a session are where the measuring device stands, what changed with time and, if asked
-for, the measured point and the zeros of the joints (:mod:`.session_unknowns`).  The
-robot's own numbers are as they were found, give or take their covariance
+A session's own values are the pose of the measuring device, the changes with time and,
+if requested, the measured point and the zeros of the joints (:mod:`.session_unknowns`).
+The robot's own numbers have their saved values within their covariance
 (:mod:`.machine_numbers`).  Both are fitted to the set-up rows of all sessions
 (:mod:`.session_fit`), and judged on all other rows.
 
-Where the covariance lets the other rows move by more than the set-up rows are off from
-the robot as it was saved, the set-up rows do not suffice.
+The set-up rows do not suffice if the covariance allows the other rows to change by more
+than the residual of the set-up rows with the saved robot.
 """
 
 import math
@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.errors import BadInput, quoted
+from forcefit.results.display import html_table, short_repr
 from validation.campaign.campaign import Campaign
 from validation.correction.machine_numbers import machine_numbers, unchanging
 from validation.correction.session_fit import SessionsFit, SetUp, fit_sessions
@@ -39,23 +39,23 @@ _MACHINE = "the robot's own numbers"
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """One session.
+    """One session: fitted values and errors.
 
     Attributes:
-        session: its name, None where the campaign has but one.
+        session: name of the session; None if the campaign has no sessions.
         unknowns: the k values that were fitted.
         values: (k,) [rad, m].
-        std: (k,) of them.
+        std: (k,) standard deviations of the values.
         rows: numbers of set-up rows and of others.
-        error: over the other rows.
-        declared: the same of the campaign's own robot, fitted alike.
-        uncertainty: [m] by which the set-up rows leave the other rows' points open,
-            rms.
-        left: [m] rms of what they leave unexplained in themselves.
-        held: [m] the same with the robot's own numbers as they were saved.
-        open_: names of the values that are known least, if they do not suffice.
-        left_behind: what changed with time where the robot was learned, and is not
-            fitted here: without a clock its course is unknown.
+        error: error on the other rows.
+        declared: error of the campaign's own robot, fitted in the same way.
+        uncertainty: [m] rms of the uncertainty of the other rows' points after the
+            set-up rows.
+        left: [m] rms residual of the set-up rows.
+        held: [m] rms residual with the robot's own numbers as saved.
+        open_: names of the most uncertain values, if the set-up rows do not suffice.
+        left_behind: changes with time in the original session that are not fitted here,
+            because their course is unknown without a clock.
     """
 
     session: str | None
@@ -75,7 +75,7 @@ class Carried:
 
     @property
     def suffices(self) -> bool:
-        """Whether the set-up rows do."""
+        """Whether the set-up rows suffice."""
         return not self.open_
 
     @property
@@ -90,8 +90,8 @@ class CarriedRobot:
     """A robot in its new sessions.
 
     Attributes:
-        fit: of what is the sessions', and of the robot's own numbers.
-        sessions: each, judged on its other rows.
+        fit: fit of the sessions' values and of the robot's own numbers.
+        sessions: the sessions, judged on their other rows.
     """
 
     fit: SessionsFit
@@ -112,16 +112,16 @@ def carry(
     """Fit a saved robot to the set-up rows of sessions, and judge it on the others.
 
     Args:
-        campaign: of the saved robot.
+        campaign: campaign of the saved robot.
         declared: the same rows with the campaign's own robot.
         setup: (R,) bool, the set-up rows.
-        fitted: of :data:`OF_A_SESSION`.
+        fitted: names in :data:`OF_A_SESSION`.
 
     Returns:
         The robot in these sessions, and every session.
 
     Raises:
-        BadInput: a session has no set-up rows, or nothing but them.
+        BadInput: a session has no set-up rows, or no others.
     """
     clock = "time" in campaign.covariates
     unknowns = session_unknowns(campaign.robot, fitted, clock=clock)
@@ -142,12 +142,12 @@ def carry(
 
 
 def _sessions(campaign: Campaign) -> tuple[str | None, ...]:
-    """Names of sessions; of a campaign without any the one."""
+    """Return the names of sessions; for a campaign without any, None alone."""
     return campaign.sessions or (None,)
 
 
 def _of(campaign: Campaign, session: str | None, setup: NDArray) -> NDArray:
-    """(R,) bool, rows of a session, of which some but not all are set-up rows."""
+    """Return (R,) bool of a session's rows, some but not all of them set-up rows."""
     own = campaign.in_session(session)
     if setup[own].any() and not setup[own].all():
         return own
@@ -157,14 +157,14 @@ def _of(campaign: Campaign, session: str | None, setup: NDArray) -> NDArray:
 
 
 def _left_behind(robot: Robot, unknowns: SessionUnknowns) -> tuple[str, ...]:
-    """Titles of what changed with time and is not among a session's unknowns."""
+    """Return titles of changes with time that are not among a session's unknowns."""
     drift, functions = of_one_session(robot)
     whole = [DRIFT] if drift and unknowns.constant is None else []
     return (*whole, *(f.title for f in functions if f not in unknowns.functions))
 
 
 def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
-    """One session, on the rows that were not fitted."""
+    """Return one session, judged on the rows that were not fitted."""
     one, alike = fit.sessions[number], other.sessions[number]
     campaign, setup, values = one.campaign, one.rows, fit.values(number)
     read = one.read(fit.robot, values)
@@ -178,7 +178,7 @@ def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
     ]
     level = max(*off, float(np.median(campaign.sigma[own])))
     cells = campaign.cells & ~setup[:, None]
-    cells[:, :3] &= not cells[:, 3:].any()  # positions decide, unless there are none
+    cells[:, :3] &= not cells[:, 3:].any()  # positions decide, if there are any
     variance, blame = fit.spread(number, cells)
     names = [*(name for _, name in one.unknowns.names), _MACHINE]
     worst = np.flatnonzero(blame > 0.1 * blame.max()).tolist()
@@ -200,13 +200,13 @@ def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
 
 
 def carried_robot(carried: CarriedRobot) -> Robot:
-    """The robot in its new sessions, what was of its old one gone.
+    """Return the robot in its new sessions, without the values of its old session.
 
     Args:
-        carried: to these sessions.
+        carried: the robot in these sessions.
 
     Returns:
-        The robot, as it is saved.
+        The robot, as saved.
     """
     robot = without_session(carried.fit.robot)
     for number, one in enumerate(carried.sessions):
@@ -220,7 +220,7 @@ def carried_robot(carried: CarriedRobot) -> Robot:
 
 
 def _added(before: Any, more: dict[str, dict[str, float]]) -> dict[str, Any]:
-    """Effects with more added to their parameters; these are all sums but a drift's."""
+    """Return effects with values added to their parameters; a drift's is replaced."""
     merged = {name: dict(values) for name, values in before.items()}
     for effect, values in more.items():
         own = merged.setdefault(effect, {})

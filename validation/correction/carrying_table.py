@@ -1,14 +1,14 @@
-"""Sessions to which a robot was carried, for machines and people."""
+"""New sessions of a robot, as plain values and as text."""
 
 from dataclasses import asdict
 from typing import Any
 
+from forcefit.results.text import in_unit, readings_text
 from validation.correction.carrying import CarriedRobot
-from validation.diagnosis.sequence import Errors
 
 
 def table(carried: CarriedRobot) -> dict[str, Any]:
-    """For machines: every session, its values and its errors on the other rows."""
+    """Return plain values: every session, its values and its errors on other rows."""
     return {
         "machine": {
             "numbers": len(carried.fit.machine.numbers),
@@ -44,7 +44,7 @@ def table(carried: CarriedRobot) -> dict[str, Any]:
 
 
 def text(carried: CarriedRobot) -> str:
-    """For people."""
+    """Return the sessions as text."""
     lines = []
     if carried.fit.machine.numbers:
         lines.append(
@@ -54,12 +54,12 @@ def text(carried: CarriedRobot) -> str:
     for one in carried.sessions:
         name = one.session or "campaign"
         lines.append(f"{name}: {one.rows[0]} set-up rows, {one.rows[1]} others")
-        lines.append(f"  others, as carried over: {_said(one.error)}")
-        lines.append(f"  others, declared robot: {_said(one.declared)}")
+        lines.append(f"  others, as carried over: {readings_text(vars(one.error))}")
+        lines.append(f"  others, declared robot: {readings_text(vars(one.declared))}")
         lines.append(
-            f"  open by the set-up rows: {1e6 * one.uncertainty:.4g} um; "
-            f"they are off by {1e6 * one.left:.4g} um themselves, "
-            f"{1e6 * one.held:.4g} um from the robot as saved"
+            f"  open by the set-up rows: {in_unit(one.uncertainty, 'um')}; "
+            f"their own error is {in_unit(one.left, 'um')}, "
+            f"{in_unit(one.held, 'um')} from the robot as saved"
         )
         lines += [
             f"  left behind, of the session it was learned in: {title}"
@@ -73,12 +73,3 @@ def text(carried: CarriedRobot) -> str:
         elif not one.better:
             lines.append("  worse than the declared robot: it does not carry over")
     return "\n".join(lines)
-
-
-def _said(error: Errors) -> str:
-    """What of an error is known."""
-    sizes = (
-        (1e6 * error.position, "um"), (1e6 * error.rotation, "urad"),
-        (error.normalised, "sigma"),
-    )  # fmt: skip
-    return ", ".join(f"{size:.4g} {unit}" for size, unit in sizes if size == size)

@@ -1,8 +1,8 @@
-r"""Commands that bring a corrected robot where the declared one would go.
+r"""Commands that bring a corrected robot to the pose of the declared one.
 
-A controller that is told q moves the drives so that the nominal robot would stand at
-the pose wanted; the machine stands off by the deviation d(q) of the corrected model.
-Gauss-Newton's method looks for commands at which both cancel, all rows at once:
+For a command q a controller moves the drives so that the nominal robot would have the
+wanted pose; the machine deviates from it by d(q) of the corrected model.
+Gauss-Newton's method solves for commands at which both cancel, for all rows together:
 
     nominal pose(q) with deviation d(q)  =  pose wanted
 
@@ -10,11 +10,11 @@ Gauss-Newton's method looks for commands at which both cancel, all rows at once:
 symbol  code           shape       meaning
 ======  =============  ==========  ===================================================
 q       ``drives``     (R, d)      commands of the driven joints
-e       ``error``      (R, 6)      from where the machine stands to the pose wanted
-J       ``jacobian``   (R, 6, d)   how the platform follows the drives
+e       ``error``      (R, 6)      from the machine's pose to the wanted pose
+J       ``jacobian``   (R, 6, d)   derivative of the platform's pose by the drives
 ======  =============  ==========  ===================================================
 
-Where there are fewer drives than six, positions come first.
+With fewer than six drives, positions have precedence.
 
 Sources:
     Nocedal, Wright, Numerical Optimization, section 10.3 (Gauss-Newton).
@@ -33,7 +33,7 @@ from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.measurement.without_clearance import flexibility
 from assembly.model.links import own_screw
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 from stiffness.screws import rotation_matrix, rotation_vector
 from validation.campaign.campaign import Campaign
 from validation.correction.spread import deviation_spread
@@ -41,28 +41,29 @@ from validation.diagnosis.prediction import finite_conditions
 
 _STEPS = 25
 _HALVINGS = 8
-_STILL = 1e-10  # [rad or m] a step that is none
-_TURN = np.pi  # [rad] largest correction of a turning drive that is a correction
-_LOW = 1e-4  # of a rotation's weight where not all six can be met
+_STILL = 1e-10  # [rad or m] smaller steps count as zero
+_TURN = np.pi  # [rad] largest valid correction of a revolute drive
+_LOW = 1e-4  # of a rotation's weight, if not all six components can be met
 
 
 @dataclass(frozen=True, eq=False)
 class Compensation:
-    """Commands that were corrected, R rows.
+    """Corrected commands, R rows.
 
     Attributes:
-        targets: the commands at which the nominal robot would stand as wanted.
+        targets: the commands at which the nominal robot would have the wanted poses.
         drives: names of the d driven joints.
-        commands: (R, d) [rad or m] for the machine; where there is no answer, as given.
+        commands: (R, d) [rad or m] for the machine; as given in rows without a
+            solution.
         transforms: (R, n, 4, 4) nominal frames at the commands.
         coordinates: (R, n) [rad or m] of every joint there.
-        before: (R, 6) [rad, m] how far the machine is from the pose wanted, at the
-            reference point, base axes, if commanded as given.
-        after: (R, 6) the same with the commands corrected.
-        spread: (R, 6) [rad, m] standard deviation of that: what the robot's file says
-            of its own uncertainty.
-        limited: (R,) bool, a joint's limit stands in the way.
-        reason: (R,) why there is no answer, else empty.
+        before: (R, 6) [rad, m] distance of the machine from the wanted pose, at the
+            reference point, base axes, for the given commands.
+        after: (R, 6) the same for the corrected commands.
+        spread: (R, 6) [rad, m] standard deviation of it, by the uncertainty in the
+            robot's file.
+        limited: (R,) bool, whether a joint's limit prevents the correction.
+        reason: (R,) reason without a solution, else empty.
     """
 
     targets: Campaign
@@ -85,18 +86,18 @@ class Compensation:
 
 
 def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
-    """Commands at which the corrected robot stands where the nominal one should.
+    """Return commands at which the corrected robot has the pose of the nominal one.
 
     Args:
-        targets: commands of the robot, which is the corrected one.
-        as_read: whether the device is believed: what it reads is to be nothing.
-            Otherwise effects of the device alone are left as they are.
+        targets: commands for the corrected robot.
+        as_read: whether the device's reading becomes zero.  Otherwise effects of the
+            device alone are not corrected.
 
     Returns:
-        The commands; those of rows without an answer are unchanged.
+        The commands; those of rows without a solution are unchanged.
 
     Raises:
-        BadInput: an effect of the robot depends on what the targets lack.
+        BadInput: an effect of the robot depends on a covariate that the targets lack.
     """
     targets = _each_once(targets)
     robot, driven = targets.robot, _driven(targets.robot)
@@ -122,7 +123,8 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
             if not worse.any():
                 break
             share = np.where(worse, share / 2, share)
-        going &= moving & ~worse  # what is left is rounding, or as near as limits allow
+        # the residual is rounding, or as small as limits allow
+        going &= moving & ~worse
         q = np.where(going[:, None], tried, q)
         standing = next_ if going[moving].all() else machine.at(q, targets)[0]
     far, reason = _too_far(robot, driven, q - targets.coordinates[:, driven], reason)
@@ -150,7 +152,7 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
 
 
 def _each_once(targets: Campaign) -> Campaign:
-    """The commands without a row for each point read."""
+    """Return the commands without a row for each point read."""
     if targets.point is None:
         return targets
     labels = tuple(dict.fromkeys(targets.labels))
@@ -159,12 +161,12 @@ def _each_once(targets: Campaign) -> Campaign:
 
 
 def _driven(robot: Robot) -> NDArray:
-    """(d,) rows of the frames with a drive."""
+    """Return the (d,) rows of the frames with a drive."""
     return np.flatnonzero([frame.actuated for frame in robot.frames])
 
 
 def _limits(robot: Robot, driven: NDArray) -> tuple[NDArray, NDArray]:
-    """(d,) least and (d,) largest commands."""
+    """Return the (d,) least and (d,) largest commands."""
     given = [robot.frames[i].limits or (-np.inf, np.inf) for i in driven]
     least, most = np.array(given).reshape(-1, 2).T
     return least, most
@@ -173,7 +175,7 @@ def _limits(robot: Robot, driven: NDArray) -> tuple[NDArray, NDArray]:
 def _too_far(
     robot: Robot, driven: NDArray, change: NDArray, reason: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Rows whose corrections (R, d) are larger than the robot, and every row's reason.
+    """Return rows with corrections (R, d) larger than the robot, and all reasons.
 
     Returns:
         (R,) bool, and (R,) texts.
@@ -193,7 +195,7 @@ def _too_far(
 
 
 def _astray(robot: Robot, error: NDArray, reason: NDArray) -> NDArray:
-    """(R,) texts, with one for rows that stay (R, 6) farther off than the robot."""
+    """Return (R,) texts, one for each row whose error (R, 6) exceeds the robot."""
     size, reason = size_of(robot), reason.copy()
     off = np.linalg.norm(error[:, 3:], axis=1)
     for row in np.flatnonzero((off > size) & (reason == "")):
@@ -205,19 +207,19 @@ def _astray(robot: Robot, error: NDArray, reason: NDArray) -> NDArray:
 
 
 def _weights(robot: Robot, drives: int) -> NDArray:
-    """(6,) [m/rad and 1] by which an error's parts count."""
+    """Return the (6,) [m/rad and 1] weights of an error's components."""
     turn = size_of(robot) * (1.0 if drives >= 6 else _LOW)
     return np.repeat([turn, 1.0], 3)
 
 
 @dataclass(frozen=True, eq=False)
 class _Standing:
-    """Where the machine stands at commands.
+    """State of the machine at commands.
 
     Attributes:
         campaign: the commands.
-        conditions: what acts there.
-        error: (R, 6) [rad, m] to the pose wanted; NaN where there is no answer.
+        conditions: their conditions.
+        error: (R, 6) [rad, m] to the wanted pose; NaN without a solution.
         jacobian: (R, 6, d) at the reference point.
     """
 
@@ -227,18 +229,18 @@ class _Standing:
     jacobian: NDArray
 
     def size(self, weights: NDArray) -> NDArray:
-        """(R,) [m] weighted length of the error."""
+        """Return the (R,) [m] weighted length of the error."""
         return np.linalg.norm(self.error * weights, axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class _Machine:
-    """The corrected robot, to be commanded.
+    """The corrected robot, for which commands are computed.
 
     Attributes:
         targets: the commands as given.
-        goal: (R, 4, 4) platform poses wanted.
-        as_read: whether the device's own effects count.
+        goal: (R, 4, 4) wanted platform poses.
+        as_read: whether the device's own effects are corrected.
     """
 
     targets: Campaign
@@ -246,7 +248,7 @@ class _Machine:
     as_read: bool
 
     def conditions(self, campaign: Campaign) -> Conditions:
-        """What acts at commands, read at the reference point."""
+        """Return the conditions of commands, read at the reference point."""
         conditions = replace(finite_conditions(campaign), target=None)
         if self.as_read:
             return conditions
@@ -254,14 +256,14 @@ class _Machine:
         return replace(conditions, base=still, tool=still[:3], reading=0.0)
 
     def at(self, q: NDArray, last: Campaign) -> tuple[_Standing, NDArray]:
-        """Where it stands, and (R,) why it cannot.
+        """Return the machine's state at commands, and (R,) reasons of failure.
 
         Args:
             q: (R, d) commands.
-            last: commands that can be reached, for rows that cannot.
+            last: reachable commands, for rows that cannot be reached.
 
         Returns:
-            Both.
+            State and reasons.
         """
         campaign, reason = _commanded(last, q)
         conditions = self.conditions(campaign)
@@ -274,7 +276,7 @@ class _Machine:
 
 
 def _commanded(last: Campaign, q: NDArray) -> tuple[Campaign, NDArray]:
-    """The commands as a campaign, those out of reach as they were."""
+    """Return the commands as a campaign; unreachable ones are unchanged."""
     robot = last.robot
     driven = _driven(robot)
     wanted = np.full((len(q), len(robot.frames)), np.nan)
@@ -296,7 +298,7 @@ def _commanded(last: Campaign, q: NDArray) -> tuple[Campaign, NDArray]:
 
 
 def _between(conditions: Conditions, deviation: NDArray, goal: NDArray) -> NDArray:
-    """(R, 6) from where the reference point stands to where it should, base axes."""
+    """Return (R, 6) from the reference point's pose to the wanted one, base axes."""
     nominal = conditions.postures.platform
     arm = nominal[:, :3, :3] @ conditions.point
     R = rotation_matrix(deviation[:, :3]) @ nominal[:, :3, :3]
@@ -307,7 +309,7 @@ def _between(conditions: Conditions, deviation: NDArray, goal: NDArray) -> NDArr
 
 
 def _jacobian(conditions: Conditions, drives: int) -> NDArray:
-    """(R, 6, d) how the reference point follows the drives, base axes."""
+    """Return the (R, 6, d) derivative of the reference point's pose by the drives."""
     robot = without_joint_clearances(conditions.robot)
     columns = np.zeros((6 * len(robot.frames), drives))
     for k, i in enumerate(_driven(robot)):
@@ -322,7 +324,7 @@ def _jacobian(conditions: Conditions, drives: int) -> NDArray:
 def _step(
     standing: _Standing, weights: NDArray, q: NDArray, limits: tuple[NDArray, NDArray]
 ) -> NDArray:
-    """(R, d) least squares' step; drives that would leave their limits stay there."""
+    """Return the (R, d) least-squares step; drives at their limits stay there."""
     A = standing.jacobian * weights[:, None]
     b = np.nan_to_num(standing.error) * weights
     held = np.zeros(q.shape, dtype=bool)

@@ -1,4 +1,4 @@
-"""What was compensated, for controllers, machines and people."""
+"""Results of a compensation for controllers, as plain values and as text."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,20 +7,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.kinematics.posture import POSE, pose_components
+from forcefit.results.text import readings_text
 from validation.campaign.campaign import LOAD
 from validation.correction.compensation import Compensation
 from validation.correction.prediction import csv_text
 
 
 def command_table(compensation: Compensation) -> str:
-    """The corrected commands as a table with the columns of the targets.
+    """Return the corrected commands as a table with the columns of the targets.
 
     Args:
-        compensation: of any targets.
+        compensation: compensation of any targets.
 
     Returns:
         CSV: ``id``, ``q.*`` or ``pose.*``, loads and covariates as given; it can be
-        commanded, measured and compensated again.
+            commanded, measured and compensated again.
     """
     targets = compensation.targets
     platform = compensation.transforms[:, targets.robot.index(targets.robot.platform)]
@@ -42,10 +43,10 @@ def command_table(compensation: Compensation) -> str:
 
 
 def offset_table(compensation: Compensation) -> str:
-    """What a controller adds to its commands, and the error before and after.
+    """Return the controller's offsets, and the error before and after, as a table.
 
     Args:
-        compensation: of any targets.
+        compensation: compensation of any targets.
 
     Returns:
         CSV: ``id``, ``offset.<drive>`` [rad or m], ``before`` and ``after`` in position
@@ -63,7 +64,7 @@ def offset_table(compensation: Compensation) -> str:
 
 
 def _text(compensation: Compensation, columns: dict[str, Any]) -> str:
-    """Columns under their names."""
+    """Return the columns under their names."""
     rows = {
         label: {
             name: values[i] if name == "session" else float(values[i])
@@ -77,17 +78,17 @@ def _text(compensation: Compensation, columns: dict[str, Any]) -> str:
 def summary(
     compensation: Compensation, diagnosed: Mapping[str, float] | None = None
 ) -> dict[str, Any]:
-    """The same for machines: errors to be expected, and what is in the way.
+    """Return plain values: expected errors, and rows without a solution.
 
     Args:
-        compensation: of any targets.
+        compensation: compensation of any targets.
         diagnosed: ``position`` [m] and ``rotation`` [rad] rms of a reading on held-out
-            rows, if not by the robot's file.
+            rows, if not those of the robot's file.
 
     Returns:
-        Plain values; ``expected`` adds what the commands leave, the spread that the
-        file states and what the diagnosis left unexplained; None where neither the file
-        nor ``diagnosed`` says anything.
+        Plain values.  ``expected`` adds the error after correction, the spread stated
+        in the file and the unexplained error of the diagnosis; None if neither the file
+        nor ``diagnosed`` has data.
     """
     ids = compensation.targets.ids
     record = compensation.targets.robot.diagnosis
@@ -124,7 +125,7 @@ def summary(
 def _unexplained(
     record: Mapping[str, Any], diagnosed: Mapping[str, float] | None
 ) -> dict[str, float] | None:
-    """[m, rad] length of what a diagnosis left beyond noise, None if not known."""
+    """Return the [m, rad] unexplained error of a diagnosis, None if unknown."""
     sizes = {}
     for key in ("position", "rotation"):
         after = record.get(key, 0.0) if diagnosed is None else diagnosed[key]
@@ -134,7 +135,7 @@ def _unexplained(
 
 
 def _sizes(error: NDArray) -> dict[str, float | None]:
-    """Rms length of positions and rotations; None of nothing."""
+    """Return the rms length of positions and rotations; None without any."""
 
     def rms(part: NDArray) -> float | None:
         known = part[np.isfinite(part).all(axis=1)]
@@ -144,7 +145,7 @@ def _sizes(error: NDArray) -> dict[str, float | None]:
 
 
 def summary_text(compensation: Compensation, table: Mapping[str, Any]) -> str:
-    """The same for people, ``table`` being :func:`summary`'s."""
+    """Return the text of ``table``, the result of :func:`summary`."""
     lines = [f"{table['rows']} commands, drives {', '.join(compensation.drives)}"]
     says = {
         "before": "as commanded", "after": "corrected", "spread": "spread of the model",
@@ -155,10 +156,7 @@ def summary_text(compensation: Compensation, table: Mapping[str, Any]) -> str:
         if key == "spread" and not compensation.spread.any():
             continue
         if size["position"] is not None:
-            lines.append(
-                f"{words}: {1e6 * size['position']:.4g} um, "
-                f"{1e6 * size['rotation']:.4g} urad"
-            )
+            lines.append(f"{words}: {readings_text(size)}")
     if table["error"]["expected"]["position"] is None:
         lines.append(
             "to be expected: what the robot's diagnosis left (--diagnosed says it); "

@@ -1,7 +1,7 @@
-"""Functions of a robot's file as curves, each with the band that its numbers leave.
+"""Functions of a robot's file as curves, with bands of their uncertainty.
 
-A function that remembers is plotted as its response to a step of one unit, with time;
-one that turns with the direction, as it is when coming from below.
+A function with memory is plotted as its response to a unit step over time.  A function
+of the direction of motion is plotted for motion from below.
 """
 
 from collections.abc import Mapping
@@ -18,19 +18,19 @@ from assembly.effects.functions import CLOCKS, parameters_of, value_of
 from assembly.effects.units import result_unit, units_of, variable_unit, whole_unit
 from assembly.model.function import Function
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.errors import plot_label
+from forcefit.results.display import html_table, short_repr
 from validation.diagnosis.saved_covariance import FUNCTION, known_covariance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _POINTS = 181
-_SHOWN = 13  # of them in a text
-_LATE = 4.0  # time constants, periods that are plotted
-_RANGES = {"temperature": 10.0, "approach": 1.0}  # to either side
-_LOAD = 100.0  # [N, N m]
-_TRAVEL = 0.5  # [m]
+_SHOWN = 13  # number of points in a text
+_LATE = 4.0  # number of time constants or periods that are plotted
+_RANGES = {"temperature": 10.0, "approach": 1.0}  # plotted to either side
+_LOAD = 100.0  # [N, N m] plotted to either side
+_TRAVEL = 0.5  # [m] plotted to either side
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,14 +38,14 @@ class Curve:
     """One component of a function.
 
     Attributes:
-        function: whose.
-        component: which.
-        variable: along which it is plotted; the other, if there is one, is ``beside``.
-        beside: (name, value) of the other variable, None where there is none.
-        x: (k,) in its unit.
+        function: the function.
+        component: its component.
+        variable: variable along which it is plotted.
+        beside: (name, value) of a second variable, None if there is none.
+        x: (k,) in the variable's unit.
         values: (k,) [rad, m, N m, N], or per wrench for a compliance.
-        std: (k,) standard deviation, zero where the file gives none.
-        units: of x and of the values.
+        std: (k,) standard deviation, zero if the file gives none.
+        units: units of x and of the values.
     """
 
     function: Function
@@ -63,15 +63,15 @@ class Curve:
 def curves_of(
     robot: Robot, over: Mapping[str, tuple[float, float]] | None = None
 ) -> list[Curve]:
-    """All functions of a robot as curves.
+    """Return all functions of a robot as curves.
 
     Args:
-        robot: with its functions.
-        over: least and largest value by variable; a full turn, the knots of a spline
-            or what is usual otherwise.
+        robot: robot with its functions.
+        over: least and largest value by variable; by default a full turn, the knots of
+            a spline, or a typical range.
 
     Returns:
-        A curve for each component; of two variables one for each of three values of
+        A curve for each component; for two variables one for each of three values of
         the second.
     """
     curves = []
@@ -90,7 +90,7 @@ def curves_of(
 
 
 def _variables(function: Function) -> tuple[str, str]:
-    """Along which variable a function is plotted, and the other if there is one."""
+    """Return the variable along which a function is plotted, and the other if any."""
     first, *rest = function.variables
     if function.form in {"lag", "creep"}:
         return "time", ""
@@ -103,7 +103,7 @@ def _curve(
     robot: Robot, function: Function, component: str, along: str,
     fixed: tuple[str, float] | None, x: NDArray,
 ) -> Curve:  # fmt: skip
-    """One curve, and its standard deviation by the covariance of its numbers."""
+    """Return one curve, with its standard deviation by its numbers' covariance."""
     values = _values(function, component, x, fixed)
     numbers, C = _covariance_of(robot, function)
     slopes = np.zeros((len(numbers), len(values)))
@@ -130,7 +130,7 @@ def _curve(
 
 
 def _covariance_of(robot: Robot, function: Function) -> tuple[list[str], NDArray]:
-    """Names of a function's uncertain numbers, and their covariance (k, k)."""
+    """Return names of a function's uncertain numbers, and their covariance (k, k)."""
     known = known_covariance(robot)
     place = str(next(k for k, f in enumerate(robot.functions) if f is function))
     own = [
@@ -144,7 +144,7 @@ def _covariance_of(robot: Robot, function: Function) -> tuple[list[str], NDArray
 def _values(
     function: Function, component: str, x: NDArray, fixed: tuple[str, float] | None
 ) -> NDArray:
-    """The function's values along x."""
+    """Return the function's values along x."""
     own = parameters_of(function, component)
     inputs = [x]
     if function.form in {"lag", "creep"}:
@@ -163,7 +163,7 @@ def _values(
 
 
 def _range(robot: Robot, function: Function, variable: str) -> tuple[float, float]:
-    """Where a variable usually lies."""
+    """Return the plotted range of a variable."""
     own = parameters_of(function, function.components[0])
     k = function.variables.index(variable) if variable in function.variables else 0
     if function.form == "spline":
@@ -184,7 +184,7 @@ def _range(robot: Robot, function: Function, variable: str) -> tuple[float, floa
 
 
 def table(robot: Robot, curves: list[Curve]) -> list[dict[str, Any]]:
-    """The same for machines."""
+    """Return the curves as plain values."""
     return [
         {
             "label": c.function.title,
@@ -213,7 +213,7 @@ def table(robot: Robot, curves: list[Curve]) -> list[dict[str, Any]]:
 
 
 def text(curves: list[Curve]) -> str:
-    """The same for people: a dozen points of each curve."""
+    """Return the curves as text: a dozen points of each."""
     lines: list[str] = []
     for c in curves:
         beside = f", {c.beside[0]} = {c.beside[1]:.4g}" if c.beside else ""
@@ -231,10 +231,10 @@ def text(curves: list[Curve]) -> str:
 
 
 def figure_of(curves: list[Curve]) -> "Figure":
-    """Every curve in a panel of its own, with twice its standard deviation.
+    """Return a figure with each curve in a panel, with twice its standard deviation.
 
     Args:
-        curves: of :func:`curves_of`, at least one.
+        curves: result of :func:`curves_of`, at least one curve.
 
     Returns:
         The figure.

@@ -1,15 +1,15 @@
-r"""The machine's own numbers in a new session: as they were found, give or take.
+r"""The machine's own numbers in a new session: saved values with their covariance.
 
 A saved robot's geometric errors, compliances, effects and functions are known with the
-covariance C of the fit.  That is the prior of them in another session.  A machine may
-have changed by more than the fit was uncertain: the prior is k C, with k of the largest
-evidence in the set-up rows (:mod:`.session_fit`).
+covariance C of the fit, which is their prior in another session.  The machine may have
+changed by more than this uncertainty: the prior is k C, with k of the largest evidence
+in the set-up rows (:mod:`.session_fit`).
 
 ======  =============  =========  ====================================================
 symbol  code           shape      meaning
 ======  =============  =========  ====================================================
 u       ``u``          (r,)       independent numbers of variance k
-L       ``root``       (m, r)     C = L L'; the m numbers are as saved plus L u
+L       ``root``       (m, r)     C = L L'; the m numbers are the saved ones plus L u
 ======  =============  =========  ====================================================
 """
 
@@ -28,17 +28,18 @@ from validation.diagnosis.saved_covariance import (
     known_covariance,
 )
 
-_RANK = 1e-10  # of the largest eigenvalue of the correlations: rounding
+# of the largest eigenvalue of the correlations: smaller ones are rounding
+_RANK = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class MachineNumbers:
-    """Numbers of a saved robot that belong to no session.
+    """Numbers of a saved robot that do not belong to a session.
 
     Attributes:
-        robot: as it was saved.
+        robot: robot as saved.
         numbers: m of them.
-        root: (m, r) of their covariance.
+        root: (m, r) factor of their covariance.
     """
 
     robot: Robot
@@ -54,13 +55,13 @@ class MachineNumbers:
         return np.sqrt(np.einsum("mr,mr->m", self.root, self.root))
 
     def robot_at(self, u: NDArray) -> Robot:
-        """The robot whose numbers have changed by L u; none to what cannot be.
+        """Return the robot with numbers changed by L u, within their possible range.
 
         Args:
             u: (r,).
 
         Returns:
-            The robot; what cannot be negative changes by a factor.
+            The robot; numbers that cannot be negative change by a factor.
         """
         robot = self.robot
         if not np.any(u):
@@ -72,14 +73,14 @@ class MachineNumbers:
 
 
 def machine_numbers(robot: Robot) -> MachineNumbers:
-    """The numbers of a saved robot that every session shares.
+    """Return the numbers of a saved robot that every session shares.
 
     Args:
-        robot: with its covariance, or ``tolerance`` and ``std``, in its file.
+        robot: robot with its covariance, or ``tolerance`` and ``std``, in its file.
 
     Returns:
-        Those that the file says how uncertain they are; none of what belongs to one
-        session, or to the place of a measuring device.
+        Those with a stated uncertainty, except numbers of one session and of a
+        measuring device's pose.
 
     Raises:
         BadInput: the covariance that the file names cannot be read.
@@ -96,7 +97,7 @@ def machine_numbers(robot: Robot) -> MachineNumbers:
 
 
 def _is_shared(number: Number, robot: Robot) -> bool:
-    """Whether a number is the machine's in all sessions."""
+    """Return whether a number belongs to the machine in all sessions."""
     if number.kind == EFFECT:
         return not number.session and number.owner not in {"registration", DRIFT}
     if number.kind == FUNCTION:
@@ -106,7 +107,7 @@ def _is_shared(number: Number, robot: Robot) -> bool:
 
 
 def _possible(number: Number, robot: Robot, by: float) -> float:
-    """A change that leaves a number what it can be."""
+    """Return a change that keeps a number in its possible range."""
     value = number.of(robot)
     if number.kind == EFFECT and value > 0.0:
         unknowns = LIBRARY[number.owner].unknowns(robot)
@@ -116,18 +117,18 @@ def _possible(number: Number, robot: Robot, by: float) -> float:
 
 
 def unchanging(robot: Robot) -> MachineNumbers:
-    """A robot whose numbers are taken as they are."""
+    """Return a robot whose numbers are taken as exact."""
     return MachineNumbers(robot, (), np.zeros((0, 0)))
 
 
 def renumbered(machine: MachineNumbers) -> list[Number]:
-    """The numbers of a robot in the one without what changed with time.
+    """Return the numbers of a robot with new indices, without changes in time.
 
     Args:
-        machine: a saved robot.
+        machine: numbers of a saved robot.
 
     Returns:
-        The same, functions counted without those of time.
+        The same numbers, with functions counted without those of time.
     """
     own, places = of_one_session(machine.robot)[1], dict[str, str]()
     for place, function in enumerate(machine.robot.functions):

@@ -12,8 +12,8 @@ from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import Prediction
 from assembly.measurement.predict import predict as predict_rows
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.errors import BadInput
+from forcefit.results.display import html_table, short_repr
 from validation.campaign.campaign import READING, Campaign
 from validation.correction.spread import deviation_spread
 from validation.diagnosis.learned_range import beyond_by_row
@@ -22,26 +22,26 @@ from validation.diagnosis.registration import register
 from validation.diagnosis.sequence import Errors, errors_of, rms
 from validation.diagnosis.unknowns import effects_in, with_effects_in
 
-_MOVED = 3.0  # times as large a residual: the measuring device has been moved
+_MOVED = 3.0  # factor of the residual above which the measuring device has been moved
 
 
 @dataclass(frozen=True, eq=False)
 class PredictedReadings:
-    """Readings of commands.
+    """Predicted readings for commands.
 
     Attributes:
-        commands: what was commanded, of R rows.
-        prediction: what the robot reads there.
-        error: of measured minus predicted; NaN where nothing was measured.
-        spread: (R, 6) [rad, m] standard deviation of the prediction, by what the
-            robot's file says of its own uncertainty.
+        commands: the commands, R rows.
+        prediction: the robot's readings.
+        error: error of measured minus predicted; NaN where not measured.
+        spread: (R, 6) [rad, m] standard deviation of the prediction, by the uncertainty
+            in the robot's file.
         noise: (R, 6) [rad, m] standard deviation of a reading about the machine's own
-            deviation; NaN where neither the table nor the robot's file says it.
-        extrapolated: (R,) names of what leaves the range in which the robot was
+            deviation; NaN if neither the table nor the robot's file has it.
+        extrapolated: (R,) names of variables outside the range in which the robot was
             identified, else empty.
         registration: ``"known"``, ``"of the robot file"``, ``"fitted to these rows"``
             or ``"none"``.
-        point: where the robot was identified, if readings are of another point.
+        point: the point of the identification, if readings are of another point.
     """
 
     commands: Campaign
@@ -56,7 +56,7 @@ class PredictedReadings:
     __repr__, _repr_html_ = short_repr, html_table
 
     def table(self) -> dict[str, Any]:
-        """For machines."""
+        """Return plain values."""
         rows = zip(self.commands.ids, self.prediction.reason, strict=True)
         far = zip(self.commands.ids, self.extrapolated, strict=True)
         missing = list(self.commands.robot.diagnosis.get("not_measured", []))
@@ -80,16 +80,16 @@ class PredictedReadings:
 
 
 def _both(values: NDArray) -> dict[str, float]:
-    """Root mean squares of positions and of rotations."""
+    """Return the root mean squares of positions and of rotations."""
     return {"position": rms(values[:, 3:]), "rotation": rms(values[:, :3])}
 
 
 def predict(commands: Campaign) -> PredictedReadings:
-    """What the robot of a campaign reads for its commands.
+    """Return the readings of a campaign's robot for its commands.
 
-    Where the registration is unknown, it is that of the robot's file; if the file has
-    none, or rows are measured and it no longer fits them (the device was moved), the
-    device's frame is fitted to the measured rows.
+    An unknown registration is taken from the robot's file.  It is fitted to the
+    measured rows if the file has none, or if rows are measured and it does not fit them
+    any more (the device was moved).
 
     Args:
         commands: the robot, with its effects, and rows.
@@ -98,7 +98,7 @@ def predict(commands: Campaign) -> PredictedReadings:
         The readings with their uncertainty.
 
     Raises:
-        BadInput: the registration is unknown, and the rows do not tell it.
+        BadInput: the registration is unknown, and the rows do not determine it.
     """
     conditions, registration = _registered(commands, finite_conditions(commands))
     prediction = predict_rows(conditions)
@@ -128,7 +128,7 @@ _FITTED = "fitted to these rows"
 
 
 def _registered(commands: Campaign, conditions: Conditions) -> tuple[Conditions, str]:
-    """Conditions with the measuring frame, and where it comes from."""
+    """Return the conditions with the measuring frame, and its origin."""
     if commands.registration == "known":
         return conditions, "known"
     carried = np.broadcast_to(conditions.base, (len(commands), 6)).any(axis=1).all()
@@ -152,7 +152,7 @@ def _registered(commands: Campaign, conditions: Conditions) -> tuple[Conditions,
 
 
 def _unplaced(robot: Robot) -> Robot:
-    """The robot without the place of any measuring frame."""
+    """Return the robot without the pose of any measuring frame."""
     for session in (None, *robot.session_effects):
         effects = {name: dict(v) for name, v in effects_in(robot, session).items()}
         for name in BASE:
@@ -162,7 +162,7 @@ def _unplaced(robot: Robot) -> Robot:
 
 
 def _noise(commands: Campaign) -> NDArray:
-    """(R, 6) [rad, m] scatter of a reading: sigma, or what hold-out rows showed."""
+    """Return (R, 6) [rad, m] scatter of a reading: sigma, or that of held-out rows."""
     record = commands.robot.diagnosis
     known = [record.get("noise_rotation"), record.get("noise_position")]
     sizes = [x if isinstance(x, float) else np.nan for x in known]
@@ -173,11 +173,11 @@ def _noise(commands: Campaign) -> NDArray:
 
 
 def reading_names(commands: Campaign) -> list[tuple[str, str, int]]:
-    """Columns of a table of readings: its name, the point, the component.
+    """Return the columns of a table of readings: column, point, component.
 
     Args:
-        commands: whose names are wanted; only what is measured somewhere, all if
-            nothing is.
+        commands: the rows of the table; components measured nowhere are left out,
+            unless all are.
 
     Returns:
         A triple for each.
@@ -201,15 +201,15 @@ def reading_names(commands: Campaign) -> list[tuple[str, str, int]]:
 
 
 def reading_table(predicted: PredictedReadings) -> str:
-    """Predicted readings as a table: ``id`` and the readings, under a campaign's names.
+    """Return predicted readings as a table: ``id`` and a campaign's reading columns.
 
     Args:
-        predicted: of any commands.
+        predicted: predicted readings of any commands.
 
     Returns:
-        CSV; a cell is empty where the robot has no answer.  Where the robot's file
-        says how uncertain it is, ``std.`` and ``noise.`` of every reading follow, and
-        ``extrapolated``: what leaves the range in which the robot was identified.
+        CSV; a cell is empty without a solution.  If the robot's file has uncertainties,
+        ``std.`` and ``noise.`` of every reading follow, and ``extrapolated``: variables
+        outside the range in which the robot was identified.
     """
     commands, deviations = predicted.commands, predicted.prediction.deviation
     columns = reading_names(commands)
@@ -234,14 +234,14 @@ def reading_table(predicted: PredictedReadings) -> str:
 
 
 def csv_text(rows: Mapping[str, Mapping[str, object]], columns: Sequence[str]) -> str:
-    """A table with labels.
+    """Return a table with labels.
 
     Args:
         rows: cells by column, by label.
-        columns: beside ``id``, in order.
+        columns: names in addition to ``id``, in order.
 
     Returns:
-        CSV with a header; what a row lacks, and NaN, is empty.
+        CSV with a header; missing values and NaN are empty cells.
     """
     lines = [",".join(["id", *columns])]
     for label, cells in rows.items():
@@ -250,7 +250,7 @@ def csv_text(rows: Mapping[str, Mapping[str, object]], columns: Sequence[str]) -
 
 
 def _cell(value: object) -> str:
-    """A number with ten digits, a text as it is."""
+    """Return a number with ten digits, a text unchanged."""
     if not isinstance(value, float):
         return str(value)
     return "" if np.isnan(value) else f"{value:.10g}"

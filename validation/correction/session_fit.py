@@ -1,24 +1,24 @@
-r"""Sessions fitted to their set-up rows: what is theirs, and the machine's numbers.
+r"""Fit of sessions to their set-up rows: their values, and the machine's numbers.
 
 ======  =============  =========  ====================================================
 symbol  code           shape      meaning
 ======  =============  =========  ====================================================
 x       ``x``          (k,)       values of every session, then u of the machine
-J       ``slopes``     (R,6,p+r)  change of the readings per unit of a session's p
+J       ``slopes``     (R,6,p+r)  derivative of the readings by a session's p
                                   values and of u
 C       ``covariance`` (k, k)     of x
 ======  =============  =========  ====================================================
 
-Of a session are its values (:mod:`.session_unknowns`), flat or with a prior; u
-(:mod:`.machine_numbers`) is common to all, N(0, k).  How much more than sigma the
-readings scatter about the saved robot, tau, is known from its diagnosis with 20 degrees
-of freedom.  Rows of one configuration tell the same: readings weigh as if there were
-one of each.
+A session has its own values (:mod:`.session_unknowns`), flat or with a prior; u
+(:mod:`.machine_numbers`) is common to all, N(0, k).  The ratio tau of the readings'
+scatter about the saved robot to sigma is known from its diagnosis with 20 degrees of
+freedom.  Rows of one configuration carry the same information: readings are weighted as
+if there were one row of each.
 
 k is chosen by cross-validation: each configuration of the set-up rows is predicted by a
-fit to the others.  It is the least that no other predicts better by a standard error
-and by a part of the noise that matters.  The evidence of k is no judge: it takes for
-granted that the machine changed in the directions of the covariance.
+fit to the others.  The chosen k is the least one that no other beats by a standard
+error and by a relevant part of the noise.  The evidence of k is not used, because it
+assumes that the machine changed in the directions of the covariance.
 """
 
 from collections.abc import Sequence
@@ -42,21 +42,21 @@ from validation.diagnosis.registration import coarse_frame
 from validation.diagnosis.separability import orthonormal_basis
 
 _STEPS = 8
-_SETTLED = 1e-3  # [sigma of the value] a step that changes nothing
-_WIDENED = 4.0 ** np.arange(8)  # k that are tried
+_SETTLED = 1e-3  # [sigma of the value] step at convergence
+_WIDENED = 4.0 ** np.arange(8)  # values of k that are tried
 _SURE = 1.0  # standard errors by which a larger k must predict better
-_MATTERS = 0.03  # of the noise's variance
-_AT_ONCE = 1000  # rows, so that memory stays small
+_MATTERS = 0.03  # relative to the noise's variance: relevant part
+_AT_ONCE = 1000  # number of rows in a batch, to limit memory
 
 
 @dataclass(frozen=True, eq=False)
 class SetUp:
-    """A session of R rows, and which of them it is fitted to.
+    """A session of R rows, with its set-up rows.
 
     Attributes:
         campaign: the rows, with the saved robot.
         rows: (R,) bool, the set-up rows.
-        unknowns: what is the session's.
+        unknowns: the session's values.
     """
 
     campaign: Campaign
@@ -65,23 +65,23 @@ class SetUp:
 
     @cached_property
     def own(self) -> Campaign:
-        """The set-up rows."""
+        """The campaign of the set-up rows."""
         return self.campaign.take(self.rows)
 
     @property
     def repeated(self) -> float:
-        """Set-up rows of each configuration, on average."""
+        """Average number of set-up rows of each configuration."""
         return len(self.own) / len(np.unique(self.own.configuration))
 
     @property
     def told(self) -> float:
-        """Variance of a reading over sigma^2, beforehand; more where rows repeat."""
+        """Prior variance of a reading over sigma^2; larger where rows repeat."""
         left = self.campaign.robot.diagnosis.get("normalised")
         level = max(1.0, left) if isinstance(left, float) else 1.0
         return level**2 * self.repeated
 
     def start(self) -> NDArray:
-        """(p,) values at which a fit begins."""
+        """Return the (p,) start values of a fit."""
         x = self.unknowns.mean.copy()
         if any(name in BASE for _, name in self.unknowns.names):
             conditions = self._still(self.campaign.robot, self.rows)
@@ -90,24 +90,24 @@ class SetUp:
         return x
 
     def _still(self, robot: Robot, rows: NDArray) -> Conditions:
-        """Conditions of some rows without what is the session's."""
+        """Return the conditions of some rows without the session's effects."""
         bare = replace(self.campaign, robot=without_session(robot))
         return finite_conditions(bare, rows)
 
     def read(self, robot: Robot, values: NDArray) -> NDArray:
-        """(R, 6) [rad, m] readings of all rows."""
+        """Return the (R, 6) [rad, m] readings of all rows."""
         still = self._still(robot, np.arange(len(self.campaign)))
         return predict(self.unknowns.applied(still, values)).deviation
 
     def tangent(
         self, machine: MachineNumbers, values: NDArray, u: NDArray, rows: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Readings of some rows, and their slopes.
+        """Return the readings of some rows, and their derivatives.
 
         Args:
             machine: the robot's own numbers.
-            values: (p,) of the session.
-            u: (r,) of the machine.
+            values: (p,) values of the session.
+            u: (r,) numbers of the machine.
             rows: mask (R,) or numbers of N rows.
 
         Returns:
@@ -134,7 +134,7 @@ class SetUp:
     def whitened(
         self, machine: MachineNumbers, values: NDArray, u: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """(n,) residual and (n, p + r) slopes of the set-up cells, over sigma."""
+        """Return (n,) residual and (n, p + r) slopes of set-up cells, over sigma."""
         own = self.own
         read, slopes = self.tangent(machine, values, u, self.rows)
         A = (slopes / own.sigma[:, :, None])[own.cells]
@@ -143,15 +143,15 @@ class SetUp:
 
 @dataclass(frozen=True, eq=False)
 class SessionsFit:
-    """Sessions as fitted.
+    """Sessions and machine as fitted.
 
     Attributes:
         sessions: m of them.
         machine: the robot's own numbers.
         x: (k,) values of every session, then u.
         covariance: (k, k) of them.
-        widened: by which the covariance of the machine's numbers was multiplied.
-        held: values of every session, the machine's numbers as they were saved.
+        widened: factor on the covariance of the machine's numbers.
+        held: values of every session for the machine's saved numbers.
     """
 
     sessions: tuple[SetUp, ...]
@@ -163,32 +163,32 @@ class SessionsFit:
 
     @property
     def u(self) -> NDArray:
-        """(r,) of the machine."""
+        """(r,) changes of the machine."""
         return self.x[len(self.x) - len(self.machine) :]
 
     @property
     def robot(self) -> Robot:
-        """The saved robot with its numbers as they are in these sessions."""
+        """The saved robot with its numbers in these sessions."""
         return self.machine.robot_at(self.u)
 
     def own(self, number: int) -> slice:
-        """Where a session's values are in x."""
+        """Return the slice of a session's values in x."""
         return _own(self.sessions, number)
 
     def values(self, number: int) -> NDArray:
-        """(p,) of a session."""
+        """Return the (p,) values of a session."""
         return self.x[self.own(number)]
 
     def spread(self, number: int, cells: NDArray) -> tuple[float, NDArray]:
-        """By how much the uncertainty of x leaves readings of a session open.
+        """Return the uncertainty of a session's readings due to that of x.
 
         Args:
-            number: of the session.
+            number: number of the session.
             cells: (R, 6) bool, which readings.
 
         Returns:
-            Mean variance, and (p + 1,) what each value by itself adds to it, and all of
-            u together.
+            Mean variance, and (p + 1,) the contribution of each single value, and of
+            all of u together.
         """
         one, own = self.sessions[number], self.own(number)
         p, u = own.stop - own.start, slice(len(self.x) - len(self.machine), len(self.x))
@@ -206,16 +206,16 @@ class SessionsFit:
 
 
 def _own(sessions: Sequence[SetUp], number: int) -> slice:
-    """Where a session's values are in x."""
+    """Return the slice of a session's values in x."""
     begin = sum(len(one.unknowns) for one in sessions[:number])
     return slice(begin, begin + len(sessions[number].unknowns))
 
 
 def fit_sessions(sessions: Sequence[SetUp], machine: MachineNumbers) -> SessionsFit:
-    """Fit what is the sessions', and the machine's numbers, to the set-up rows.
+    """Fit the sessions' values and the machine's numbers to the set-up rows.
 
     Args:
-        sessions: of one robot.
+        sessions: sessions of one robot.
         machine: its own numbers.
 
     Returns:
@@ -236,7 +236,7 @@ def _settled(
     sessions: Sequence[SetUp], machine: MachineNumbers, x: NDArray,
     told: Sequence[float], widened: float,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """(k,) most probable x, and its covariance (k, k)."""
+    """Return the (k,) most probable x, and its covariance (k, k)."""
     begin = len(x) - len(machine)
     mean = np.concatenate([
         *(s.unknowns.mean for s in sessions),
@@ -261,7 +261,7 @@ def _settled(
 
 
 def _inverse(H: NDArray) -> NDArray:
-    """H^-1; a direction of which nothing is known stays finite."""
+    """Return H^-1; directions without information stay finite."""
     size = np.sqrt(np.diag(H))
     unit = np.where(size > 0, size, 1.0)
     scaled = H / np.outer(unit, unit) + 1e-14 * np.eye(len(H))
@@ -272,7 +272,7 @@ def _widened(
     sessions: Sequence[SetUp], machine: MachineNumbers, x: NDArray,
     told: Sequence[float],
 ) -> tuple[float, float]:  # fmt: skip
-    """How much the covariance is to be multiplied by, and tau, by the evidence."""
+    """Return the factor on the covariance, and tau, by cross-validation."""
     values = sum(len(one.unknowns) for one in sessions)
     zs, rows = [], []
     for k, one in enumerate(sessions):
@@ -290,7 +290,7 @@ def _widened(
     blocks = np.concatenate([_blocks(sessions, k) for k in range(len(sessions))])
 
     def predicted(k: float) -> tuple[NDArray, float]:
-        """Squared errors of every block, and tau."""
+        """Return the squared errors of every block, and tau."""
         std = np.append(known, np.full(len(machine), np.sqrt(k)))
         marginal = marginalise(A, std, z, Q)
         errors, _ = leave_block_out(marginal, blocks)
@@ -308,13 +308,13 @@ def _widened(
 
 
 def _matters(more: NDArray, count: int) -> bool:
-    """Whether blocks are predicted worse, beyond chance and a part of the noise."""
+    """Return whether blocks are predicted worse, beyond chance and some noise."""
     error = float(more.std(ddof=1)) * np.sqrt(len(more)) if len(more) > 1 else 0.0
     return bool(more.sum() > max(_SURE * error, _MATTERS * count))
 
 
 def _blocks(sessions: Sequence[SetUp], number: int) -> NDArray:
-    """(n,) configuration of every set-up cell, counted over all sessions."""
+    """Return the (n,) configuration of every set-up cell, counted over all sessions."""
     before = sum(len(np.unique(s.own.configuration)) for s in sessions[:number])
     own = sessions[number].own
     rows = np.nonzero(own.cells)[0]

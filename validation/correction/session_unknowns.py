@@ -1,12 +1,12 @@
-"""What of a robot belongs to one session, and is fitted again to the next.
+"""Numbers of a robot that belong to one session and are fitted again in the next.
 
-Where the device stands; if asked for, the measured point and the zeros of the joints;
-and whatever changed with time, the effect ``drift`` and functions of time.  A slow wave
-or a step of one day is not the machine's: in a new session its numbers are taken for
-zero, give or take as much as they once were.  What settled from a session's beginning
-may do so again: as it was, give or take as much.  Readings early in a session tell
-little of a drift later, and that is then among what set-up rows leave open.  A session
-without a clock has no drift.
+They are the pose of the device; if requested, the measured point and the zeros of the
+joints; and all changes with time: the effect ``drift`` and functions of time.  A slow
+wave or a step of one day does not belong to the machine: in a new session its numbers
+have mean zero, with their old size as standard deviation.  A change that settled from a
+session's beginning may do so again: its numbers have their old values as mean.  Early
+readings determine a later drift poorly, which is then part of the uncertainty after
+set-up rows.  A session without a clock has no drift.
 """
 
 from collections.abc import Sequence
@@ -32,13 +32,13 @@ from assembly.model.robot import Robot
 OF_A_SESSION = ("registration", "tool", "zeros")
 DRIFT = "drift"
 _ZERO = 1e-3  # [rad, m] standard deviation of a zero that was set again
-_SETTLING = ("lag", "creep")  # of time: they begin with the session
-_STEP = 1e-6  # [rad, m] of what is no drift
+_SETTLING = ("lag", "creep")  # functions of time that begin with the session
+_STEP = 1e-6  # [rad, m] step of parameters other than a drift
 _CONSTANT = "time_constant"
 
 
 def of_one_session(robot: Robot) -> tuple[dict[str, float], tuple[Function, ...]]:
-    """Parameters of the drift, and functions of time, that no session is named for."""
+    """Return the drift's parameters and functions of time without a named session."""
     functions = tuple(
         f for f in robot.functions
         if f.session is None and any(name in CLOCKS for name in f.variables)
@@ -47,7 +47,7 @@ def of_one_session(robot: Robot) -> tuple[dict[str, float], tuple[Function, ...]
 
 
 def without_session(robot: Robot) -> Robot:
-    """The robot alone: without the device's place and what changed with time."""
+    """Return the robot alone: without the device's pose and changes with time."""
     effects = {name: dict(values) for name, values in robot.effects.items()}
     effects.pop(DRIFT, None)
     tool = {k: v for k, v in effects.pop("registration", {}).items() if k in TOOL}
@@ -60,16 +60,15 @@ def without_session(robot: Robot) -> Robot:
 
 @dataclass(frozen=True, eq=False)
 class SessionUnknowns:
-    """The k numbers that are fitted to a session.
+    """The k numbers that are fitted in a session.
 
     Attributes:
-        names: of each, what it belongs to (an effect, or a function's title) and its
-            own.
-        mean: (k,) what they are thought to be beforehand.
-        prior: (k,) 1 / variance of that; zero where nothing is known.
+        names: owner of each (an effect, or a function's title) and its own name.
+        mean: (k,) prior means.
+        prior: (k,) prior precisions, 1 / variance; zero without information.
         step: (k,) change that moves the readings by micrometres, for slopes.
-        constant: [s] the drift's, absent where none is fitted.
-        functions: of time, whose numbers are among them.
+        constant: [s] the drift's time constant, absent if no drift is fitted.
+        functions: functions of time, whose numbers are fitted.
     """
 
     names: tuple[tuple[str, str], ...]
@@ -84,11 +83,11 @@ class SessionUnknowns:
 
     @property
     def owners(self) -> list[str]:
-        """What the numbers of each function are said to belong to."""
+        """Names of the owners of each function's numbers."""
         return [_owner(i, function) for i, function in enumerate(self.functions)]
 
     def effects(self, x: NDArray) -> dict[str, dict[str, float]]:
-        """Effects of the library with values (k,)."""
+        """Return the effects of the library with values (k,)."""
         values: dict[str, dict[str, float]] = {}
         for (effect, name), value in zip(self.names, x.tolist(), strict=True):
             if effect in LIBRARY:
@@ -98,7 +97,7 @@ class SessionUnknowns:
         return values
 
     def functions_with(self, x: NDArray, session: str | None) -> tuple[Function, ...]:
-        """The functions of time with values (k,), in a session alone."""
+        """Return the functions of time with values (k,), in a session alone."""
         known = dict(zip(self.names, x.tolist(), strict=True))
         return tuple(
             replace(
@@ -114,7 +113,7 @@ class SessionUnknowns:
         )
 
     def applied(self, conditions: Conditions, x: NDArray) -> Conditions:
-        """Conditions of the session's rows with values (k,)."""
+        """Return the conditions of the session's rows with values (k,)."""
         known = apply_effects(conditions, self.effects(x))
         return apply_functions(known, self.functions_with(x, None), conditions)
 
@@ -122,15 +121,15 @@ class SessionUnknowns:
 def session_unknowns(
     robot: Robot, fitted: Sequence[str], *, clock: bool
 ) -> SessionUnknowns:
-    """What is fitted to a session.
+    """Return the numbers to be fitted in a session.
 
     Args:
-        robot: as it was saved, with what belonged to the session it was learned in.
-        fitted: of :data:`OF_A_SESSION`.
+        robot: robot as saved, with the values of its original session.
+        fitted: names in :data:`OF_A_SESSION`.
         clock: whether the session's rows have a time.
 
     Returns:
-        The unknowns; what changed with time among them where there is a clock.
+        The unknowns; changes with time are included if there is a clock.
     """
     names: list[tuple[str, str]] = []
     if "registration" in fitted:
@@ -146,7 +145,7 @@ def session_unknowns(
     step, mean = [_STEP] * len(names), [0.0] * len(names)
     drift, functions = of_one_session(robot) if clock else ({}, ())
     constant = drift.pop(_CONSTANT, None)
-    # a formula is not linear in its numbers: it is left behind
+    # a formula is not linear in its numbers, so it is left out
     functions = tuple(f for f in functions if f.form != FORMULA)
     alone = {name: (name[-2], value) for name, value in drift.items()}
     owned = [(DRIFT, True, alone)]
@@ -173,12 +172,12 @@ def session_unknowns(
 
 
 def _owner(number: int, function: Function) -> str:
-    """What the numbers of a function of time are said to belong to."""
+    """Return the owner's name of the numbers of a function of time."""
     return f"function of time {number + 1}: {function.title}"
 
 
 def _numbers(robot: Robot, function: Function) -> dict[str, tuple[str, float]]:
-    """Numbers in which a function is linear: unit, and value."""
+    """Return the numbers in which a function is linear: unit, and value."""
     numbers, units = {}, units_of(robot, function)
     for component in function.components:
         own = parameters_of(function, component)

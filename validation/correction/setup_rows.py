@@ -1,4 +1,4 @@
-"""Which rows of a campaign ``--setup`` names."""
+"""The rows of a campaign selected by ``--setup``."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,10 +8,10 @@ from validation.campaign.campaign import Campaign
 
 
 def setup_rows(campaign: Campaign, text: str) -> NDArray:
-    """Which rows ``--setup`` names.
+    """Return the rows selected by ``--setup``.
 
     Args:
-        campaign: with rows in the order of the file.
+        campaign: campaign with rows in the order of the file.
         text: ``20`` for the first 20 of each session, numbers and ranges of rows such
             as ``1-20,31``, or labels.
 
@@ -19,7 +19,7 @@ def setup_rows(campaign: Campaign, text: str) -> NDArray:
         (R,) bool; all points of a row of the file together.
 
     Raises:
-        BadInput: neither a number of rows nor rows that are there.
+        BadInput: neither a number of rows nor existing rows.
     """
     labels = list(campaign.labels)
     order = list(dict.fromkeys(labels))
@@ -32,7 +32,7 @@ def setup_rows(campaign: Campaign, text: str) -> NDArray:
 
 
 def _first(campaign: Campaign, labels: list[str], count: int) -> set[str]:
-    """The first rows of every session."""
+    """Return the first rows of every session."""
     chosen: set[str] = set()
     for session in campaign.sessions or (None,):
         own = zip(labels, campaign.in_session(session), strict=True)
@@ -42,7 +42,7 @@ def _first(campaign: Campaign, labels: list[str], count: int) -> set[str]:
 
 
 def _range(part: str, order: list[str]) -> list[str]:
-    """Labels of a row's number, of a range of them, or of a label."""
+    """Return the labels for a row's number, a range of numbers, or a label."""
     if part in order:
         return [part]
     begin, dash, end = part.partition("-")

@@ -1,6 +1,6 @@
-"""How far a robot may be from what its file says, by what the file says of that.
+"""Standard deviation of a robot's deviation by the uncertainty in its file.
 
-The covariance of readings is J C J', C that of the numbers in the file
+The covariance of readings is J C J', with C that of the numbers in the file
 (:mod:`validation.diagnosis.saved_covariance`) and J their derivatives.
 """
 
@@ -25,20 +25,20 @@ from validation.diagnosis.saved_covariance import (
     known_covariance,
 )
 
-_STEP = 0.1  # standard deviations of a number, for its derivative
+_STEP = 0.1  # standard deviations of a number: step for its derivative
 
 
 def deviation_spread(
     robot: Robot, conditions_for: Callable[[Robot], Conditions]
 ) -> NDArray:
-    """Standard deviation of the platform's deviation at the points measured.
+    """Return the standard deviation of the platform's deviation at the points measured.
 
     Args:
-        robot: with its effects.
-        conditions_for: R rows of it, or of one with other numbers.
+        robot: robot with its effects.
+        conditions_for: function of a robot that returns R rows of conditions.
 
     Returns:
-        (R, 6) [rad, m]; zero where the file says nothing.
+        (R, 6) [rad, m]; zero if the file has no uncertainty.
     """
     known = known_covariance(robot)
     conditions = conditions_for(robot)
@@ -53,17 +53,17 @@ def number_slopes(
     robot: Robot, conditions: Conditions, numbers: tuple[Number, ...], std: NDArray,
     conditions_for: Callable[[Robot], Conditions],
 ) -> NDArray:  # fmt: skip
-    """Change of the deviation per number of a robot's file.
+    """Return derivatives of the deviation by numbers of a robot's file.
 
     Args:
-        robot: with its effects.
+        robot: robot with its effects.
         conditions: R rows of it.
         numbers: k of its file.
-        std: (k,) their standard deviations, by which steps are chosen.
-        conditions_for: the same rows of a robot with other numbers.
+        std: (k,) their standard deviations, which determine the steps.
+        conditions_for: function of a robot that returns the same rows for it.
 
     Returns:
-        (R, 6, k) [rad, m] per unit of a number; zero where the model has no answer.
+        (R, 6, k) [rad, m] per unit of a number; zero without a solution.
     """
     J = np.zeros((len(conditions), 6, len(numbers)))
     response = responses(conditions)
@@ -84,7 +84,7 @@ def number_slopes(
 
 
 def _is_direct(robot: Robot, number: Number) -> bool:
-    """Whether a function does not depend on what it does itself."""
+    """Return whether a function does not depend on its own effect."""
     function = robot.functions[int(number.owner)]
     wrench = any(name.startswith("wrench.") for name in function.variables)
     alone = function.where not in PLACES and function.kind == "compliance"
@@ -97,7 +97,7 @@ def _of_function(
     robot: Robot, conditions: Conditions, response: Responses, number: Number,
     sigma: float,
 ) -> NDArray:  # fmt: skip
-    """(R, 6) change of the deviation per number of a function."""
+    """Return the (R, 6) derivatives of the deviation by a function's numbers."""
     one = robot.functions[int(number.owner)]
     step = _STEP * sigma if sigma > 0.0 else 1.0
     more = one.parameters[number.name] + step
@@ -115,7 +115,7 @@ def _of_function(
 def _answer(
     conditions: Conditions, response: Responses, function: Function, component: str
 ) -> NDArray:
-    """(R, 6) change of the deviation per unit of one component of a function."""
+    """Return the (R, 6) derivative of the deviation by a function's component."""
     axis = READING.index(component)
     if function.where == "reading":
         return np.broadcast_to(np.eye(6)[axis], (len(conditions), 6))

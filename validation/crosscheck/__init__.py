@@ -1,5 +1,5 @@
-"""Model and simulation compared number by number, over several scales.
+"""Comparison of model and simulation, number by number, at several scales.
 
-Begin at ``crosscheck.py``; ``pose_metric.py`` and ``clearance_metric.py`` say what is
-compared.
+Begin at ``crosscheck.py``; ``pose_metric.py`` and ``clearance_metric.py`` define the
+quantities compared.
 """

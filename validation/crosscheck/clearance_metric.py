@@ -1,12 +1,12 @@
 """Energies and springs of two models with clearances.
 
-Where no load acts on a clearance the minimum is not unique in the pose, so poses are
-not compared.  Unique are the least energy and the springs' deformations and wrenches.
-The simulated clearance screws are also put into the linear model: their energy there,
+If no load acts on a clearance the minimum is not unique in the pose, so poses are not
+compared.  The least energy and the springs' deformations and wrenches are unique. The
+simulated clearance screws are also inserted into the linear model: their energy there,
 beyond the least, is the optimality gap.  With springs as links the energy must also be
 that of the exact virtual-joint model, at full size.  Errors, clearances and load are
-scaled together by s; the linear energy is proportional to s^2, and the relative gap
-falls as s^2 too, down to the compliance of the contacts.
+scaled together by s; the linear energy is proportional to s^2.  The relative gap falls
+as s^2 too, down to the compliance of the contacts.
 """
 
 import math
@@ -27,7 +27,7 @@ from validation.crosscheck.pair import Pair
 from validation.crosscheck.verdict import Check
 
 TOLERANCE = 0.02  # relative, of limits: contacts are compliant and smoothed
-FLOOR_ENERGY = 1e-4  # [J] at scale 1: of the springs that centre clearances
+FLOOR_ENERGY = 1e-4  # [J] energy of the springs that centre clearances, at scale 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class ClearanceMetric:
     """Differences of the energy and of springs, and the optimality gap.
 
     Attributes:
-        robot: with its clearances.
+        robot: robot with its clearances.
         pairs: both solutions at each scale, largest first.
         springs: whether all links are springs in the simulation too.
     """
@@ -68,7 +68,7 @@ class ClearanceMetric:
         """Whether clearances or springs deform by more than the noise.
 
         Inside an assembly zone both energies are zero, which is a result only if
-        closing without clearances would cost energy.
+        closing without clearances would need energy.
         """
         linear, s = self.pairs[0].linear, self.pairs[0].scale
         return (
@@ -77,7 +77,7 @@ class ClearanceMetric:
 
     @cached_property
     def limits(self) -> dict[str, Check]:
-        """Relative differences extrapolated to no imperfection."""
+        """Relative differences extrapolated to zero imperfections."""
         ours = np.array([pair.linear_energy for pair in self.pairs])
         theirs = np.array([pair.simulated.rigid_energy for pair in self.pairs])
         gap = limit_of(self.scales**2, self.gaps)
@@ -92,7 +92,7 @@ class ClearanceMetric:
         return {k: replace(check, signal=self.signal) for k, check in limits.items()}
 
     def _strain_limit(self) -> Check:
-        """Difference of all springs' deformations in the energy norm."""
+        """Return the difference of all springs' deformations in the energy norm."""
         frames = self.robot.frames
         K = {"link_screws": np.zeros((len(frames), 6, 6))}
         K["joint_screws"] = np.zeros((len(frames), 6, 6))
@@ -142,7 +142,7 @@ class ClearanceMetric:
 
     @cached_property
     def checks(self) -> dict[str, Check]:
-        """What must hold, by name."""
+        """The checks, by name."""
         checks = {f"limit of {name}": check for name, check in self.limits.items()}
         exact = abs(float(self.energies["exact"][0]))
         if self.springs:
@@ -153,7 +153,7 @@ class ClearanceMetric:
         return checks
 
     def table(self) -> dict[str, Any]:
-        """Its own keys of the public format."""
+        """Return the metric's own keys of the public format."""
         return {
             "clearances": "on both sides; poses are not unique and not judged",
             "slope": None,
@@ -163,7 +163,7 @@ class ClearanceMetric:
         }
 
     def header(self) -> list[str]:
-        """Names of the columns of :meth:`rows`."""
+        """Return the names of the columns of :meth:`rows`."""
         return [
             "scale of imperfections",
             "energy, simulated [J]",
@@ -173,7 +173,7 @@ class ClearanceMetric:
         ]
 
     def rows(self) -> list[list[str]]:
-        """One row for each scale, as text."""
+        """Return one row for each scale, as text."""
         return [
             [
                 f"{pair.scale:.4g}",
@@ -188,20 +188,20 @@ class ClearanceMetric:
         ]
 
     def notes(self) -> list[str]:
-        """Lines of text before the table of scales."""
+        """Return the lines of text before the table of scales."""
         return ["with clearances"]
 
 
 def optimality_gap(pair: Pair) -> float:
-    """Energy of the simulated clearance screws in the linear model, beyond the least.
+    """Return energy of simulated clearance screws in the linear model, less the least.
 
     Args:
         pair: both solutions, of a robot with clearances.
 
     Returns:
         [-] energy minus the load's work at the simulated clearance screws, projected
-        onto their cones, minus the least one; relative to the energy stored without
-        clearances, or with them under the load if that is more, or to
+        onto their cones, minus the least one.  It is relative to the largest of the
+        energy stored without clearances, that with them under the load, and
         :data:`FLOOR_ENERGY`.
     """
     best = pair.linear

@@ -1,9 +1,10 @@
-"""The virtual-joint model against the multibody simulation of the same robot.
+"""Comparison of the virtual-joint model with the multibody simulation of a robot.
 
 Both models are solved at several scales s of all imperfections (geometric errors,
 clearances) and loads.  Without clearances the platform's poses are compared
-(:mod:`validation.crosscheck.pose_metric`); with them the pose of least energy is not
-unique, and energies and springs are (:mod:`validation.crosscheck.clearance_metric`).
+(:mod:`validation.crosscheck.pose_metric`).  With clearances the pose of least energy is
+not unique, and energies and springs are compared
+(:mod:`validation.crosscheck.clearance_metric`).
 """
 
 from collections.abc import Callable, Sequence
@@ -17,9 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble, failure_status, solve_assembly
 from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.statuses import FAILS, OK, SIMULATION_FAILED, UNDECIDED
+from assembly.model.statuses import FAILS, OK, PASSED, SIMULATION_FAILED, UNDECIDED
 from assembly.solvers.conic import SolverFailed
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 from validation.crosscheck.clearance_metric import ClearanceMetric
 from validation.crosscheck.link_models import link_models
 from validation.crosscheck.pair import (
@@ -51,31 +52,31 @@ from validation.multibody.simulation import (
 )
 
 Result = TypeVar("Result")
-ELEMENTS = 4  # of each beam in the simulation
+ELEMENTS = 4  # number of elements of each beam in the simulation
 
 
 class Metric(Protocol):
-    """What is compared of two models at several scales."""
+    """Comparison of two models at several scales."""
 
     @property
     def slope(self) -> float:
-        """Of the pose difference over the scale; NaN where poses are not compared."""
+        """Slope of the pose difference over the scale; NaN without poses."""
 
     @property
     def checks(self) -> dict[str, Check]:
-        """What must hold, by name."""
+        """The checks, by name."""
 
     def notes(self) -> list[str]:
-        """Lines of text before the table of scales."""
+        """Return lines of text before the table of scales."""
 
     def header(self) -> list[str]:
-        """Names of the columns of :meth:`rows`."""
+        """Return the names of the columns of :meth:`rows`."""
 
     def rows(self) -> list[list[str]]:
-        """Cells, one row for each scale."""
+        """Return cells, one row for each scale."""
 
     def table(self) -> dict[str, Any]:
-        """Its own keys of the public format."""
+        """Return the metric's own keys of the public format."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,11 +86,11 @@ class Crosscheck:
     Attributes:
         posture: nominal.
         load: (6,) [N m, N] on the platform at scale 1, base axes.
-        links: how the simulation modelled links: ``"beam"``, ``"spring"``, ``"fem"``.
+        links: model of links in the simulation: ``"beam"``, ``"spring"``, ``"fem"``.
         gravity: (3,) [m/s^2] at scale 1, base axes.
         pairs: one for each scale, largest first.
-        asked: how many of the scales were asked for; smaller ones were added to decide.
-        metric: what is compared.
+        asked: number of requested scales; smaller ones were added for a decision.
+        metric: the comparison.
     """
 
     posture: Posture
@@ -109,17 +110,17 @@ class Crosscheck:
 
     @property
     def slope(self) -> float:
-        """Of the pose difference over the scale; NaN where poses are not compared."""
+        """Slope of the pose difference over the scale; NaN without poses."""
         return self.metric.slope
 
     @property
     def checks(self) -> dict[str, Check]:
-        """What must hold, by name."""
+        """The checks, by name."""
         return self.metric.checks
 
     @cached_property
     def resolutions(self) -> list[Resolution]:
-        """The smallest change of each number of the robot that would be noticed."""
+        """The smallest change of each number of the robot that the check detects."""
         assert isinstance(self.metric, PoseMetric | ClearanceMetric)
         return resolutions(
             self.posture, self.pairs, self.metric, self.load, self.gravity
@@ -128,13 +129,13 @@ class Crosscheck:
     @property
     def passed(self) -> bool:
         """Whether every check holds."""
-        return verdict(self) == "passed"
+        return verdict(self) == PASSED
 
     def table(self) -> dict[str, Any]:
-        """Everything ``validation crosscheck`` reports, keys of the public format.
+        """Return all results of ``validation crosscheck``, keys of the public format.
 
         Returns:
-            ``scales`` holds those asked for, ``added_scales`` the others.
+            ``scales`` holds the requested ones, ``added_scales`` the others.
         """
         robot = self.posture.robot
         tables = [pair.table(robot) for pair in self.pairs]
@@ -171,11 +172,11 @@ class Crosscheck:
                 for one in self.resolutions
             ],
             "verdict": outcome,
-            "passed": outcome == "passed",
+            "passed": outcome == PASSED,
         }
 
     def text(self) -> str:
-        """A table and the verdict for people, without colours."""
+        """Return a table and the verdict as text, without colours."""
         cells = [self.metric.header(), *self.metric.rows()]
         lines = [f"{self.posture.robot.name}, {self.metric.notes()[0]}"]
         lines += self.metric.notes()[1:]
@@ -206,9 +207,9 @@ def crosscheck(
     """Solve a robot with both models at several scales of its imperfections.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         scales: at least two different factors on errors, clearances and load, > 0;
-            smaller ones are added where these leave a check undecided.
+            smaller ones are added if a check is undecided.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         links: ``"beam"``: beams bend geometrically exactly; ``"spring"``: every link
             is its K_E in the simulation too, which checks everything but the beams;
@@ -225,7 +226,7 @@ def crosscheck(
     Raises:
         BadInput: too few scales, or one that is not positive.
         SimulationFailed: the simulation found no equilibrium.
-        CannotAssemble: the virtual-joint model has none.
+        CannotAssemble: the virtual-joint model has no solution.
         FreeMotion: the load drives a motion that nothing resists.
     """
     robot = posture.robot if clearances else without_clearance(posture.robot)
@@ -251,7 +252,7 @@ def crosscheck(
         )  # fmt: skip
         if simulated.held:
             held.append(s)
-        # what holds free motions in the simulation holds them in the other models too
+        # springs that hold free motions in the simulation are in the other models too
         if simulated.held and holding is not None:
             linear = holding
         exact = exact_solution(linear, s * g)
@@ -279,11 +280,11 @@ def crosscheck(
 def attempt(
     robot: str, check: Callable[[], Result]
 ) -> tuple[Result | None, dict[str, Any]]:
-    """A check's result, or why there is none, for sweeps and the command line.
+    """Return a check's result or the reason of its failure.
 
     Args:
         robot: its name.
-        check: what to run, without arguments.
+        check: function that runs the check, without arguments.
 
     Returns:
         The result and nothing, or None and ``status``, ``reason``, ``passed`` and a

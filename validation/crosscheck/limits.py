@@ -9,7 +9,7 @@ limit   ``limit_difference`` difference / s^p extrapolated to s = 0, relative
 ======  ===================  ==========================================================
 
 The uncertainty of a limit is twice its change when the largest scale is left out.
-Differences below :data:`FLOOR`, which simulations do not resolve, are noise.
+Differences below :data:`FLOOR`, the resolution of simulations, are noise.
 """
 
 import math
@@ -23,25 +23,26 @@ from validation.crosscheck.link_models import link_stiffness
 from validation.crosscheck.pair import Pair, sprung
 from validation.crosscheck.verdict import Check
 
-LIMIT_TOLERANCE = 1e-3  # relative, of every quantity extrapolated to no error
+LIMIT_TOLERANCE = 1e-3  # relative, of every quantity extrapolated to zero error
 FLOOR = {
     "rotation": 1e-10,
     "translation": 1e-11,
 }  # [rad], [m] resolution of simulations
-_NOISE = 3.0  # times what weak springs of free motions change is noise
+# factor on the effect of free motions' weak springs, below which changes are noise
+_NOISE = 3.0
 HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 
 
 def spring_limits(
     robot: Robot, pairs: Sequence[Pair], spread: bool = False
 ) -> dict[str, Check]:
-    """Differences of springs and energy, extrapolated to no error.
+    """Return the differences of springs and energy, extrapolated to zero error.
 
     Args:
-        robot: whose links and joint springs are compared.
+        robot: the robot with the links and joint springs compared.
         pairs: both solutions at several scales.
-        spread: whether loads act between the links' ends: the linear model does not
-            contain them, and links' wrenches are left out.
+        spread: whether loads act between the links' ends.  The linear model lacks
+            these, so links' wrenches are left out.
 
     Returns:
         By name, relative to the largest among all links or all joints; see
@@ -78,7 +79,7 @@ def spring_limits(
 
 
 def energy_floor(robot: Robot) -> float:
-    """[J] energies below it are noise: :data:`FLOOR` in the stiffest spring."""
+    """Return the energy [J] of noise: :data:`FLOOR` in the stiffest spring."""
     return float((_stiffest(robot) * np.array(list(FLOOR.values())) ** 2).max())
 
 
@@ -86,20 +87,21 @@ def limit_difference(
     scales: NDArray, ours: NDArray, theirs: NDArray, power: int, floor: float,
     bound: float = LIMIT_TOLERANCE, least_size: float = 0.0,
 ) -> Check:  # fmt: skip
-    """Largest difference as the scale goes to 0, relative to the largest value.
+    """Return the largest difference as the scale goes to 0, relative to the values.
 
     Args:
         scales: (k,) all different, largest first.
-        ours: (k, ...) values that fall as a power of the scale.
+        ours: (k, ...) values that decrease as a power of the scale.
         theirs: (k, ...) values to compare.
-        power: of the scale.
+        power: power of the scale.
         floor: differences below it, in the values' unit, are noise.
         bound: on the relative difference.
-        least_size: relative to which, at least, in the unit of the values at scale 1.
+        least_size: least reference of the difference, in the unit of the values at
+            scale 1.
 
     Returns:
-        [-] the difference; at most the bound if only noise is left.  There is a signal
-        where the bound on our largest value is above the noise.
+        [-] the difference; at most the bound if only noise remains.  There is a signal
+        if the bound on our largest value is above the noise.
     """
     weight = scales.reshape(-1, *[1] * (ours.ndim - 1)) ** -float(power)
     limit, change = limit_of(scales, (theirs - ours) * weight)
@@ -110,7 +112,7 @@ def limit_difference(
 
 
 def limit_of(scales: NDArray, values: NDArray) -> tuple[float, float]:
-    """Largest component at scale 0, and its uncertainty.
+    """Return the largest component at scale 0, and its uncertainty.
 
     Args:
         scales: (k,) all different, largest first.
@@ -125,7 +127,7 @@ def limit_of(scales: NDArray, values: NDArray) -> tuple[float, float]:
 
 
 def _stiffest(robot: Robot) -> NDArray:
-    """(2,) [N m/rad, N/m] the largest stiffness of any spring to turns and shifts."""
+    """Return the (2,) [N m/rad, N/m] largest stiffness of any spring."""
     diagonals = [np.zeros(6)]
     links = [frame for frame in robot.frames if frame.link is not None]
     diagonals += [np.diag(link_stiffness(frame)) for frame in links]
@@ -135,12 +137,13 @@ def _stiffest(robot: Robot) -> NDArray:
 
 
 def difference_slope(scales: ArrayLike, differences: ArrayLike, floor: float) -> float:
-    """Slope of log difference over log scale, of its first- and second-order terms.
+    """Return the slope of log difference over log scale, by its first two orders.
 
-    A difference of second order is ``c2 s^2 + c3 s^3 + ..``, vectors that may cancel in
-    part: a line through the logarithms of its size then has any slope, at scales from 1
-    to 1/8 as low as 1.3.  So the first-order term ``c1 s`` is extrapolated by itself,
-    from ``difference / s``, and compared with all others at the smallest scale.
+    A difference of second order is ``c2 s^2 + c3 s^3 + ..``, with vectors that may
+    partly cancel.  A line through the logarithms of its size then has any slope, down
+    to 1.3 at scales from 1 to 1/8.  So the first-order term ``c1 s`` is extrapolated
+    separately, from ``difference / s``, and compared with all others at the smallest
+    scale.
 
     Args:
         scales: (k,) > 0, largest first.
@@ -148,8 +151,8 @@ def difference_slope(scales: ArrayLike, differences: ArrayLike, floor: float) ->
         floor: differences of a size below it are noise and are left out.
 
     Returns:
-        2 without a first-order term, 1 with nothing else; NaN if fewer than two
-        differences are left.
+        2 without a first-order term, 1 with this term alone; NaN with fewer than two
+        differences.
     """
     scales, parts = _clear(scales, differences, floor)
     if len(scales) < 2:
@@ -162,7 +165,7 @@ def difference_slope(scales: ArrayLike, differences: ArrayLike, floor: float) ->
 def slope_check(
     scales: ArrayLike, differences: ArrayLike, floor: float, bound: float
 ) -> Check:
-    """Difference of a slope from 2.
+    """Return the difference of a slope from 2.
 
     Args:
         scales: (k,) largest first.
@@ -172,8 +175,8 @@ def slope_check(
 
     Returns:
         The difference; its uncertainty is the change when the largest scale is left
-        out, infinite on two scales.  There is no slope, and no signal, without two
-        differences above the floor, or where noise alone can make more of a slope than
+        out, infinite for two scales.  There is no slope, and no signal, without two
+        differences above the floor, or if noise alone can change the slope by more than
         the bound.
     """
     value = 2.0 - difference_slope(scales, differences, floor)
@@ -192,7 +195,7 @@ def slope_check(
 def _clear(
     scales: ArrayLike, differences: ArrayLike, floor: float
 ) -> tuple[NDArray, NDArray]:
-    """Scales and (k, components) differences that are above the noise."""
+    """Return the scales and (k, components) differences above the noise."""
     scales = np.asarray(scales, dtype=float)
     parts = np.asarray(differences, dtype=float).reshape(len(scales), -1)
     clear = np.linalg.norm(parts, axis=1) > floor
@@ -200,7 +203,7 @@ def _clear(
 
 
 def _slope_of_noise(scales: ArrayLike, differences: ArrayLike, floor: float) -> float:
-    """By how much noise of the floor in every difference may change the slope."""
+    """Return the change of the slope that noise of the floor may cause."""
     scales, parts = _clear(scales, differences, floor)
     weights = extrapolate(scales, np.diag(1.0 / scales))
     first = scales[-1] * floor * float(np.abs(weights).sum())
@@ -208,7 +211,7 @@ def _slope_of_noise(scales: ArrayLike, differences: ArrayLike, floor: float) -> 
 
 
 def extrapolate(scales: NDArray, values: NDArray) -> NDArray:
-    """Value at scale 0 of the polynomial through all points, by Neville's scheme.
+    """Return the value at scale 0 of the polynomial through all points (Neville).
 
     Args:
         scales: (k,) all different.

@@ -1,4 +1,4 @@
-"""How a simulation models a robot's links: as beams, as springs or as solids."""
+"""Models of a robot's links in a simulation: beams, springs or solids."""
 
 from collections.abc import Mapping
 
@@ -15,15 +15,15 @@ KINDS = ("beam", "spring", "fem")
 
 
 def link_models(robot: Robot, kind: str) -> SimulationModel:
-    """The model of a robot's links: stiffnesses of springs, and solids.
+    """Return the model of a robot's links: stiffnesses of springs, and solids.
 
     Args:
-        robot: any.
+        robot: any robot.
         kind: ``"beam"``: beams as beams, all others as springs; ``"spring"``: all as
-            springs; ``"fem"``: meshed links as solids, the others as with ``"beam"``.
+            springs; ``"fem"``: meshed links as solids, others as for ``"beam"``.
 
     Returns:
-        The model, joints without clearance.
+        The model; its joints have no clearance.
 
     Raises:
         BadInput: an unknown kind, or a mesh is not usable.
@@ -40,11 +40,11 @@ def link_models(robot: Robot, kind: str) -> SimulationModel:
 
 
 def link_stiffnesses(robot: Robot, links: str) -> Mapping[str, NDArray]:
-    """K_E of the links that a simulation will model as springs.
+    """Return K_E of the links that a simulation models as springs.
 
     Args:
-        robot: any.
-        links: ``"spring"``, or anything else, where beams need none.
+        robot: any robot.
+        links: ``"spring"``, or another kind, in which beams are left out.
 
     Returns:
         By frame, (6, 6) [N m/rad .. N/m] in its axes.
@@ -58,5 +58,5 @@ def link_stiffnesses(robot: Robot, links: str) -> Mapping[str, NDArray]:
 
 
 def link_stiffness(frame: Frame) -> NDArray:
-    """(6, 6) [N m/rad .. N/m] K_E of a frame's link."""
+    """Return the (6, 6) [N m/rad .. N/m] K_E of a frame's link."""
     return np.linalg.inv(link_compliance(frame))

@@ -22,13 +22,14 @@ class Pair:
 
     Attributes:
         scale: factor on errors and load.
-        linear: of the virtual-joint model.
-        simulated: of the simulation.
-        exact: of the virtual-joint model with finite rotations, None if there is none.
-        between: [J] stored by weights in the simulation's beams between their ends,
-            which the linear model does not contain.
-        holding: the linear model with the springs of :func:`hold_free_motions`, to know
-            what weaker ones in the simulation do; None if there are none.
+        linear: result of the virtual-joint model.
+        simulated: result of the simulation.
+        exact: result of the virtual-joint model with finite rotations, or None.
+        between: [J] energy of distributed weights in the simulation's beams, which the
+            linear model does not contain.
+        holding: the linear model with the springs of :func:`hold_free_motions`, to
+            estimate the effect of weaker ones in the simulation; None if there are
+            none.
     """
 
     scale: float
@@ -39,7 +40,7 @@ class Pair:
     holding: Assembly | None = None
 
     def noise_of(self, quantity: str) -> NDArray:
-        """What the springs of free motions in the simulation change, at scale 1.
+        """Return the effect of the simulation's springs of free motions, at scale 1.
 
         They are so weak that their effect is proportional to their stiffness.
 
@@ -47,8 +48,8 @@ class Pair:
             quantity: a screw or wrenches of an ``Assembly``, proportional to the scale.
 
         Returns:
-            Sizes of the changes, shaped as the quantity; zero where both models have
-            the same springs.
+            Sizes of the changes, shaped as the quantity; zero if both models have the
+            same springs.
         """
         value = np.asarray(getattr(self.linear, quantity))
         if self.holding is None or self.simulated.held:
@@ -59,9 +60,9 @@ class Pair:
 
     @property
     def linear_energy(self) -> float:
-        """[J] of the linear model, and of weights between links' ends.
+        """[J] of the linear model, and of distributed weights.
 
-        Without what holds free motions, as in the simulation.
+        It excludes the springs that hold free motions, as in the simulation.
         """
         robot = self.linear.posture.robot
         held = holding_energy(robot, self.linear.joint_screws)
@@ -73,7 +74,7 @@ class Pair:
         return self.simulated.platform_screw - self.linear.platform_screw
 
     def table(self, robot: Robot) -> dict[str, Any]:
-        """Both solutions and their differences, by name; see the public format."""
+        """Return both solutions and their differences in the public format."""
         linear, simulated = self.linear, self.simulated
         vjm = {
             "platform_screw": linear.platform_screw,
@@ -116,10 +117,10 @@ class Pair:
 
 
 def sprung(robot: Robot) -> NDArray:
-    """Where joints have springs: in rigid directions the simulation has no wrench.
+    """Return the components with joint springs; rigid ones have no simulated wrench.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
 
     Returns:
         (n, 6) 1 where K_B is finite, else 0.
@@ -132,7 +133,7 @@ def sprung(robot: Robot) -> NDArray:
 
 
 def _named(robot: Robot, part: str, rows: NDArray) -> dict[str, NDArray]:
-    """Rows of the frames that have a part, by name."""
+    """Return the rows of the frames that have a part, by name."""
     return {
         frame.name: row
         for frame, row in zip(robot.frames, rows, strict=True)
@@ -141,10 +142,10 @@ def _named(robot: Robot, part: str, rows: NDArray) -> dict[str, NDArray]:
 
 
 def hold_free_motions(posture: Posture) -> Posture:
-    """The same posture with the springs by which a simulation holds free motions.
+    """Return the posture with the simulation's springs on free motions.
 
     Args:
-        posture: of a robot without clearances.
+        posture: posture of a robot without clearances.
 
     Returns:
         A posture of a robot whose passive joints without a spring of their own have one
@@ -164,10 +165,10 @@ def hold_free_motions(posture: Posture) -> Posture:
 
 
 def holding_energy(robot: Robot, joint_screws: NDArray) -> float:
-    """Energy in the springs that hold free motions, where a robot has them.
+    """Return the energy in the springs that hold free motions, if there are any.
 
     Args:
-        robot: of the virtual-joint model, perhaps with such springs.
+        robot: robot of the virtual-joint model, perhaps with such springs.
         joint_screws: (n, 6) [rad, m] deformations of its joints.
 
     Returns:
@@ -183,10 +184,10 @@ def holding_energy(robot: Robot, joint_screws: NDArray) -> float:
 def exact_solution(
     linear: Assembly, gravity: ArrayLike | None = None
 ) -> ExactAssembly | None:
-    """The solution with finite rotations near a linear one; None if none was found.
+    """Return a solution with finite rotations near a linear one, or None.
 
     Args:
-        linear: to start from.
+        linear: the start.
         gravity: (3,) [m/s^2] base axes, the one of the linear solution.
 
     Returns:
@@ -206,7 +207,7 @@ def exact_solution(
 
 
 def scaled(posture: Posture, scale: float) -> Posture:
-    """The same posture with all imperfections times a factor.
+    """Return the same posture with all imperfections times a factor.
 
     Args:
         posture: nominal.

@@ -13,15 +13,15 @@ if TYPE_CHECKING:
 
 
 def slope_figure(check: Crosscheck) -> "Figure":
-    """Difference of simulation and linear model against the scale of the errors.
+    """Return the difference of simulation and linear model against the errors' scale.
 
     Args:
-        check: of :func:`validation.crosscheck.crosscheck.crosscheck`, without
+        check: result of :func:`validation.crosscheck.crosscheck.crosscheck`, without
             clearances.
 
     Returns:
-        A log-log figure, rotation [mrad] and translation [mm] beside each other, each
-        with a line of slope 2 through the value of the smallest scale.
+        A log-log figure with rotation [mrad] and translation [mm], each with a line of
+        slope 2 through the value of the smallest scale.
     """
     from matplotlib.figure import Figure
 

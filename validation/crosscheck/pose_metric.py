@@ -1,11 +1,11 @@
 """Poses of two models without clearances: slopes, limits, explained differences.
 
 The virtual-joint model is linear in the errors, the simulation is not.  If the linear
-model is right, their difference is of second order: as the errors and the load are
-scaled by s, the pose difference falls as s^2, a slope of 2 in a log-log plot, and every
-quantity of the simulation, divided by its power of s and extrapolated to s = 0, is the
-linear model's.  A wrong term of first order, even of a thousandth, changes the slope
-and the limit.  Passive joints move freely along their z on both sides.
+model is right, their difference is of second order.  If errors and load are scaled by
+s, the pose difference falls as s^2, with a slope of 2 in a log-log plot.  Every
+quantity of the simulation, divided by its power of s and extrapolated to s = 0, is then
+that of the linear model.  A wrong term of first order, even of a thousandth, changes
+the slope and the limit.  Passive joints move freely along their z on both sides.
 
 ======  ===============  =============================================================
 symbol  code             meaning
@@ -36,10 +36,11 @@ from validation.crosscheck.limits import (
 from validation.crosscheck.pair import Pair
 from validation.crosscheck.verdict import Check
 
-SLOPE_TOLERANCE = 0.1  # of the pose difference, around 2
-EXPLAINED_TOLERANCE = 0.02  # of the pose difference, with springs as links
-# relative, of the pose: a first-order difference that a mesh's K_E may have against the
-# solid by rounding; it says nothing where second orders are as small
+SLOPE_TOLERANCE = 0.1  # accepted difference of the pose difference's slope from 2
+# accepted share of the pose difference that the exact model with springs leaves
+EXPLAINED_TOLERANCE = 0.02
+# relative, of the pose: a first-order difference between a mesh's K_E and its solid due
+# to rounding, significant only where second orders are as small
 _ROUNDING = 2e-5
 
 
@@ -48,10 +49,10 @@ class PoseMetric:
     """Differences of the platform's pose, of springs and energy.
 
     Attributes:
-        robot: without clearances.
+        robot: robot without clearances.
         pairs: both solutions at each scale, largest first.
         springs: whether all links are springs in the simulation too.
-        gravity: whether there is any.
+        gravity: whether there is gravity.
     """
 
     robot: Robot
@@ -77,7 +78,7 @@ class PoseMetric:
 
     @cached_property
     def slopes(self) -> dict[str, float]:
-        """Slope of each difference; NaN where only the solver's noise is left."""
+        """Slope of each difference; NaN if it is only the solver's noise."""
         return {
             name: difference_slope(self.scales, values, FLOOR[name])
             for name, values in self.components.items()
@@ -85,17 +86,17 @@ class PoseMetric:
 
     @property
     def slope(self) -> float:
-        """The slope farther from 2; NaN where there is no difference."""
+        """The slope farther from 2; NaN if there is no difference."""
         known = [s for s in self.slopes.values() if not math.isnan(s)]
         return max(known, key=lambda s: abs(s - 2.0)) if known else math.nan
 
     @cached_property
     def unexplained(self) -> dict[str, float]:
-        """Share of the pose difference left against the exact virtual-joint model.
+        """Share of the pose difference that remains with the exact virtual-joint model.
 
-        At the largest scale.  With springs as links nothing but rounding is left; with
-        beams, what an end-point spring misses of a beam's own finite bending.  NaN
-        where there is nothing to explain.
+        It is taken at the largest scale.  With springs as links only rounding remains;
+        with beams, the error of an end-point spring for a beam's own finite bending.
+        NaN without a difference.
         """
         first = self.pairs[0]
         if first.exact is None:
@@ -110,7 +111,7 @@ class PoseMetric:
 
     @cached_property
     def limits(self) -> dict[str, Check]:
-        """Difference of each quantity, extrapolated to no error, relative to its size.
+        """Relative difference of each quantity, extrapolated to zero error.
 
         Screws and wrenches are compared by halves, each relative to the largest among
         all frames that have such a spring; differences below :data:`FLOOR`, and the
@@ -129,7 +130,7 @@ class PoseMetric:
 
     @cached_property
     def checks(self) -> dict[str, Check]:
-        """What must hold, by name."""
+        """The checks, by name."""
         slopes = {}
         for name, values in self.components.items():
             slope = slope_check(self.scales, values, FLOOR[name], SLOPE_TOLERANCE)
@@ -148,7 +149,7 @@ class PoseMetric:
         return slopes | limits | shares
 
     def table(self) -> dict[str, Any]:
-        """Its own keys of the public format."""
+        """Return the metric's own keys of the public format."""
         return {
             "clearances": "left out on both sides",
             "slope": self.slope,
@@ -158,7 +159,7 @@ class PoseMetric:
         }
 
     def header(self) -> list[str]:
-        """Names of the columns of :meth:`rows`."""
+        """Return the names of the columns of :meth:`rows`."""
         return [
             "scale of the errors",
             "rotation difference [rad]",
@@ -168,7 +169,7 @@ class PoseMetric:
         ]
 
     def rows(self) -> list[list[str]]:
-        """One row for each scale, as text."""
+        """Return one row for each scale, as text."""
         differences = zip(*self.differences.values(), strict=True)
         return [
             [
@@ -182,7 +183,7 @@ class PoseMetric:
         ]
 
     def notes(self) -> list[str]:
-        """Lines of text before the table of scales."""
+        """Return the lines of text before the table of scales."""
         lines = ["without clearances: simulation minus virtual-joint model"]
         known = {k: v for k, v in self.unexplained.items() if not math.isnan(v)}
         shares = [f"{100 * share:.2g} % of {half}" for half, share in known.items()]

@@ -1,4 +1,4 @@
-"""A cross-check at every pose of a grid; one that fails says so and stops nothing."""
+"""A cross-check at every pose of a grid; a failure is recorded and stops no other."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -9,12 +9,19 @@ from numpy.typing import NDArray
 from assembly.kinematics.posture import POSE, Posture, place_many
 from assembly.kinematics.verdict import limits_passed
 from assembly.model.robot import Robot
-from assembly.model.statuses import BEYOND_LIMITS, NO_SIGNAL, OUT_OF_REACH
+from assembly.model.statuses import (
+    BEYOND_LIMITS,
+    NO_SIGNAL,
+    NOT_DECIDED,
+    OK,
+    OUT_OF_REACH,
+    PASSED,
+)
 from validation.crosscheck.crosscheck import Crosscheck, attempt
 
 _VERDICTS = {
-    "passed": "passed",
-    "not decided": "NOT DECIDED",
+    PASSED: "passed",
+    NOT_DECIDED: "NOT DECIDED",
     NO_SIGNAL: "NOT CHECKED, nothing stands out of the noise",
 }
 
@@ -28,15 +35,15 @@ def check_poses(
     """Run a check at every reachable pose of a grid.
 
     Args:
-        robot: with its errors.
+        robot: robot with its errors.
         axes: values [m or rad] by pose component; components not named are free.
-        check: what to run at a posture.
-        progress: called after each pose with the number done and the total.
+        check: function that runs at a posture.
+        progress: function called after each pose with the number done and the total.
 
     Returns:
-        For each pose what was ``asked``, ``passed``, ``status`` and the check's table;
-        poses out of reach have the status ``"out of reach"``, those beyond the joints'
-        limits ``"beyond_limits"``, and ``passed`` None.
+        For each pose the requested pose as ``asked``, ``passed``, ``status`` and the
+        check's table; unreachable poses have the status ``"out of reach"``, those
+        beyond the joints' limits ``"beyond_limits"``, and ``passed`` None.
 
     Raises:
         BadInput: the robot's closures do not hold in its home pose.
@@ -60,24 +67,24 @@ def _row(
     reason: str,
     check: Callable[[Posture], Crosscheck],
 ) -> dict[str, Any]:
-    """The result at one pose."""
+    """Return the result at one pose."""
     if posture is None:
         return {"status": OUT_OF_REACH, "reason": reason, "passed": None}
     if passed := limits_passed(robot, posture.coordinates):
         return {"status": BEYOND_LIMITS, "reason": passed, "passed": None}
     result, failure = attempt(robot.name, lambda: check(posture))
-    return failure if result is None else {"status": "ok"} | result.table()
+    return failure if result is None else {"status": OK} | result.table()
 
 
 def poses_table(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """All poses for machines: ``passed`` if every reachable one did, and one did."""
+    """Return plain values; ``passed`` is true if all of the reached poses passed."""
     reached = [row for row in rows if row["passed"] is not None]
     passed = bool(reached) and all(row["passed"] for row in reached)
     return {"poses": rows, "passed": passed, "reached": len(reached)}
 
 
 def poses_text(rows: list[dict[str, Any]]) -> str:
-    """A line for each pose, and the verdict."""
+    """Return a line for each pose, and the verdict."""
     lines = []
     for row in rows:
         where = ", ".join(f"{k}={v:.6g}" for k, v in row["asked"].items())
@@ -87,7 +94,7 @@ def poses_text(rows: list[dict[str, Any]]) -> str:
         verdict = _VERDICTS.get(row.get("verdict", ""), "FAILED")
         if row["passed"] is None:
             verdict = "not checked"
-        status = "" if row["status"] == "ok" else f" ({row['status']})"
+        status = "" if row["status"] == OK else f" ({row['status']})"
         lines.append(f"{where}: {measured}{verdict}{status}")
     reached = poses_table(rows)["reached"]
     lines.append(

@@ -1,10 +1,10 @@
-"""The smallest change of each number of a robot that a cross-check would notice.
+"""The smallest change of each number of a robot that a cross-check detects.
 
-A check notices a wrong number by what it changes in the linear model: each number is
-changed by a hundredth, the model is solved again, and its answer is compared with the
+A check detects a wrong number by its effect in the linear model.  Each number is
+changed by a hundredth and the model is solved again.  The result is compared with the
 unchanged one by the same metric, floors and bounds as the simulation's.  The relative
-change at which the first check reaches its bound follows in proportion.  A number whose
-change by its own size is not noticed is unproved.
+change at which the first check reaches its bound follows in proportion.  A number is
+unproved if a change by its own size is not detected.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,6 +20,7 @@ from assembly.linear.assembled import Assembly
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, MeshLink
+from assembly.model.statuses import NO_EQUILIBRIUM
 from assembly.solvers.conic import SolverFailed
 from stiffness.screws import SCREW
 from validation.crosscheck.clearance_metric import ClearanceMetric
@@ -32,23 +33,23 @@ from validation.crosscheck.pair import (
 )
 from validation.crosscheck.pose_metric import PoseMetric
 
-_CHANGE = 1e-2  # relative, of a number, to see what follows
+_CHANGE = 1e-2  # relative change of a number, to compute its effect
 _QUADRATIC = "optimality gap"  # grows with the square of a change
-UNPROVED = 1.0  # relative change that is not noticed
-_NAMED = 4  # numbers in a line of text
+UNPROVED = 1.0  # relative change that is not detected
+_NAMED = 4  # largest number of numbers in a line of text
 _KINDS = ("link", "joint stiffness", "clearance", "error")
 
 
 @dataclass(frozen=True)
 class Resolution:
-    """What of one number a cross-check would notice.
+    """Detection of changes of one number by a cross-check.
 
     Attributes:
         name: frame and quantity, such as ``leg1.elbow.radial``.
         kind: link, joint stiffness, clearance or error.
-        value: of the number; 1 for a link, whose stiffness is scaled.
-        smallest: relative change that is noticed; inf if none is.
-        by: the check that notices it first.
+        value: value of the number; 1 for a link, whose stiffness is scaled.
+        smallest: relative change that is detected; inf if none is.
+        by: the check that detects it first.
     """
 
     name: str
@@ -59,7 +60,7 @@ class Resolution:
 
     @property
     def unproved(self) -> bool:
-        """Whether even a change by its own size is not noticed."""
+        """Whether even a change by its own size is not detected."""
         return not self.smallest < UNPROVED
 
 
@@ -67,12 +68,12 @@ def resolutions(
     posture: Posture, pairs: Sequence[Pair], metric: PoseMetric | ClearanceMetric,
     load: NDArray, gravity: NDArray,
 ) -> list[Resolution]:  # fmt: skip
-    """The smallest changes that the limits of a cross-check notice.
+    """Return the smallest changes that the limits of a cross-check detect.
 
     Args:
-        posture: of the robot compared.
+        posture: posture of the robot compared.
         pairs: solutions at several scales, largest first.
-        metric: what is compared.
+        metric: the comparison.
         load: (6,) [N m, N] at scale 1.
         gravity: (3,) [m/s^2] at scale 1.
 
@@ -86,13 +87,13 @@ def resolutions(
         try:
             smallest, by = _noticed(changed, pairs, metric, load, gravity)
         except (CannotAssemble, FreeMotion, SolverFailed):
-            smallest, by = _CHANGE, "no equilibrium"
+            smallest, by = _CHANGE, NO_EQUILIBRIUM
         found.append(Resolution(name, kind, value, smallest, by))
     return found
 
 
 def _changes(posture: Posture, weight: bool) -> Iterator[tuple[str, str, float, Frame]]:
-    """Name, kind and value of each number, and its frame with the number changed."""
+    """Yield name, kind and value of each number, and its changed frame."""
     more = 1.0 + _CHANGE
     for frame in posture.robot.frames:
         link = frame.link
@@ -120,7 +121,7 @@ def _changes(posture: Posture, weight: bool) -> Iterator[tuple[str, str, float, 
 def _joint_changes(
     frame: Frame, more: float
 ) -> Iterator[tuple[str, str, float, Frame]]:
-    """The finite entries of a joint's stiffness; a full matrix as a whole."""
+    """Yield the finite entries of a joint's stiffness; a full matrix as a whole."""
     K = frame.joint_stiffness
     if K is None:
         return
@@ -137,7 +138,7 @@ def _joint_changes(
 
 
 def _with_frame(posture: Posture, frame: Frame) -> Posture:
-    """The posture with one frame in the place of the one of its name."""
+    """Return the posture with one frame replaced by another of its name."""
     frames = [frame if f.name == frame.name else f for f in posture.robot.frames]
     return replace(posture, robot=replace(posture.robot, frames=tuple(frames)))
 
@@ -146,13 +147,13 @@ def _noticed(
     changed: Posture, pairs: Sequence[Pair], metric: PoseMetric | ClearanceMetric,
     load: NDArray, gravity: NDArray,
 ) -> tuple[float, str]:  # fmt: skip
-    """The smallest relative change that a limit notices, and which limit."""
+    """Return the smallest relative change that a limit detects, and which limit."""
     first = pairs[0]
     if first.simulated.held:
         changed = hold_free_motions(changed)
     s = first.scale
     other = solve_assembly(scaled(changed, s), s * load, gravity=s * gravity)
-    # the linear model is homogeneous: any second scale will do
+    # the linear model is homogeneous, so any second scale is valid
     compared = tuple(
         replace(pair, simulated=_as_simulated(other, first, pair)) for pair in pairs[:2]
     )
@@ -169,7 +170,7 @@ def _noticed(
 
 
 def _as_simulated(other: Assembly, first: Pair, pair: Pair) -> Any:
-    """A solution at the first scale as a simulation's at another."""
+    """Return a solution at the first scale as a simulation's at another."""
     ratio = pair.scale / first.scale
     held = holding_energy(other.posture.robot, other.joint_screws)
     energy = (other.energy - held) * ratio**2 + pair.between
@@ -187,7 +188,7 @@ def _as_simulated(other: Assembly, first: Pair, pair: Pair) -> Any:
 
 
 def resolution_text(found: Sequence[Resolution]) -> list[str]:
-    """Lines for people: what is noticed of each kind of number, what is unproved."""
+    """Return text lines: detected changes of each kind of number, unproved numbers."""
     lines = []
     for kind in _KINDS:
         proved = [r for r in found if r.kind == kind and not r.unproved]
@@ -208,5 +209,5 @@ def resolution_text(found: Sequence[Resolution]) -> list[str]:
 
 
 def _percent(share: float) -> str:
-    """A share with two digits."""
+    """Return a share with two digits."""
     return f"{100 * share:.2g} %"

@@ -1,4 +1,4 @@
-"""Meshed links as solids for a simulation: the mesh K_E comes from, and its matrix."""
+"""Meshed links as solids for a simulation: the mesh behind K_E, and its matrix."""
 
 import numpy as np
 from scipy.sparse import csr_matrix, diags
@@ -11,18 +11,18 @@ from validation.multibody.exudyn_parts import MeshBody, MeshedSolid
 
 
 def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
-    """Solids of the links that a robot gives by a mesh, for a simulation.
+    """Return the solids of a robot's mesh links, for a simulation.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
-        By frame, the finest mesh from which the linear model's K_E comes too; links of
+        By frame, the finest mesh, from which the linear model's K_E comes too; links of
         one shape and material share one solid.
 
     Raises:
         BadInput: a mesh was not solved when the robot was loaded, or an interface is
-            not rigid, the only kind a floating frame has here.
+            not rigid, the only kind supported here.
     """
     known: dict[tuple[MeshedLink, float], MeshedSolid] = {}
     bodies = {}
@@ -45,7 +45,7 @@ def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
 
 
 def _solid(solved: MeshedLink, factor: float) -> MeshedSolid:
-    """The finest mesh of a link, with its stiffness matrix times a factor."""
+    """Return the finest mesh of a link, with its stiffness matrix times a factor."""
     from stiffness.fem.elements import assemble
 
     mesh, constants = solved.level.mesh, solved.level.material

@@ -1,10 +1,10 @@
-"""Distributed weight of a beam, and the energy lost when it acts at the ends.
+"""Distributed weight of a beam, and the energy lost by weights at its ends.
 
-The virtual-joint model describes a link by its two ends.  Half of the weight at either
+The virtual-joint model describes a link by its two ends.  Half of the weight at each
 end, with the moments of a beam clamped at both (:func:`assembly.linear.load.weights`),
-gives the exact displacements of the ends; the energy between them is missing.  Half of
-the weight alone, without the moments, also moves the ends: a cantilever's by a third
-too far.
+causes the exact displacements of the ends; the energy between them is missing.  Half of
+the weight alone, without the moments, also moves the ends: that of a cantilever by a
+third too far.
 """
 
 from collections.abc import Iterator
@@ -24,9 +24,9 @@ class HeavyBeam:
     """A beam under its weight.
 
     Attributes:
-        index: of its frame.
+        index: index of its frame.
         link: its material.
-        section: its constants.
+        section: its section constants.
         length: [m].
         line: (3,) [m] from its base to its tip, base axes.
         weight: (3,) [N/m] across its section's x, y, z.
@@ -43,14 +43,14 @@ class HeavyBeam:
 
 
 def heavy_beams(posture: Posture, gravity: ArrayLike) -> Iterator[HeavyBeam]:
-    """All beams of a robot that have a density.
+    """Yield all beams of a robot that have a density.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         gravity: (3,) [m/s^2] base axes.
 
     Yields:
-        Each with its weight.
+        Each beam with its weight.
     """
     g = np.asarray(gravity, dtype=float)
     for index, frame in enumerate(posture.robot.frames):
@@ -76,16 +76,16 @@ def heavy_beams(posture: Posture, gravity: ArrayLike) -> Iterator[HeavyBeam]:
 def energy_between_ends(
     posture: Posture, gravity: ArrayLike, pieces: float = np.inf
 ) -> float:
-    """Energy of beams clamped at both ends under their own weight.
+    """Return the energy of beams clamped at both ends under their own weight.
 
     For the weight across, q^2 L^5 / 1440 EI in bending and q^2 L^3 / 24 GA in shear;
     q^2 L^3 / 24 EA for that along the beam.  The ends' motion does no work on it.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         gravity: (3,) [m/s^2] base axes.
-        pieces: number of equal ones at whose ends the weight acts, with the moments of
-            a clamped piece: their own energy is left out, the share 1 / pieces^4 of
+        pieces: number of equal pieces with weights at their ends, and the moments of a
+            clamped piece.  Their own energy is left out, the share 1 / pieces^4 of
             bending and 1 / pieces^2 of shear and stretching.
 
     Returns:

@@ -1,13 +1,13 @@
 """The platform's stiffness by two methods of the multibody simulation.
 
 At the equilibrium with the robot's errors, its load and its weight the simulation's own
-residual is differentiated, and it is loaded a little along each axis, both ways; either
-method has an uncertainty of its own (:mod:`validation.multibody.tangent`).  One whose
-uncertainty is above what is asked for decides nothing.
+residual is differentiated.  It is also loaded slightly along each axis, in both
+directions.  Each method has its own uncertainty (:mod:`validation.multibody.tangent`).
+A method whose uncertainty exceeds the tolerance decides nothing.
 
-Clearances are left out on both sides unless asked for; where they are pressed there is
-the linearised method alone, through contacts that are smoothed.  A load's force is
-dead, its moment a couple of dead forces: a moment of fixed axes has no potential
+Clearances are left out on both sides unless requested.  With pressed clearances only
+the linearised method is used, through smoothed contacts.  A load's force is dead, its
+moment a couple of dead forces: a moment of fixed axes has no potential
 (``docs/exact.md``).
 """
 
@@ -24,32 +24,33 @@ from assembly.linear.reference.reduction import FreeMotion
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import without_clearance as classical
 from assembly.platform_stiffness.matrices import PlatformStiffness
-from forcefit.inputs.display import html_table, numbers, short_repr
+from forcefit.results.display import html_table, numbers, short_repr
 from stiffness.screws import SCREW, rotation_vector
 from validation.crosscheck.link_models import link_models
 from validation.multibody.simulation import TIME_LIMIT, without_clearance
 from validation.multibody.tangent import SimulatedTangent, is_bent, simulated_tangent
 
-# of entries over sqrt(C_ii C_jj); contacts of the simulation give way by themselves
+# of entries over sqrt(C_ii C_jj); contacts of the simulation are compliant themselves
 TOLERANCE = {"spring": 1e-6, "beam": 1e-3, "fem": 2e-2}
 CONTACT_TOLERANCE = 2e-2
-_ELSEWHERE = 0.1  # of how far platforms have moved; links as beams differ by 1e-3
+_ELSEWHERE = 0.1  # of the platforms' motion; with beams as links they differ by 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class StiffnessCheck:
-    """A compliance found three times.
+    """A compliance computed by three methods.
 
     Attributes:
-        exact: the tangent of the exact equilibrium, clearances left out.
+        exact: the tangent of the exact equilibrium, without clearances.
         linear: the classical one, of the nominal robot.
-        simulated: the simulation's, of small motions at the platform's origin.
-        load: (6,) [N m, N] already there.
-        links: how the simulation modelled links.
+        simulated: stiffness in the simulation, for small motions at the platform's
+            origin.
+        load: (6,) [N m, N] existing load.
+        links: the simulation's model of the links.
         bent: whether springs are bent: by errors, a load or weight.
-        clearances: whether they count.
-        moved: (6,) [rad, m] by how far the platform stands from where it is nominally,
-            by the exact equilibrium.
+        clearances: whether they are included.
+        moved: (6,) [rad, m] displacement of the platform from its nominal pose, by the
+            exact equilibrium.
     """
 
     exact: PlatformStiffness
@@ -67,8 +68,8 @@ class StiffnessCheck:
     def differences(self) -> dict[str, float]:
         """Largest difference of entries over sqrt(C_ii C_jj).
 
-        Of the exact compliance from load steps and from the linearised system, and of
-        the classical one from load steps.
+        They are differences of the exact compliance from load steps and from the
+        linearised system, and of the classical one from load steps.
         """
         exact, linear = self.exact.compliance, self.linear.compliance
         stepped, linearised = self.simulated.stepped, self.simulated.linearised
@@ -84,7 +85,7 @@ class StiffnessCheck:
 
     @property
     def uncertainties(self) -> dict[str, float]:
-        """Of the simulation's two roads, by the difference in which they are."""
+        """Uncertainties of the simulation's two methods, by name."""
         return {
             "exact": self.simulated.stepped_error,
             "linearised": self.simulated.linearised_error,
@@ -92,17 +93,17 @@ class StiffnessCheck:
 
     @property
     def tolerance(self) -> float:
-        """[-] what the exact tangent may differ by."""
+        """[-] accepted difference of the exact tangent."""
         own = TOLERANCE[self.links]
         return max(own, CONTACT_TOLERANCE) if self.clearances else own
 
     @cached_property
     def mixed(self) -> tuple[str, ...]:
-        """Joints that are bent and have no one finite law.
+        """Joints that are bent and have no unique finite law.
 
-        They turn or slide elastically, are locked otherwise, and are elastic in more
-        than one way.  What is locked is a component of the logarithm here, an angle
-        between axes there: the same only to first order.
+        They rotate or slide elastically, are locked otherwise, and are elastic in more
+        than one direction.  A locked component is one of the logarithm here, and an
+        angle between axes in the simulation: equal only to first order.
         """
         names = []
         for frame in self.exact.posture.robot.frames:
@@ -114,16 +115,16 @@ class StiffnessCheck:
 
     @cached_property
     def simulated_moved(self) -> NDArray:
-        """(6,) [rad, m] the same by the simulation."""
+        """(6,) [rad, m] the same displacement in the simulation."""
         nominal, there = self.exact.posture.platform, self.simulated.platform
         turn = rotation_vector(there[:3, :3] @ nominal[:3, :3].T)
         return np.concatenate([turn, there[:3, 3] - nominal[:3, 3]])
 
     @property
     def another_equilibrium(self) -> bool:
-        """Whether the tangents differ because the platforms stand elsewhere.
+        """Whether the tangents differ because the platforms have different poses.
 
-        A robot loaded beyond what buckles it has several equilibria.
+        A robot loaded beyond buckling has several equilibria.
         """
         scale = np.repeat([self.exact.length, 1.0], 3)
         ours, theirs = scale * self.moved, scale * self.simulated_moved
@@ -133,19 +134,19 @@ class StiffnessCheck:
 
     @property
     def passed(self) -> bool:
-        """Whether every method that decides agrees, and one decides."""
+        """Whether every method that decides agrees, and at least one decides."""
         return not self.mixed and bool(self._decided) and all(self._decided)
 
     @property
     def _decided(self) -> list[bool]:
-        """Whether they agree, of the methods whose results are known well enough."""
+        """Whether the methods with sufficient accuracy agree."""
         return [
             self.differences[name] <= self.tolerance
             for name, own in self.uncertainties.items() if own <= self.tolerance
         ]  # fmt: skip
 
     def table(self) -> dict[str, Any]:
-        """Everything as plain values."""
+        """Return all results as plain values."""
         return {
             "robot": self.exact.posture.robot.name,
             "pose": self.exact.posture.pose(),
@@ -168,7 +169,7 @@ class StiffnessCheck:
         }
 
     def text(self) -> str:
-        """For people."""
+        """Return the results as text."""
         posture = self.exact.posture
         lines = [
             f"{posture.robot.name} at {numbers(posture.pose().values())} [m, rad], "
@@ -188,7 +189,7 @@ class StiffnessCheck:
             f"{own['linearised']:.2g}",
             f"linear minus linearised simulation: {off['linear']:.2g}",
         ]
-        if self.clearances:  # no load steps there
+        if self.clearances:  # without load steps
             del rows["load steps"], texts[0]
         for name, C in rows.items():
             cells = "".join(f"{value:12.5g}" for value in np.diag(C))
@@ -235,21 +236,21 @@ def check_stiffness(
     """Compare the tangent of the exact equilibrium with load steps in Exudyn.
 
     Args:
-        posture: where the robot stands; its errors count.
+        posture: the robot's configuration, with its errors.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         links: ``"spring"``, ``"beam"`` or ``"fem"``.
         gravity: (3,) [m/s^2] base axes.
         time_limit: [s] of the simulation.
-        clearances: whether they count.
+        clearances: whether they are included.
 
     Returns:
         All compliances.
 
     Raises:
         CannotAssemble: the errors cannot be closed.
-        FreeMotion: a motion of the platform is resisted by nothing.
+        FreeMotion: a motion of the platform has no resistance.
         SolverFailed: no equilibrium was found.
-        SimulationFailed: neither did the simulation.
+        SimulationFailed: the simulation found no equilibrium either.
     """
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     robot = posture.robot if clearances else without_clearance(posture.robot)

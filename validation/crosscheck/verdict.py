@@ -1,12 +1,12 @@
-"""Verdicts of comparisons, on as many scales as a decision needs.
+"""Verdicts of comparisons, at as many scales as a decision needs.
 
-At large errors and few scales a limit is uncertain by more than its bound: terms of
+At large errors and few scales the uncertainty of a limit exceeds its bound: terms of
 higher order look like errors of first order, or cancel them.  Then smaller scales are
 added, each half of the last, until every check is decided: a wrong term of first order
-stays, all others vanish.  Nothing fails on fewer than four scales.
+remains, all others vanish.  No check fails on fewer than four scales.
 
-Where a quantity is below the noise of either model (a robot without errors and load)
-nothing was compared: such a check has no signal, and does not count as passed.
+If a quantity is below the noise of either model (a robot without errors and load)
+nothing is compared: such a check has no signal, and does not count as passed.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,13 +15,22 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from assembly.model.statuses import FAILS, NO_SIGNAL, UNDECIDED
+from assembly.model.statuses import (
+    FAILED,
+    FAILS,
+    NO_SIGNAL,
+    NOT_DECIDED,
+    OK,
+    PASSED,
+    UNDECIDED,
+)
 from forcefit.inputs.table import BadInput
 from validation.crosscheck.pair import Pair
 
 SCALES = (1.0, 0.5, 0.25, 0.125)
 NOT_CHECKED = "not checked, nothing to compare"
-_FEWEST, _MOST = 4, 6  # scales on which a check may fail; at which none is added
+# least number of scales on which a check may fail; largest number of scales
+_FEWEST, _MOST = 4, 6
 
 
 @dataclass(frozen=True)
@@ -31,7 +40,7 @@ class Check:
     Attributes:
         value: best estimate, >= 0.
         bound: on it.
-        uncertainty: of the value.
+        uncertainty: uncertainty of the value.
         signal: whether the compared quantities are above the noise.
     """
 
@@ -42,7 +51,7 @@ class Check:
 
     @property
     def verdict(self) -> str:
-        """Whether it holds.
+        """Outcome of the check.
 
         ``"ok"``; ``"fails"``; ``"undecided"`` if its uncertainty is too large; ``"no
         signal"`` if there is nothing to compare.
@@ -51,9 +60,9 @@ class Check:
             return FAILS
         if not self.signal and not max(self.value, self.uncertainty) > self.bound:
             return NO_SIGNAL
-        # a value that is not a number is not known
+        # a value that is not a number is unknown
         known = self.value <= self.bound and self.uncertainty <= self.bound
-        return "ok" if known else UNDECIDED
+        return OK if known else UNDECIDED
 
 
 class Judged(Protocol):
@@ -65,28 +74,28 @@ class Judged(Protocol):
 
     @property
     def checks(self) -> Mapping[str, Check]:
-        """What must hold, by name."""
+        """The checks, by name."""
 
 
 Comparison = TypeVar("Comparison", bound=Judged)
 
 
 def verdict(comparison: Judged) -> str:
-    """Outcome of all checks on the scales solved.
+    """Return the outcome of all checks on the scales solved.
 
     Args:
-        comparison: with its checks.
+        comparison: comparison with its checks.
 
     Returns:
-        ``"passed"``, ``"failed"``, ``"not decided"``, or ``"no signal"`` where no check
-        had anything to compare.
+        ``"passed"``, ``"failed"``, ``"not decided"``, or ``"no signal"`` if no check
+        had a signal.
     """
     outcomes = {check.verdict for check in comparison.checks.values()}
     if FAILS in outcomes and len(comparison.pairs) >= _FEWEST:
-        return "failed"
+        return FAILED
     if outcomes & {FAILS, UNDECIDED}:
-        return "not decided"
-    return "passed" if "ok" in outcomes else NO_SIGNAL
+        return NOT_DECIDED
+    return PASSED if OK in outcomes else NO_SIGNAL
 
 
 def compare_scales(
@@ -98,9 +107,9 @@ def compare_scales(
 
     Args:
         scales: factors on all imperfections, at least two different ones.
-        solve: both models at a scale.
-        judge: makes a comparison of pairs, largest scale first, and the number of
-            those asked for.
+        solve: function that solves both models at a scale.
+        judge: function that makes a comparison of pairs, largest scale first, and the
+            number of requested ones.
 
     Returns:
         The comparison, decided or on six scales at least.
@@ -112,19 +121,19 @@ def compare_scales(
     pairs = [solve(scale) for scale in factors]
     while True:
         comparison = judge(tuple(pairs), len(factors))
-        if verdict(comparison) != "not decided" or len(pairs) >= _MOST:
+        if verdict(comparison) != NOT_DECIDED or len(pairs) >= _MOST:
             return comparison
         pairs.append(solve(pairs[-1].scale / 2))
 
 
 def check_scales(scales: Sequence[float]) -> list[float]:
-    """Scales from which a slope can be read, largest first.
+    """Return the scales of a slope, largest first.
 
     Args:
         scales: factors on errors, clearances and load.
 
     Returns:
-        Those that differ, sorted.
+        The distinct scales, sorted.
 
     Raises:
         BadInput: fewer than two, or one that is not finite and > 0.
@@ -138,18 +147,18 @@ def check_scales(scales: Sequence[float]) -> list[float]:
 
 
 def verdict_text(comparison: Judged) -> str:
-    """The verdict in a few words, with the number of checks without a signal."""
+    """Return the verdict in a few words, with the number of checks without a signal."""
     texts = {
-        "passed": "passed",
-        "failed": "FAILED",
-        "not decided": "NOT DECIDED: the errors are too large for these scales; ask "
+        PASSED: "passed",
+        FAILED: "FAILED",
+        NOT_DECIDED: "NOT DECIDED: the errors are too large for these scales; ask "
         "for smaller ones",
         NO_SIGNAL: "NOT CHECKED: nothing stands out of the noise; a robot without "
         "errors and load compares zero with zero",
     }
     outcome = verdict(comparison)
     silent = sum(check.verdict == NO_SIGNAL for check in comparison.checks.values())
-    if outcome == "passed" and silent:
+    if outcome == PASSED and silent:
         count = len(comparison.checks)
         return f"passed; {silent} of {count} checks had nothing to compare"
     return texts[outcome]

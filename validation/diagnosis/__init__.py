@@ -1,5 +1,5 @@
 """From measured deviations to the effect that a declared model lacks.
 
-Begin at ``diagnose.py``: selection of effects, learning, ``judge.py`` the verdict;
-``diagnosis.py`` is what comes of it.
+Begin at ``diagnose.py``: selection of effects, learning of functions, and the verdict
+of ``judge.py``; ``diagnosis.py`` holds the result.
 """

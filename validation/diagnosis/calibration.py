@@ -1,4 +1,4 @@
-"""How often a diagnosis is right on a campaign's own design, by simulation."""
+"""Error rates of a diagnosis on a campaign's own design, by simulation."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -17,14 +17,14 @@ from validation.diagnosis.verdict import verdict
 
 @dataclass(frozen=True)
 class Calibration:
-    """How often the method is right on a campaign's own design.
+    """Success and error rates of the method on a campaign's own design.
 
     Attributes:
-        campaigns: simulated, of each kind.
-        without: verdicts where nothing but noise was there.
-        with_found: verdicts where what was found was there at its fitted size.
-        right: share of the latter that named exactly the effects found.
-        false_claims: share of all that named effects that were not there.
+        campaigns: number simulated, of each kind.
+        without: verdicts on campaigns of noise alone.
+        with_found: verdicts on campaigns with the effects found, at their fitted sizes.
+        right: share of the latter with exactly the effects found.
+        false_claims: share of all verdicts that named absent effects.
     """
 
     campaigns: int
@@ -39,13 +39,13 @@ def calibrate(
 ) -> Calibration:
     """Simulate campaigns on a design and search them.
 
-    To first order about the machine found: search and verdict are the diagnosis's, the
-    final fit is left out.
+    The simulation is of first order about the machine found.  Search and verdict are
+    those of the diagnosis; the final fit is left out.
 
     Args:
-        diagnosis: whose design, and whose machine.
-        count: campaigns of each kind.
-        update: told how many of all are done.
+        diagnosis: with the design and the machine.
+        count: number of campaigns of each kind.
+        update: function called with the number done.
 
     Returns:
         The tally.
@@ -74,7 +74,7 @@ def calibrate(
 
 
 def _decided(selected: Selected, count: int) -> tuple[str, tuple[str, ...]]:
-    """The verdict on a simulated campaign."""
+    """Return the verdict on a simulated campaign."""
     best = selected.states[0]
     names = tuple(sorted(e.name for e in best.elements if e.name))
     freedom = max(1.0, count - selected.unknowns)

@@ -1,6 +1,6 @@
-"""Functions that a machine may have beside the library's effects, to be learned.
+"""Functions that a machine may have in addition to the library's effects.
 
-A small screw, or a compliance, at a place, as a function of something that was varied.
+A function is a small screw, or a compliance, at a place, that depends on a variable.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,18 +18,19 @@ from assembly.model.robot import Robot
 from validation.diagnosis.function_forms import CandidateShape
 
 TURN, SHIFT = AXES[:3], AXES[3:]
-_ROUNDING = 1e-12  # of the largest component of a vector
+# relative to the largest component of a vector: smaller changes are rounding
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
 class CandidatePart:
-    """Where a candidate acts, and what it depends on there.
+    """Place of a candidate, and its variables there.
 
     Attributes:
         where: a frame, ``"base"`` or ``"reading"``.
-        components: of the screw there.
+        components: components of the screw there.
         variable: its public name.
-        beside: that of a second variable, if it depends on two.
+        beside: public name of a second variable, if there are two.
     """
 
     where: str
@@ -48,7 +49,7 @@ class Candidate:
     """A function that may act, at one place or at several of one kind.
 
     Attributes:
-        parts: where, and of what.
+        parts: places and variables.
         kind: ``"screw"`` or ``"compliance"``.
         shape: the form, the same for all parts.
     """
@@ -58,7 +59,7 @@ class Candidate:
     shape: CandidateShape
 
     def functions(self) -> list[Function]:
-        """The functions of a robot file, their numbers still to be found."""
+        """Return the functions of a robot file, with numbers still unknown."""
         numbers = dict.fromkeys(self.shape.names, 0.0) | dict(self.shape.given)
         return [
             Function(
@@ -74,14 +75,14 @@ class Candidate:
 
 
 def is_turn(component: str) -> bool:
-    """Whether a component is a rotation, or a moment; otherwise a shift or a force."""
+    """Return whether a component is a rotation or a moment."""
     return component[0] in "rm"
 
 
 def variables_of(conditions: Conditions) -> list[str]:
-    """Return names of what was varied, and is known in every row of some session.
+    """Return the names of variables that vary and are known throughout a session.
 
-    Coordinates of drives, loads and their size, positions, covariates.
+    They are coordinates of drives, loads and their sizes, positions, covariates.
     """
     names = [f"q.{name}" for name in drives(conditions.robot)]
     names += [f"load.{axis}" for axis in ("mx", "my", "mz", "fx", "fy", "fz")]
@@ -101,15 +102,15 @@ def variables_of(conditions: Conditions) -> list[str]:
 
 
 def _kind(name: str) -> str:
-    """Components of one vector; of a slide along x, z varies by rounding alone."""
+    """Return the vector of a component, whose others may vary by rounding alone."""
     vectors = "position.", "load.m", "load.f"
     return next((v for v in vectors if name.startswith(v)), name)
 
 
 def is_known(conditions: Conditions, *names: str) -> NDArray:
-    """Return (R,) bool, rows of sessions in which variables are always known.
+    """Return the (R,) bool of rows of sessions in which variables are always known.
 
-    All rows or none, where there are no sessions; wrenches are not asked for.
+    Without sessions all rows are one; wrenches are not checked.
     """
     known = np.ones(len(conditions), dtype=bool)
     for name in names:
@@ -123,11 +124,11 @@ def is_known(conditions: Conditions, *names: str) -> NDArray:
 def places_of(
     robot: Robot, variables: Sequence[str]
 ) -> Iterator[tuple[str, tuple[CandidatePart, ...]]]:
-    """Kinds and parts of all candidates, variable by variable.
+    """Yield kinds and parts of all candidates, variable by variable.
 
     Yields:
-        Kind, and where with what: components one by one and by three, drives together
-        each with its own coordinate, bodies together along their axes.
+        Kind, and place with variable: components one by one and by three, all drives
+        together with their own coordinates, all bodies together along their axes.
     """
     single: list[tuple[str, tuple[str, ...]]]
     single = [(f.name, (axis,)) for f in robot.frames for axis in AXES]
@@ -151,6 +152,6 @@ def places_of(
 
 
 def _along(robot: Robot, name: str) -> tuple[str, ...]:
-    """Components of a body's lengthening."""
+    """Return the components of a body's lengthening."""
     axis = np.abs(body_axis(robot.frame(name))[1])
     return tuple(a for a, part in zip(SHIFT, axis, strict=True) if part > 1e-9)

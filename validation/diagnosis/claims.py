@@ -1,8 +1,8 @@
-"""Which effects of a fitted machine the readings support.
+"""Effects of a fitted machine that the readings support.
 
-An effect is claimed only if what it changes in the readings exceeds the uncertainty of
-that change, the chance of as large a change without it is small, and none of its
-unknowns that give it its name is at a bound.
+An effect is claimed on three conditions: its change of the readings exceeds the
+uncertainty of that change; the chance of as large a change without it is small; and no
+unknown that defines it is at a bound.
 """
 
 from dataclasses import dataclass
@@ -17,14 +17,15 @@ from validation.diagnosis.lack_of_fit import UNLIKELY
 from validation.diagnosis.separability import orthonormal_basis
 from validation.diagnosis.unknowns import STEP, Acting, effects_in
 
-_AT_BOUND = 1e-3  # of a bound: the unknown is at the bound
+# relative to a bound: distance within which an unknown is at the bound
+_AT_BOUND = 1e-3
 
 
 def supported(fit: MachineFit, one: Acting) -> bool:
-    """Whether the readings support an effect, one of the fitted machine's.
+    """Return whether the readings support an effect of the fitted machine.
 
     Returns:
-        True for the place of the measuring frame, which is always there.
+        True for the pose of the measuring frame, which always exists.
     """
     slots = one.hypothesis.slots
     if one.device or not slots:
@@ -50,7 +51,7 @@ def supported(fit: MachineFit, one: Acting) -> bool:
 
 
 def _without_devices(fit: MachineFit, slopes: NDArray) -> NDArray:
-    """(n, k) slopes without what the place of a measuring device does as well."""
+    """Return (n, k) slopes without the part that a measuring frame imitates."""
     own = [fit.own(one)[2] for one in fit.unknowns.effects if one.device]
     if not own:
         return slopes
@@ -59,7 +60,7 @@ def _without_devices(fit: MachineFit, slopes: NDArray) -> NDArray:
 
 
 def _at_bound(bound: float, value: float) -> bool:
-    """Whether a value is at a finite bound."""
+    """Return whether a value is at a finite bound."""
     return bool(np.isfinite(bound) and abs(value - bound) <= _AT_BOUND * abs(bound))
 
 
@@ -68,11 +69,11 @@ class Parameter:
     """A parameter of an effect of a machine, in the unit of the public format.
 
     Attributes:
-        name: public.
-        value: of the machine, with what was declared.
-        std: of it.
-        declared: in the robot's file; None where it is not.
-        difference: found for it.
+        name: public name.
+        value: value of the machine, with the declared value.
+        std: its standard deviation.
+        declared: value in the robot's file; None if it has none.
+        difference: the difference found.
     """
 
     name: str
@@ -83,7 +84,7 @@ class Parameter:
 
 
 def parameters_of(fit: MachineFit, one: Acting) -> list[Parameter]:
-    """Parameters of an effect that was found, on which some reading depends."""
+    """Return the parameters of an effect found, on which some reading depends."""
     h, robot = one.hypothesis, fit.unknowns.robot.without_effects()
     declared = effects_in(fit.unknowns.robot, one.session).get(h.effect, {})
     x, C, _ = fit.own(one)
@@ -108,7 +109,7 @@ def parameters_of(fit: MachineFit, one: Acting) -> list[Parameter]:
         around = np.remainder(change + np.pi, 2 * np.pi) - np.pi
         J[:, i] = np.where(phase, around, change) / (2 * step)
     std = np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", J, C, J), 0.0)).tolist()
-    # not a component that was not measured
+    # without components that were not measured
     shown = np.any(J[:, fit.seen(one)] != 0, axis=1).tolist()
     return [
         Parameter(name, v, s, declared.get(name), difference[name])

@@ -38,9 +38,11 @@ from validation.diagnosis.signatures import (
 from validation.diagnosis.whitening import Whitening, platform_motions, whitening
 
 FUNCTION = "function"
-_CLOCK = 0.999  # correlation with time of what counts it, rounded as it may be
-_SAMPLE = 500  # rows, drawn once: functions by the thousand are scored in a second
-_ALIKE = 1e-3  # share of a column that a device's place does not imitate: none
+_CLOCK = 0.999  # correlation with time above which a variable counts as the time
+# number of rows, drawn once: functions by the thousand are scored in a second
+_SAMPLE = 500
+# share of a column that a device's frame does not imitate, below which none is left
+_ALIKE = 1e-3
 _VISIBLE = 4.0  # squared whitened change of all readings: two standard deviations
 
 
@@ -52,9 +54,9 @@ class Columns:
         row: (N,) row of every cell.
         block: (N,) configuration or span of time of every cell.
         visit: (N,) measurement of every cell: a row of the file, of several points.
-        motions: (R, 6, 6) what a motion of the platform changes, see
-            :func:`.platform_motions`; None where every row is a measurement.
-        device: hypothesis of an unknown measuring frame; else None.
+        motions: (R, 6, 6) change of the readings by motions of the platform, see
+            :func:`.platform_motions`; None if every row is a measurement.
+        device: hypothesis of an unknown measuring frame; None if it is known.
         flat: (N, f) its columns, by session.
         library: elements of the library's effects.
         nuisance: geometric errors and springs.
@@ -68,11 +70,11 @@ class Columns:
         update: Callable[[str, int, int], None] = lambda what, done, total: None,
         odds: Mapping[str, float] = MappingProxyType({}),
     ) -> None:  # fmt: skip
-        """Compute all derivatives; of what was measured only the pattern of NaN counts.
+        """Compute all derivatives; of the readings only the pattern of NaN is used.
 
         Conditions are registered and have the second-order part.  ``odds`` are factors
-        on the prior odds of effects, of ``"function"``, ``"geometry"`` and
-        ``"springs"`` by name; 0 leaves something out.
+        on the prior odds of effects by name, of ``"function"``, ``"geometry"`` and
+        ``"springs"``; 0 excludes one.
         """
         self.odds = odds
         self.campaign, self.conditions = campaign, derivatives.conditions
@@ -142,7 +144,7 @@ class Columns:
         return bool(self.library or self.explicit or self.functions.variables)
 
     def loadings(self, cells: NDArray) -> NDArray | None:
-        """(n, 6) change of cells over sigma per rotation and shift of the platform."""
+        """Return the (n, 6) change of cells over sigma per rotation and shift."""
         if self.motions is None:
             return None
         measured = self.campaign.cells
@@ -155,7 +157,7 @@ class Columns:
         """Return the map of cells (N,) bool to cells of independent noise.
 
         ``root`` (n,) are square roots of their relative precisions, ``common`` [rad, m]
-        sizes of the platform's motion in common, over tau.
+        standard deviations of the platform's common motion, over tau.
         """
         loadings = self.loadings(cells) if any(common) else None
         if loadings is not None:
@@ -164,12 +166,12 @@ class Columns:
 
     @property
     def has_clocks(self) -> bool:
-        """Whether rows follow one another and a variable is the time."""
+        """Whether rows are consecutive in time and a variable is the time."""
         successive = blocks_of(self.campaign)[1] == SPANS
         return successive and any(map(self._is_clock, self.functions.variables))
 
     def _is_clock(self, name: str) -> bool:
-        """Whether a variable is the time, or proportional to it."""
+        """Return whether a variable is the time, or proportional to it."""
         time = self.conditions.time
         if name == "time" or not np.isfinite(time).all() or not np.ptp(time):
             return name == "time"
@@ -191,7 +193,7 @@ class Columns:
         return np.hstack([columns * self.tangents.rows_of(s) for s in sessions])
 
     def _told(self, signature: Signature) -> Signature:
-        """Return a hypothesis of sessions without what their devices imitate."""
+        """Return a hypothesis of sessions without the part that devices imitate."""
         h = signature.hypothesis
         if not self.flat.shape[1] or sessions_of(h) == (None,):
             return signature
@@ -219,6 +221,6 @@ def _print(signature: Signature) -> object:
 
 
 def _moves_base(h: Hypothesis) -> bool:
-    """Return whether a hypothesis moves the measuring frame, which is flat."""
+    """Return whether a hypothesis moves the measuring frame, included in ``flat``."""
     device = LIBRARY[h.effect].device
     return any(name in device for slot in h.slots for name in slot.names)

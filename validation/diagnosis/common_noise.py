@@ -1,10 +1,10 @@
-"""Noise that the points of one measurement have in common: how large is it?
+"""Size of the noise that the points of one measurement have in common.
 
-A device that reads several points of the platform at once sees in all of them how the
-machine repeats, and how its frame shakes: a small motion of the platform, drawn once
-for a measurement.  It has one standard deviation of rotations and one of translations
-of the points' centre.  Both maximise the evidence of a model of the readings, every
-other unknown marginalised.
+A device that reads several points of the platform together sees in all of them the
+machine's repeatability and the motion of its frame.  This is a small motion of the
+platform, drawn once for a measurement.  It has one standard deviation of rotations and
+one of translations of the points' centre.  Both maximise the evidence of a model of the
+readings, with all other unknowns marginalised.
 """
 
 import math
@@ -17,11 +17,11 @@ from validation.diagnosis.gaussian import size_penalty
 from validation.diagnosis.states import IN_USE, Models, State
 from validation.diagnosis.weighted_readings import NONE
 
-_STEP = 1.0  # of the logarithms of both sizes, which begin at one sigma
-_CLOSE = 0.05  # of a logarithm, that ends the search
-_LEAST = 0.02  # [sigma] contribution to the readings that is none
-_CLEAR = 1.0  # [sigma] contribution to the readings from which a size is needed
-_EVALUATIONS = 40  # each fits a model
+_STEP = 1.0  # first step of the logarithms of both sizes, which start at one sigma
+_CLOSE = 0.05  # relative to a logarithm: step that ends the search
+_LEAST = 0.02  # [sigma] contribution to the readings below which a size is 0
+_CLEAR = 1.0  # [sigma] contribution to the readings above which a size is needed
+_EVALUATIONS = 40  # largest number of evaluations; each fits a model
 _STABLE = 0.1  # change of a logarithm that changes no decision
 
 
@@ -30,7 +30,7 @@ def common_sizes(state: State) -> tuple[float, float]:
 
     Returns:
         [rad, m] standard deviations of rotation and translation over the noise's scale;
-        zero for what is not better than none by more than its cost.
+        zero if the gain is not above the cost of the size.
     """
     some = state.readings.sample(NONE)
     loadings = some.columns.loadings(some.cells)
@@ -57,7 +57,7 @@ def common_sizes(state: State) -> tuple[float, float]:
 def _largest(
     state: State, kinds: tuple[int, ...], units: list[float]
 ) -> tuple[tuple[float, float], float]:
-    """Return the sizes of largest evidence, and that."""
+    """Return the sizes of largest evidence, and the evidence."""
 
     def sizes(logs: NDArray) -> tuple[float, float]:
         own = dict(zip(kinds, np.exp(logs).tolist(), strict=True))
@@ -77,7 +77,7 @@ def _largest(
 
 
 def _evidence(state: State, sizes: tuple[float, float]) -> float:
-    """Return the log posterior of a model's elements with some noise in common."""
+    """Return the log posterior of a model's elements with noise in common."""
     some = state.readings.sample(sizes)
     return (
         Models(some).state(state.elements, state.mode, state).score - some.log_det / 2

@@ -1,4 +1,4 @@
-"""What a machine reads as its file declares it, the same for all folds."""
+"""Readings of a machine as its file declares it, common to all folds."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -21,10 +21,10 @@ from validation.diagnosis.signatures import conditions_of, whiten
 
 @dataclass(frozen=True, eq=False)
 class Declared:
-    """What a machine reads as its file declares it; no reading is asked.
+    """Predicted readings of a machine as declared; no measured reading is used.
 
     Attributes:
-        conditions: of all rows, before any registration.
+        conditions: conditions of all rows, before any registration.
         finite: whether motions of the declared model are finite.
     """
 
@@ -33,15 +33,15 @@ class Declared:
 
     @cached_property
     def derivatives(self) -> Derivatives:
-        """Of what is read there, clearances of closed chains where they rest."""
+        """Derivatives of the readings there, with closed chains' clearances at rest."""
         return Derivatives(at_rest(self.conditions))
 
     def bent(
         self, campaign: Campaign, conditions: Conditions, errors: NDArray, least: float
     ) -> Conditions | None:
-        """Return conditions with what finite motions add to geometric errors (n, 6).
+        """Return conditions with finite motions' effect on geometric errors (n, 6).
 
-        None where they change no reading of the campaign by ``least`` [sigma].
+        None if this changes no reading of the campaign by ``least`` [sigma].
         """
         if not errors.any():
             return None
@@ -57,15 +57,15 @@ class Declared:
 
 
 def declared(campaign: Campaign, *, finite: bool = False) -> Declared:
-    """What the file of a campaign's robot says of its rows.
+    """Return the declared model of a campaign's rows.
 
     Args:
-        campaign: of R rows.
-        finite: whether motions of the declared model are finite; they are too if the
+        campaign: campaign of R rows.
+        finite: whether motions of the declared model are finite; they also are if the
             file says so.
 
     Returns:
-        The same whichever readings of the campaign are hidden.
+        The same result whichever readings of the campaign are hidden.
     """
     conditions = conditions_of(campaign)
     finite = finite or conditions.exact
@@ -74,7 +74,7 @@ def declared(campaign: Campaign, *, finite: bool = False) -> Declared:
 
 
 def at_rest(conditions: Conditions) -> Conditions:
-    """Conditions with clearances of closed chains where they rest, found once."""
+    """Return conditions with clearances of closed chains at rest, computed once."""
     if conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]:
         return with_rest_positions(conditions)
     return conditions

@@ -1,7 +1,7 @@
-"""What a machine reads under declared conditions, and how that changes with effects.
+"""Readings of a machine under declared conditions, and their derivatives by effects.
 
-It depends on the design of a campaign and on none of its readings, so that searches of
-the same conditions share it: the folds of a diagnosis, above all.
+They depend on the design of a campaign and on none of its readings.  So searches with
+the same conditions share them, above all the folds of a diagnosis.
 """
 
 from collections.abc import Mapping
@@ -19,41 +19,42 @@ from validation.diagnosis.hypotheses import Slot
 from validation.diagnosis.responses import Responses, responses
 from validation.diagnosis.sensitivities import Sensitivities
 
-STEP = 1e-3  # of an unknown's plausible size: between rounding and curvature
+# relative to an unknown's plausible size: a step between rounding and curvature
+STEP = 1e-3
 
 
 class Derivatives:
-    """Readings of R rows, near what is declared; each is computed once.
+    """Readings of R rows near the declared model; each is computed once.
 
     Attributes:
-        conditions: as declared, with the registration if that was fitted.
+        conditions: declared conditions, with the registration if it was fitted.
     """
 
     def __init__(self, conditions: Conditions) -> None:
-        """Compute nothing yet."""
+        """Store the conditions; derivatives are computed on first use."""
         self.conditions = conditions
         self._begun: dict[object, NDArray] = {}
 
     @cached_property
     def declared(self) -> NDArray:
-        """(R, 6) [rad, m] what is read without effects."""
+        """(R, 6) [rad, m] readings without effects."""
         return predict(self.conditions).deviation
 
     @cached_property
     def response(self) -> Responses:
-        """How the readings answer small screws at all frames."""
+        """Response of the readings to small screws at all frames."""
         return responses(self.conditions)
 
     @cached_property
     def sensitivities(self) -> Sensitivities:
-        """How the readings answer functions at all places."""
+        """Response of the readings to functions at all places."""
         return Sensitivities(self.conditions, self.response)
 
     def model(self, effects: Mapping[str, Values], *, finite: bool = False) -> NDArray:
-        """Return (R, 6) [rad, m] read with effects, to first order in clearances.
+        """Return the (R, 6) [rad, m] readings with effects, clearances to first order.
 
-        Effects are parameters by their public names; NaN where the model has no answer.
-        Finite motions are those of what is declared or, asked for, of the changed
+        Effects are parameters by their public names; NaN without a solution.  Finite
+        motions are those of the declared machine or, if requested, of the changed
         machine.
         """
         changed = apply_effects(self.conditions, effects)
@@ -65,7 +66,7 @@ class Derivatives:
         return predict(changed).deviation
 
     def begun(self, effect: str, slot: Slot, shapes: Mapping[str, float]) -> NDArray:
-        """Return (R, 6) [rad, m] where one number of an effect is a step off.
+        """Return the (R, 6) [rad, m] readings with one number of an effect a step off.
 
         ``shapes`` are values of the unknowns that shape the effect.
         """

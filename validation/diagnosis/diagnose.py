@@ -1,15 +1,15 @@
-"""The diagnosis of a campaign: which effects its model lacks, and how sure that is.
+"""The diagnosis of a campaign: effects that its model lacks, with probabilities.
 
-Steps, each opened once:
+Steps:
 
-1. rows that judge are chosen (:mod:`.holdout`); nothing reads them until step 5;
-2. set-up blunders (:mod:`.setup_blunders`), then effects and functions
-   (:mod:`.trace`) are searched for in the other rows;
-3. all unknown numbers of the machine are fitted together, through the function that
-   predicts with the saved file (:mod:`.fit`); effects that the readings do not support
-   are dropped (:mod:`.claims`);
-4. where folds judge, 2 and 3 are done for each fold and for all rows;
-5. the errors of the fitted robots on the held-out rows, and the verdict.
+1. choose the rows that judge (:mod:`.holdout`); step 5 is the first to read them;
+2. search for set-up blunders (:mod:`.setup_blunders`), then for effects and functions
+(:mod:`.trace`), in the other rows;
+3. fit all unknown numbers of the machine together, through the function that
+      predicts with the saved file (:mod:`.fit`); drop effects that the readings do not
+      support (:mod:`.claims`);
+4. if there are folds, repeat 2 and 3 for each fold and for all rows;
+5. compute the errors of the fitted robots on the held-out rows, and the verdict.
 """
 
 from collections.abc import Callable, Mapping
@@ -37,11 +37,11 @@ Update = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """What was searched for and fitted without some rows.
+    """Result of search and fit without some rows.
 
     Attributes:
-        traced: what the search found.
-        fit: the machine that has it.
+        traced: result of the search.
+        fit: the fitted machine.
         setup: blunders of the set-up.
     """
 
@@ -62,16 +62,16 @@ def diagnose(
     Args:
         campaign: measured deviations.
         finite: whether motions of the declared model are finite in the search; they
-            are too if the robot's file has the effect ``geometric_stiffening``.
+            also are if the robot's file has the effect ``geometric_stiffening``.
         odds: factors on the prior odds of effects by name, of ``"function"`` (any
-            function), ``"geometry"`` and ``"springs"``; 0 leaves something out.
-        update: told what is done, how much of it and of how much.
+            function), ``"geometry"`` and ``"springs"``; 0 excludes one.
+        update: function called with the step, its progress and its total.
 
     Returns:
         The diagnosis.
 
     Raises:
-        BadInput: the measuring frame is not known and cannot be found.
+        BadInput: the measuring frame is unknown and cannot be estimated.
     """
     held = hold_out(campaign)
     design = declared(campaign, finite=finite)  # the same in all folds
@@ -80,7 +80,7 @@ def diagnose(
         part = hidden(campaign, ~rows)
         seen = part.cells.any(axis=1)
         setup = setup_blunders(part.take(seen), conditions_of(part).take(seen))
-        # where there are some, anything else that is found would stand for them
+        # with blunders any other effect found would imitate them
         nothing = dict.fromkeys((*LIBRARY, FUNCTION, GEOMETRY, SPRINGS), 0.0)
         own = nothing if setup else odds
         return _Found(*trace(part, rows, design, update, odds=own), setup)
@@ -103,5 +103,5 @@ def diagnose(
 
 
 def _fitted_rows(held: HeldOut, rows: NDArray) -> NDArray:
-    """(R,) bool, rows that are fitted where others judge; all where none is spared."""
+    """Return (R,) bool of rows to fit while others judge; all if none are spared."""
     return np.ones(len(rows), dtype=bool) if held.how == "none" else ~rows

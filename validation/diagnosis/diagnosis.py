@@ -1,7 +1,7 @@
-"""What a diagnosis holds: the verdict and all that it rests on.
+"""Result of a diagnosis: the verdict and its grounds.
 
-Words, figures and files are made of it by the modules above; the function that makes
-the text comes along as ``wording``, so that this module needs none of them.
+The modules above format it as text, figures and files.  ``wording`` is the function
+that makes the text, so that this module imports none of them.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from assembly.measurement.conditions import Conditions
 from assembly.model.robot import Robot
-from forcefit.inputs.display import Figures, html_table, short_repr
+from forcefit.results.display import Figures, html_table, short_repr
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.fit import MachineFit
 from validation.diagnosis.holdout import HeldOut
@@ -26,44 +26,47 @@ from validation.diagnosis.trace import Traced
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What a campaign says about the machine, and what it cannot say.
+    """Result of the diagnosis of a campaign.
 
     Attributes:
-        campaign: what was measured, with the sigma stated.
+        campaign: the measurements, with the stated sigma.
         verdict: ``"explained"``, ``"learned"``, ``"none_needed"``, ``"ambiguous"``,
             ``"outside_library"`` or ``"not_enough_rows"``.
-        fit: the machine found, every number fitted together; its robot is saved.
-        traced: what the search found.
-        claimed: names of the effects that are claimed.
+        fit: the machine found, with all numbers fitted together; its robot is saved.
+        traced: result of the search.
+        claimed: names of the claimed effects.
         effects: names of the effects of the machine found, claimed or not.
-        probability: of every effect of the library that the design can show.
+        probability: probability of every effect of the library that the design can
+            show.
         alternatives: sets of effects by name, with their probabilities, best first.
-        lack: is the residual of the fitted rows noise?
-        before: on the held-out rows without outliers, with the declared model.
-        after: likewise, with machines fitted without these rows; whatever the verdict.
+        lack: test whether the residual of the fitted rows is noise.
+        before: errors of the declared model on the held-out rows without outliers.
+        after: errors there of machines fitted without these rows, for any verdict.
         saved: errors of the saved robot on all rows without outliers, to which it was
             fitted.
-        noise: by sigma, and by what the points of a measurement have in common.
-        with_outliers: before and after with the held-out rows called outliers.
+        noise: errors due to sigma, and to the noise that points of a measurement share.
+        with_outliers: before and after, with the held-out outliers included.
         uncertainty: [-] standard error of ``after.normalised``, by scatter of blocks.
+        noise_scale: true over stated sigma, and its standard deviation.
         noise_scale: true over stated sigma, and the standard deviation of that.
-        noise_in_time: how noise is correlated in time, None if it is not; intervals of
-            the effects are the wider for it.
+        noise_in_time: correlation of the noise in time, None if there is none; it makes
+            intervals of the effects wider.
         sequence: models up to the machine found, with errors on the held-out rows.
-        held: the rows that judge, and how.
-        outliers: (R,) bool, rows left out of everything.
-        conditions: the campaign's, as declared and registered.
-        open: (R,) bool, rows where clearances leave the pose free, in the declared
-            model or with the effects found; see
+        held: the rows that judge, and the method.
+        outliers: (R,) bool, rows left out of all computations.
+        conditions: conditions of the campaign, as declared and registered.
+        open: (R,) bool, rows in which clearances leave the pose undetermined, in the
+            declared model or with the effects found; see
             :class:`assembly.measurement.predict.Prediction`.
         residual_before: (R, 6) [rad, m] reading minus declared model; NaN not measured.
-        residual_after: (R, 6) [rad, m] reading minus what the saved robot reads.
-        trends: what the residual varies with, if more than noise is left.
+        residual_after: (R, 6) [rad, m] reading minus that of the saved robot.
+        trends: variables with which the residual varies, if it is more than noise.
         next: the measurement that would decide, if the verdict is ambiguous.
-        needed: rows that would decide, if there are not enough.
-        remarks: numbers that no machine has, and readings that no sensor gives.
-        setup: what of the campaign is set up wrongly; nothing else was looked for then.
-        wording: the function that puts a diagnosis into words.
+        needed: rows that would decide, if there are too few.
+        remarks: implausible numbers of the machine, and impossible readings.
+        setup: errors of the campaign's set-up; if there are any, nothing else was
+            searched.
+        wording: function that puts a diagnosis into words.
     """
 
     campaign: Campaign
@@ -101,12 +104,12 @@ class Diagnosis:
 
     @property
     def robot(self) -> Robot:
-        """The machine found, as fitted."""
+        """The fitted machine."""
         return self.fit.robot
 
     @property
     def fitted(self) -> NDArray:
-        """(R,) bool, rows to which the machine that is saved was fitted."""
+        """(R,) bool, rows to which the saved machine was fitted."""
         return np.asarray(self.traced.used | (self.held.rows & ~self.outliers))
 
     @property
@@ -117,15 +120,15 @@ class Diagnosis:
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """What is said of the noise: its scale, repeats, memory."""
+        """Findings on the noise: its scale, repeatability, memory."""
         return self.traced.selected.noise.findings
 
     def summary(self) -> str:
-        """The text that ``forcefit validation diagnose`` prints."""
+        """Return the text that ``forcefit validation diagnose`` prints."""
         return self.wording(self)
 
     def _figures(self) -> Figures:
-        """The verdict, and what it rests on."""
+        """Return the verdict, and the numbers behind it."""
         likely = sorted(self.probability.items(), key=lambda one: -one[1])[:3]
         return {
             "campaign": f"{self.campaign.name}, {len(self.campaign)} rows",

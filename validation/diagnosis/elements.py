@@ -19,7 +19,7 @@ from validation.diagnosis.signatures import Signature
 from validation.diagnosis.whitening import Whitening
 
 _PLAUSIBLE = 1e3  # largest ratio of an unknown to its plausible size
-_NO_OFFSET = 1e-9  # [sigma] below which an offset is rounding
+_NO_OFFSET = 1e-9  # [sigma] smaller offsets are rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Element:
     """An effect of the library at certain frames, or a function.
 
     Attributes:
-        name: of the effect; ``""`` for a function.
+        name: name of the effect; ``""`` for a function.
         columns: (N, m) whitened change of the readings per scaled unknown.
         scale: (m,) unknown per scaled unknown.
         offset: (N,) contribution at d = 0; None if zero.
@@ -90,7 +90,7 @@ def effect_element(
     """Return the element of a library effect.
 
     ``shapes`` (k,) are the values at which it is linearised; absent for the start
-    values.  Unknowns without influence stay at their start values.
+    values.  Unknowns without influence keep their start values.
     """
     h = signature.hypothesis
     shape = np.array([slot.shape for slot in h.slots], dtype=bool)
@@ -105,7 +105,7 @@ def effect_element(
     kinds = [_kind(robot, h, k) for k in slots.tolist()]
     norm = _norms(columns, kinds)
     norm = np.where(shape[slots], 1.0, norm)
-    # at the start values the unknowns that shape an effect have no columns
+    # at the start values the shape parameters of an effect have no columns
     held = np.where(shape & (shapes is None), 0.0, begin)
     offset = signature.offset + signature.columns @ held
     scale = plausible / norm
@@ -136,7 +136,7 @@ def _kind(robot: Robot, h: Hypothesis, slot: int) -> tuple[object, ...]:
 
 
 def _norms(columns: NDArray, kinds: Iterable[object]) -> NDArray:
-    """Return (m,) rms norms of the columns of each column's kind."""
+    """Return the (m,) rms norm of the columns of each column's kind."""
     names = list(kinds)
     squares = (columns**2).sum(axis=0)
     own = [[k for k, other in enumerate(names) if other == kind] for kind in names]

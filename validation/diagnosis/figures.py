@@ -1,4 +1,4 @@
-"""Charts of a diagnosis, and the robot to be turned.
+"""Charts of a diagnosis, and a three-dimensional view of the robot.
 
 Functions take a diagnosis and return HTML of a page.
 """
@@ -25,7 +25,7 @@ _COLOURS = {"before": RED, "after": BLUE}
 
 
 def error_chart(diagnosis: Diagnosis) -> str:
-    """Bars of the errors before, after and of noise on the held-out rows."""
+    """Return the bars of the errors before, after and of noise on the held-out rows."""
     charts = []
     for kind, unit in (("position", "m"), ("rotation", "rad")):
         names = ("before", "after", "noise")
@@ -39,7 +39,7 @@ def error_chart(diagnosis: Diagnosis) -> str:
 
 
 def sequence_chart(diagnosis: Diagnosis) -> str:
-    """Bars of the error of every model of the sequence, in sigma, in their order."""
+    """Return bars of the error of every model of the sequence, in sigma, in order."""
     values: dict[str, float] = {}
     for step in diagnosis.sequence:
         again = step.term in values  # several functions may be learned
@@ -50,7 +50,7 @@ def sequence_chart(diagnosis: Diagnosis) -> str:
 
 
 def vector_charts(diagnosis: Diagnosis) -> str:
-    """Residual displacements at the points measured, seen from the top and the side."""
+    """Return residual displacements at the measured points, from top and side."""
     platform = diagnosis.conditions.postures.platform
     where = platform[:, :3, 3] + platform[:, :3, :3] @ diagnosis.conditions.point
     known = ~diagnosis.outliers
@@ -81,7 +81,7 @@ def vector_charts(diagnosis: Diagnosis) -> str:
 
 
 def covariate_charts(diagnosis: Diagnosis) -> str:
-    """Size of the residual against load, drives and covariates, before and after."""
+    """Return charts of the residual, before and after, against load and variables."""
     kept, rows = ~diagnosis.outliers, _labels(diagnosis)
     sizes = {
         name: np.sqrt(np.nanmean((left / diagnosis.campaign.sigma) ** 2, axis=1))[kept]
@@ -111,18 +111,18 @@ def covariate_charts(diagnosis: Diagnosis) -> str:
 
 
 def _residuals(diagnosis: Diagnosis) -> dict[str, NDArray]:
-    """(R, 6) [rad, m] before and after."""
+    """Return the (R, 6) [rad, m] before and after."""
     return {"before": diagnosis.residual_before, "after": diagnosis.residual_after}
 
 
 def _labels(diagnosis: Diagnosis) -> list[str]:
-    """Of all rows but outliers."""
+    """Return labels of all rows except outliers."""
     ids = zip(diagnosis.campaign.ids, diagnosis.outliers, strict=True)
     return [label(name) for name, outlier in ids if not outlier]
 
 
 def _varied(diagnosis: Diagnosis) -> dict[tuple[str, str], NDArray]:
-    """What the residual may depend on, by its name and unit."""
+    """Return the variables of the residual, with name and unit."""
     campaign = diagnosis.campaign
     varied = {("load size", "N"): np.linalg.norm(campaign.loads[:, 3:], axis=1)}
     for i, frame in enumerate(campaign.robot.frames):
@@ -136,7 +136,7 @@ def _varied(diagnosis: Diagnosis) -> dict[tuple[str, str], NDArray]:
 
 
 def probability_chart(diagnosis: Diagnosis) -> str:
-    """Bars of the probability of every effect, the likeliest on top."""
+    """Return the bars of the probability of every effect, the likeliest on top."""
     ranked = sorted(diagnosis.probability.items(), key=lambda item: -item[1])
     axis = Axis(f"probability (claimed from {CLAIM}, a rival from {RIVAL})",
                 options={"range": [0, 1]})  # fmt: skip
@@ -144,7 +144,7 @@ def probability_chart(diagnosis: Diagnosis) -> str:
 
 
 def confounding_chart(diagnosis: Diagnosis) -> str:
-    """Matrix of the share of a row's effect that the column's effect can imitate."""
+    """Return a matrix: share of the row's effect that the column's can imitate."""
     columns: dict[str, NDArray] = {}
     for element in diagnosis.traced.columns.library:  # the most general form first
         if np.any(element.columns):
@@ -157,11 +157,11 @@ def confounding_chart(diagnosis: Diagnosis) -> str:
 
 
 def worst_row(diagnosis: Diagnosis) -> tuple[int, str]:
-    """The held-out row at which the declared model errs most.
+    """Return the held-out row at which the declared model errs most.
 
     Returns:
-        The row, and what of it is largest: ``"position"``, or ``"rotation"`` where no
-        position was measured; -1 and an empty text without such a row.
+        The row, and the larger part of its error: ``"position"``, or ``"rotation"`` if
+        no position was measured; -1 and an empty text without such a row.
     """
     aside = diagnosis.held.rows & ~diagnosis.outliers
     for name, part in (("position", slice(3, 6)), ("rotation", slice(0, 3))):
@@ -174,7 +174,7 @@ def worst_row(diagnosis: Diagnosis) -> tuple[int, str]:
 
 
 def assembled(diagnosis: Diagnosis, row: int) -> Assembly | None:
-    """The machine found at a row under its load, by small screws; None if it is not."""
+    """Return machine found, assembled at a row under its load; None if impossible."""
     campaign = replace(diagnosis.campaign, robot=diagnosis.robot)
     try:
         forced = assemble_row(replace(conditions_of(campaign), exact=False), row)
@@ -184,7 +184,7 @@ def assembled(diagnosis: Diagnosis, row: int) -> Assembly | None:
 
 
 def worst_robot(diagnosis: Diagnosis) -> str:
-    """The robot as it is assembled at the worst row; empty without such a row."""
+    """Return the scene of the robot at the worst row; empty without such a row."""
     row, name = worst_row(diagnosis)
     forced = assembled(diagnosis, row) if row >= 0 else None
     if forced is None:

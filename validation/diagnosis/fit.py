@@ -1,4 +1,4 @@
-r"""The last step of a diagnosis: every unknown number of a robot fitted together.
+r"""Fit of all unknown numbers of a robot together, the last step of a diagnosis.
 
 The most probable x minimises
 
@@ -6,8 +6,8 @@ The most probable x minimises
 
 with f the readings of the robot that would be saved, computed by the function that
 predicts with the saved file (:mod:`validation.diagnosis.prediction`).  Steps are
-Gauss-Newton's, with the slopes of the linear model at the robot reached; a step that
-leads up is halved.
+Gauss-Newton steps, with the slopes of the linear model at the present robot; a step
+that increases F is halved.
 
 ======  ==============  =========  ===================================================
 symbol  code            shape      meaning
@@ -39,11 +39,11 @@ from validation.diagnosis.separability import ROUNDING
 from validation.diagnosis.unknowns import Acting, Unknowns
 from validation.diagnosis.whitening import whitening_of
 
-_STEPS = 20  # Gauss-Newton's, at most: most fits settle within ten
-_SLOPES = 6  # steps for which slopes are computed again
-_SHORTEST = 1 / 64  # of a step
-_SETTLED = 1e-3  # decrease of F that is none; F counts squared standard deviations
-_NO_ANSWER = 1e3  # [sigma] residual of a reading for which the robot has no answer
+_STEPS = 20  # largest number of Gauss-Newton steps: most fits converge within ten
+_SLOPES = 6  # number of steps with recomputed slopes
+_SHORTEST = 1 / 64  # shortest part of a step
+_SETTLED = 1e-3  # decrease of F at convergence; F counts squared standard deviations
+_NO_ANSWER = 1e3  # [sigma] residual of a reading for which the robot has no solution
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,11 +51,11 @@ class MachineFit:
     """A robot fitted to some rows of a campaign.
 
     Attributes:
-        unknowns: what was fitted.
-        x: (k,) the most probable numbers.
+        unknowns: the numbers fitted.
+        x: (k,) their most probable values.
         covariance: (k, k) of their posterior, at fixed prior sizes and sigma.
         slopes: (n, k) change of the fitted cells per unknown, over sigma, whitened.
-        residual: (n,) of the fitted cells, likewise.
+        residual: (n,) of the fitted cells, over sigma, whitened.
     """
 
     unknowns: Unknowns
@@ -66,7 +66,7 @@ class MachineFit:
 
     @cached_property
     def robot(self) -> Robot:
-        """The fitted robot, as it would be saved."""
+        """The fitted robot, as it is saved."""
         return self.unknowns.robot_at(self.x)
 
     @property
@@ -76,22 +76,22 @@ class MachineFit:
 
     @property
     def determined(self) -> NDArray:
-        """(k,) share of each unknown that the readings say and not its prior."""
+        """(k,) share of each unknown that the readings determine, not its prior."""
         prior = self.unknowns.std**2
         return 1.0 - np.clip(np.diag(self.covariance) / prior, 0.0, 1.0)
 
     @property
     def effects(self) -> tuple[Acting, ...]:
-        """Effects of the library that it has, the measuring frame's place aside."""
+        """Effects of the library that it has, without the measuring frame's pose."""
         return tuple(one for one in self.unknowns.effects if not one.device)
 
     def own(self, part: Acting) -> tuple[NDArray, NDArray, NDArray]:
-        """(k,) values, (k, k) covariance and (n, k) slopes of one effect's unknowns."""
+        """Return (k,) values, (k, k) covariance and (n, k) slopes of one effect."""
         own = self.unknowns.place(part)
         return self.x[own], self.covariance[own, own], self.slopes[:, own]
 
     def seen(self, part: Acting) -> NDArray:
-        """(k,) bool, unknowns of one effect that some reading depends on."""
+        """Return the (k,) bool of an effect's unknowns on which a reading depends."""
         return self.determined[self.unknowns.place(part)] > ROUNDING
 
 
@@ -101,15 +101,15 @@ def fit_machine(
     """Fit the unknown numbers of a robot to some rows of a campaign.
 
     Args:
-        campaign: of R rows, whose sigma and noise in common are believed.
-        unknowns: of its robot.
+        campaign: campaign of R rows, whose sigma and noise in common are used.
+        unknowns: unknowns of its robot.
         rows: (R,) bool, rows to be fitted; readings of others are not used.
-        start: (k,) where to begin; the prior's mean if absent.
+        start: (k,) start values; the prior's mean if absent.
 
     Returns:
         The fit.
     """
-    # all rows are predicted: what a row reads may depend on commands before it
+    # all rows are predicted, because a row may depend on commands before it
     cells = campaign.cells & rows[:, None]
     sigma, whiten = campaign.sigma[cells], whitening_of(campaign, cells)
 
@@ -130,7 +130,7 @@ def _minimum(
     unknowns: Unknowns, residual: Callable[[NDArray], NDArray],
     slopes: Callable[[NDArray], NDArray], start: NDArray | None,
 ) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
-    """(k,) most probable x, (n, k) slopes and (n,) residual there."""
+    """Return the (k,) most probable x, (n, k) slopes and (n,) residual there."""
     mean, std = unknowns.mean, unknowns.std
     lower, upper = unknowns.bounds
     x = np.clip(mean if start is None else start, lower, upper)
@@ -161,7 +161,7 @@ def _minimum(
 
 
 def _step(unknowns: Unknowns, A: NDArray, left: NDArray, x: NDArray) -> NDArray:
-    """(k,) Gauss-Newton step within the bounds, unknowns in units of their prior."""
+    """Return the (k,) Gauss-Newton step within bounds, in units of the prior."""
     std = unknowns.std
     B = A * std
     L = cholesky(_information(B), lower=True, check_finite=False)
@@ -170,7 +170,7 @@ def _step(unknowns: Unknowns, A: NDArray, left: NDArray, x: NDArray) -> NDArray:
     step = solve_triangular(L, y, lower=True, trans=1, check_finite=False)
     low, high = ((bound - x) / std for bound in unknowns.bounds)
     if np.any(step < low) or np.any(step > high):
-        # |L' step - y| is the same minimum, now with bounds
+        # |L' step - y| has the same minimum, now with bounds
         wide = high - low > 0.0
         step = np.zeros(len(x))
         free = lsq_linear(L.T[:, wide], y, (low[wide], high[wide]), method="bvls")
@@ -179,7 +179,7 @@ def _step(unknowns: Unknowns, A: NDArray, left: NDArray, x: NDArray) -> NDArray:
 
 
 def _information(B: NDArray) -> NDArray:
-    """(k, k) B'B + 1, the inverse of C for unknowns in units of their prior."""
+    """Return (k, k) B'B + 1, the inverse of C for unknowns in units of their prior."""
     M = B.T @ B
     M[np.diag_indices(len(M))] += 1.0
     return np.asarray(M)

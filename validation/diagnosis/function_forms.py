@@ -15,20 +15,23 @@ from assembly.measurement.conditions import Conditions
 from assembly.measurement.variables import variable
 from assembly.model.robot import Robot
 
-KNOTS = 7  # of a spline: it follows what a power of three does not
-MANY = 150  # rows from which many waves a turn are looked for
-LAGS = 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.3, 0.5  # of the span of time
-_CYCLES = 0.5, 1, 1.5, 2, 3, 4, 6  # of a slow wave in the span of time
-_DEPTHS = 0.03, 0.1, 0.3, 1.0  # of slip, relative to the variable's range
-_ALL_DEPTHS = tuple(0.01 * 1.4**k for k in range(15))  # of the best, once it is known
-_TURNS = 0.5  # of a screw over the range of its slide: a coarser step misses waves
-_MOST_TURNS = 200.0  # of a screw over that range, and two for each position
-_FINER = 1.2  # of a number in which a form is not linear: first step of its refinement
-_NO_LOAD = 1e-3  # of the largest one: what takes up backlash
+KNOTS = 7  # knots of a spline, which fits shapes that powers up to three do not
+MANY = 150  # number of rows above which waves of high order are searched
+# time constants relative to the span of time
+LAGS = 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.3, 0.5
+_CYCLES = 0.5, 1, 1.5, 2, 3, 4, 6  # cycles of a slow wave in the span of time
+_DEPTHS = 0.03, 0.1, 0.3, 1.0  # depths of slip, relative to the variable's range
+# of the best depth, in a refined search
+_ALL_DEPTHS = tuple(0.01 * 1.4**k for k in range(15))
+# turns of a screw over its slide's range: step of the search; larger ones miss waves
+_TURNS = 0.5
+_MOST_TURNS = 200.0  # most turns of a screw over that range, and two for each position
+_FINER = 1.2  # first factor in the refinement of a shape parameter
+_NO_LOAD = 1e-3  # relative to the largest load: a smaller one does not take up backlash
 _HIGH = 12  # highest order of waves that is tried alone
 _CLOCKS = "time", "cov.time"
 _JUMPS, _MANY_JUMPS = 10, 91  # numbers of times at which a step is tried
-_INNER = np.linspace(0.1, 0.9, 9)  # quantiles at which anything else is tried
+_INNER = np.linspace(0.1, 0.9, 9)  # quantiles at which other shape parameters are tried
 
 
 @dataclass(frozen=True)
@@ -37,8 +40,8 @@ class CandidateShape:
 
     Attributes:
         form: a name of :data:`assembly.effects.forms.FORMS`.
-        names: of its columns.
-        given: numbers in which it is not linear.
+        names: names of the columns.
+        given: shape parameters, in which it is not linear.
     """
 
     form: str
@@ -47,12 +50,12 @@ class CandidateShape:
 
     @property
     def bends(self) -> NDArray:
-        """(0,) or (1,) the number in which it is not linear, if that is fitted."""
+        """(0,) or (1,) the shape parameter, if it is fitted."""
         one = len(self.given) == 1 and self.form != "step"
         return np.array([value for _, value in self.given] if one else [])
 
     def bent(self, by: float) -> "CandidateShape":
-        """The form with that number larger."""
+        """Return the form with its shape parameter increased."""
         ((key, value),) = self.given
         return replace(self, given=((key, value + by),))
 
@@ -62,7 +65,7 @@ def _powers(*powers: int) -> CandidateShape:
 
 
 def _waves(*orders: int, form: str = "waves") -> CandidateShape:
-    """Sines and cosines of these orders of an angle."""
+    """Return the sines and cosines of these orders of an angle."""
     names = tuple(f"{k}.{w}" for k in orders for w in ("sine", "cosine"))
     return CandidateShape(form, names)
 
@@ -70,7 +73,7 @@ def _waves(*orders: int, form: str = "waves") -> CandidateShape:
 def _at_each(
     form: str, names: tuple[str, ...], key: str, values: Iterable[float]
 ) -> list[CandidateShape]:
-    """A form with each of some numbers in which it is not linear."""
+    """Return a form with each of several values of its shape parameter."""
     return [CandidateShape(form, names, ((key, float(v)),)) for v in values]
 
 
@@ -80,13 +83,13 @@ _ANGLE = ("0.cosine", *_WAVE)
 
 
 def is_angle(robot: Robot, name: str) -> bool:
-    """Whether a variable is the coordinate of a joint that turns."""
+    """Return whether a variable is the coordinate of a joint that turns."""
     kind, _, rest = name.partition(".")
     return kind == "q" and robot.frame(rest).joint == "revolute"
 
 
 def first(conditions: Conditions, name: str) -> list[CandidateShape]:
-    """Return general forms that show whether a variable matters."""
+    """Return general forms that test whether a variable matters."""
     if name == "approach":
         return [STRAIGHT]
     cubic, memory = _powers(0, 1, 2, 3), _reversals(conditions, name, _DEPTHS)
@@ -138,7 +141,7 @@ def screw(
     conditions: Conditions, name: str, form: str = "waves",
     names: tuple[str, ...] = _WAVE,
 ) -> list[CandidateShape]:  # fmt: skip
-    """Return waves of a slide's coordinate, whose period is the lead of its screw."""
+    """Return waves of a slide's coordinate with the lead of its screw as period."""
     if not name.startswith("q.") or is_angle(conditions.robot, name):
         return []
     x = variable(conditions, name)
@@ -200,10 +203,10 @@ def knees(load: NDArray, *, jump: bool) -> list[CandidateShape]:
 def near(
     conditions: Conditions, variables: Sequence[str], shape: CandidateShape, part: float
 ) -> list[CandidateShape]:
-    """Return a form with the number in which it is not linear a bit less, and more.
+    """Return a form with its shape parameter slightly smaller, and larger.
 
-    ``part`` is relative to half the step by which forms are tried first.  None of a
-    form without such a number, or of a step.
+    ``part`` is relative to half the step of the first search.  Empty for a form without
+    shape parameter, or a step.
     """
     if not len(shape.bends):
         return []

@@ -41,9 +41,10 @@ from validation.diagnosis.sensitivities import Sensitivities, in_cells
 
 Variables = tuple[str, ...]
 Request = tuple[Variables, tuple[CandidateShape, ...]]  # variables, and their forms
-_WIDEST = 36  # most columns of several components: six of six
-_LISTED = 2000  # best functions that are looked through for those of each request
-_BATCH = 2_000_000  # numbers that a batch occupies at once: 16 MB
+_WIDEST = 36  # largest number of columns of several components: six of six
+# number of best functions among which those of each request are selected
+_LISTED = 2000
+_BATCH = 2_000_000  # numbers in a batch: 16 MB
 
 
 @dataclass(frozen=True)
@@ -84,20 +85,20 @@ class Functions:
         self._depend_on(variables)
 
     def _depend_on(self, variables: list[str]) -> None:
-        """Set the variables, and make each answer once."""
+        """Set the variables, and compute each response once."""
         self.variables = variables
         self.shapes_of = cache(self._shapes_of)
         self.prior = cache(self._prior)
         self._numbers = cache(self._columns)
 
     def of(self, variables: list[str]) -> "Functions":
-        """The same of some of the variables."""
+        """Return the functions of some of the variables."""
         other = copy(self)
         other._depend_on(variables)
         return other
 
     def at_rows(self, rows: NDArray) -> "Functions":
-        """The same whose elements have columns of some rows only."""
+        """Return the functions with elements that have columns only in some rows."""
         other = copy(self)
         other.campaign = self.campaign.take(rows)
         other.sensitivities = self.sensitivities.take(rows)
@@ -162,8 +163,8 @@ class Functions:
     ) -> list[ScoredFunction]:  # fmt: skip
         """Return the functions that improve a model most, best first.
 
-        The model is in the cells of ``weighted``; of each request ``most`` are
-        returned.
+        The model is that of the cells of ``weighted``; ``most`` functions of each
+        request are returned.
         """
         if not len(self.places):
             return []
@@ -217,9 +218,9 @@ class Functions:
         """Compute inner products of f forms of m columns at all places.
 
         Yields:
-            Of c functions with equally many columns: (c, 3) number of the request, of
-            its form and of the place; (c, m, m) B'C^-1 B, columns scaled to norm about
-            1; (c, m) B'C^-1 z; (c,) largest plausible size; (c,) log prior.
+            For c functions with equally many columns: (c, 3) indices of the request,
+            its form and the place; (c, m, m) B'C^-1 B, columns scaled to norm about 1;
+            (c, m) B'C^-1 z; (c,) largest plausible size; (c,) log prior.
         """
         named = [(requests[number][0], requests[number][1][k]) for number, k in own]
         each = [self._numbers(*name)[weighted.rows] for name in named]

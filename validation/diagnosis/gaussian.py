@@ -26,14 +26,15 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr
 
-FREEDOM = 20.0  # of the prior of tau^2: sigma stated at 1/3 to 2 times the true one
+# degrees of freedom of tau^2's prior: true sigma is 1/2 to 3 times the stated one
+FREEDOM = 20.0
 SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)  # [sigma] prior contributions to readings
 SPAN = math.log(SIZES[-1] / SIZES[0])
-_SEEN = 1e-8  # least eigenvalue of a scaled candidate that is not rounding
+_SEEN = 1e-8  # least eigenvalue of a scaled candidate above rounding
 
 
 def deviance(squares: NDArray | float, count: int) -> NDArray | float:
-    """Return -2 ln p(z) of n readings without what does not depend on z' C^-1 z."""
+    """Return -2 ln p(z) of n readings, without terms independent of z' C^-1 z."""
     return (FREEDOM + count) * np.log1p(np.asarray(squares) / FREEDOM)
 
 
@@ -104,7 +105,7 @@ def evidence_gains(
         along: (c, m) B'C^-1 z.
         most: (c,) largest plausible prior standard deviation, in that scale.
         bounded: (c,) whether the single unknown cannot be negative.
-        marginal: what is known.
+        marginal: the model to which they are added.
 
     Returns:
         (c,) logarithms; -inf where no plausible size is visible.
@@ -140,7 +141,7 @@ def evidence_gains(
 def size_penalty(determined: float) -> float:
     """Return the penalty of an optimised prior size (Laplace approximation).
 
-    The logarithm of the ratio of maximum and average over the range of sizes, which
-    ``determined`` well determined unknowns share.
+    It is the logarithm of the ratio of maximum and average over the range of sizes,
+    which ``determined`` well-determined unknowns share.
     """
     return math.log(SPAN) + 0.5 * math.log(max(determined, 1.0) / math.pi)

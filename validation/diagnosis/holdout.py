@@ -1,9 +1,9 @@
-"""Rows held out: whole configurations or spans of time, shared by no two sets.
+"""Held-out rows: whole configurations or spans of time, never split between sets.
 
 A campaign of 60 configurations or more is split once.  A smaller one is judged by
-cross-validation: in each fold the whole diagnosis is made again without its rows
-(nested), since a quarter of few configurations is too small a sample to judge by.
-Nothing reads the readings of a held-out row before the last decision.
+cross-validation, because a quarter of few configurations is too small a sample: in each
+fold the whole diagnosis is repeated without its rows (nested).  No readings of a
+held-out row are used before the verdict.
 """
 
 from dataclasses import dataclass, replace
@@ -13,22 +13,22 @@ from numpy.typing import NDArray
 
 from validation.campaign.campaign import Campaign
 
-FEWEST = 8  # blocks of rows by which something can be judged
-_SPLIT = 60  # configurations from which one split judges
+FEWEST = 8  # least number of blocks of rows that can judge
+_SPLIT = 60  # number of configurations above which one split judges
 _SHARES = (1 / 4, 1 / 10)  # of the blocks held out: of 60, and of many
-_ENOUGH = 60  # blocks held out that judge well, however many there are
+_ENOUGH = 60  # number of held-out blocks that suffices for any campaign
 _FOLDS = 5  # Hastie, Tibshirani, Friedman, Elements of Statistical Learning, 7.10
 SPANS = "spans of time"
 
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Which rows judge, and how.
+    """The rows that judge, and the method.
 
     Attributes:
         how: ``"split"``, ``"folds"`` or ``"none"``.
         folds: (R,) bool each, rows held out together; one for a split.
-        words: the same for people.
+        words: the method in words.
     """
 
     how: str
@@ -45,8 +45,8 @@ def hold_out(campaign: Campaign) -> HeldOut:
     """Choose the rows that judge a diagnosis.
 
     Returns:
-        The same for the same campaign; ``"none"`` where there are fewer than two
-        blocks, of which all rows are judged by the fit to themselves.
+        The same for the same campaign; ``"none"`` for fewer than two blocks, where all
+        rows are judged by their own fit.
     """
     blocks, kind = blocks_of(campaign)
     names = np.random.default_rng(0).permutation(np.unique(blocks))
@@ -72,30 +72,30 @@ def hold_out(campaign: Campaign) -> HeldOut:
 
 
 def hidden(campaign: Campaign, rows: NDArray) -> Campaign:
-    """The campaign whose readings in some rows (R,) bool are NaN; commands stay."""
+    """Return the campaign with readings of rows (R,) bool set to NaN; commands stay."""
     readings = np.where(rows[:, None], np.nan, campaign.measured)
     return replace(campaign, measured=readings)
 
 
 def drawn(visit: NDArray, most: int) -> NDArray:
-    """(R,) bool, about ``most`` rows drawn once, those of one visit (R,) together."""
+    """Return (R,) bool: about ``most`` rows drawn once, rows of one visit together."""
     listed = np.unique(visit)
     count = most * len(listed) // max(len(visit), 1)
     return np.isin(visit, np.random.default_rng(0).permutation(listed)[:count])
 
 
 def blocks_of(campaign: Campaign) -> tuple[NDArray, str]:
-    """What rows that are predicted must not share with rows that are fitted.
+    """Return the blocks that must not be shared by predicted and fitted rows.
 
     Returns:
-        (R,) number of the configuration, or of a span of time where there are too few;
-        and which of the two, in words.
+        (R,) number of the configuration, or of a span of time if configurations are too
+        few; and which of the two, in words.
     """
     blocks = campaign.configuration
     if len(np.unique(blocks)) >= FEWEST:
         return blocks, "configurations"
     time = campaign.covariates.get("time", np.arange(len(campaign)))
-    # points that are measured at once share the span
+    # points that are measured together are in one span
     _, first, visit = np.unique(
         campaign.measured_at_once, return_index=True, return_inverse=True
     )

@@ -1,11 +1,11 @@
 """Hypotheses: an effect of the library, at certain frames, with certain unknowns.
 
-An effect may act at one frame, at each frame with a number of its own, or at several
-that share one number (all of them, or those of one kind: ``leg1.rod``, ``leg2.rod``).
-Each of these is a hypothesis of its own, with as many unknowns as it has slots.
+An effect may act at one frame, at each frame with its own number, or at several frames
+that share one number (all, or those of one kind: ``leg1.rod``, ``leg2.rod``).  Each of
+these is a separate hypothesis, with as many unknowns as it has slots.
 
-Between sessions a machine is homed again, its tool is changed and its device is moved:
-an effect may have numbers of its own in each.  Such a hypothesis has every slot once
+Between sessions a machine is homed again, its tool is changed and its device is moved,
+so an effect may have different numbers in each.  Such a hypothesis has every slot once
 for each session; a session's slots act in its rows alone.
 """
 
@@ -21,19 +21,20 @@ from assembly.measurement.conditions import Conditions
 from assembly.model.robot import Robot
 
 PER_SESSION = ("registration", "encoder_offset", "drift")
-_MOST_UNKNOWNS = 24  # of one effect; beyond it frames share them, kind by kind
+# of one effect; with more frames these share unknowns, kind by kind
+_MOST_UNKNOWNS = 24
 
 
 @dataclass(frozen=True)
 class Slot:
-    """One number to be fitted; several unknowns of an effect may share it.
+    """One number to be fitted, which several unknowns of an effect may share.
 
     Attributes:
-        names: of the unknowns it sets.
+        names: names of the unknowns that it sets.
         unknown: their scale and bounds.
-        start: where a fit begins.
-        shape: whether the model is far from linear in it, so that screening holds it.
-        session: the only one in which it acts; None where it acts in all.
+        start: start value of a fit.
+        shape: whether the model is strongly nonlinear in it; screening then holds it.
+        session: the only session in which it acts; None for all.
     """
 
     names: tuple[str, ...]
@@ -45,12 +46,12 @@ class Slot:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """An effect, where it acts, and the numbers that describe it.
+    """An effect, the frames at which it acts, and the numbers that describe it.
 
     Attributes:
         effect: its name.
         where: frames at which it acts, none for effects of the whole.
-        slots: what is fitted.
+        slots: the numbers to be fitted.
     """
 
     effect: str
@@ -58,7 +59,7 @@ class Hypothesis:
     slots: tuple[Slot, ...]
 
     def public(self, robot: Robot, x: Sequence[float] | NDArray) -> dict[str, float]:
-        """Parameters by their public names [SI], x one for each slot."""
+        """Return parameters by their public names [SI], for values x of the slots."""
         values = {
             name: float(value)
             for slot, value in zip(self.slots, x, strict=True)
@@ -68,7 +69,7 @@ class Hypothesis:
 
     @property
     def start(self) -> NDArray:
-        """(k,) where a fit begins."""
+        """(k,) start values of a fit."""
         return np.array([slot.start for slot in self.slots])
 
     @property
@@ -81,10 +82,10 @@ class Hypothesis:
 
 
 def hypotheses(conditions: Conditions, loads: Sequence[str]) -> list[Hypothesis]:
-    """Return all hypotheses that declared conditions can tell anything about.
+    """Return all hypotheses that declared conditions can test.
 
-    Effect by effect; ``loads`` are components of the load that the campaign records,
-    such as ``["fx"]``.
+    They are listed effect by effect.  ``loads`` are the components of the load that the
+    campaign records, such as ``["fx"]``.
     """
     return [h for effect in LIBRARY.values() for h in _of(effect, conditions, loads)]
 
@@ -92,7 +93,7 @@ def hypotheses(conditions: Conditions, loads: Sequence[str]) -> list[Hypothesis]
 def _of(
     effect: Effect, conditions: Conditions, loads: Sequence[str]
 ) -> Iterator[Hypothesis]:
-    """Hypotheses of one effect."""
+    """Yield hypotheses of one effect."""
     for covariate in effect.needs:
         values = getattr(conditions, covariate)
         if not np.isfinite(values).all() or not np.any(values):
@@ -122,7 +123,7 @@ def _of(
 def _choices(
     effect: Effect, unknowns: tuple[Unknown, ...], loads: Sequence[str]
 ) -> Iterator[list[Unknown]]:
-    """Subsets of the unknowns of an effect of the whole, the whole set first."""
+    """Yield subsets of an effect's unknowns if it has no frames, first all."""
     if effect.follows_load:
         # an offset in a direction never loaded belongs to another candidate model
         kept = {f"offset.{name}" for name in loads}
@@ -142,7 +143,7 @@ def _choices(
 def _groupings(
     places: tuple[str, ...], each: int
 ) -> Iterator[tuple[tuple[str, ...], ...]]:
-    """Ways in which frames share numbers: own each, one for all, by kind, one alone."""
+    """Yield groupings of frames: own numbers, one for all, by kind, single frames."""
     if not places:
         return
     kinds: dict[str, list[str]] = {}
@@ -163,7 +164,7 @@ def _scanned(
     effect: Effect, where: tuple[str, ...],
     slots: list[tuple[tuple[str, ...], Unknown]], conditions: Conditions,
 ) -> Iterator[Hypothesis]:  # fmt: skip
-    """One hypothesis, or one for each value at which a shape is looked at."""
+    """Yield one hypothesis, or one for each start value of a shape parameter."""
     scan: tuple[float, ...] = next((u.scan for _, u in slots if u.scan), (0.0,))
     by = next((u.scan_by for _, u in slots if u.scan_by), "")
     size = float(np.ptp(getattr(conditions, by))) if by else 1.0
@@ -181,10 +182,10 @@ def _scanned(
 
 
 def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis]:
-    """Return hypotheses whose effect and that of a robot's file are one again.
+    """Return the hypotheses that combine with a declared effect to a single one.
 
-    That leaves out contact laws and delays where there is one; a drift has the time
-    constant that the file declares, and springs may be stiffer than declared.
+    Contact laws and delays are left out if one is declared.  A drift has the declared
+    time constant, and springs may be stiffer than declared.
     """
     curved = {
         (name, key.removesuffix(".coefficient").removesuffix(".time_constant"))
@@ -205,12 +206,12 @@ def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis
     return list(kept)
 
 
-_CURVED = ("contact_stiffening", "delayed_expansion")  # no two make one
+_CURVED = ("contact_stiffening", "delayed_expansion")  # two of them are not one
 _SPRINGS = ("drive_compliance", "base_compliance")
 
 
 def _stiffer(slot: Slot, soft: Mapping[str, float]) -> Slot:
-    """A slot of compliances, which may be less by those declared, by public name."""
+    """Return a slot of compliances, which may be negative down to the declared ones."""
     names = [
         n.removesuffix(".compliance").replace("compliance.", "stiffness.")
         for n in slot.names
@@ -220,7 +221,7 @@ def _stiffer(slot: Slot, soft: Mapping[str, float]) -> Slot:
 
 
 def _held(slot: Slot, constant: float) -> Slot:
-    """A slot of a drift, its time constant held."""
+    """Return a slot of a drift, its time constant held."""
     if slot.names != ("time_constant",):
         return slot
     unknown = replace(slot.unknown, lower=constant, upper=constant, scan=())
@@ -232,9 +233,9 @@ def with_sessions(
 ) -> list[Hypothesis]:
     """Return hypotheses, and those that may differ from session to session.
 
-    Where there are several sessions, each effect of :data:`PER_SESSION` and ``further``
-    that shares no number among frames is listed a second time, with
-    numbers for every session.
+    If there are several sessions, each effect of :data:`PER_SESSION` and ``further``
+    that shares no number among frames is listed a second time, with numbers for every
+    session.
     """
     if len(sessions) < 2:
         return list(listed)
@@ -248,18 +249,18 @@ def with_sessions(
 
 
 def _each(h: Hypothesis, sessions: Sequence[str]) -> Hypothesis:
-    """A hypothesis with numbers for every session."""
+    """Return a hypothesis with numbers for every session."""
     slots = (replace(slot, session=name) for name in sessions for slot in h.slots)
     return replace(h, slots=tuple(slots))
 
 
 def sessions_of(h: Hypothesis) -> tuple[str | None, ...]:
-    """The sessions in which a hypothesis has numbers of its own, else None alone."""
+    """Return the sessions for which a hypothesis has own numbers, else None alone."""
     return tuple(dict.fromkeys(slot.session for slot in h.slots)) or (None,)
 
 
 def in_one_session(h: Hypothesis, session: str | None) -> tuple[Hypothesis, NDArray]:
-    """What a hypothesis says of one session, as if of all, and which slots it has."""
+    """Return a hypothesis of one session, as if of all, and its slots."""
     own = [k for k, s in enumerate(h.slots) if s.session in (None, session)]
     slots = tuple(replace(h.slots[k], session=None) for k in own)
     return replace(h, slots=slots), np.array(own, dtype=int)

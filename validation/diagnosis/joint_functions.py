@@ -26,9 +26,9 @@ Parts = tuple[CandidatePart, ...]
 
 
 def joint_functions(functions: Functions, rows: NDArray) -> list[Element]:
-    """Return functions at several places and cubic springs that the readings depend on.
+    """Return functions at several places and cubic springs that affect the readings.
 
-    Their columns are those of the cells of some rows.
+    Their columns are those of the cells of the given rows.
     """
     some = functions.at_rows(rows)
     listed: list[tuple[Candidate, float]] = []
@@ -58,7 +58,7 @@ def _of_wrench(functions: Functions) -> list[tuple[Candidate, float]]:
 
 
 def _knees(functions: Functions, name: str, component: str) -> list[CandidateShape]:
-    """Return laws with a knee of what a drive or a spring carries along its motion."""
+    """Return laws with a knee for the load of a drive or a spring along its motion."""
     robot = functions.conditions.robot
     frame, axis = robot.frame(name), AXES.index(component)
     if axis != frame.own_axis or name not in (*drives(robot), *elastic_joints(robot)):

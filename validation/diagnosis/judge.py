@@ -1,4 +1,4 @@
-"""The verdict on what a diagnosis found, and the errors on the rows held out."""
+"""The verdict of a diagnosis, and the errors on the held-out rows."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -39,13 +39,14 @@ from validation.diagnosis.trace import FINITE, Traced
 from validation.diagnosis.verdict import by_names, verdict
 from validation.diagnosis.whitening import independent, size_of_noise, whitening_of
 
-_LOOSE = 1.25  # rms of held-out rows, in sigma, that is noise whatever its chance
-_SHARE = 0.5  # of the readings that may be determined unknowns
+# rms of held-out rows, in sigma, that counts as noise for any probability
+_LOOSE = 1.25
+_SHARE = 0.5  # relative to the readings: largest share of determined unknowns
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A machine fitted without some rows, and these.
+    """A machine fitted without the rows that judge it.
 
     Attributes:
         fit: the machine.
@@ -62,11 +63,11 @@ def judge(
     campaign: Campaign, traced: Traced, fit: MachineFit, held: HeldOut,
     folds: Sequence[Judged],
 ) -> Diagnosis:  # fmt: skip
-    """The errors on the held-out rows, and the verdict.
+    """Return the errors on the held-out rows, and the verdict.
 
     Args:
-        campaign: of R rows, as it was measured.
-        traced: what the search found.
+        campaign: campaign of R rows, as measured.
+        traced: result of the search.
         fit: the machine that is saved.
         held: the rows that judge.
         folds: machines fitted without them.
@@ -108,7 +109,7 @@ def judge(
     if FINITE in names:
         conditions = replace(conditions, second_order=0.0)
     declared = np.asarray(campaign.measured - predict(conditions).deviation)
-    if held.how == "split":  # what is saved is fitted to all rows, now that they judged
+    if held.how == "split":  # after judging, the saved machine is fitted to all rows
         fit, correlated = _of_all_rows(believed, traced, fit, used | rows)
         left = residual_of(campaign, fit.robot)
     varies, following = [], None
@@ -155,8 +156,8 @@ def judge(
 
 
 def _noisy(campaign: Campaign, traced: Traced) -> Campaign:
-    """The campaign with the noise by which residuals are judged."""
-    # sigma as it is stated, unless it counts in what the points have in common
+    """Return the campaign with the noise that is used to judge residuals."""
+    # sigma as stated, unless it is part of the noise in common
     common = traced.campaign.common
     if common is None:
         return campaign
@@ -167,7 +168,7 @@ def _noisy(campaign: Campaign, traced: Traced) -> Campaign:
 def _outlying_held(
     campaign: Campaign, traced: Traced, held: HeldOut, residual: NDArray
 ) -> NDArray:
-    """(R,) bool, outliers among the rows that judge."""
+    """Return the (R,) bool, outliers among the rows that judge."""
     outliers = np.zeros(len(campaign), dtype=bool)
     judged = campaign.take(held.rows)
     whitened = np.nan_to_num(whiten(judged, residual[held.rows]))
@@ -179,7 +180,7 @@ def _outlying_held(
 def _of_all_rows(
     believed: Campaign, traced: Traced, fit: MachineFit, rows: NDArray
 ) -> tuple[MachineFit, NoiseInTime | None]:
-    """The same unknowns fitted to some more rows, of the noise found in the others."""
+    """Return the fit of the same unknowns to more rows, with the noise found."""
     more = believed.cells & ~traced.campaign.cells
     sigma = np.where(more, traced.selected.noise.tau, 1.0) * believed.sigma
     believed = replace(believed, sigma=sigma)
@@ -190,7 +191,7 @@ def _of_all_rows(
 def _with_noise_in_time(
     fitting: Campaign, fit: MachineFit
 ) -> tuple[MachineFit, NoiseInTime | None]:
-    """The fit with the covariance that noise correlated in time leaves, if it is."""
+    """Return the fit with the covariance due to noise correlated in time, if any."""
     noise = noise_in_time(fitting, fit.residual)
     if noise is None or not len(fit.x):
         return fit, noise
@@ -202,7 +203,7 @@ def _fails(
     campaign: Campaign, folds: Sequence[Judged], residual: NDArray, rows: NDArray,
     lack: LackOfFit,
 ) -> bool:  # fmt: skip
-    """Whether held-out rows show more than noise and the uncertainty of the fit."""
+    """Return whether held-out rows show more than noise and the fit's uncertainty."""
     squares, count = 0.0, 0
     for one in folds:
         own = campaign.cells & (one.held & rows)[:, None] & np.isfinite(residual)
@@ -223,14 +224,14 @@ def _fails(
 
 
 def _too_few(campaign: Campaign, used: NDArray, determined: float, fails: bool) -> bool:
-    """Whether so few rows decide nothing."""
+    """Return whether too few rows leave the verdict undecided."""
     blocks = len(np.unique(blocks_of(campaign)[0][used]))
     many = determined > _SHARE * int(campaign.cells[used].sum())
     return many or (fails and blocks <= FEWEST)
 
 
 def _needed(campaign: Campaign, fit: MachineFit) -> str:
-    """Rows that would decide, in words."""
+    """Return the rows that would decide, in words."""
     components = max(1, int(campaign.cells.any(axis=0).sum()))
     wanted = float(fit.determined.sum()) / _SHARE / components
     blocks = len(np.unique(campaign.configuration))
@@ -243,7 +244,7 @@ def _needed(campaign: Campaign, fit: MachineFit) -> str:
 
 
 def _uncertainty(campaign: Campaign, residual: NDArray, rows: NDArray) -> float:
-    """Standard error of the rms of held-out rows in sigma, by scatter of blocks."""
+    """Return the standard error of the held-out rms in sigma, by scatter of blocks."""
     z = np.where(campaign.cells, residual / campaign.sigma, np.nan)[rows]
     _, block = np.unique(blocks_of(campaign)[0][rows], return_inverse=True)
     sums = np.bincount(block, np.nansum(z**2, axis=1))
@@ -255,7 +256,7 @@ def _uncertainty(campaign: Campaign, residual: NDArray, rows: NDArray) -> float:
 
 
 def _impossible(campaign: Campaign) -> tuple[str, ...]:
-    """A remark on rows with readings that no sensor gives, or none."""
+    """Return a remark on rows with impossible readings, or none."""
     ids = [campaign.ids[i] for i in np.flatnonzero(impossible_rows(campaign))]
     if not ids:
         return ()

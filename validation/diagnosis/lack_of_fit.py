@@ -1,8 +1,8 @@
-"""Is a residual noise?  If not, which rows are outliers, and with what does it vary?
+"""Tests whether a residual is noise; its outliers and trends if it is not.
 
-It is judged against the stated sigma and against repeats.  A trend is a handful of
-functions of one thing that was varied (a component of the pose, the load, a covariate)
-which all six components of the reading follow, with a coefficient of their own.
+The residual is compared with the stated sigma and with repeats.  A trend is a group of
+functions of one variable (a component of the pose, the load, a covariate) which all six
+components of the reading follow, each with its own coefficients.
 
 Sources:
     Draper, Smith, Applied Regression Analysis, 3rd ed., section 2.1 (lack of fit and
@@ -22,26 +22,27 @@ from validation.campaign.campaign import LOAD, Campaign, number_rows
 from validation.diagnosis.noise import repeat_scatter
 from validation.diagnosis.separability import orthonormal_basis
 
-SIGNIFICANT = 1e-4  # probability by chance below which noise is not believed
-UNLIKELY = 1e-3  # likewise, of one among many things that are looked for
-OUTLIERS = 20  # one row in so many may be called an outlier
-_LEVELS = 30  # of a covariate's range within which rows are alike
-_OUTLYING = 5.5  # rms of a row, in medians of all rows
-_MOST = 6  # trends that are reported
+SIGNIFICANT = 1e-4  # probability below which a residual is not noise
+UNLIKELY = 1e-3  # probability below which one of many tested residuals is unlikely
+OUTLIERS = 20  # at most one row in 20 may be an outlier
+_LEVELS = 30  # steps of a covariate's range; rows in one step are alike
+_OUTLYING = 5.5  # rms of an outlying row, in medians of all rows
+_MOST = 6  # largest number of trends that are reported
 
 
 @dataclass(frozen=True)
 class LackOfFit:
-    """What is left of a residual, judged.
+    """Result of the test of a residual.
 
     Attributes:
-        rms: [-] of the whitened residual, degrees of freedom counted.
-        probability: that noise of the stated sigma leaves as much.
+        rms: [-] of the whitened residual, with degrees of freedom.
+        probability: probability of a residual as large by noise of the stated sigma.
         repeats: [-] rms scatter between repeats, whitened; NaN without repeats.
         repeats_freedom: [-] its degrees of freedom.
-        against_repeats: probability that noise as between repeats leaves as much.
-        common: whether noise that points of one measurement share was found in the
-            residual itself: repeats must then show it too.
+        against_repeats: probability of a residual as large by noise of the repeats'
+            scatter.
+        common: whether the noise common to points of one measurement was estimated from
+            the residual itself; repeats must then show it too.
     """
 
     rms: float
@@ -53,7 +54,7 @@ class LackOfFit:
 
     @property
     def significant(self) -> bool:
-        """Whether more than noise is left, whichever noise is believed."""
+        """Whether the residual is more than noise, by sigma and by repeats."""
         by_repeats = self.against_repeats < SIGNIFICANT
         if self.sigma_too_small:
             return by_repeats
@@ -61,7 +62,7 @@ class LackOfFit:
 
     @property
     def sigma_too_small(self) -> bool:
-        """Whether repeats scatter more than sigma says."""
+        """Whether repeats scatter more than sigma."""
         if not self.repeats_freedom:
             return False
         squares = self.repeats**2 * self.repeats_freedom
@@ -69,12 +70,12 @@ class LackOfFit:
 
 
 def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfFit:
-    """Judge a residual.
+    """Test a residual.
 
     Args:
-        campaign: of R rows, N measured cells.
+        campaign: campaign of R rows, N measured cells.
         residual: (N,) whitened, independent in every cell if it is noise.
-        unknowns: how many were fitted.
+        unknowns: number of unknowns fitted.
 
     Returns:
         The judgement.
@@ -88,8 +89,8 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
     repeats, between = repeat_scatter(residual, group)
     against = 1.0
     if between and freedom > between:
-        # what repeats do not share with the others: lack of fit over pure error, which
-        # is nothing where a device rounds and repeats are equal
+        # scatter beyond repeats: lack of fit over pure error, which is zero where a
+        # device rounds and repeats are equal
         excess = (rss - between * repeats**2) / (freedom - between)
         ratio = excess / repeats**2 if repeats else (np.inf if excess > 0 else 0.0)
         against = float(f.sf(ratio, freedom - between, between))
@@ -101,9 +102,9 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
 
 
 def _alike(campaign: Campaign) -> NDArray:
-    """(R,) number of the conditions: command, load, every covariate but time."""
-    # alike: no covariate differs by more than a thirtieth of its range.  An effect
-    # that is not modelled must not pass for noise
+    """Return the (R,) number of the conditions: command, load, covariates but time."""
+    # alike: no covariate differs by more than a thirtieth of its range, so that an
+    # effect that is not modelled does not count as noise
     parts = [campaign.repeat]
     for name, values in campaign.covariates.items():
         span = float(np.ptp(values))
@@ -113,12 +114,12 @@ def _alike(campaign: Campaign) -> NDArray:
 
 
 def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> NDArray:
-    """Rows whose residuals are outliers.
+    """Return the rows whose residuals are outliers.
 
     Args:
-        campaign: of R rows, N measured cells.
+        campaign: campaign of R rows, N measured cells.
         residual: (N,) whitened.
-        most: how many may be called so; one row in twenty if not said.
+        most: largest number of outliers; one row in twenty if absent.
 
     Returns:
         (R,) bool.
@@ -131,7 +132,7 @@ def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> 
     squares = np.bincount(rows, residual**2, minlength=len(campaign))
     cells = np.bincount(rows, minlength=len(campaign))
     rms = np.sqrt(squares / np.maximum(cells, 1))
-    # a row of few cells is noisier: compared with what noise of its size may reach
+    # a row of few cells is noisier: compared with the largest noise of its size
     far = rms > _OUTLYING * max(float(np.median(rms)), 1.0)
     most = len(campaign) // OUTLIERS if most is None else most
     if far.sum() > most:
@@ -141,12 +142,12 @@ def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> 
 
 @dataclass(frozen=True)
 class Trend:
-    """What a residual varies with.
+    """A variable with which a residual varies.
 
     Attributes:
-        against: in words.
-        share: [-] of the squared whitened residual that it takes away.
-        probability: that noise takes away as much, over all trends tried.
+        against: the variable in words.
+        share: [-] of the squared whitened residual that it explains.
+        probability: probability of so large a share by noise, over all trends tried.
     """
 
     against: str
@@ -157,15 +158,15 @@ class Trend:
 def trends(
     campaign: Campaign, conditions: Conditions, residual: NDArray
 ) -> list[Trend]:
-    """What a residual varies with, the strongest first.
+    """Return variables with which a residual varies, the strongest first.
 
     Args:
-        campaign: of R rows.
+        campaign: campaign of R rows.
         conditions: its conditions.
         residual: (R, 6) [rad, m]; NaN where not measured.
 
     Returns:
-        At most six trends that noise would hardly show.
+        At most six trends that are unlikely for noise.
     """
     z = residual / campaign.sigma
     tried = list(_candidates(campaign, conditions))
@@ -177,7 +178,7 @@ def trends(
 def _candidates(
     campaign: Campaign, conditions: Conditions
 ) -> Iterator[tuple[str, NDArray]]:
-    """Names, and functions (R, p) without the constant."""
+    """Yield names, and functions (R, p) without the constant."""
     loads = campaign.loads
     force = loads[:, 3:]
     size = np.linalg.norm(force, axis=1)
@@ -209,13 +210,13 @@ def _candidates(
 
 
 def _powers(x: NDArray) -> NDArray:
-    """(R, 2) a quantity about its mean, and its square."""
+    """Return (R, 2): a quantity about its mean, and its square."""
     centred = x - x.mean()
     return np.column_stack([centred, centred**2])
 
 
 def _test(name: str, X: NDArray, z: NDArray, tried: int) -> Trend | None:
-    """F test of functions beside a constant, in every component of the reading."""
+    """Return the F test of functions with a constant, in all components."""
     before = after = 0.0
     extra = freedom = 0
     for column in z.T:

@@ -1,8 +1,8 @@
-"""Where a machine was measured when its robot file was made, and rows beyond that.
+"""Range of the data a model was identified on, and rows that extrapolate beyond it.
 
-A function of a covariate, and any other effect, is known where that covariate has been.
-A joint that has made a full turn is where it was: its angle is compared modulo a
-turn, unless the file has a function of it that does not repeat after a turn.
+A function of a covariate, and any other effect, is known only in the covariate's range.
+The angle of a joint that has made a full turn is compared modulo a turn, unless the
+file has a function of it that does not repeat after a turn.
 """
 
 from collections.abc import Iterator
@@ -17,22 +17,22 @@ from assembly.model.function import Function
 from assembly.model.robot import Robot
 from validation.campaign.campaign import LOAD, Campaign
 
-_MARGIN = 0.05  # of a range: so far it is continued without a word
-_SAME = 1e-3  # of a value: so far one that never varied is the same
-# forms that repeat after a turn of any variable; of the first alone
+_MARGIN = 0.05  # relative to a range: accepted extrapolation
+_SAME = 1e-3  # relative to a value: accepted difference if a variable never varied
+# forms that repeat after a turn of any variable; then those of the first alone
 _PERIODIC = ("waves", "reversal_waves", "scaled_waves", "reversal", "slip")
 
 
 @dataclass(frozen=True)
 class Beyond:
-    """A variable that leaves the range in which a robot was learned.
+    """A variable outside the range in which a robot was identified.
 
     Attributes:
         variable: its public name.
-        learned: least and largest value.
-        now: least and largest in the rows looked at.
-        rows: how many of these are outside.
-        count: number of rows.
+        learned: least and largest value of the range.
+        now: least and largest value in the rows.
+        rows: number of rows outside.
+        count: number of all rows.
     """
 
     variable: str
@@ -42,7 +42,7 @@ class Beyond:
     count: int
 
     def table(self) -> dict[str, Any]:
-        """For machines."""
+        """Return plain values."""
         return {
             "variable": self.variable, "learned": list(self.learned),
             "now": list(self.now), "rows": self.rows,
@@ -57,9 +57,9 @@ class Beyond:
 
 
 def learned_range(campaign: Campaign, rows: NDArray) -> dict[str, tuple[float, float]]:
-    """Return least and largest value of all that acts in some rows, but time.
+    """Return least and largest value of all variables in some rows, except time.
 
-    By public name: drives, components of the load, covariates.
+    They are drives, components of the load and covariates, by public name.
     """
     ranges = {}
     for name, values in _variables(campaign).items():
@@ -70,10 +70,10 @@ def learned_range(campaign: Campaign, rows: NDArray) -> dict[str, tuple[float, f
 
 
 def beyond(robot: Robot, campaign: Campaign) -> tuple[Beyond, ...]:
-    """Return what leaves the range in which a robot was learned.
+    """Return variables outside the range in which a robot was identified.
 
-    One for each variable outside by more than a twentieth of its range; none where the
-    robot's file says no range.
+    A variable is listed if it is outside by more than a twentieth of its range; none if
+    the robot's file has no range.
     """
     left = []
     for name, values, outside in _outside(robot, campaign):
@@ -84,7 +84,7 @@ def beyond(robot: Robot, campaign: Campaign) -> tuple[Beyond, ...]:
 
 
 def beyond_by_row(robot: Robot, campaign: Campaign) -> NDArray:
-    """(R,) names of what leaves the learned range in each row, or empty."""
+    """Return the (R,) names of variables outside the range in each row, or empty."""
     names = np.full(len(campaign), "", dtype=object)
     for name, _, outside in _outside(robot, campaign):
         names[outside] = [f"{before} {name}".strip() for before in names[outside]]
@@ -94,7 +94,7 @@ def beyond_by_row(robot: Robot, campaign: Campaign) -> NDArray:
 def _outside(
     robot: Robot, campaign: Campaign
 ) -> Iterator[tuple[str, NDArray, NDArray]]:
-    """Name, (R,) values and (R,) bool of every variable that leaves its range."""
+    """Yield name, (R,) values and (R,) bool of every variable outside its range."""
     variables = _variables(campaign)
     for name, (low, high) in robot.learned_range.items():
         values = variables.get(name, np.zeros(0))
@@ -108,7 +108,7 @@ def _outside(
 
 
 def _repeats(robot: Robot, name: str) -> bool:
-    """Whether the robot is the same after a turn of a variable."""
+    """Return whether the robot is unchanged after a turn of a variable."""
     turning = [f"q.{f.name}" for f in robot.frames if f.joint == "revolute"]
     return name in turning and all(
         _turns_over(function, name)
@@ -118,13 +118,13 @@ def _repeats(robot: Robot, name: str) -> bool:
 
 
 def _turns_over(function: Function, name: str) -> bool:
-    """Whether a function repeats after a turn of one of its variables."""
+    """Return whether a function repeats after a turn of one of its variables."""
     forms = _PERIODIC if name == function.variables[0] else _PERIODIC[:2]
     return function.form in forms and "period" not in function.parameters
 
 
 def _variables(campaign: Campaign) -> dict[str, NDArray]:
-    """(R,) of everything that acts, by public name."""
+    """Return the (R,) values of all variables, by public name."""
     robot = campaign.robot
     variables = {
         f"q.{name}": campaign.coordinates[:, robot.index(name)]
@@ -132,6 +132,6 @@ def _variables(campaign: Campaign) -> dict[str, NDArray]:
     }
     variables |= {f"load.{a}": w for a, w in zip(LOAD, campaign.loads.T, strict=True)}
     for name, values in campaign.covariates.items():
-        if name != "time":  # every session has its own
+        if name != "time":  # every session has its own time
             variables["approach" if name == "approach" else f"cov.{name}"] = values
     return variables

@@ -1,12 +1,13 @@
-"""Which measurement would decide between two explanations.
+"""The measurement that would decide between two candidate models.
 
-Where explanation A is true, explanation B fitted to the same readings misses a further
-measurement by d, known up to the covariance J C J' of what B could still adapt.  The
-measurement with the greatest non-centrality
+If model A is true, model B fitted to the same readings errs in a further measurement by
+d.  The covariance J C J' is the part that B could still adapt.  The measurement with
+the greatest non-centrality
 
     d' (I + J C J')^-1 d     (whitened)
 
-tells them apart best; the smaller of that of A against B and of B against A counts.
+distinguishes them best.  The smaller of the values for A against B and B against A is
+used.
 
 Sources:
     Atkinson, Fedorov (1975), The design of experiments for discriminating between two
@@ -26,22 +27,23 @@ from assembly.measurement.predict import predict
 from validation.campaign.campaign import LOAD, Campaign
 from validation.diagnosis.fit import MachineFit
 
-_TRIED = 240  # conditions looked at
-_FURTHER = 1.5  # of the range of loads and covariates used so far
-_STEP = 1e-3  # of a standard deviation, for derivatives
-_AS_GOOD = 0.97  # of the largest non-centrality
+_TRIED = 240  # number of conditions tried
+_FURTHER = 1.5  # factor on the range of loads and covariates used so far
+_STEP = 1e-3  # relative to a standard deviation: step for derivatives
+# relative to the largest non-centrality: conditions above it are equally good
+_AS_GOOD = 0.97
 _DECIDES = 1.0  # [-] least non-centrality worth a measurement
 
 
 @dataclass(frozen=True)
 class NextMeasurement:
-    """A measurement that would decide.
+    """A measurement that would decide between models.
 
     Attributes:
-        why: in words.
+        why: reason in words.
         configuration: commanded coordinates or pose by column name.
         load: (6,) [N m, N] at the reference point, base axes.
-        covariates: such as a temperature to be reached.
+        covariates: covariates, such as a temperature to be set.
         power: [-] non-centrality of one such reading; 10 decides nearly always.
     """
 
@@ -58,21 +60,22 @@ def next_measurement(
     fit: MachineFit,
     rivals: Sequence[MachineFit],
 ) -> NextMeasurement | None:
-    """The measurement that would decide between a fit and its likeliest rival.
+    """Return the measurement that would decide between a fit and its likeliest rival.
 
-    Looked for over the configurations measured so far and others between any two of
-    them that the robot can reach, with loads and covariates within half as much again
-    of their ranges.  A rival that nothing tells from the fit (a longer bar and a turned
-    encoder may be the same) leaves the question to the next.
+    The search covers the configurations measured so far and others between any two of
+    them that the robot can reach.  Loads and covariates may exceed their ranges by
+    half. If a rival is indistinguishable from the fit (a longer bar and a turned
+    encoder may be equivalent) the next rival is used.
 
     Args:
-        campaign: what was measured.
+        campaign: the measurements.
         conditions: its conditions, as declared and registered.
-        fit: the best explanation.
-        rivals: others, likeliest first.
+        fit: the best model.
+        rivals: other models, likeliest first.
 
     Returns:
-        The measurement, None if none of those tried tells any rival from the fit.
+        The measurement, None if none of those tried distinguishes any rival from the
+        fit.
     """
     tried = _conditions_tried(conditions)
     sigma = np.nanmedian(campaign.sigma, axis=0)
@@ -81,7 +84,7 @@ def next_measurement(
     for rival in rivals:
         b, Jb, Cb = _model(tried, rival, sigma)
         powers = np.minimum(_power(a - b, Jb, Cb), _power(b - a, Ja, Ca))
-        # among conditions as good as the best, the one that asks for the least load
+        # among conditions as good as the best, the one with the least load
         good = powers >= _AS_GOOD * powers.max()
         best = int(np.argmin(np.where(good, size, np.inf)))
         if powers[best] >= _DECIDES:
@@ -94,7 +97,7 @@ def _measurement(
     campaign: Campaign, tried: Conditions, best: int, power: float,
     fits: Sequence[MachineFit],
 ) -> NextMeasurement:  # fmt: skip
-    """One of the conditions tried, in words and numbers."""
+    """Return one of the conditions tried, in words and numbers."""
     sets = [sorted({e.hypothesis.effect for e in one.effects}) for one in fits]
     names = [" + ".join(effects) or "nothing" for effects in sets]
     why = (
@@ -109,7 +112,7 @@ def _measurement(
 
 
 def _conditions_tried(conditions: Conditions) -> Conditions:
-    """Conditions to choose from: within reach, loads and covariates wider."""
+    """Return conditions to choose from: reachable, with wider loads and covariates."""
     rng = np.random.default_rng(0)
     tried = _between(conditions.take(rng.integers(0, len(conditions), _TRIED)), rng)
     largest = np.abs(conditions.load).max(axis=0)
@@ -117,7 +120,7 @@ def _conditions_tried(conditions: Conditions) -> Conditions:
     temperature = tried.temperature
     if np.isfinite(temperature).all():
         low, high = conditions.temperature.min(), conditions.temperature.max()
-        # a campaign at one temperature: ten kelvin are within reach of a workshop
+        # a campaign at one temperature: ten kelvin are possible in a workshop
         span = max(_FURTHER * (high - low), 10.0)
         temperature = rng.choice([low, (low + high) / 2, low + span], _TRIED)
     approach = tried.approach
@@ -132,8 +135,8 @@ def _conditions_tried(conditions: Conditions) -> Conditions:
 
 
 def _between(measured: Conditions, rng: np.random.Generator) -> Conditions:
-    """Half of the configurations moved towards others, where the robot can follow."""
-    if measured.rest is not None:  # it is known for measured configurations only
+    """Return the conditions with half of the configurations moved towards others."""
+    if measured.rest is not None:  # known only for measured configurations
         return measured
     actuated = np.array([frame.actuated for frame in measured.robot.frames])
     q = np.where(actuated, measured.coordinates, np.nan)
@@ -145,7 +148,7 @@ def _between(measured: Conditions, rng: np.random.Generator) -> Conditions:
     for i, posture in enumerate(postures):
         if posture is not None:
             coordinates[i], transforms[i] = posture.coordinates, posture.transforms
-    # second orders of the declared errors are in both models, and not known elsewhere
+    # second orders of the declared errors are in both models, and unknown elsewhere
     return replace(
         measured, coordinates=coordinates, transforms=transforms, second_order=0.0
     )
@@ -154,8 +157,8 @@ def _between(measured: Conditions, rng: np.random.Generator) -> Conditions:
 def _model(
     tried: Conditions, fit: MachineFit, sigma: NDArray
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """(S, 6) whitened predictions with a machine's effects, (S, 6, k) derivatives."""
-    # a session's own numbers say nothing of another measurement
+    """Return (S, 6) whitened predictions with a machine's effects, and derivatives."""
+    # a session's own numbers do not apply to another measurement
     parts = [one for one in fit.effects if one.session is None]
     places = [fit.unknowns.place(one) for one in parts]
     chosen = np.concatenate([np.arange(len(fit.x))[own] for own in [slice(0), *places]])
@@ -185,11 +188,11 @@ def _model(
 
 
 def _power(d: NDArray, J: NDArray, C: NDArray) -> NDArray:
-    """(S,) non-centrality of missing by d with J C J' still open; 0 if not finite."""
+    """Return the (S,) non-centrality of errors d with J C J' open; 0 if not finite."""
     S = np.eye(d.shape[1]) + np.einsum("sik,kl,sjl->sij", J, C, J)
     good = np.isfinite(d).all(axis=1) & np.isfinite(S).all(axis=(1, 2))
     powers = np.zeros(len(d))
-    # S is 1 plus what is semidefinite but for rounding, which may be large
+    # S is 1 plus a matrix that is semidefinite up to rounding, which may be large
     values, vectors = np.linalg.eigh(S[good])
     along = np.einsum("sij,si->sj", vectors, d[good])
     powers[good] = np.sum(along**2 / np.maximum(values, 1.0), axis=1)
@@ -197,7 +200,7 @@ def _power(d: NDArray, J: NDArray, C: NDArray) -> NDArray:
 
 
 def _configuration(campaign: Campaign, tried: Conditions, row: int) -> dict[str, float]:
-    """The command of some conditions, by the columns of the campaign."""
+    """Return the command of some conditions, by the columns of the campaign."""
     if campaign.commanded == "joints":
         return {
             f"q.{frame.name}": float(tried.coordinates[row, i])
@@ -212,6 +215,6 @@ def _configuration(campaign: Campaign, tried: Conditions, row: int) -> dict[str,
 
 
 def load_text(load: Sequence[float]) -> str:
-    """A load as on the command line."""
+    """Return a load as on the command line."""
     parts = [f"{name}={w:g}" for name, w in zip(LOAD, load, strict=True) if w]
     return ",".join(parts) or "none"

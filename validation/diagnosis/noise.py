@@ -1,7 +1,7 @@
-"""Noise: its scale beside the stated sigma, and blunders.
+"""Noise: its scale relative to the stated sigma, and blunders.
 
-A reading is good, with N(0, tau^2), or with a probability of one in five thousand a
-blunder, thirty times as wide.
+A reading is good, with distribution N(0, tau^2), or with a probability of one in five
+thousand a blunder, thirty times as wide.
 
 Sources:
     Box, Tiao (1968), A Bayesian approach to some outlier problems, Biometrika 55, 119.
@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from forcefit.results.text import readings_text
+
 _BLUNDERS = 2e-4  # prior probability of a blunder
 _WIDTH = 30.0  # standard deviation of blunders over tau
 _LEFT_OUT = 1e-12  # relative precision of a blunder
-_CLEAR = 10.0  # residual over tau: least of a blunder before a model is fitted
+_CLEAR = 10.0  # residual over tau: least size of a blunder before a model is fitted
 _MANY = 0.05  # largest share of blunders, as in the judgement; more indicate an effect
-_UNLIKE = 4.0  # standard deviations of tau from 1 that are reported: no chance
+_UNLIKE = 4.0  # standard deviations of tau from 1 above which it is reported
 _CLOSE = 0.2  # least ln tau that is reported: accuracy of a stated sigma
 _CHANCE = 1e-4  # p-value below which repeats are not repeatable
 _MEDIAN = 0.4549  # median of chi-square with one degree of freedom
@@ -32,8 +34,8 @@ class Noise:
         tau: true over stated sigma.
         tau_std: its standard deviation.
         findings: sentences for the user.
-        common: [rad, m] standard deviations of rotation and translation of a motion
-            that the points of one measurement have in common.
+        common: [rad, m] standard deviations of rotation and translation of the motion
+            that the points of one measurement share.
     """
 
     tau: float
@@ -43,10 +45,11 @@ class Noise:
 
 
 def probability_good(squares: NDArray, *, clearly: bool = False) -> NDArray:
-    """Return the (n,) probability that each reading is no blunder, by expected squares.
+    """Return the (n,) probability that each reading is good, from expected squares.
 
-    1 if it is more likely good, and of all if there are too many outliers.  ``clearly``
-    asks for large residuals, because effects are not fitted yet.
+    It is 1 if the reading is more likely good, and for all readings if there are too
+    many outliers.  ``clearly`` requires large residuals, because effects are not fitted
+    yet.
     """
     v = max(float(np.median(squares)) / _MEDIAN, 1e-12)
     with np.errstate(over="ignore", under="ignore"):
@@ -60,7 +63,7 @@ def probability_good(squares: NDArray, *, clearly: bool = False) -> NDArray:
 
 
 def cell_weights(good: NDArray) -> NDArray:
-    """Return (n,) relative precisions: 1 of a good reading, hardly any of a blunder."""
+    """Return (n,) relative precisions: 1 for a good reading, nearly 0 for a blunder."""
     return np.maximum(good, _LEFT_OUT)
 
 
@@ -77,12 +80,12 @@ def findings(
     tau: float, tau_std: float, repeats: tuple[float, int], *, memory: bool,
     common: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[str, ...]:  # fmt: skip
-    """Return sentences about the noise; none where all is as stated.
+    """Return sentences about the noise; none if it is as stated.
 
     Args:
         tau: true over stated sigma.
         tau_std: its standard deviation.
-        repeats: of :func:`repeat_scatter`, from the residual.
+        repeats: result of :func:`repeat_scatter`, from the residual.
         memory: whether the model depends on earlier rows.
         common: [rad, m] noise that the points of a measurement share.
 
@@ -91,8 +94,8 @@ def findings(
     """
     told = []
     if any(common):
-        named = (common[1], "um"), (common[0], "urad")
-        sizes = ", ".join(f"{1e6 * size:.3g} {unit}" for size, unit in named if size)
+        named = {"position": common[1] or None, "rotation": common[0] or None}
+        sizes = readings_text(named, digits=3)
         told.append(f"noise common to the points of a row: {sizes}")
         if not repeats[1]:
             unsure = "a cause that was not recorded would look the same"

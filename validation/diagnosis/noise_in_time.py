@@ -1,4 +1,4 @@
-r"""Noise correlated in time: is there any, and how much wider are intervals for it?
+r"""Noise correlated in time: its size, and the wider intervals due to it.
 
 Within a session each component of a reading has noise that is partly white and partly
 an Ornstein-Uhlenbeck process.  Over sigma, between times t_i and t_j,
@@ -9,13 +9,13 @@ an Ornstein-Uhlenbeck process.  Over sigma, between times t_i and t_j,
 symbol  code           shape      meaning
 ======  =============  =========  ====================================================
 a       ``share``                 of the variance that is correlated
-tau     ``constant``              [s] time over which it is
+tau     ``constant``              [s] correlation time
 G       ``slopes``     (N, k)     change of the whitened readings per unknown
 H       ``covariance`` (k, k)     (G'G)^-1, of the unknowns by white noise
 ======  =============  =========  ====================================================
 
-Fits stay those of white noise; with R instead of 1 their covariance is H G'R G H.  The
-likelihood of a and tau is the Kalman filter's, over a grid of both at once.
+Fits remain those for white noise; with R instead of 1 their covariance is H G'R G H.
+The likelihood of a and tau is computed by a Kalman filter on a grid of both.
 
 Sources:
     Uhlenbeck, Ornstein (1930), On the theory of the Brownian motion, Phys. Rev. 36.
@@ -33,8 +33,9 @@ from validation.campaign.campaign import Campaign
 from validation.diagnosis.lack_of_fit import SIGNIFICANT
 
 _SHARES = np.array([0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95])
-_CONSTANTS = 12  # time constants from the usual step of time to the longest session
-_FEWEST = 30  # rows with a time
+# number of time constants from the usual step of time to the longest session
+_CONSTANTS = 12
+_FEWEST = 30  # least number of rows with a time
 
 
 @dataclass(frozen=True)
@@ -43,8 +44,8 @@ class NoiseInTime:
 
     Attributes:
         share: [-] of the variance that is correlated.
-        constant: [s] time over which it is.
-        probability: that white noise looks as correlated.
+        constant: [s] correlation time.
+        probability: probability of as much correlation by white noise.
     """
 
     share: float
@@ -53,15 +54,15 @@ class NoiseInTime:
 
 
 def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
-    """How a residual is correlated in time.
+    """Estimate the correlation of a residual in time.
 
     Args:
-        campaign: of R rows, N measured cells.
+        campaign: campaign of R rows, N measured cells.
         residual: (N,) whitened.
 
     Returns:
-        Share and time constant of the largest likelihood; None where the rows have no
-        time, are few, or white noise looks as correlated in one case in 10^4.
+        Share and time constant of the largest likelihood.  None if the rows have no
+        time or are few, or if white noise looks as correlated in one case in 10^4.
     """
     if "time" not in campaign.covariates or len(campaign) < _FEWEST:
         return None
@@ -88,14 +89,14 @@ def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
 def widened(
     covariance: NDArray, slopes: NDArray, campaign: Campaign, noise: NoiseInTime
 ) -> NDArray:
-    """The covariance of unknowns that were fitted as if noise were white.
+    """Return the covariance of unknowns that were fitted as if noise were white.
 
     Args:
         covariance: (k, k) by white noise.
-        slopes: (N, k) of the estimates' weights: what the unknowns are is the
-            covariance times their products with the whitened readings.
-        campaign: of R rows, N measured cells.
-        noise: as it is.
+        slopes: (N, k) of the estimates' weights: the estimates are the covariance times
+            their products with the whitened readings.
+        campaign: campaign of R rows, N measured cells.
+        noise: the correlated noise.
 
     Returns:
         (k, k).
@@ -112,7 +113,7 @@ def widened(
 
 
 def _series(campaign: Campaign) -> Iterator[tuple[NDArray, NDArray]]:
-    """Every component of every point in every session: its times, and its cells."""
+    """Yield the series of each component, point and session: times and cells."""
     rows, columns = np.nonzero(campaign.cells)
     time = campaign.covariates["time"][rows]
     own = [
@@ -129,7 +130,7 @@ def _series(campaign: Campaign) -> Iterator[tuple[NDArray, NDArray]]:
 def _innovations(
     times: NDArray, z: NDArray, constants: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Sums over a series of v^2/S and ln S, (shares, constants)."""
+    """Return the sums over a series of v^2/S and ln S, (shares, constants)."""
     share = _SHARES[:, None]
     fading = np.exp(-np.diff(times)[:, None] / constants)
     mean = np.zeros((len(_SHARES), len(constants)))

@@ -1,8 +1,8 @@
 """Nuisance parameters: geometric errors and compliances that every machine has.
 
-No frame is made exactly where it was drawn, and nothing is rigid.  Each of these
-unknowns has a Gaussian prior about what is declared: from the frame's ``tolerance``, or
-of one size for all of a group that the readings are asked for.
+No frame is made exactly as drawn, and no part is rigid.  Each of these unknowns has a
+Gaussian prior about its declared value: from the frame's ``tolerance``, or with a
+standard deviation common to a group, which the readings determine.
 """
 
 from collections.abc import Container
@@ -21,9 +21,10 @@ from validation.diagnosis.signatures import UNSEEN, whiten
 
 GEOMETRY, SPRINGS = "geometry", "springs"
 KINDS = ("rotation", "translation")
-LARGEST_TURN = 0.2  # [rad] no error of a drive, a frame or a device is larger
-LARGEST_SHIFT = 0.1  # of the robot's size, likewise
-_ROUNDING = 1e-9  # of the largest column of a group: what moves nothing
+LARGEST_TURN = 0.2  # [rad] largest error of a drive, a frame or a device
+LARGEST_SHIFT = 0.1  # relative to the robot's size: largest plausible translation
+# relative to the largest column of a group: smaller ones move no reading
+_ROUNDING = 1e-9
 _SAME = 1 - 1e-6  # cosine above which two columns are equal
 
 
@@ -58,7 +59,7 @@ class Nuisance:
         return bool(np.isfinite(self.given).any())
 
     def take(self, unknowns: NDArray) -> "Nuisance":
-        """Some of the unknowns, by a mask (k,) or numbers."""
+        """Return a selection of the unknowns, by a mask (k,) or numbers."""
         return Nuisance(
             self.columns[:, unknowns], self.spring[unknowns], self.frame[unknowns],
             self.axis[unknowns], self.given[unknowns], self.most[unknowns],
@@ -69,16 +70,16 @@ def nuisance(
     campaign: Campaign, conditions: Conditions, response: Responses, named: NDArray,
     kinds: Container[str] = (GEOMETRY, SPRINGS),
 ) -> Nuisance:  # fmt: skip
-    """Return geometric errors and springs that show in a campaign's readings.
+    """Return geometric errors and springs that affect a campaign's readings.
 
-    Random springs describe compliance that is spread over many joints: one with the
+    Random springs describe compliance distributed over many joints.  A spring with the
     same column as a single unknown of a library effect (N, c) ``named`` is that effect,
     and left out.  ``response`` is of the conditions as declared.
     """
     robot, n = campaign.robot, len(campaign.robot.frames)
     own = [conditions.robot.index(frame.name) for frame in robot.frames]
     screws, carried = response.screws[:, :, own], response.wrenches[:, own]
-    # what closures meet at, and the platform, have no spring of their own
+    # frames of closures and of the platform have no spring of their own
     carried[:, [not _may_give(robot, f.name) for f in robot.frames]] = 0.0
     changes = np.concatenate([screws, screws * carried[:, None]], axis=2)
     given = np.full((2 * n, 6), np.nan)
@@ -102,22 +103,22 @@ def nuisance(
 
 
 def _may_give(robot: Robot, name: str) -> bool:
-    """Whether a frame may have a joint stiffness."""
+    """Return whether a frame may have a joint stiffness."""
     return name != robot.platform and all(name not in pair for pair in robot.closures)
 
 
 def visible(small: Nuisance) -> NDArray:
-    """(k,) bool, unknowns that show beside the others of their group, and at all."""
+    """Return the (k,) bool of unknowns visible within their group, and at all."""
     size = np.linalg.norm(small.columns, axis=0)
     largest = np.zeros(4)
     np.maximum.at(largest, small.group, size)
-    # a tolerance of zero says that a direction is exact
+    # a tolerance of zero declares a direction exact
     shown = (size > _ROUNDING * largest[small.group]) & ~(small.given == 0.0)
     return np.asarray(shown & (size > UNSEEN / small.most))
 
 
 def _is_among(columns: NDArray, named: NDArray) -> NDArray:
-    """(k,) bool, columns (N, k) that are equal to some of others but for their size."""
+    """Return (k,) bool: columns (N, k) equal to others except for their size."""
     unit = [c / np.maximum(np.linalg.norm(c, axis=0), 1e-300) for c in (named, columns)]
     return np.asarray((np.abs(unit[0].T @ unit[1]) > _SAME).any(axis=0))
 

@@ -23,9 +23,11 @@ from validation.diagnosis.signatures import fingerprints
 from validation.diagnosis.whitening import Whitening
 
 Where = tuple[str, str, str]  # place, component, kind
-_HEAVY = 10.0  # largest unrecorded force over the largest recorded one: a cable's
+# largest unrecorded force over the largest recorded one, such as a cable's
+_HEAVY = 10.0
 _FORCE = 1000.0  # [N] largest unrecorded force where no load is recorded
-_REMEMBERED = 8  # most columns of a form whose products are kept, for memory
+# largest number of columns of a form whose products are cached, to limit memory
+_REMEMBERED = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +71,7 @@ class Places:
         members: indices of the S single components of each place.
         equal: other components with the same response.
         most: largest plausible unknown of each place.
-        sizes: by number of components: places, members, and which are rotations.
+        sizes: for each number of components: places, members and rotations among them.
     """
 
     def __init__(self, campaign: Campaign, sensitivities: Sensitivities) -> None:
@@ -170,7 +172,7 @@ class Places:
         """Return weighted responses at all places in cells (N,) bool.
 
         Rows of one measurement have equal variables, so that a response times a
-        function is whitened as the response is.
+        function is whitened like the response.
         """
         row, component = (axis[cells] for axis in np.nonzero(self._campaign.cells))
         rows, row = np.unique(row, return_inverse=True)

@@ -1,8 +1,8 @@
-"""Numbers that no machine has, and readings that no sensor gives.
+"""Implausible numbers of a machine, and impossible readings of a sensor.
 
-A fit may explain readings by a base that stands 29 m away on a foundation as soft as
-rubber.  Ranges are wide, in terms of the robot's size and of the largest load: beyond
-them something else is wrong, and nothing is claimed.
+A fit may explain readings by a base that is 29 m away on a foundation as soft as
+rubber. The plausible ranges are wide, relative to the robot's size and the largest
+load.  Beyond them another cause is likely, and no effect is claimed.
 
 Sources:
     Ashby, Materials Selection in Mechanical Design, 4th ed., figure 4.11 (expansion of
@@ -25,16 +25,16 @@ from validation.diagnosis.nuisance import (
     LARGEST_TURN,
 )
 
-_GIVES = 0.2  # [rad, sizes] that nothing gives under the largest load
+_GIVES = 0.2  # [rad, sizes] largest deformation under the largest load
 _MADE = (0.1, 0.02)  # [rad, sizes] largest geometric errors of a manufactured frame
-_HOT = 150.0  # [K] away from calibration: no machine is measured there
+_HOT = 150.0  # [K] largest distance from the calibration temperature
 _G = 9.81  # [m/s^2]
 _FACTORS = {"load_gain": (0.3, 3.0), "modulus_scale": (0.2, 5.0)}
 _LIKELY = "check the declared stiffness, the units and the registration"
 
 
 def impossible_rows(campaign: Campaign) -> NDArray:
-    """(R,) bool, rows with a temperature that no sensor reads beside a machine."""
+    """Return (R,) bool: rows with a temperature that is impossible at a machine."""
     wrong = np.zeros(len(campaign), dtype=bool)
     for name, values in campaign.covariates.items():
         if "temperature" in name:
@@ -43,19 +43,19 @@ def impossible_rows(campaign: Campaign) -> NDArray:
 
 
 def implausible(campaign: Campaign, fit: MachineFit) -> tuple[str, ...]:
-    """What of a fitted machine no machine has, in one sentence each."""
+    """Return implausible numbers of a fitted machine, one sentence each."""
     return tuple(f"{one}: {_LIKELY}" for one in _implausible(campaign, fit))
 
 
 def _implausible(campaign: Campaign, fit: MachineFit) -> Iterator[str]:
-    """Statements on numbers that no machine has."""
+    """Yield statements on implausible numbers."""
     robot, size = campaign.robot, size_of(campaign.robot)
     force = float(np.abs(campaign.loads[:, 3:]).max())
     force += _G * sum(frame.mass for frame in robot.frames)
     moment = float(np.abs(campaign.loads[:, :3]).max()) + force * size
     reach = ", under which the loads would move it out of reach"
     shift = LARGEST_SHIFT * size
-    ranges = {  # by unit: least, largest, and what is said beyond them
+    ranges = {  # by unit: least, largest, and the statement beyond them
         "rad": (-LARGEST_TURN, LARGEST_TURN, f", larger than {LARGEST_TURN:.2g}"),
         "m": (-shift, shift, f", larger than {shift:.2g}"),
         "N/m": (force / (_GIVES * size), np.inf, reach),
@@ -83,11 +83,11 @@ def _implausible(campaign: Campaign, fit: MachineFit) -> Iterator[str]:
 def _parameters(
     campaign: Campaign, fit: MachineFit
 ) -> Iterator[tuple[str, str, float]]:
-    """Effect, name and value of what was found; a drift as far as it went."""
+    """Yield effect, name and value of the parameters found; a drift at its end."""
     bare = campaign.robot.without_effects()
     for one in fit.effects:
         values = one.hypothesis.public(bare, fit.own(one)[0])
-        if one.session is None:  # with what the robot's file declares
+        if one.session is None:  # the values of the robot's file are added
             machine = fit.robot.effects.get(one.hypothesis.effect, {})
             values = {k: machine.get(k, v) for k, v in values.items()}
         went = 1.0

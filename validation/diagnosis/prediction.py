@@ -1,6 +1,6 @@
-"""Readings of a saved robot: the one function by which robots are fitted and judged.
+"""Readings of a saved robot: the one function for fitting and judging robots.
 
-A diagnosis fits a robot through it, prints the errors of that robot through it, and
+A diagnosis fits a robot through it and prints the robot's errors through it, and
 ``forcefit validation predict`` prints readings of the saved file through it.
 """
 
@@ -18,16 +18,15 @@ from validation.diagnosis.signatures import conditions_of
 
 
 def finite_conditions(campaign: Campaign, rows: NDArray | None = None) -> Conditions:
-    """What acts in a campaign, motions finite as those of a machine are.
+    """Return the conditions of a campaign with finite motions, as of a real machine.
 
     Args:
-        campaign: of R rows.
-        rows: some of them, by numbers or a mask; what they read may depend on others
-            before them.
+        campaign: campaign of R rows.
+        rows: selection by numbers or a mask; their readings may depend on earlier rows.
 
     Returns:
-        Their conditions; of a robot with clearance the linear model's, since where it
-        rests without a load is open.
+        Their conditions; for a robot with clearance those of the linear model, since
+        its rest position without a load is undetermined.
     """
     conditions = conditions_of(campaign)
     if rows is not None:
@@ -40,21 +39,21 @@ def finite_conditions(campaign: Campaign, rows: NDArray | None = None) -> Condit
 def predicted(
     campaign: Campaign, robot: Robot | None = None, *, linear: bool = False
 ) -> Prediction:
-    """What a robot reads for the commands of a campaign.
+    """Return the readings of a robot for the commands of a campaign.
 
     Args:
-        campaign: of R rows; its readings are not used.
+        campaign: campaign of R rows; its readings are not used.
         robot: other than the campaign's, of the same frames and closures.
-        linear: whether motions are small, as of a model that lacks finite ones.
+        linear: whether motions are small, for a model without finite motions.
 
     Returns:
-        The readings, with the registration that the robot carries.
+        The readings, with the robot's registration.
     """
     campaign = replace(campaign, robot=campaign.robot if robot is None else robot)
     return predict((conditions_of if linear else finite_conditions)(campaign))
 
 
 def residual_of(campaign: Campaign, robot: Robot, *, linear: bool = False) -> NDArray:
-    """(R, 6) [rad, m] readings minus what :func:`predicted` is; NaN not measured."""
+    """Return (R, 6) [rad, m] readings minus predicted ones; NaN if not measured."""
     deviation = predicted(campaign, robot, linear=linear).deviation
     return np.asarray(campaign.measured - deviation)

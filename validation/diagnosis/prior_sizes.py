@@ -4,7 +4,7 @@ With posterior mean mu and covariance V of the unknowns of a group and s their s
 
     d ln p(z) / d ln s = sum of [(mu^2 + V)/s^2 - 1],
 
-zero where s^2 = sum mu^2 / sum (1 - V/s^2): MacKay's step, marginal with a limit.
+which is zero for s^2 = sum mu^2 / sum (1 - V/s^2): MacKay's step, with a limit.
 
 Sources:
     MacKay (1992), Bayesian interpolation, Neural Computation 4, 415.
@@ -21,11 +21,11 @@ from scipy.linalg import cho_solve, solve_triangular
 from validation.diagnosis.gaussian import FREEDOM, deviance, size_penalty
 
 Eigen = tuple[NDArray, NDArray]
-_STEPS = 25  # about ten are needed
+_STEPS = 25  # largest number of steps; about ten are needed
 _SETTLED = 0.03  # change of ln s that ends the iteration: the evidence is flat there
-_LEAP = 4.0  # largest factor of change in a step, which holds nearby
-_BEGIN = 4.0  # [sigma] contribution of a group's unknowns at the start: visible
-_LEAST = 1e-2  # [sigma] contribution that is none
+_LEAP = 4.0  # largest factor of change in a step
+_BEGIN = 4.0  # [sigma] start value of a group's contribution to the readings
+_LEAST = 1e-2  # [sigma] contribution below which a size is 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +33,10 @@ class Sizes:
     """Optimised prior standard deviations and the posterior.
 
     Attributes:
-        std: (k,) of every unknown, in units of the noise's scale tau.
+        std: (k,) prior standard deviation of every unknown, over the noise's scale tau.
         of_group: standard deviations by group.
-        mean: (k,) posterior.
-        covariance: (k, k) likewise, over tau^2.
+        mean: (k,) posterior mean.
+        covariance: (k, k) posterior covariance, over tau^2.
         squares: z' C^-1 z.
         log_det: ln det C.
         cost: penalty of the optimisation, see :func:`.gaussian.size_penalty`.
@@ -81,7 +81,7 @@ class Grouped:
     most: NDArray
 
     def without(self, unknowns: NDArray) -> "Grouped":
-        """The same without some unknowns, by their numbers."""
+        """Return the unknowns without some of them, by number."""
         kept = np.delete(np.arange(len(self.along)), unknowns)
         return replace(
             self, gram=self.gram[np.ix_(kept, kept)], along=self.along[kept],
@@ -95,8 +95,8 @@ def best_sizes(
 ) -> Sizes:  # fmt: skip
     """Return the likeliest prior standard deviations of all groups.
 
-    They begin at ``start``; ``eigen`` are eigenvalues and eigenvectors of some groups'
-    blocks of the inner products.
+    The iteration starts at ``start``; ``eigen`` are eigenvalues and eigenvectors of
+    some groups' blocks of the inner products.
     """
     given, group, count = model.given, model.group, model.count
     free = np.isnan(given)
@@ -147,7 +147,7 @@ def best_sizes(
 
 @dataclass(frozen=True, eq=False)
 class _Posterior:
-    """Posterior at given standard deviations, in the turned unknowns over them.
+    """Posterior at given standard deviations, in the rotated unknowns over them.
 
     Attributes:
         std: (k,) standard deviations.
@@ -170,14 +170,14 @@ class _Posterior:
 
 @dataclass(frozen=True, eq=False)
 class _Turned:
-    """Inner products, with the unknowns of the largest group turned.
+    """Inner products, with the unknowns of the largest group rotated.
 
-    Their block of the inner products is then diagonal, and so is D of
+    Their block of the inner products is then diagonal, and so is D in
 
         M = 1 + S G S = [A  C; C' D],
 
-    because they share one standard deviation, whatever its value.  M is factored by
-    A - C D^-1 C', which is small, while a group may have hundreds of unknowns.
+    because they share one standard deviation, for any value of it.  M is factored by A
+    - C D^-1 C', which is small, while a group may have hundreds of unknowns.
 
     Attributes:
         values, V: eigenvalues and eigenvectors of the group's block.
@@ -219,7 +219,7 @@ class _Turned:
         )  # fmt: skip
 
     def back(self, x: NDArray) -> NDArray:
-        """Return unknowns along the last axis, turned back."""
+        """Return unknowns along the last axis, rotated back."""
         turned = x.copy()
         turned[..., self.group] = x[..., self.group] @ self.V.T
         return turned
@@ -241,7 +241,7 @@ class _Turned:
 def _turned(
     gram: NDArray, along: NDArray, group: NDArray, eigen: Eigen | None
 ) -> _Turned:
-    """Turn the unknowns of a group so that their inner products are diagonal."""
+    """Rotate the unknowns of a group so that their inner products are diagonal."""
     rest = np.setdiff1d(np.arange(len(gram)), group)
     values, V = eigen or np.linalg.eigh(gram[np.ix_(group, group)])
     turned = along.copy()

@@ -1,9 +1,9 @@
-"""How well functions hold where their variable has not been.
+"""Errors of functions outside the range of their variable.
 
-Each fifth of the range of a function's variable is predicted by a fit to the others, at
-the model's prior sizes: without refits, by the leave-block-out identity
-(:mod:`.gaussian`).  Random rows lie between others; a wave that fits them may be
-anything beyond the range.
+Each fifth of the range of a function's variable is predicted by a fit to the other
+fifths, at the model's prior sizes, without refits, by the leave-block-out identity
+(:mod:`.gaussian`).  Random rows lie between others, so they do not test a function,
+such as a wave, outside the range.
 """
 
 from dataclasses import dataclass
@@ -16,8 +16,8 @@ from validation.diagnosis.candidates import Candidate
 from validation.diagnosis.gaussian import leave_block_out
 from validation.diagnosis.states import State
 
-PARTS = 5  # of a range, as folds of rows
-_DISTINCT = 4  # values of a variable for each part, at least
+PARTS = 5  # number of parts of a range, as of folds
+_DISTINCT = 4  # least number of values of a variable in each part
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class RangeError:
         variable: its public name.
         without: [sigma] rms of all readings, predicted by the model without the
             function.
-        after: [sigma] the same with it.
+        after: [sigma] the same with the function.
     """
 
     variable: str
@@ -39,10 +39,11 @@ class RangeError:
 def range_error(
     candidate: Candidate, best: State, without: State, rows: NDArray
 ) -> RangeError | None:
-    """Return the error where a function of a model must extrapolate.
+    """Return the error of a function of a model where it must extrapolate.
 
-    Of its variables that with the largest error, None where none has enough values.
-    ``without`` is the model without it, ``rows`` (n,) are those of the fitted cells.
+    For several variables the largest error is returned, None if none has enough values.
+    ``without`` is the model without the function, ``rows`` (n,) are the rows of the
+    fitted cells.
     """
     conditions = best.readings.columns.conditions
     names = dict.fromkeys(v for part in candidate.parts for v in part.variables)

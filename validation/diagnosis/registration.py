@@ -1,4 +1,4 @@
-"""Where the measuring device stands, found first of all when it is not known."""
+"""Pose of the measuring device, estimated first if it is unknown."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,29 +17,29 @@ from validation.diagnosis.hypotheses import Hypothesis, Slot
 from validation.diagnosis.signatures import conditions_of
 from validation.diagnosis.unknowns import Acting, Unknowns
 
-_FEWEST_POINTS = 3  # that fix a frame
+_FEWEST_POINTS = 3  # least number of points that determine a frame
 
 
 def device_frame(declared: Conditions) -> Hypothesis:
-    """The hypothesis of six unknowns that a measuring frame is turned and shifted."""
+    """Return the hypothesis of a rotated and shifted measuring frame, six unknowns."""
     unknowns = LIBRARY["registration"].unknowns(declared.robot)
     slots = (Slot((u.name,), u, u.start) for u in unknowns if u.name in BASE)
     return Hypothesis("registration", (), tuple(slots))
 
 
 def register(campaign: Campaign, conditions: Conditions) -> Conditions:
-    """Conditions with the measuring frame where it fits the declared model best.
+    """Return conditions with the measuring frame fitted to the declared model.
 
     Args:
-        campaign: rows from which it is found.
+        campaign: rows for the estimate.
         conditions: all conditions to be registered, of these rows or of more.
 
     Returns:
-        The same conditions, registered; each session by itself.
+        The same conditions, registered, each session separately.
 
     Raises:
-        BadInput: too few full positions and rotations to find it from, or a session
-            without any row.
+        BadInput: too few complete positions and rotations for the estimate, or a
+            session without any row.
     """
     own = with_second_order(conditions_of(campaign))
     if campaign.session is None or conditions.session is None:
@@ -58,7 +58,7 @@ def register(campaign: Campaign, conditions: Conditions) -> Conditions:
 
 
 def _device(campaign: Campaign, own: Conditions) -> dict[str, dict[str, float]]:
-    """The measuring frame that fits the declared model best, as an effect."""
+    """Return the measuring frame that fits the declared model best, as an effect."""
     start, frame = coarse_frame(campaign, own), device_frame(own)
     begin = np.array([start[name] for name in BASE])
     unknowns = Unknowns(campaign.robot, (Acting(frame, begin, None, True),))
@@ -67,7 +67,7 @@ def _device(campaign: Campaign, own: Conditions) -> dict[str, dict[str, float]]:
 
 
 def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]:
-    """A first guess: Kabsch's rotation of points, or the mean of rotations."""
+    """Return a first guess: Kabsch's rotation of points, or the mean of rotations."""
     model = predict(conditions).deviation
     nominal = conditions.measured_points
     answered = np.isfinite(model).all(axis=1)
@@ -91,13 +91,13 @@ def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]
 def device_rotation(
     points: NDArray, seen: NDArray, turns: NDArray, seen_turns: NDArray
 ) -> NDArray:
-    """Rotation of a device by what it sees: the mean of rotations, else Kabsch's.
+    """Return a device's rotation: the mean of rotations, else Kabsch's.
 
     Args:
         points: (P, 3) [m] in the base's axes, off one line if there are no rotations.
-        seen: (P, 3) [m] the same in the device's.
+        seen: (P, 3) [m] the same points in the device's axes.
         turns: (T, 3, 3) orientations in the base's axes.
-        seen_turns: (T, 3, 3) the same in the device's.
+        seen_turns: (T, 3, 3) the same orientations in the device's axes.
 
     Returns:
         (3, 3) from the base's axes to the device's.
@@ -105,13 +105,13 @@ def device_rotation(
     if len(turns):
         gap = seen_turns @ np.swapaxes(turns, 1, 2)
         return Rotation.from_matrix(gap).mean().as_matrix()
-    # of two sets of points it is enough to centre one
+    # it suffices to centre one of two sets of points
     centred = points - points.mean(axis=0)
     return Rotation.align_vectors(seen, centred)[0].as_matrix()
 
 
 def off_one_line(points: NDArray) -> bool:
-    """Whether (P, 3) points fix a frame."""
+    """Return whether (P, 3) points determine a frame."""
     if len(points) < _FEWEST_POINTS:
         return False
     size = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)

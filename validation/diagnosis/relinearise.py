@@ -1,9 +1,9 @@
 """Linearise the effects of a model again at their estimates, all together.
 
-Derivatives at the start values miss three things: products of two effects, nonlinear
-parameters (a time constant, an exponent), and finite motions.  The prediction with all
-effects of a model is therefore compared with the sum of their linear contributions;
-where they differ, all derivatives are computed again at the estimates.
+Derivatives at the start values lack three things: products of two effects, nonlinear
+parameters (a time constant, an exponent), and finite motions.  So the prediction with
+all effects of a model is compared with the sum of their linear contributions.  If they
+differ, all derivatives are computed again at the estimates.
 """
 
 from collections.abc import Sequence
@@ -17,9 +17,9 @@ from validation.diagnosis.hypotheses import in_one_session, sessions_of
 from validation.diagnosis.signatures import Signature, Tangents
 from validation.diagnosis.states import Models, State
 
-_ROUNDS = 3  # of linearisation, which may go back and forth
-MOVED = 0.3  # log posterior: change that alters no decision
-_LINEAR = 0.5  # squared whitened error of a linearisation that is accepted
+_ROUNDS = 3  # largest number of linearisations, which may oscillate
+MOVED = 0.3  # change of the log posterior that alters no decision
+_LINEAR = 0.5  # largest accepted squared whitened error of a linearisation
 _SHIFT = 3.0  # largest factor by which a nonlinear parameter changes in a round
 
 
@@ -43,7 +43,7 @@ class Relinearisation:
         return state
 
     def _again(self, state: State) -> tuple[Element, ...] | None:
-        """Return elements linearised at the estimates; None if that changes nothing."""
+        """Return elements linearised at the estimates; None if there is no change."""
         own = [
             (k, e)
             for k, e in enumerate(state.elements)
@@ -86,8 +86,8 @@ class Relinearisation:
     ) -> list[Element]:
         """Return effects linearised at given values of their slots, acting together.
 
-        The sum of what is returned is exact there.  The given ones are returned if the
-        model has no solution there.
+        The sum of the returned elements is exact there.  The given ones are returned if
+        the model has no solution there.
         """
         robot = self.tangents.campaign.robot
         middle = self.combined(elements, xs)
@@ -108,7 +108,7 @@ class Relinearisation:
     def _one(
         self, elements: Sequence[Element], xs: Sequence[NDArray], k: int
     ) -> Signature:
-        """Return the k-th effect to first order about values, the others beside it."""
+        """Return k-th effect to first order about values, with the others acting."""
         h, offset = elements[k].hypothesis, np.zeros_like(self.tangents.declared)
         columns = np.zeros((len(offset), len(h.slots)))
         for session in _sessions(elements):
@@ -133,7 +133,7 @@ class Relinearisation:
     def _public(
         self, elements: Sequence[Element], xs: Sequence[NDArray], session: str | None
     ) -> dict[str, dict[str, float]]:
-        """Return parameters by their public names, as they are in a session."""
+        """Return parameters by their public names, as they act in a session."""
         robot, values = self.tangents.derivatives.conditions.robot, {}
         for e, x in zip(elements, xs, strict=True):
             there, own = in_one_session(e.hypothesis, session)
@@ -142,7 +142,7 @@ class Relinearisation:
 
 
 def _sessions(elements: Sequence[Element]) -> tuple[str | None, ...]:
-    """Return the sessions that effects tell apart, else None alone."""
+    """Return the sessions that effects distinguish, else None alone."""
     every = [name for e in elements for name in sessions_of(e.hypothesis)]
     return tuple(dict.fromkeys(name for name in every if name is not None)) or (None,)
 

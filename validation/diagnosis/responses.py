@@ -1,8 +1,8 @@
-"""How the readings answer a small screw at any frame, and what every joint carries.
+"""Response of the readings to small screws at any frame, and joint wrenches.
 
 Both come from the linear model at the declared state, for all rows together.  A small
-geometric error adds its screw times the answer; a spring adds its compliance times the
-wrench it carries times the answer.
+geometric error adds its screw times the response; a spring adds its compliance times
+its wrench times the response.
 
 ======  =============  ============  =================================================
 symbol  code           shape         meaning
@@ -30,14 +30,15 @@ from assembly.measurement.settled_clearance import (
 )
 from assembly.measurement.without_clearance import flexibility
 
-_STEP = 1e-5  # [rad, m] for a derivative: central, exact to 1e-10
-_ROUNDING = 1e-9  # of the largest moment or force: in struts between ball joints
-_AT_ONCE = 50  # postures, so that memory stays small
+_STEP = 1e-5  # [rad, m] step of a derivative: central, exact to 1e-10
+# of the largest moment or force: rounding, as in struts between ball joints
+_ROUNDING = 1e-9
+_AT_ONCE = 50  # number of postures in a batch, to limit memory
 
 
 @dataclass(frozen=True, eq=False)
 class Responses:
-    """What R readings of a robot with n frames answer to, see the head.
+    """Responses of R readings of a robot with n frames; see the module's docstring.
 
     Attributes:
         reading: (R, 6, 6) per unit platform screw [rad, m].
@@ -51,9 +52,9 @@ class Responses:
 
 
 def responses(conditions: Conditions) -> Responses:
-    """Return how R rows answer small screws, clearances where they rest.
+    """Return the response of R rows to small screws, with clearances at rest.
 
-    Rows that do not close have zeros.
+    Rows without a solution have zeros.
     """
     tight = _without_clearance(conditions)
     distinct, which = tight.postures.distinct
@@ -80,7 +81,7 @@ def responses(conditions: Conditions) -> Responses:
 
 
 def _without_clearance(conditions: Conditions) -> Conditions:
-    """The same rows with clearances where they rest."""
+    """Return the same rows with clearances at rest."""
     if not virtual_joints(conditions.robot).cones.shape[1]:
         return conditions
     if conditions.rest is not None:
@@ -91,7 +92,7 @@ def _without_clearance(conditions: Conditions) -> Conditions:
 
 
 def _some(postures: Posture, rows: slice) -> Posture:
-    """A few of many postures."""
+    """Return a selection of many postures."""
     return replace(
         postures,
         coordinates=postures.coordinates[rows],
@@ -100,7 +101,7 @@ def _some(postures: Posture, rows: slice) -> Posture:
 
 
 def _reading(conditions: Conditions) -> NDArray:
-    """(R, 6, 6) change of what is read per unit platform screw."""
+    """Return the (R, 6, 6) change of the readings per unit platform screw."""
     D = np.zeros((len(conditions), 6, 6))
     for k in range(6):
         screw = np.zeros((len(conditions), 6))

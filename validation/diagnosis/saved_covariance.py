@@ -1,8 +1,8 @@
-"""The covariance of the numbers in a saved robot file, in a file of its own.
+"""Covariance of the numbers in a saved robot file, stored in a separate file.
 
 A number of the file is a geometric error, a compliance in series with a joint, a
-parameter of an effect or one of a function.  What is written is their joint posterior
-covariance, so that readings can be predicted with an interval:
+parameter of an effect or a parameter of a function.  The file holds their joint
+posterior covariance, so that readings can be predicted with an interval:
 
     covariance of readings = J C J',  J their derivatives in the numbers.
 """
@@ -29,7 +29,7 @@ from validation.diagnosis.unknowns import STEP, Small, effects_in, with_effects_
 ERROR, COMPLIANCE, EFFECT, FUNCTION = (
     "geometric_error", "joint_compliance", "effect", "function",
 )  # fmt: skip
-_STAYS = 1e-3  # of a compliance, whatever is taken from it
+_STAYS = 1e-3  # relative to a compliance: least remainder after a decrease
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,10 @@ class Number:
     """A number of a robot file.
 
     Attributes:
-        kind: one of the four at the head of this file.
-        owner: the frame, the effect, or the place of the function in the file.
+        kind: one of the four kinds in the module's docstring.
+        owner: the frame, the effect, or the index of the function in the file.
         name: the component, or the parameter.
-        session: of an effect that acts in one session alone.
+        session: session of an effect that acts in only one session.
     """
 
     kind: str
@@ -49,7 +49,7 @@ class Number:
     session: str = ""
 
     def of(self, robot: Robot) -> float:
-        """Its value; of a compliance what was added to the file's, which is 0."""
+        """Return the number's value; 0 for a change of a compliance in the file."""
         if self.kind == ERROR:
             return float(
                 robot.errors[robot.index(self.owner), READING.index(self.name)]
@@ -62,7 +62,7 @@ class Number:
         return 0.0
 
     def moved(self, robot: Robot, by: float) -> Robot:
-        """The robot in which it is larger; of a compliance something always stays."""
+        """Return the robot with the number increased; compliances stay positive."""
         if self.kind == ERROR:
             row, axis = robot.index(self.owner), READING.index(self.name)
             return with_error(robot, *map(np.atleast_1d, (row, axis, by)))
@@ -81,7 +81,7 @@ class Number:
         )
 
     def _softened(self, robot: Robot, by: float) -> Robot:
-        """The robot whose joint gives more, or less, in one direction."""
+        """Return the robot whose joint is more, or less, compliant in one direction."""
         row, axis = robot.index(self.owner), READING.index(self.name)
         K = robot.frames[row].resistance
         stiffness = np.inf if K is None else float(K[axis, axis])
@@ -113,7 +113,7 @@ class SavedCovariance:
 
 
 def covariance_of(fit: MachineFit, robot: Robot) -> SavedCovariance:
-    """Covariance of the numbers of a fitted robot's file, to first order."""
+    """Return the covariance of the numbers of a fitted robot's file, to first order."""
     numbers = _numbers(fit, robot)
     J = np.zeros((len(numbers), len(fit.x)))
     middle = np.array([n.of(robot) for n in numbers])
@@ -134,10 +134,10 @@ def covariance_of(fit: MachineFit, robot: Robot) -> SavedCovariance:
 
 
 def _value(number: Number, robot: Robot, saved: Robot) -> float:
-    """A number's value in a robot near the saved one, 0 where it is not there."""
+    """Return a number's value in a robot near the saved one, 0 if absent."""
     if number.kind != FUNCTION:
         return number.of(robot)
-    # a robot nearby may have one function more, of numbers that are zero in the saved
+    # a robot nearby may have one function more, with zero numbers in the saved one
     own = saved.functions[int(number.owner)]
     alike = [f for f in saved.functions if _names(f) == _names(own)]
     there = [f for f in robot.functions if _names(f) == _names(own)]
@@ -148,12 +148,12 @@ def _value(number: Number, robot: Robot, saved: Robot) -> float:
 
 
 def _names(function: Function) -> tuple[object, ...]:
-    """What tells functions of a file apart."""
+    """Return the properties that distinguish functions of a file."""
     return function.where, function.variables, function.form, function.kind
 
 
 def _numbers(fit: MachineFit, robot: Robot) -> list[Number]:
-    """Numbers of a saved robot that the unknowns change."""
+    """Return the numbers of a saved robot that the unknowns change."""
     numbers = [n for part in fit.unknowns.small for n in _of_frames(part, robot)]
     for one in fit.unknowns.effects:
         effect = one.hypothesis.effect
@@ -168,7 +168,7 @@ def _numbers(fit: MachineFit, robot: Robot) -> list[Number]:
 
 
 def _of_frames(part: Small, robot: Robot) -> list[Number]:
-    """Numbers of geometric errors or compliances, in the order of the unknowns."""
+    """Return numbers of geometric errors or compliances, in the unknowns' order."""
     kind = ERROR if part.name == GEOMETRY else COMPLIANCE
     return [
         Number(kind, robot.frames[row].name, READING[axis])
@@ -177,10 +177,10 @@ def _of_frames(part: Small, robot: Robot) -> list[Number]:
 
 
 def write_covariance(saved: SavedCovariance, path: Path | str) -> None:
-    """Write a covariance as a file of arrays, with the ending ``.npz``.
+    """Write a covariance as a file of arrays, with the suffix ``.npz``.
 
     Raises:
-        BadInput: it cannot be written.
+        BadInput: the file cannot be written.
     """
     labels = [json.dumps([n.kind, n.owner, n.name, n.session]) for n in saved.numbers]
     content = io.BytesIO()
@@ -191,13 +191,13 @@ def write_covariance(saved: SavedCovariance, path: Path | str) -> None:
 
 
 def read_covariance(robot: Robot) -> SavedCovariance | None:
-    """The covariance that a robot's file names.
+    """Return the covariance that a robot's file names.
 
     Returns:
-        None where the file names none.
+        None if the file names none.
 
     Raises:
-        BadInput: the file named is not there, or is no covariance of this robot.
+        BadInput: the named file does not exist, or is no covariance of this robot.
     """
     path = robot.diagnosis.get("covariance")
     if not path:
@@ -212,7 +212,7 @@ def read_covariance(robot: Robot) -> SavedCovariance | None:
         values = [number.of(robot) for number in numbers]
     except FileNotFoundError:
         raise BadInput(f"{path}: no such file; {expected}") from None
-    except Exception:  # of many kinds: a damaged archive
+    except Exception:  # a damaged archive raises various exceptions
         raise BadInput(f"{path}: found other content, {expected}") from None
     if C.shape != (len(values), len(values)) or not np.isfinite(C).all():
         raise BadInput(f"{path}: found shape {C.shape}, expected {len(values)} squared")
@@ -220,11 +220,11 @@ def read_covariance(robot: Robot) -> SavedCovariance | None:
 
 
 def known_covariance(robot: Robot) -> SavedCovariance:
-    """All that a robot's file says of the uncertainty of its numbers.
+    """Return all information of a robot's file on the uncertainty of its numbers.
 
     Returns:
-        The covariance that the file names; of numbers that it lacks, ``tolerance`` of
-        frames and ``std`` of functions, as independent.
+        The covariance that the file names; numbers that it lacks have the ``tolerance``
+        of frames and the ``std`` of functions, as independent.
 
     Raises:
         BadInput: as :func:`read_covariance`.

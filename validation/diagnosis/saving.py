@@ -1,7 +1,7 @@
-"""The robot that a diagnosis saves: its numbers, how sure they are, where it is known.
+"""The robot saved by a diagnosis: numbers, uncertainty, and range of validity.
 
-The posterior covariance of all numbers is written in a file of its own; geometric
-errors carry their standard deviation as ``tolerance``, functions as ``std``.
+The posterior covariance of all numbers is written to a separate file; geometric errors
+have their standard deviation as ``tolerance``, functions as ``std``.
 """
 
 import hashlib
@@ -25,11 +25,11 @@ from validation.diagnosis.unknowns import Small
 
 
 def corrected(diagnosis: Diagnosis) -> Robot:
-    """The machine found, as it is saved.
+    """Return the machine found, as it is saved.
 
     Returns:
-        The fitted robot with the range it was identified in, the point measured, the
-        uncertainty of its geometric errors, and a record of the diagnosis.
+        The fitted robot with the range of its data, the point measured, the uncertainty
+        of its geometric errors, and a record of the diagnosis.
     """
     campaign, robot = diagnosis.campaign, _with_tolerances(diagnosis.fit)
     ranges = learned_range(campaign, ~diagnosis.outliers)
@@ -45,10 +45,10 @@ def corrected(diagnosis: Diagnosis) -> Robot:
 
 
 def functions_of(diagnosis: Diagnosis) -> list[list[Function]]:
-    """Functions that were learned, with their numbers and standard deviations.
+    """Return the learned functions, with their numbers and standard deviations.
 
     Returns:
-        For every function learned one of a robot file, or several of one kind.
+        For every learned function one of a robot file, or several of one kind.
     """
     fit, units = diagnosis.fit, diagnosis.campaign.motion_units
     learned = []
@@ -63,7 +63,7 @@ def functions_of(diagnosis: Diagnosis) -> list[list[Function]]:
 
 
 def _named(one: Function, units: Mapping[str, str]) -> Function:
-    """A function, labelled where a frame moves by a gain of a measured motion."""
+    """Return a function, with a label if a frame moves in proportion to a variable."""
     name = one.variables[0].removeprefix("cov.")
     kinds = {"rad" if component[0] == "r" else "m" for component in one.components}
     straight = one.form == "powers" and one.kind == "screw" and one.where != "load"
@@ -79,13 +79,13 @@ def _named(one: Function, units: Mapping[str, str]) -> Function:
 
 
 def _with_tolerances(fit: MachineFit) -> Robot:
-    """The robot whose geometric errors carry how uncertain they are."""
+    """Return the robot with the uncertainty of its geometric errors as tolerance."""
     robot = fit.robot
     for part, own in fit.unknowns.places:
         if not isinstance(part, Small) or part.name != GEOMETRY:
             continue
-        # a component that the readings do not see is as uncertain as its prior, which
-        # is that of the other components of its kind
+        # a component that no reading depends on is as uncertain as its prior, which is
+        # that of the other components of its kind
         unseen = np.repeat(
             [part.std[part.axis // 3 == kind].max(initial=0.0) for kind in (0, 1)], 3
         )
@@ -100,7 +100,7 @@ def _with_tolerances(fit: MachineFit) -> Robot:
 
 
 def _record(diagnosis: Diagnosis) -> dict[str, Any]:
-    """What the file says of the diagnosis that made it."""
+    """Return the record of the diagnosis for the file."""
     campaign, noise = diagnosis.campaign, asdict(diagnosis.noise)
     record: dict[str, Any] = {
         "campaign": campaign.name,
@@ -121,7 +121,7 @@ def _record(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _digest(campaign: Campaign) -> str:
-    """What tells a campaign's rows from others: a digest of commands and readings."""
+    """Return a digest of a campaign's commands and readings, which identifies it."""
     text = hashlib.sha256()
     for values in (campaign.coordinates, campaign.loads, campaign.measured):
         text.update(np.round(values, 12).tobytes())
@@ -129,12 +129,12 @@ def _digest(campaign: Campaign) -> str:
 
 
 def save(diagnosis: Diagnosis, path: Path | str) -> None:
-    """Write the machine found as a robot file, its covariance beside it.
+    """Write the machine found as a robot file, with its covariance in another file.
 
     Args:
         diagnosis: the diagnosis.
-        path: of the robot file; the covariance is written to the same name with the
-            ending ``.npz``.
+        path: path of the robot file; the covariance is written to the same name with
+            the suffix ``.npz``.
 
     Raises:
         BadInput: a file cannot be written.

@@ -1,4 +1,4 @@
-"""What every element would add to a model, estimated at its standard deviations."""
+"""Scores of elements that may be added to a model, at given standard deviations."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -17,18 +17,18 @@ from validation.diagnosis.states import MORE, State
 from validation.diagnosis.weighted_readings import WeightedReadings
 from validation.diagnosis.whitening import Whitening
 
-BEAM = 6  # elements to add to a model: trials
-OF_NAME = 2  # of them with the same name
+BEAM = 6  # number of elements that are tried in a model
+OF_NAME = 2  # largest number of them with the same name
 _VARIABLES = 4  # variables whose products with others are scored
 _WIDEST = 600  # most columns of a function at several places, for memory
-_HALVINGS = 6  # of the step of a number in which a form is not linear; the fit ends it
+_HALVINGS = 6  # halvings of a shape parameter's step; the fit refines it further
 
 
 class Scores:
     """Scores of all candidates, given a model of the same readings."""
 
     def __init__(self, readings: WeightedReadings) -> None:
-        """Compute nothing yet."""
+        """Store the readings; scores are computed on first use."""
         self.readings, self.columns = readings, readings.columns
         self.functions = readings.columns.functions
         self._made: dict[object, Element | None] = {}
@@ -121,7 +121,7 @@ class Scores:
 
     @property
     def _more(self) -> float:
-        """Readings of all rows for one of the sampled rows."""
+        """Number of all readings over that of the sampled rows."""
         return len(self.readings.sampled) / max(int(self.readings.sampled.sum()), 1)
 
     def _element(self, one: Candidate, log_prior: float) -> Element | None:
@@ -156,7 +156,7 @@ class Scores:
         return [e for _, e in best]
 
     def sharper(self, e: Element, base: State) -> Element:
-        """Return a function with the number in which its form is not linear refined."""
+        """Return a function with its shape parameter refined."""
         one = e.candidate
         if not len(one.shape.bends):
             return e

@@ -19,12 +19,14 @@ from validation.diagnosis.weighted_readings import WeightedReadings
 
 Update = Callable[[str, int, int], None]
 Tried = tuple[tuple[Element, ...], State]  # elements; model that gives start values
-_MOST = 5  # elements of a model, the limit that the docs state
-_KEPT = 3  # width of the beam: trials, as the numbers below
-_LOOKED = 2  # models of the beam for which functions are scored
-_FORMS = 4  # models whose function is tried in all forms
-_DROP = 1.0  # log posterior by which a larger model may be worse, if two need it
-_ROUNDS = 3  # of exchanges: with memory that is not in the model they never end
+_MOST = 5  # largest number of elements of a model, as the docs state
+_KEPT = 3  # width of the beam: number of models kept
+_LOOKED = 2  # number of models of the beam for which functions are scored
+_FORMS = 4  # number of models whose function is tried in all forms
+# decrease of the log posterior accepted for a larger model, if two are needed
+_DROP = 1.0
+# rounds of exchanges; without the machine's memory in the model they do not end
+_ROUNDS = 3
 _NEAR = 15.0  # log posterior: error of an estimate at fixed standard deviations
 
 
@@ -146,8 +148,8 @@ class Search:
             for less in self._without_nuisance([base])[1:]:
                 listed += self.scores.best_to_add(less, functions=False)
             listed.sort(key=lambda one: -one[0])
-            # other ways in which the same effect may act are always tried: estimates
-            # err alike for all of them
+            # other forms of the same effect are always tried: their estimates have
+            # similar errors
             near = {
                 e.origin: e
                 for w, e in listed

@@ -1,8 +1,8 @@
 """Select a model of the deviations: effects of the library and functions.
 
 A model is a set of elements with or without geometric errors and springs
-(:mod:`.states`).  The search (:mod:`.search`) visits many.  Every visited model has a
-posterior weight.  The result describes the best one; the probability of a name is the
+(:mod:`.states`).  The search (:mod:`.search`) visits many models, and each has a
+posterior weight.  The result describes the best model; the probability of a name is the
 sum of the weights of the models that contain it.
 """
 
@@ -34,12 +34,12 @@ from validation.diagnosis.states import State, prediction_gain
 from validation.diagnosis.unknowns import Small
 from validation.diagnosis.weighted_readings import NONE, WeightedReadings
 
-_EQUAL = 3.0  # log posterior, odds of 20: less tells nothing apart
-_CLAIMED = 0.9  # probability of functions from which the best model has them
-_SAME = 1.0  # squared whitened difference that no reading tells
-_LISTED = 20  # models in the result: the rest has no weight
-_COMPARED = 60  # models whose predictions are compared: others have no weight
-_FEWEST = 5  # blocks: with fewer, functions are not cross-validated
+_EQUAL = 3.0  # log posterior, odds of 20: smaller differences do not decide
+_CLAIMED = 0.9  # probability of functions above which the best model must have them
+_SAME = 1.0  # squared whitened difference that no reading shows
+_LISTED = 20  # number of models in the result: the others have negligible weight
+_COMPARED = 60  # number of models whose predictions are compared
+_FEWEST = 5  # least number of blocks for cross-validation of functions
 _AGAIN = 3  # searches with other noise in common: it hardly changes after the first
 _SURE = 2.0  # standard errors: false functions reached 1.8, true ones at least 6.9
 
@@ -49,13 +49,13 @@ def select(
     update: Update = lambda what, done, total: None,
     common: tuple[float, float] | None = None,
 ) -> Selected:  # fmt: skip
-    """Find what the declared model lacks.
+    """Find the effects and functions that the declared model lacks.
 
     Args:
-        columns: of all N measured cells.
+        columns: columns of all N measured cells.
         z: (n,) whitened residual of the fitted cells.
         cells: (N,) mask of the fitted cells; no other reading is used.
-        update: told the stage, steps done, and steps in total.
+        update: function called with the stage, steps done, and steps in total.
         common: [rad, m] noise that cells of a measurement share, over tau, if known.
 
     Returns:
@@ -93,7 +93,7 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
     weights = np.exp(weights - logsumexp(weights))
     learned = np.array([_functions(s) > 0 for s in states])
     if learned[0] and not learned.all() and weights[learned].sum() < _CLAIMED:
-        # a function whose absence predicts as well is not kept
+        # a function is dropped if the model without it predicts equally well
         first = int(np.argmin(learned))
         order = [first, *(k for k in range(len(states)) if k != first)]
         states, weights = [states[k] for k in order], weights[order]
@@ -168,7 +168,7 @@ def _confirmed(search: Search, states: list[State]) -> list[State]:
     while len(np.unique(blocks)) >= _FEWEST and len(states) > 1:
         best = states[0]
         learned = [e for e in best.elements if not e.name]
-        # each one, and all together: two functions can compensate each other
+        # each function, and all together: two functions can compensate each other
         rests = [best.without([e]) for e in learned]
         sure = [
             prediction_gain(best, models.state(rest, best.mode, best), blocks)
@@ -185,11 +185,11 @@ def _confirmed(search: Search, states: list[State]) -> list[State]:
 
 
 def _merged(states: Sequence[State]) -> list[State]:
-    """Return models without others of equal predictions, best first.
+    """Return models of distinct predictions, best first.
 
-    The one with fewer functions is kept: a function with the same columns as an effect
-    of the library is that effect; but for errors of the measuring device, which the
-    machine may have as well.
+    Of equal models the one with fewer functions is kept: a function with the same
+    columns as an effect of the library is that effect.  Errors of the measuring device
+    are an exception, because the machine may have them as well.
     """
     every = _best_first(states)
     # models without functions are kept in case no function is confirmed
@@ -229,7 +229,7 @@ def _best_first(states: Sequence[State]) -> list[State]:
 
 
 def _joined(one: State, other: State) -> State:
-    """Return a model with the weight of another one as well."""
+    """Return a model with the added weight of another one."""
     return replace(one, score=float(np.logaddexp(one.score, other.score)))
 
 
@@ -238,7 +238,7 @@ def _is_refined(state: State) -> bool:
 
 
 def _refined(e: Element) -> str:
-    """Return the effect that an element's is a refinement of, or nothing."""
+    """Return the effect that an element's effect refines, or nothing."""
     return LIBRARY[e.name].refines if e.name else ""
 
 

@@ -17,11 +17,11 @@ class Learned:
     """A learned function.
 
     Attributes:
-        candidate: where, of what, in which form.
+        candidate: places, variables and form.
         equivalent: other places and variables with the same predictions.
         std: (m,) prior standard deviations of the unknowns of :class:`.Sensitivities`.
-        probability: of all models with a function of these variables.
-        range_error: where it must extrapolate; None where that cannot be said.
+        probability: probability of all models with a function of these variables.
+        range_error: error in extrapolation; None if it cannot be estimated.
     """
 
     candidate: Candidate
@@ -51,16 +51,17 @@ class Selected:
     """Result of :func:`.select.select`.
 
     Attributes:
-        hypotheses: of the best model, the measuring frame first where it is not known.
+        hypotheses: hypotheses of the best model, first the measuring frame if it is
+            unknown.
         values: (k,) estimates of their unknowns, in the order of the hypotheses.
-        functions: of the best model.
+        functions: functions of the best model.
         small: geometric errors and springs in use.
         noise: scale and findings.
-        weights: (n,) probability that a cell is no blunder.
-        models: by names, best first.
-        probability: of each effect of the library in any visited model.
+        weights: (n,) probability that a cell is good.
+        models: models by names, best first.
+        probability: probability of each effect of the library in any visited model.
         unknowns: [-] number of well determined unknowns, with the measuring frame.
-        states: models that were seen, best first.
+        states: the visited models, best first.
     """
 
     hypotheses: tuple[Hypothesis, ...]

@@ -35,18 +35,20 @@ from validation.diagnosis.candidates import (
 from validation.diagnosis.function_forms import CandidateShape
 from validation.diagnosis.responses import Responses
 
-_STIFF = 0.1  # of a spline's size that its straight part may have, per step
-_RANK = 1e-8  # relative size of a power that is no rounding of those below it
-_STEP = 1e-3  # of the largest load, for a derivative: the model is linear in it
-_BENT = 64  # columns that are kept of forms whose last number is being fitted
-_NOTHING = 1e-9  # of the largest unknown: what the readings do not see
+_STIFF = 0.1  # relative to a spline's size: prior size of its linear part, per step
+_RANK = 1e-8  # relative size of a power above the rounding of those below it
+# relative to the largest load: step for a derivative, in which the model is linear
+_STEP = 1e-3
+_BENT = 64  # columns that are cached for forms whose shape parameter is being fitted
+# relative to the largest unknown: below it the readings do not depend on it
+_NOTHING = 1e-9
 
 
 class Sensitivities:
     """How readings respond to a component at any place; the rows' variables."""
 
     def __init__(self, conditions: Conditions, response: Responses) -> None:
-        """Keep what candidates are made of: R rows as declared, and how they answer."""
+        """Store R rows as declared, and their response."""
         self.conditions, self._response = conditions, response
         self.rows = np.arange(len(conditions))
         self._origin = conditions.postures.platform[:, :3, 3]
@@ -54,7 +56,7 @@ class Sensitivities:
         self._raw = lru_cache(maxsize=_BENT)(self._unmixed)
 
     def take(self, rows: NDArray) -> "Sensitivities":
-        """The same of some rows, by number; forms are normalised over all."""
+        """Return the sensitivities for some rows, with forms normalised over all."""
         other = copy(self)
         other.rows, other._origin = self.rows[rows], self._origin[rows]
         r = self._response
@@ -62,7 +64,7 @@ class Sensitivities:
         return other
 
     def about(self, conditions: Conditions, response: Responses) -> "Sensitivities":
-        """Return the same where effects have changed the conditions of the rows.
+        """Return the sensitivities for conditions changed by effects.
 
         Forms are normalised as before.
         """
@@ -88,7 +90,7 @@ class Sensitivities:
         return change
 
     def sensitivity(self, where: str, component: str, kind: str) -> NDArray:
-        """(R, 6) change of the reading per unit of a component at a place."""
+        """Return (R, 6) change of the reading per unit of a component at a place."""
         if where == "load":
             return self.under_load[self.rows, :, LOADS.index(component)]
         axis = AXES.index(component)
@@ -108,14 +110,14 @@ class Sensitivities:
     def _basis(
         self, variables: tuple[str, ...], shape: CandidateShape
     ) -> tuple[NDArray, NDArray]:
-        """(R, q) columns of a form of variables, of order one, and T (p, q)."""
+        """Return (R, q) columns of a form of variables, of order one, and T (p, q)."""
         raw = self._unmixed(variables, shape)
         size = np.sqrt(np.mean(raw**2, axis=0))
         mixed = np.diag(1 / np.where(size > 0, size, 1.0))
         if shape.form == "powers" and len(shape.names) > 1:
-            # so that a power does not stand for the one below it
+            # so that a power does not imitate the one below it
             Q, R = np.linalg.qr(raw * np.diag(mixed))
-            # of fewer rows than powers no more can be told than there are rows
+            # at most as many powers can be determined as there are rows
             good = np.flatnonzero(np.abs(np.diag(R)) > _RANK * np.sqrt(len(raw)))
             mixed = mixed[:, good] @ np.linalg.inv(R[np.ix_(good, good)])
             mixed *= np.sqrt(len(raw))
@@ -129,7 +131,7 @@ class Sensitivities:
         return raw @ mixed, mixed
 
     def _unmixed(self, variables: tuple[str, ...], shape: CandidateShape) -> NDArray:
-        """(R, p) columns of a form of variables."""
+        """Return the (R, p) columns of a form of variables."""
         if variables[0].startswith("wrench."):
             wrench = [self._wrench(*variables)]
             return FORMS[shape.form].basis(shape.names, wrench, dict(shape.given))
@@ -140,21 +142,20 @@ class Sensitivities:
         return raw
 
     def _wrench(self, name: str) -> NDArray:
-        """(R,) [N m or N] what a joint carries as declared."""
+        """Return the (R,) [N m or N] load of a joint as declared."""
         frame, _, component = name.removeprefix("wrench.").rpartition(".")
         row = self.conditions.robot.index(frame)
         return self._response.wrenches[:, row, LOADS.index(component)]
 
     def changes(self, one: Candidate, x: NDArray | None = None) -> NDArray:
-        """Return (R, 6, m) [rad, m] what a candidate adds, per unknown.
+        """Return the (R, 6, m) [rad, m] contribution of a candidate, per unknown.
 
-        ``x`` (m,) is where it is linearised.  If it is (m + 1,), the last is by how
-        much the number in which its form is not linear is larger, and has a column as
-        well.
+        ``x`` (m,) are the values at which it is linearised.  If it is (m + 1,), the
+        last is the change of the shape parameter, which then has a column as well.
         """
         m = len(self.axes(one))
         by = 0.0 if x is None or len(x) == m else float(x[-1])
-        # unknown by unknown in memory, as they are made and put together
+        # unknown by unknown in memory, in the order of computation
         blocks = [columns.T[:, :, None] * s for s, columns in self._factors(one, by)]
         if x is not None and len(x) > m:
             step = _STEP * float(one.shape.bends[0])
@@ -163,9 +164,9 @@ class Sensitivities:
         return np.moveaxis(np.concatenate(blocks), 0, 2)
 
     def moved(self, one: Candidate, x: NDArray, by: float = 0.0) -> NDArray:
-        """Return (R, 6) [rad, m] what a candidate of numbers x (m,) adds.
+        """Return the (R, 6) [rad, m] contribution of a candidate with numbers x (m,).
 
-        The number in which its form is not linear is larger by ``by``.
+        The shape parameter is changed by ``by``.
         """
         total, at = np.zeros((len(self.rows), 6)), 0
         for sensitivity, columns in self._factors(one, by):
@@ -175,7 +176,7 @@ class Sensitivities:
         return total
 
     def axes(self, one: Candidate) -> NDArray:
-        """(m,) component that each unknown of a candidate acts in."""
+        """Return the (m,) component in which each unknown of a candidate acts."""
         counts = [columns.shape[1] for _, columns in self._factors(one)]
         components = [c for part in one.parts for c in part.components]
         kinds = [0 if is_turn(c) else 3 for c in components]
@@ -188,7 +189,7 @@ class Sensitivities:
     def _factors(
         self, one: Candidate, by: float = 0.0
     ) -> Iterator[tuple[NDArray, NDArray]]:
-        """(R, 6) of every component and (R, q) of its unknowns: both multiplied."""
+        """Yield the factors of each component: (R, 6), and (R, q) of its unknowns."""
         for part in one.parts:
             columns, mixed = self.basis(part.variables, one.shape)
             if by:
@@ -200,8 +201,8 @@ class Sensitivities:
     def fitted(self, one: Candidate, x: NDArray, std: NDArray) -> list[Function]:
         """Return the functions of a robot file with their numbers.
 
-        One for each part of a candidate that the readings see; for each session, if
-        some lack a variable of it.  ``x`` is (m,) or (m + 1,), see :meth:`changes`;
+        One for each part of a candidate that the readings depend on; for each session,
+        if some lack a variable of it.  ``x`` is (m,) or (m + 1,), see :meth:`changes`;
         ``std`` are its standard deviations, taken as independent.
         """
         functions, at = [], 0
@@ -214,7 +215,7 @@ class Sensitivities:
         for part, function in zip(one.parts, one.functions(), strict=True):
             _, mixed = self.basis(part.variables, one.shape)
             numbers, spread = dict(given), dict(sure)
-            shown = []  # components that the readings see
+            shown = []  # components on which the readings depend
             alone = len(part.components) == 1
             for component in part.components:
                 own = slice(at, at + mixed.shape[1])
@@ -242,7 +243,7 @@ class Sensitivities:
         return functions
 
     def _sessions(self, variables: tuple[str, ...]) -> tuple[str | None, ...]:
-        """The sessions in which variables are known, None for all."""
+        """Return the sessions in which variables are known, None for all."""
         conditions = self.conditions
         if variables[0].startswith("wrench.") or conditions.session is None:
             return (None,)
@@ -255,7 +256,7 @@ class Sensitivities:
 def in_cells(
     sensitivities: Sensitivities, one: Candidate, campaign: Campaign
 ) -> NDArray:
-    """(N, m) change of a campaign's measured cells over sigma per unknown."""
+    """Return (N, m) change of a campaign's measured cells over sigma per unknown."""
     changes = np.moveaxis(sensitivities.changes(one), 2, 0) / campaign.sigma
     columns = changes.reshape(len(changes), -1)
     if not campaign.cells.all():

@@ -1,4 +1,4 @@
-"""What a diagnosis says, in sentences."""
+"""Result of a diagnosis in sentences."""
 
 import math
 from collections.abc import Sequence
@@ -23,11 +23,11 @@ WORDS = {GEOMETRY: "geometric errors", SPRINGS: "springs"}
 
 
 def sentence(diagnosis: Diagnosis) -> str:
-    """What may be said, and no more."""
+    """Return the sentences that the evidence supports."""
     if diagnosis.setup:
         said = "; ".join(one.sentence for one in diagnosis.setup)
         return f"The campaign is set up wrongly: {said}"
-    where = {  # which rows the errors before and after are of
+    where = {  # rows of the errors before and after
         "split": "held-out rows",
         "folds": f"rows held out in {len(diagnosis.held.folds)} folds",
         "none": "the rows fitted, too few to hold any out",
@@ -66,13 +66,13 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 
 def titles(diagnosis: Diagnosis) -> list[str]:
-    """Where every learned function acts, and of what."""
+    """Return place and variables of each learned function."""
     every = functions_of(diagnosis)
     return [function.title for functions in every for function in functions]
 
 
 def calibration_text(tally: Calibration) -> str:
-    """How often the method is right on this design, in words."""
+    """Return how often the method is right on this design, in words."""
 
     def counts(words: dict[str, int]) -> str:
         return ", ".join(f"{name} {n}" for name, n in sorted(words.items()))
@@ -86,7 +86,7 @@ def calibration_text(tally: Calibration) -> str:
 
 
 def open_text(open_: NDArray) -> str:
-    """In how many rows (R,) bool clearances leave the pose free, in one line."""
+    """Return a line on the number of rows whose pose is free within clearances."""
     return (
         f"clearances leave the pose free in {int(open_.sum())} of {len(open_)} rows "
         "(marked open): of the poses of least energy one is predicted there, in a "
@@ -95,7 +95,7 @@ def open_text(open_: NDArray) -> str:
 
 
 def formula(function: Function) -> str:
-    """A function in words, by component: numbers times what they multiply."""
+    """Return a function's text by component: numbers times columns."""
     names = [name.rpartition(".")[2] for name in function.variables]
     words = []
     for component in function.components:
@@ -110,7 +110,7 @@ def formula(function: Function) -> str:
 
 
 def _column_text(function: Function, key: str, names: Sequence[str]) -> str:
-    """What a column of a function's form is, in words."""
+    """Return the text of a column of a function's form."""
     form, given = function.form, function.parameters
     head, _, word = key.rpartition(".")
     if form == "knee":

@@ -1,9 +1,9 @@
-"""Which effects a campaign's design can tell apart, before anything is fitted.
+"""Effects that a campaign's design can distinguish, before any fit.
 
-An effect shows in the readings as a combination of its signature's columns A.  What
-nuisances (an unknown registration) can imitate is lost: they are projected out first.
-With P_f the projection on the signature of effect f, |P_f A_e| / |A_e| is the share of
-effect e that f can imitate.
+An effect changes the readings by a combination of its signature's columns A.  The part
+that nuisance parameters (an unknown registration) can imitate is lost, so they are
+projected out first.  With P_f the projection on the signature of effect f, |P_f A_e| /
+|A_e| is the share of effect e that f can imitate.
 
 Sources:
     Bjoerck, Golub (1973), Numerical methods for computing angles between linear
@@ -19,25 +19,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from validation.diagnosis.signatures import UNSEEN
 
-LIKE = 0.98  # cosine above which a design cannot separate
-SEEN = 3.0  # [sigma] length a signature needs to stand out of the noise
-ROUNDING = 1e-9  # relative size of what is rounding: a direction that others do as well
-_RANK = 1e-3  # likewise of signatures, which are secants
+LIKE = 0.98  # cosine above which a design cannot distinguish
+SEEN = 3.0  # [sigma] length of a signature that exceeds the noise
+ROUNDING = 1e-9  # relative size that is rounding: of a direction that others imitate
+_RANK = 1e-3  # relative size that is zero for signatures, because they are secants
 
 
 @dataclass(frozen=True, eq=False)
 class Separability:
-    """What of each effect is left to be seen, and what looks like it.
+    """Visibility of each effect, and its similarity to others.
 
     Attributes:
         names: m effects.
-        strength: (m,) [sigma] length of an effect's signature at plausible sizes of
-            its unknowns, all rows together, before nuisances are projected out.
-        left: (m,) share of it that nuisances leave.
+        strength: (m,) [sigma] length of an effect's signature at plausible sizes of its
+            unknowns, all rows together, before nuisance parameters are projected out.
+        left: (m,) share of it after the projection.
         unknowns: (m,) number of unknowns.
-        rank: (m,) how many of them the design can tell apart.
-        cosine: (m, m) of the smallest angle between two signatures: 1 if some
-            combination of one looks like some combination of the other.
+        rank: (m,) number of them that the design can distinguish.
+        cosine: (m, m) of the smallest angle between two signatures: 1 if a combination
+            of one equals a combination of the other.
         shared: (m, m) share of the row's effect that the column's effect can imitate.
     """
 
@@ -51,22 +51,22 @@ class Separability:
 
     @property
     def visible(self) -> NDArray:
-        """(m,) bool: would stand out of the noise at a plausible size."""
+        """(m,) bool: exceeds the noise at a plausible size."""
         return self.strength * self.left >= SEEN
 
     @property
     def traced(self) -> NDArray:
-        """(m,) bool: would show if it were large enough."""
+        """(m,) bool: would exceed the noise if it were large enough."""
         return (self.strength * self.left >= UNSEEN) & (self.rank > 0)
 
     @property
     def shows_at(self) -> NDArray:
-        """(m,) factor on plausible sizes that stands out of the noise; inf: none."""
+        """(m,) factor on plausible sizes that exceeds the noise; inf if none does."""
         size = np.where(self.traced, self.strength * self.left, 0.0)
         return np.divide(SEEN, size, out=np.full(len(size), np.inf), where=size > 0)
 
     def classes(self) -> list[tuple[str, ...]]:
-        """Effects that imitate each other, wholly and both ways.
+        """Return the effects that imitate each other completely, in both directions.
 
         Returns:
             Classes of two and more; a verdict can only name the class.
@@ -87,13 +87,13 @@ class Separability:
         return groups
 
     def imitated(self) -> list[tuple[str, str]]:
-        """Pairs (a, b): whatever a does b can do as well, but not the other way."""
+        """Return pairs (a, b) with the span of a in that of b, but not conversely."""
         one_way = (self.shared > LIKE) & (self.shared.T <= LIKE)
         one_way &= np.outer(self.traced, self.traced)
         return [(self.names[i], self.names[j]) for i, j in np.argwhere(one_way)]
 
     def overlapping(self) -> list[tuple[str, str]]:
-        """Pairs of which neither imitates the other, but parts of them do."""
+        """Return pairs of which neither imitates the other, but parts of them do."""
         part = (self.cosine > LIKE) & (self.shared <= LIKE) & (self.shared.T <= LIKE)
         part &= np.outer(self.visible, self.visible)
         return [(self.names[i], self.names[j]) for i, j in np.argwhere(part) if i < j]
@@ -102,11 +102,11 @@ class Separability:
 def compare_signatures(
     columns: Mapping[str, NDArray], nuisance: NDArray | None = None
 ) -> Separability:
-    """Angles between signatures.
+    """Return the angles between signatures.
 
     Args:
         columns: (N, k) by effect: change of the readings over sigma at plausible sizes.
-        nuisance: (N, p) columns fitted in any case, over sigma.
+        nuisance: (N, p) columns that are always fitted, over sigma.
 
     Returns:
         The comparison.
@@ -135,19 +135,19 @@ def compare_signatures(
 
 
 def _basis(columns: NDArray, whole: float) -> NDArray:
-    """(N, r) orthonormal basis; ``whole`` is the size that counts as large."""
+    """Return an (N, r) orthonormal basis; ``whole`` is the size of a large column."""
     return orthonormal_basis(columns, _RANK, _RANK * whole)
 
 
 def orthonormal_basis(
     columns: NDArray, rank: float = ROUNDING, floor: ArrayLike = 0.0
 ) -> NDArray:
-    """Basis of what columns span, whatever their units.
+    """Return an orthonormal basis of columns, independent of their units.
 
     Args:
         columns: (N, k).
-        rank: relative singular value below which normalised columns are one.
-        floor: length up to which a column is none; one, or (k,).
+        rank: relative singular value below which normalised columns are dependent.
+        floor: length up to which a column counts as zero; one number, or (k,).
 
     Returns:
         (N, r) orthonormal.

@@ -1,8 +1,8 @@
 """The sequence of models that leads to a fitted robot, each judged on held-out rows.
 
-Models in the order in which a machine is understood: as declared, where the device
-stands, geometric errors, springs, effects of the library, learned functions.  Each has
-the unknowns of those before it and is fitted as a whole; the last is the fitted robot.
+The models are added in a fixed order: as declared, pose of the device, geometric
+errors, springs, effects of the library, learned functions.  Each has the unknowns of
+those before it and is fitted as a whole; the last is the fitted robot.
 """
 
 from collections.abc import Sequence
@@ -22,18 +22,19 @@ LEARNED = "learned effects"
 _TERMS = (
     "declared", "registration", GEOMETRY, SPRINGS, "library effects", LEARNED,
 )  # fmt: skip
-_DECLARED, _REGISTRATION, _LIBRARY, _LEARNED = 0, 1, 4, 5  # places in them
-Place = tuple[int, int]  # of a model in the sequence: its last term, learned functions
+_DECLARED, _REGISTRATION, _LIBRARY, _LEARNED = 0, 1, 4, 5  # indices of terms
+# of a model in the sequence: last term, number of learned functions
+Place = tuple[int, int]
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Root mean squares over some rows.
+    """Root mean square errors over some rows.
 
     Attributes:
-        position: [m] of the components measured.
-        rotation: [rad] likewise.
-        normalised: [-] of residual over sigma.
+        position: [m] error of the components measured.
+        rotation: [rad] error of the components measured.
+        normalised: [-] error of the components measured over sigma.
     """
 
     position: float
@@ -44,13 +45,13 @@ class Errors:
 def errors_of(
     campaign: Campaign, residual: NDArray, rows: NDArray | slice = slice(None)
 ) -> Errors:
-    """Rms of a residual (R, 6) [rad, m] in rows (R,) bool; NaN of what no row has."""
+    """Return the rms of a residual (R, 6) [rad, m] in rows (R,) bool; NaN if empty."""
     z = np.where(campaign.cells, residual, np.nan)[rows]
     return Errors(rms(z[:, 3:]), rms(z[:, :3]), rms(z / campaign.sigma[rows]))
 
 
 def rms(values: NDArray) -> float:
-    """Root mean square of what is finite; NaN of nothing."""
+    """Return the root mean square of finite values; NaN without any."""
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
 
@@ -60,11 +61,12 @@ class Step:
     """A model of the sequence and its errors.
 
     Attributes:
-        term: what it adds: ``"declared"``, ``"registration"``, ``"geometry"``,
+        term: the term that it adds: ``"declared"``, ``"registration"``, ``"geometry"``,
             ``"springs"``, ``"library effects"`` or, for each function, ``"learned
             effects"``.
-        unknowns: [-] numbers added; of many with a prior, how many the readings say.
-        error: on the rows held out.
+        unknowns: [-] number of added unknowns; with a prior, those the readings
+            determine.
+        error: error on the held-out rows.
     """
 
     term: str
@@ -77,7 +79,7 @@ class Stage:
     """A model of the sequence on the rows of one fold.
 
     Attributes:
-        unknowns: as in :class:`Step`.
+        unknowns: unknowns as in :class:`Step`.
         residual: (R, 6) [rad, m] of the fold's rows, NaN elsewhere.
     """
 
@@ -91,8 +93,8 @@ def stages(
     """Fit the models that lead to a fitted robot; judge each on held-out rows.
 
     Args:
-        campaign: of R rows.
-        fit: where the sequence ends.
+        campaign: campaign of R rows.
+        fit: the last model of the sequence.
         rows: (R,) bool, rows that were fitted.
         held: (R,) bool, rows that judge.
 
@@ -117,12 +119,12 @@ def stages(
 
 
 def _has_finite_motions(unknowns: Unknowns) -> bool:
-    """Whether finite motions are among the effects that are added."""
+    """Return whether finite motions are among the added effects."""
     return any(LIBRARY[one.hypothesis.effect].finite for one in unknowns.effects)
 
 
 def _models(unknowns: Unknowns) -> dict[Place, Unknowns]:
-    """Unknowns of the models up to a robot's; steps that it lacks are left out."""
+    """Yield the unknowns of the models up to a robot's; absent steps are left out."""
     device = tuple(one for one in unknowns.effects if one.device)
     now = replace(unknowns, effects=(), small=(), functions=())
     models = {(_DECLARED, 0): now}
@@ -139,7 +141,7 @@ def _models(unknowns: Unknowns) -> dict[Place, Unknowns]:
 
 
 def _start(unknowns: Unknowns, fit: MachineFit) -> NDArray:
-    """(k,) where a smaller model begins: the fitted robot's effects, else the mean."""
+    """Return (k,) start values of a smaller model: fitted effects, else the mean."""
     start = unknowns.mean
     for one in unknowns.effects:
         start[unknowns.place(one)] = fit.x[fit.unknowns.place(one)]
@@ -149,11 +151,11 @@ def _start(unknowns: Unknowns, fit: MachineFit) -> NDArray:
 def pooled(
     campaign: Campaign, folds: list[dict[Place, Stage]], rows: NDArray
 ) -> list[Step]:
-    """The sequence judged on rows (R,) bool of all folds together.
+    """Return the sequence judged on rows (R,) bool of all folds together.
 
     Returns:
         The steps, in order; the last is the error of the diagnosis.  A fold without a
-        step has the one before it there.
+        step uses the step before it.
     """
     steps = []
     for place in sorted(set().union(*folds)):
@@ -169,7 +171,7 @@ def pooled(
 
 
 def joined(reached: Sequence[Stage]) -> NDArray:
-    """(R, 6) [rad, m] residual of a stage of every fold, each on its own rows."""
+    """Return the (R, 6) [rad, m] residual of a stage of all folds, on their rows."""
     residual = reached[0].residual
     for stage in reached[1:]:
         residual = np.where(np.isnan(stage.residual), residual, stage.residual)

@@ -1,7 +1,8 @@
-"""Set-up blunders: signs, quarter turns, units, exchanged columns; before any search.
+"""Set-up blunders: signs, quarter turns, units, exchanged columns.
 
-They move readings by decimetres where effects move them by micrometres, so that rigid
-motions and the declared springs are enough to tell them.  Several may act together.
+They are tested before any search.  They change readings by decimetres, while effects
+change them by micrometres, so rigid motions and the declared springs suffice to
+identify them.  Several may act together.
 """
 
 from collections.abc import Sequence
@@ -24,32 +25,35 @@ from validation.diagnosis.setup_corrections import (
     corrections,
 )
 
-_ROWS = 40  # by which corrections are judged
-_TRIMMED = 0.9  # of the cells, the smallest: blunders of single readings do not count
-_MOST = 3  # blunders that act together
-_BEAM = 4  # sets of corrections that are followed
-_CLEAR = 0.1  # of the residual left: only this set of corrections is followed
-_LESS = 0.9  # of the residual must be left for a further correction to be followed
-_DECISIVE = 0.5  # of the residual must be left for blunders to be reported
-_NEEDED = 1.5  # times the residual that is left without one of them
-_FAR = 10.0  # times the spread of the readings: no unit that places could have
-_NOISE = 3.0  # [sigma] of residual, below which nothing is looked for
-_LEAST = 100.0  # by which chi-square must fall for each blunder
+_ROWS = 40  # number of rows that judge corrections
+# share of the cells, the smallest: blunders of single readings do not count
+_TRIMMED = 0.9
+_MOST = 3  # largest number of simultaneous blunders
+_BEAM = 4  # number of sets of corrections that are followed
+# of the residual: if it falls below, only this set of corrections is followed
+_CLEAR = 0.1
+# relative to the residual: a further correction is followed if it falls below
+_LESS = 0.9
+_DECISIVE = 0.5  # relative to the residual: blunders are reported if it falls below
+_NEEDED = 1.5  # factor on the residual without a correction, above which it is needed
+_FAR = 10.0  # times the spread of the readings: no unit of the positions explains it
+_NOISE = 3.0  # [sigma] residual below which no blunder is searched
+_LEAST = 100.0  # least decrease of chi-square for each blunder
 
 Corrections = tuple[Correction, ...]
 
 
 @dataclass(frozen=True)
 class SetupBlunder:
-    """Something that is set up wrongly.
+    """An error in the set-up of a campaign.
 
     Attributes:
         kind: ``sign``, ``quarter_turn``, ``exchanged``, ``unit``, ``transposed`` or
             ``quaternion``.
-        columns: of the campaign's table, by name.
+        columns: columns of the campaign's table, by name.
         before: [sigma] residual without its correction, all others made.
         after: [sigma] residual with all corrections.
-        sentence: what to look at.
+        sentence: advice on what to check.
     """
 
     kind: str
@@ -62,16 +66,16 @@ class SetupBlunder:
 def setup_blunders(
     campaign: Campaign, conditions: Conditions
 ) -> tuple[SetupBlunder, ...]:
-    """Set-up blunders whose correction reduces the residual decisively.
+    """Return the set-up blunders whose correction reduces the residual decisively.
 
     Args:
         campaign: measured deviations.
         conditions: its R rows as the robot's file declares the machine.
 
     Returns:
-        The blunders, none where the residual falls to no half; residuals are the root
-        mean square over the smaller nine tenths of the cells, in sigma, after the
-        device's place is fitted where it is not known.
+        The blunders; none if the residual does not fall to half.  Residuals are the
+        root mean square over the smaller nine tenths of the cells, in sigma, after the
+        device's pose is fitted if it is unknown.
     """
     rows = _sample(campaign)
     if not len(rows):
@@ -92,7 +96,7 @@ def setup_blunders(
 
 
 def _blunder(correction: Correction, before: float, after: float) -> SetupBlunder:
-    """A blunder with its sentence."""
+    """Return a blunder with its sentence."""
     columns = correction.columns
     fit, s = ("fits", "") if len(columns) == 1 else ("fit", "s")
     sentence = (
@@ -104,7 +108,7 @@ def _blunder(correction: Correction, before: float, after: float) -> SetupBlunde
 
 
 def _search(judge: "_Judge", start: float) -> tuple[Corrections, float]:
-    """The corrections that leave least, by a beam search, and what they leave."""
+    """Return the corrections of least residual, by a beam search, and the residual."""
     tried = corrections(judge.campaign)
     best: tuple[Corrections, float] = ((), start)
     beam = [best]
@@ -129,12 +133,12 @@ def _search(judge: "_Judge", start: float) -> tuple[Corrections, float]:
 def _needed(
     judge: "_Judge", chosen: Corrections, left: float
 ) -> tuple[Corrections, float]:
-    """The corrections without those that hardly change what is left."""
+    """Return the corrections without those that hardly change the residual."""
     for one in chosen:
         fewer = _without(chosen, one)
         without = judge.residual(fewer)
         rivals = [without]
-        # where springs hardly respond, small loads are no better than none
+        # where springs hardly respond, small loads are no better than zero loads
         if one.array == "loads":
             rivals.append(judge.residual(fewer, loads=0.0))
         if min(rivals) < _NEEDED * left:
@@ -143,12 +147,12 @@ def _needed(
 
 
 def _without(chosen: Sequence[Correction], one: Correction) -> Corrections:
-    """All corrections but one."""
+    """Return all corrections except one."""
     return tuple(other for other in chosen if other is not one)
 
 
 def _sample(campaign: Campaign) -> NDArray:
-    """Rows spread evenly over those by which a set-up can be judged."""
+    """Return rows spread evenly over those that can judge a set-up."""
     cells = campaign.cells
     enough = np.any if campaign.registration == "known" else np.all
     usable = cells[:, :3].all(axis=1) | enough(cells[:, 3:], axis=1)
@@ -157,7 +161,7 @@ def _sample(campaign: Campaign) -> NDArray:
 
 
 class _Judge:
-    """What set-ups leave of the readings of some rows."""
+    """Residuals of set-ups on the readings of some rows."""
 
     def __init__(self, campaign: Campaign, conditions: Conditions) -> None:
         self.campaign, self.given = campaign, as_given(campaign)
@@ -169,12 +173,12 @@ class _Judge:
     def residual(
         self, made: Corrections, *, loads: float = 1.0, stated: bool = False
     ) -> float:
-        """Trimmed rms with corrections made.
+        """Return the trimmed rms with corrections made.
 
         Args:
             made: corrections of the campaign as given.
             loads: factor on all loads.
-            stated: whether sigma is as stated, whatever was made of the lengths.
+            stated: whether sigma is as stated, for any correction of lengths.
 
         Returns:
             [sigma], infinite where a command cannot be reached.
@@ -206,7 +210,7 @@ class _Judge:
         return float(np.sqrt(np.mean(kept**2)))
 
     def _moved(self, setup: SetUp) -> Conditions | None:
-        """Conditions of a set-up; None where a command cannot be reached."""
+        """Return the conditions of a set-up; None where a command cannot be reached."""
         moved, given = replace(self.conditions, load=setup.loads), self.given
         if setup.places is not given.places or setup.axes is not given.axes:
             wide = np.nanstd(setup.points, axis=0).max()
@@ -232,7 +236,7 @@ class _Judge:
     def _device(
         self, setup: SetUp, points: NDArray, turns: NDArray, own: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Rotation (3, 3) and shift (3,) [m] of the device, fitted where not known."""
+        """Return rotation (3, 3) and shift (3,) [m] of the device, or fit them."""
         if self.campaign.registration == "known":
             return np.eye(3), np.zeros(3)
         read, seen = points[own], setup.points[own]

@@ -1,8 +1,8 @@
 """Corrections of set-up blunders: a sign, a unit, an exchanged column.
 
-A campaign gives what was read as deviations from the commanded pose.  A correction acts
-on the absolute readings (deviation and commanded pose put together), since the device
-saw these, or on the deviations themselves, where it says so.
+A campaign gives readings as deviations from the commanded pose.  A correction acts on
+the absolute readings (commanded pose and deviation combined), since the device measured
+these, or on the deviations themselves if it says so.
 """
 
 from collections.abc import Callable, Iterator
@@ -18,7 +18,7 @@ from stiffness.screws import rotation_matrix
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.signatures import loaded_components
 
-_UNITS = {  # factors between units that are taken for one another
+_UNITS = {  # factors between units that are confused
     "length": (25.4, 1e3),  # inches, millimetres
     "angle": (180 / np.pi,),  # degrees
     "load": (9.81, 1e3),  # kilograms, kilonewtons
@@ -26,20 +26,20 @@ _UNITS = {  # factors between units that are taken for one another
 
 
 def _rolled(turns: Rotation, by: int) -> Rotation:
-    """Rotations whose quaternions have a part at the wrong end."""
+    """Return the rotations with the parts of their quaternions shifted."""
     return Rotation.from_quat(np.roll(turns.as_quat(), by, axis=-1))
 
 
 _MISREAD = (
     ("transposed", "transposed", Rotation.inv),
-    # of x y z w read as w x y z, the parts x y z w hold y z w x
+    # if x y z w is read as w x y z, the parts x y z w hold y z w x
     ("quaternion", "with the quaternion's w taken last, not first",
      partial(_rolled, by=1)),
     ("quaternion", "with the quaternion's w taken first, not last",
      partial(_rolled, by=-1)),
 )  # fmt: skip
-# columns, the array of a SetUp that they fill, in words how it is corrected, and
-# whether the deviation alone is
+# columns, the array of a SetUp that they fill, the correction in words, and whether it
+# is of the deviation alone
 _LENGTHS = (
     ("pose.t", "places", "", False),
     ("meas.t", "points", ", as positions", False),
@@ -54,16 +54,16 @@ _ROTATIONS = (
 
 @dataclass(frozen=True, eq=False)
 class SetUp:
-    """What was commanded and read, as it is taken to be.
+    """Assumed commands and readings.
 
     Attributes:
         coordinates: (R, n) [rad or m] commanded, of every joint.
-        places: (R, 3) [m] commanded of the platform, where poses are.
-        axes: (R, 3, 3) likewise.
+        places: (R, 3) [m] commanded positions of the platform, if poses are commanded.
+        axes: (R, 3, 3) commanded axes of the platform.
         loads: (R, 6) [N m, N].
-        points: (R, 3) [m] as read, base axes; NaN where not read.
-        turns: (R, 3, 3) the platform's axes as read; NaN where not read.
-        nominal: points and turns of the commands as the file gives them.
+        points: (R, 3) [m] measured positions, base axes; NaN if not measured.
+        turns: (R, 3, 3) the platform's measured axes; NaN if not measured.
+        nominal: points and turns of the commands as given in the file.
         sigma: (R, 6) [rad, m] of the readings.
     """
 
@@ -79,15 +79,15 @@ class SetUp:
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """One thing set right.
+    """A correction of one blunder.
 
     Attributes:
-        kind: in one word.
-        columns: of the campaign's table that it changes.
-        what: what is done to them, for a sentence.
-        array: of :class:`SetUp` that it changes, by name.
-        change: of that array, or of its deviation from what was commanded.
-        deviation: whether of the deviation.
+        kind: kind in one word.
+        columns: columns of the campaign's table that it changes.
+        what: the correction in words, for a sentence.
+        array: name of the array of :class:`SetUp` that it changes.
+        change: function of that array, or of its deviation from the command.
+        deviation: whether the deviation is changed.
         sigma: factor on the sigma of positions.
     """
 
@@ -100,7 +100,7 @@ class Correction:
     sigma: float = 1.0
 
     def apply(self, given: SetUp) -> SetUp:
-        """The set-up corrected."""
+        """Return the set-up corrected."""
         values, about = getattr(given, self.array), given.nominal.get(self.array)
         if not self.deviation or about is None:
             values = self.change(values)
@@ -113,7 +113,7 @@ class Correction:
 
 
 def as_given(campaign: Campaign) -> SetUp:
-    """The set-up of a campaign of R rows as its files give it."""
+    """Return the set-up of a campaign of R rows as given in its files."""
     T = campaign.transforms[:, campaign.robot.index(campaign.robot.platform)]
     axes = T[:, :3, :3]
     points = T[:, :3, 3] + np.einsum("rij,rj->ri", axes, campaign.targets)
@@ -130,7 +130,7 @@ def as_given(campaign: Campaign) -> SetUp:
 
 
 def corrections(campaign: Campaign) -> list[Correction]:
-    """All corrections that a campaign's columns allow."""
+    """Return all corrections that a campaign's columns allow."""
     read = np.isfinite(campaign.measured)
     there = {
         "pose.t": campaign.commanded == "pose",
@@ -158,7 +158,7 @@ def corrections(campaign: Campaign) -> list[Correction]:
 
 
 def _of_joints(campaign: Campaign) -> Iterator[Correction]:
-    """Signs, quarter turns, exchanges and units of commanded coordinates."""
+    """Yield signs, quarter turns, exchanges and units of commanded coordinates."""
     frames, kinds = campaign.robot.frames, dict[str, list[int]]()
     count = np.arange(len(frames))
     of = partial(Correction, array="coordinates")
@@ -187,7 +187,7 @@ def _of_joints(campaign: Campaign) -> Iterator[Correction]:
 
 
 def _of_loads(campaign: Campaign) -> Iterator[Correction]:
-    """Loads that are reactions, or in another unit."""
+    """Yield loads that are reactions, or in another unit."""
     names = tuple(f"load.{name}" for name in loaded_components(campaign))
     factors = [(-1.0, "with their signs reversed"), *_factors("load")]
     for factor, what in factors if names else ():
@@ -196,18 +196,18 @@ def _of_loads(campaign: Campaign) -> Iterator[Correction]:
 
 
 def _xyz(stem: str) -> tuple[str, ...]:
-    """Three columns of a campaign's table."""
+    """Return three columns of a campaign's table."""
     return tuple(f"{stem}{axis}" for axis in "xyz")
 
 
 def _factors(quantity: str) -> list[tuple[float, str]]:
-    """Factors between units, both ways, and what they do in words."""
+    """Yield the factors between units, both ways, and their meaning in words."""
     both = (f for one in _UNITS[quantity] for f in (one, 1 / one))
     return [(factor, f"times {factor:.4g}") for factor in both]
 
 
 def _turned(turns: NDArray, change: Callable[[Rotation], Rotation]) -> NDArray:
-    """(R, 3, 3) rotations changed; NaN stays."""
+    """Return the (R, 3, 3) rotations changed; NaN stays."""
     read = np.isfinite(turns).all(axis=(1, 2))
     changed = turns.copy()
     changed[read] = change(Rotation.from_matrix(turns[read])).as_matrix()

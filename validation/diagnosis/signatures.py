@@ -1,4 +1,4 @@
-"""Signatures: how each hypothesis would show in the readings, to first order.
+"""Signatures: the first-order change of the readings by each hypothesis.
 
 ======  =============  =========  ================================================
 symbol  code           shape      meaning
@@ -32,19 +32,20 @@ from validation.diagnosis.hypotheses import (
     sessions_of,
 )
 
-_PROBES = 3  # random projections that identify equal columns
-_DIGITS = 6  # of a projection that must agree
-_PROBED = 4  # rows of largest load, and of largest rotation
-_HARDLY = 2.0  # squared whitened change of all readings together, in no case visible
-UNSEEN = 1e-3  # [sigma] over all readings, of an unknown's own size
+_PROBES = 3  # number of random projections that identify equal columns
+_DIGITS = 6  # digits of a projection that must agree
+_PROBED = 4  # number of rows of largest load, and of largest rotation
+_HARDLY = 2.0  # squared whitened change of all readings together that is never visible
+# [sigma] over all readings: smaller changes by an unknown of its own size are 0
+UNSEEN = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Signature:
-    """What one hypothesis adds to the model, in units of sigma.
+    """Contribution of one hypothesis to the model, in units of sigma.
 
     Attributes:
-        hypothesis: whose.
+        hypothesis: the hypothesis.
         offset: (N,) at unknowns zero, on the tangent.
         columns: (N, k) per unknown.
     """
@@ -60,18 +61,18 @@ class Signature:
 
 
 def conditions_of(campaign: Campaign) -> Conditions:
-    """The conditions of a campaign, as its robot's file declares the machine.
+    """Return the conditions of a campaign, as its robot's file declares the machine.
 
     Args:
-        campaign: of R rows.
+        campaign: campaign of R rows.
 
     Returns:
         R conditions; a covariate that some sessions lack is NaN there.  Covariates
-        ``gravity.x``, ``.y``, ``.z`` [m/s^2], where given, are the weight's known
+        ``gravity.x``, ``.y``, ``.z`` [m/s^2], if given, are the weight's known
         direction in each row.
 
     Raises:
-        BadInput: a function of the robot depends on a covariate that is not there.
+        BadInput: a function of the robot depends on an absent covariate.
     """
     session, whole = campaign.session, campaign.covariates
     known = {**whole, **campaign.partial}
@@ -99,18 +100,18 @@ def conditions_of(campaign: Campaign) -> Conditions:
 
 
 def loaded_components(campaign: Campaign) -> list[str]:
-    """Components of the load that are not zero in every row."""
+    """Return the components of the load that are not zero in every row."""
     return [name for name, w in zip(LOAD, campaign.loads.T, strict=True) if w.any()]
 
 
 def whiten(campaign: Campaign, deviation: NDArray) -> NDArray:
-    """(N, ..) deviations (R, 6, ..) of the measured cells in units of their sigma."""
+    """Return (N, ..) deviations (R, 6, ..) of measured cells in units of sigma."""
     some = deviation[campaign.cells]
     return some / campaign.sigma[campaign.cells].reshape(-1, *[1] * (some.ndim - 1))
 
 
 def fingerprints(columns: NDArray) -> list[tuple[float, ...]]:
-    """Keys that columns (n, k) share which are equal but for their size and sign."""
+    """Return keys of columns (n, k), equal for columns of equal direction."""
     probes = np.random.default_rng(0).normal(size=(_PROBES, len(columns)))
     seen = probes @ columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     seen *= np.sign(seen[0])
@@ -121,32 +122,31 @@ class Tangents:
     """First derivatives of a campaign's readings in every unknown of every effect.
 
     Attributes:
-        campaign: of R rows, N measured cells.
-        derivatives: of what is read in its rows.
-        declared: (N,) what is read without effects, whitened.
+        campaign: campaign of R rows, N measured cells.
+        derivatives: derivatives of the readings in its rows.
+        declared: (N,) readings without effects, whitened.
     """
 
     def __init__(self, campaign: Campaign, derivatives: Derivatives) -> None:
-        """Read what the declared model predicts in the measured cells."""
+        """Store the readings of the declared model in the measured cells."""
         self.campaign, self.derivatives = campaign, derivatives
         self.declared = whiten(campaign, derivatives.declared)
 
     def model(self, effects: Mapping[str, Values], *, finite: bool = False) -> NDArray:
-        """(N,) whitened, what is read with effects; see :meth:`.Derivatives.model`."""
+        """Return (N,) whitened readings with effects, by :meth:`.Derivatives.model`."""
         return whiten(self.campaign, self.derivatives.model(effects, finite=finite))
 
     def rows_of(self, session: str | None) -> NDArray:
-        """(N, 1) 1 in the cells of a session, else 0; 1 in all of None."""
+        """Return (N, 1): 1 in the cells of a session, else 0; 1 in all for None."""
         row = np.nonzero(self.campaign.cells)[0]
         if session is None or self.campaign.session is None:
             return np.ones((len(row), 1))
         return (self.campaign.session[row] == session)[:, None].astype(float)
 
     def at_start(self, hypothesis: Hypothesis) -> Signature:
-        """Return a hypothesis to first order where it begins.
+        """Return a hypothesis to first order at its start values.
 
-        Where it begins to differ from what is declared; it has numbers of all rows, or
-        of every session.  NaN where there is no answer.
+        It has numbers for all rows, or for every session.  NaN without a solution.
         """
         sessions = sessions_of(hypothesis)
         one = self._at_start(in_one_session(hypothesis, sessions[0])[0])
@@ -154,7 +154,7 @@ class Tangents:
         return Signature(hypothesis, one.offset, columns)
 
     def _at_start(self, hypothesis: Hypothesis) -> Signature:
-        """A hypothesis with numbers of all rows where it begins."""
+        """Return a hypothesis with numbers for all rows, at its start values."""
         if not hypothesis.slots:
             offset = np.zeros_like(self.declared)
             if not self._invisible(hypothesis):
@@ -172,7 +172,7 @@ class Tangents:
         return Signature(hypothesis, -columns @ begin, columns)
 
     def _invisible(self, hypothesis: Hypothesis) -> bool:
-        """Whether an effect without unknowns hardly shows where loads are largest."""
+        """Return whether an effect without unknowns is invisible at large loads."""
         # the exact model is a hundred times slower than the linear one
         conditions = self.derivatives.conditions
         load = np.linalg.norm(conditions.load, axis=1)
@@ -190,14 +190,14 @@ class Tangents:
         return bool(np.mean(size**2) * len(self.declared) < _HARDLY)
 
     def _column(self, effect: str, slot: Slot, shapes: dict[str, float]) -> NDArray:
-        """(N,) derivative in one slot of one effect, where the effect begins."""
+        """Return the (N,) derivative by one slot of an effect, at its start values."""
         begun = whiten(self.campaign, self.derivatives.begun(effect, slot, shapes))
         return _seen((begun - self.declared) / (STEP * slot.unknown.scale), slot)
 
     def about(
         self, hypothesis: Hypothesis, x: NDArray, others: Mapping[str, Values]
     ) -> Signature:
-        """A hypothesis to first order about values x (k,), other effects acting too."""
+        """Return a hypothesis to first order about x (k,), other effects acting."""
         robot = self.derivatives.conditions.robot
 
         def model(values: NDArray) -> NDArray:
@@ -217,6 +217,6 @@ class Tangents:
 
 
 def _seen(column: NDArray, slot: Slot) -> NDArray:
-    """(N,) a derivative, zero where its unknown's own size does not show."""
+    """Return an (N,) derivative, zero if its unknown's own size is not visible."""
     size = np.linalg.norm(column) * slot.unknown.scale
     return np.zeros_like(column) if size < UNSEEN else column

@@ -30,7 +30,7 @@ from validation.diagnosis.weighted_readings import NARROW, WeightedReadings
 Mode = tuple[bool, bool]  # geometric errors in use, springs in use
 MORE = math.log(2.0)  # each further element halves the prior probability
 IN_USE = math.log(10.0)  # prior odds against geometry, and against springs: 10
-_GROUPS = 4  # of nuisance parameters
+_GROUPS = 4  # number of groups of nuisance parameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class State:
         sizes: standard deviations and posterior of all unknowns.
         score: log posterior, up to a constant.
         tau: true over stated sigma.
-        readings: what it is a model of.
+        readings: the readings that it models.
     """
 
     elements: tuple[Element, ...]
@@ -56,12 +56,12 @@ class State:
     readings: WeightedReadings
 
     def _columns(self) -> NDArray:
-        """(n, k) of all unknowns; not kept, they may be hundreds of megabytes."""
+        """Return (n, k) columns of all unknowns; not cached, as they may be large."""
         r = self.readings
         return np.hstack([r.small[:, self.used], *(r.own(e) for e in self.elements)])
 
     def _z(self) -> NDArray:
-        """(n,) readings minus the offsets of the elements."""
+        """Return the (n,) readings minus the offsets of the elements."""
         return self.readings.without_offsets(self.elements)
 
     @cached_property
@@ -113,7 +113,7 @@ class State:
         return errors
 
     def without(self, some: Sequence[Element]) -> tuple[Element, ...]:
-        """Return the elements but for some."""
+        """Return the elements without some of them."""
         return tuple(e for e in self.elements if e not in some)
 
     @property
@@ -148,7 +148,7 @@ class State:
 
 
 def _at_bounds(e: Element, mean: NDArray) -> bool:
-    """Whether all numbers of an effect, or one that shapes it, are at a bound."""
+    """Return whether all numbers of an effect, or one of its shape, are at a bound."""
     if not e.name or not e.columns.shape[1]:
         return False
     at, x = (mean <= e.lower) | (mean >= e.upper), e.values(mean)
@@ -162,12 +162,12 @@ def _at_bounds(e: Element, mean: NDArray) -> bool:
 
 
 def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
-    """Return by how many standard errors one model predicts better than another.
+    """Return the gain in prediction of one model over another, in standard errors.
 
-    Each block (n,) of readings is predicted by a fit to the others.  It is the gain of
-    their log predictive densities on average or, if that says more, of signed ranks
-    (Wilcoxon 1945): a few blocks often make up most of a gain and of its scatter, while
-    nearly all others gain as well.  0 of a single block, whose gain has no known error.
+    Each block (n,) of readings is predicted by a fit to the others.  The gain is that
+    of the log predictive densities on average or, if larger, of signed ranks (Wilcoxon
+    1945): a few blocks often make up most of a gain and of its scatter, while nearly
+    all others gain too.  It is 0 for a single block, whose gain has no known error.
     """
     densities = []
     for state in (one, other):
@@ -192,7 +192,7 @@ class Models:
         self._states: dict[object, State] = {}
 
     def forget(self) -> None:
-        """Drop what can be computed again: models seen and products of columns."""
+        """Drop cached results: models and products of columns."""
         for state in self._states.values():
             state.forget()
         self._states.clear()
@@ -211,7 +211,7 @@ class Models:
     ) -> State:
         """Return the model with optimised standard deviations, from a cache.
 
-        They begin at those of ``start``.
+        The optimisation starts at those of ``start``.
         """
         key = frozenset(elements), mode
         if key not in self._states:
@@ -253,7 +253,7 @@ class Models:
         return State(elements, mode, used, sizes, score, tau, self.readings)
 
     def _linear(self, elements: tuple[Element, ...], used: NDArray) -> Grouped:
-        """Return some nuisance parameters and the elements' unknowns."""
+        """Return the nuisance parameters in use and the elements' unknowns."""
         readings, small = self.readings, self._small
         z = readings.without_offsets(elements)
         with_small, inner = readings.products(elements)

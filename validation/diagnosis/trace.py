@@ -1,13 +1,13 @@
-"""The search of a diagnosis, from readings to the unknown numbers of a machine.
+"""Search of a diagnosis, from readings to the unknown numbers of a machine.
 
 Steps:
 
-1. the measuring frame is found, where it is not known;
+1. the measuring frame is estimated if it is unknown;
 2. effects and functions are searched for together (:mod:`.select`);
-3. the machine that has them is fitted (:mod:`.fit`); what finite motions add to its
-   geometric errors is added to the model, and 2 is repeated until it stays.
+3. the machine with them is fitted (:mod:`.fit`); second-order terms of its geometric
+   errors are added to the model, and 2 is repeated until they do not change.
 
-It is given the rows to be fitted, and reads no others.
+The search reads only the rows to be fitted.
 """
 
 from collections.abc import Callable, Mapping
@@ -44,8 +44,8 @@ from validation.diagnosis.weighted_readings import NONE
 Update = Callable[[str, int, int], None]
 FINITE = next(name for name, effect in LIBRARY.items() if effect.finite)
 _SEARCHED = 2000  # rows by which models are chosen; all are fitted
-_TURNS = 6  # of the search, without gross blunders
-_BENDS = 1  # of them, with what finite geometric errors add
+_TURNS = 6  # most repetitions of the search without gross blunders
+_BENDS = 1  # repetitions with second-order terms of geometric errors
 _GROSS = 30.0  # medians of all rows, from which a row is a gross blunder
 _CLEARLY = 2.0  # standard errors by which time must predict other spans better
 _BENT = 0.3  # [sigma] change of a reading by finite geometric errors, from which on
@@ -53,16 +53,17 @@ _BENT = 0.3  # [sigma] change of a reading by finite geometric errors, from whic
 
 @dataclass(frozen=True, eq=False)
 class Traced:
-    """What the search found.
+    """Result of the search for effects and functions.
 
     Attributes:
-        campaign: of R rows; sigma is as large as the search believed, of a blunder
-            many times as large, and so is the noise in common.
-        conditions: of all rows, registered, with what finite geometric errors add.
+        campaign: campaign of R rows; sigma is as large as the search estimated, of a
+            blunder many times as large, and so is the noise in common.
+        conditions: conditions of all rows, registered, with what finite geometric
+            errors add.
         used: (R,) bool, rows that were fitted.
         outliers: (R,) bool, rows whose readings are blunders, left out.
         selected: models with their probabilities.
-        columns: of the campaign's cells.
+        columns: columns of the campaign's cells.
     """
 
     campaign: Campaign
@@ -102,7 +103,7 @@ class Traced:
         return len(found.hypotheses) - device + len(found.functions) == 1
 
     def rivals(self, most: int = 3) -> list[Unknowns]:
-        """Machines of other effects than the best model's, likeliest first."""
+        """Return machines of other effects than the best model's, likeliest first."""
         states = self.selected.states
         own = frozenset(e.name for e in states[0].elements if e.name)
         found: dict[frozenset[str], Unknowns] = {}
@@ -125,7 +126,7 @@ class Traced:
         return list(found.values())
 
     def _device_frames(self, hypothesis: Hypothesis) -> list[Acting]:
-        """The measuring frame as it was found, one for each session."""
+        """Return the measuring frame as it was found, one for each session."""
         base = np.broadcast_to(self.conditions.base, (len(self.campaign), 6))
         own = {}
         for session in self.campaign.sessions or (None,):
@@ -137,7 +138,7 @@ class Traced:
 
 
 def _acting(hypothesis: Hypothesis, values: NDArray) -> list[Acting]:
-    """A hypothesis at work, in each session for which it has numbers."""
+    """Return a hypothesis at work, in each session for which it has numbers."""
     own = [(in_one_session(hypothesis, s), s) for s in sessions_of(hypothesis)]
     return [Acting(there, values[places], s) for (there, places), s in own]
 
@@ -149,14 +150,15 @@ def trace(
     """Search for the effects and functions that a declared model lacks.
 
     Args:
-        campaign: of R rows.
+        campaign: campaign of R rows.
         fitted: (R,) bool, the rows that are read.
-        declared: of all rows.
-        update: told what is done, how much of it and of how much.
-        odds: factors on the prior odds of what may act, see :class:`.columns.Columns`.
+        declared: declared model of all rows.
+        update: called with the step's name, the number done and their total.
+        odds: factors on the prior odds of effects and functions, see
+            :class:`.columns.Columns`.
 
     Returns:
-        What was found, and the machine that has it.
+        The effects found, and the fitted machine with them.
 
     Raises:
         BadInput: the measuring frame is not known and cannot be found.
@@ -195,14 +197,14 @@ def trace(
 
 
 def _searched_rows(campaign: Campaign, fitted: NDArray) -> NDArray:
-    """(R,) bool, the rows by which models are chosen: all, or so many drawn once."""
+    """Return (R,) bool, rows by which models are chosen: all, or a random part."""
     chosen = np.zeros(len(campaign), dtype=bool)
     chosen[fitted] = drawn(campaign.measured_at_once[fitted], _SEARCHED)
     return chosen
 
 
 def _without_outlying(traced: Traced, fit: MachineFit) -> tuple[Traced, MachineFit]:
-    """The machine fitted without blunders among the rows that were not drawn."""
+    """Return the machine fitted without blunders among the rows that were not drawn."""
     others = traced.used & ~np.isin(np.arange(len(traced.used)), traced.columns.row)
     if not others.any():
         return traced, fit
@@ -218,7 +220,7 @@ def _without_outlying(traced: Traced, fit: MachineFit) -> tuple[Traced, MachineF
 def _with_its_errors(
     campaign: Campaign, declared: Declared, derivatives: Derivatives, fitted: NDArray
 ) -> Derivatives:
-    """Conditions with what finite geometric errors add, before anything is searched."""
+    """Return derivatives at conditions with second-order terms of geometric errors."""
     conditions, seen = derivatives.conditions, hidden(campaign, ~fitted)
     alone = dict.fromkeys([*LIBRARY, FUNCTION], 0.0)
     columns = Columns(campaign, derivatives, odds=alone)
@@ -227,7 +229,7 @@ def _with_its_errors(
         z = whiten(campaign, campaign.measured - predict(conditions).deviation)
         known = cells & np.isfinite(z)
         selected = select(columns, z[known], known, common=NONE)
-        # a fit of the machine takes long: do the linear estimates come near the limit?
+        # a fit takes long, so the linear estimates are compared with the limit
         near = selected.states[0].errors
         if declared.bent(seen, conditions, near, _BENT / 3) is None:
             break
@@ -242,12 +244,12 @@ def _with_its_errors(
 
 
 def _errors(fit: MachineFit) -> NDArray:
-    """(n, 6) [rad, m] geometric errors found, beside those declared."""
+    """Return the (n, 6) [rad, m] geometric errors found in addition to the declared."""
     return np.asarray(fit.robot.errors - fit.unknowns.robot.errors)
 
 
 def _gross(campaign: Campaign, fit: MachineFit, used: NDArray) -> NDArray:
-    """(R,) bool, fitted rows that are outliers: the others are then examined alone."""
+    """Return (R,) bool, fitted rows that are outliers; a search excludes them."""
     left = residual_of(campaign, fit.robot) / campaign.sigma
     left = np.where(campaign.cells & used[:, None], left, 0.0)
     count = np.maximum((campaign.cells & used[:, None]).sum(axis=1), 1)
@@ -256,14 +258,14 @@ def _gross(campaign: Campaign, fit: MachineFit, used: NDArray) -> NDArray:
 
 
 def _searched(columns: Columns, z: NDArray, cells: NDArray, update: Update) -> Selected:
-    """The search; where rows follow one another, time itself explains the least."""
-    # it varies with whatever changed meanwhile, and says nothing of another day: it is
-    # believed only where it predicts other spans of time clearly better
-    # where nothing may act, what would is no noise
+    """Return result of the search; functions of time must predict clearly better."""
+    # time is correlated with all slow changes and does not repeat on another day: it is
+    # accepted only if it predicts other periods clearly better; without candidates
+    # their effects must not be estimated as noise
     whole = select(columns, z, cells, update, None if columns.candidates else NONE)
     if not columns.has_clocks:
         return whole
-    common = whole.states[0].readings.common  # of one noise alone can they be compared
+    common = whole.states[0].readings.common  # models need the same noise
     timeless = select(columns.without_clocks(), z, cells, update, common)
     blocks = columns.block[cells]
     sure = prediction_gain(whole.states[0], timeless.states[0], blocks)
@@ -274,7 +276,7 @@ def _traced(
     campaign: Campaign, conditions: Conditions, fitted: NDArray, cells: NDArray,
     selected: Selected, columns: Columns,
 ) -> Traced:  # fmt: skip
-    """What was found, with the sigma that was believed and rows that are blunders."""
+    """Return the effects found, with the estimated sigma and the rows with blunders."""
     weights = np.ones(len(columns.row))
     weights[cells] = cell_weights(selected.weights)
     sigma = campaign.sigma.copy()
@@ -285,7 +287,7 @@ def _traced(
         common = columns.motions * np.repeat(selected.noise.common, 3)
     good = np.ones(len(columns.row))
     good[cells] = selected.weights
-    # the row of a blunder is left out whole: what else was read then is doubtful, and
+    # the whole row of a blunder is excluded: its other readings are doubtful, and
     # errors and verdicts are by row
     blunders = np.bincount(columns.row, good < 0.5, minlength=len(campaign))
     outliers = (blunders > 0) | impossible_rows(campaign)
@@ -300,7 +302,7 @@ def _traced(
 
 
 def _fitted(traced: Traced) -> MachineFit:
-    """The machine found, without effects that the readings do not support."""
+    """Return the machine found, without effects that the readings do not support."""
     fit = fit_machine(traced.campaign, traced.unknowns, traced.used)
     while True:
         weak = [one for one in fit.unknowns.effects if not supported(fit, one)]
@@ -312,6 +314,6 @@ def _fitted(traced: Traced) -> MachineFit:
 
 
 def _size(fit: MachineFit, one: Acting) -> float:
-    """[sigma^2] squared change of the fitted readings by an effect."""
+    """Return the [sigma^2] squared change of the fitted readings by an effect."""
     x, _, slopes = fit.own(one)
     return float(np.sum((slopes @ x) ** 2))

@@ -1,8 +1,8 @@
 """The unknown numbers of a machine, and the robot that has them.
 
-A diagnosis finds which numbers a robot file lacks: effects of the library, geometric
-errors, compliances of joints, functions.  Side by side they are a vector x, and every
-x is a robot, the one that can be saved.
+A diagnosis determines the numbers that a robot file lacks: effects of the library,
+geometric errors, compliances of joints, functions.  Together they are a vector x, and
+every x defines a robot that can be saved.
 """
 
 from collections.abc import Mapping
@@ -27,9 +27,9 @@ from validation.diagnosis.sensitivities import Sensitivities
 from validation.diagnosis.signatures import conditions_of
 
 _WIDE = 1e3  # plausible sizes of an effect's unknown: standard deviation of its prior
-_BEND = 0.5  # of a number in which a function is not linear, likewise; and its bound
-_HELD = 1e-12  # plausible sizes, of an unknown whose value the file declares
-STEP = 1e-4  # of a number's size, for its derivative
+_BEND = 0.5  # standard deviation of a function's shape parameter; and its bound
+_HELD = 1e-12  # plausible sizes: standard deviation of an unknown with a declared value
+STEP = 1e-4  # relative to a number's size: step for its derivative
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Small:
         name: ``"geometry"`` or ``"springs"``.
         frame: (k,) row of the frame in the robot.
         axis: (k,) component of the screw there, 0 to 5.
-        std: (k,) [rad, m] or [rad/(N m), m/N] of the prior about what is declared.
+        std: (k,) [rad, m] or [rad/(N m), m/N] of the prior about the declared value.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Small:
 
     @property
     def bounds(self) -> tuple[NDArray, NDArray]:
-        """(k,) lower and upper; springs only add compliance."""
+        """(k,) lower and upper bounds; springs only add compliance."""
         least = -np.inf if self.name == GEOMETRY else 0.0
         return np.full(len(self), least), np.full(len(self), np.inf)
 
@@ -63,10 +63,10 @@ class Acting:
     """An effect of the library, in all rows or in those of one session.
 
     Attributes:
-        hypothesis: where it acts and what is unknown.
-        mean: (k,) where a fit begins, and the mean of its prior.
-        session: the only one in which it acts, None in all.
-        device: whether it is the place of a measuring frame, which is always unknown.
+        hypothesis: the frames and the unknowns.
+        mean: (k,) mean of the prior, and start of a fit.
+        session: the only session in which it acts, None for all.
+        device: whether it is the pose of a measuring frame, which is always unknown.
     """
 
     hypothesis: Hypothesis
@@ -79,14 +79,14 @@ class Acting:
 
     @property
     def std(self) -> NDArray:
-        """(k,) of the prior, so wide that it is flat."""
+        """(k,) standard deviations of the prior, so wide that it is flat."""
         unknowns = [slot.unknown for slot in self.hypothesis.slots]
         wide = [(_HELD if u.upper == u.lower else _WIDE) * u.scale for u in unknowns]
         return np.array(wide)
 
     @property
     def bounds(self) -> tuple[NDArray, NDArray]:
-        """(k,) lower and upper, as the library says."""
+        """(k,) lower and upper bounds of the library."""
         return self.hypothesis.bounds
 
 
@@ -95,7 +95,7 @@ class LearnedFunction:
     """A function of the machine whose coefficients are unknown.
 
     Attributes:
-        candidate: where it acts, of what, in which form.
+        candidate: places, variables and form.
         coefficients: (m,) standard deviations of their prior.
     """
 
@@ -107,12 +107,12 @@ class LearnedFunction:
 
     @property
     def std(self) -> NDArray:
-        """(m,) or (m + 1,): last that of the number in which it is not linear."""
+        """(m,) or (m + 1,) standard deviations; the last is the shape parameter's."""
         return np.concatenate([self.coefficients, _BEND * self.candidate.shape.bends])
 
     @property
     def bounds(self) -> tuple[NDArray, NDArray]:
-        """(m,) or (m + 1,) lower and upper: of the last number its prior's size."""
+        """(m,) or (m + 1,) bounds, lower and upper; the last are the shape's."""
         upper = np.full(len(self), np.inf)
         upper[len(self.coefficients) :] = self.std[len(self.coefficients) :]
         return -upper, upper
@@ -126,11 +126,11 @@ class Unknowns:
     """The unknown numbers x of a robot, with their prior.
 
     Attributes:
-        robot: as declared, with the effects of its file.
-        effects: of the library, the registration among them.
+        robot: robot as declared, with the effects of its file.
+        effects: effects of the library, including the registration.
         small: geometric errors and joint compliances.
         functions: learned ones.
-        sensitivities: by which functions are normalised; None without functions.
+        sensitivities: with the normalisation of functions; None without functions.
     """
 
     robot: Robot
@@ -144,7 +144,7 @@ class Unknowns:
 
     @cached_property
     def places(self) -> list[tuple[Part, slice]]:
-        """What x consists of, in its order, and where it is in x."""
+        """Parts of x, in order, with their slices."""
         parts: list[Part] = [*self.effects, *self.small, *self.functions]
         ends = np.cumsum([len(part) for part in parts]).tolist()
         return [
@@ -152,12 +152,12 @@ class Unknowns:
         ]
 
     def place(self, part: Part) -> slice:
-        """Where one part is in x."""
+        """Return the slice of one part in x."""
         return next(own for one, own in self.places if one is part)
 
     @property
     def mean(self) -> NDArray:
-        """(k,) mean of the prior, where a fit begins."""
+        """(k,) mean of the prior, and start of a fit."""
         zeros = np.zeros(len(self) - sum(len(one) for one in self.effects))
         return np.concatenate([*(one.mean for one in self.effects), zeros])
 
@@ -174,7 +174,7 @@ class Unknowns:
         return lower, upper
 
     def robot_at(self, x: NDArray) -> Robot:
-        """The robot with numbers x (k,) built in: what is saved, and what is judged."""
+        """Return the robot with numbers x (k,), which is saved and judged."""
         robot, functions = self.robot, list(self.robot.functions)
         for part, own in self.places:
             if isinstance(part, Small):
@@ -192,7 +192,7 @@ class Unknowns:
         return robot
 
     def _effects_at(self, x: NDArray) -> dict[str | None, dict[str, dict[str, float]]]:
-        """Effects that are added to those of the file, of all rows or of a session."""
+        """Return effects added to those of the file, for all rows or a session."""
         found: dict[str | None, dict[str, dict[str, float]]] = {}
         for one in self.effects:
             values = one.hypothesis.public(
@@ -204,10 +204,10 @@ class Unknowns:
         return found
 
     def slopes(self, campaign: Campaign, x: NDArray) -> NDArray:
-        """Change of the readings per unknown, by the linear model at x (k,).
+        """Return the change of the readings per unknown, by the linear model at x (k,).
 
         Returns:
-            (R, 6, k) [rad, m] per unit of x; zero where the model has no answer.
+            (R, 6, k) [rad, m] per unit of x; zero without a solution.
         """
         robot = self.robot_at(x)
         conditions = _linear(conditions_of(replace(campaign, robot=robot)))
@@ -242,13 +242,13 @@ class Unknowns:
         return np.nan_to_num(J, nan=0.0, posinf=0.0, neginf=0.0)
 
     def without(self, effect: Acting) -> "Unknowns":
-        """The same without one of its effects."""
+        """Return the unknowns without those of one effect."""
         kept = tuple(one for one in self.effects if one is not effect)
         return replace(self, effects=kept)
 
 
 def effects_in(robot: Robot, session: str | None) -> Mapping[str, Values]:
-    """Effects of a robot's file in all rows, or those of one session alone."""
+    """Return effects of a robot's file in all rows, or those of one session alone."""
     if session is None:
         return robot.effects
     return robot.session_effects.get(session, {})
@@ -257,7 +257,7 @@ def effects_in(robot: Robot, session: str | None) -> Mapping[str, Values]:
 def with_effects_in(
     robot: Robot, session: str | None, effects: Mapping[str, Values]
 ) -> Robot:
-    """A robot with other effects in all rows, or in one session alone."""
+    """Return a robot with other effects in all rows, or in one session alone."""
     if session is None:
         return replace(robot, effects=effects)
     sessions = {**robot.session_effects, session: effects}
@@ -265,7 +265,7 @@ def with_effects_in(
 
 
 def _linear(conditions: Conditions) -> Conditions:
-    """The linear model, clearances of closed chains held where they rest."""
+    """Return the linear model, with closed chains' clearances held at rest."""
     conditions = replace(conditions, exact=False)
     loose = virtual_joints(conditions.robot).cones.shape[1]
     if loose and conditions.robot.closures and conditions.rest is None:
@@ -274,7 +274,7 @@ def _linear(conditions: Conditions) -> Conditions:
 
 
 def _resting_as(conditions: Conditions, held: Conditions) -> Conditions:
-    """Conditions with clearances where they rest in others; a foundation has none."""
+    """Return conditions with the rest positions of others; a foundation has none."""
     assert held.rest is not None
     rest = np.zeros_like(conditions.errors)
     for row, frame in enumerate(conditions.robot.frames):

@@ -1,4 +1,4 @@
-"""From probabilities to a verdict."""
+"""The verdict from probabilities of models."""
 
 from assembly.model.statuses import (
     AMBIGUOUS,
@@ -10,18 +10,18 @@ from assembly.model.statuses import (
 from validation.diagnosis.columns import FUNCTION
 from validation.diagnosis.selected import Selected
 
-CLAIM = 0.9  # probability from which an effect is claimed
-RIVAL = 0.5  # probability from which another one is a rival
-_LISTED = 0.02  # probability from which an alternative is listed
+CLAIM = 0.9  # probability above which an effect is claimed
+RIVAL = 0.5  # probability above which another effect is a rival
+_LISTED = 0.02  # probability above which an alternative is listed
 
 Sets = tuple[tuple[tuple[str, ...], float], ...]
 
 
 def by_names(selected: Selected) -> Sets:
-    """Probabilities of models by the effects that they have, likeliest first.
+    """Return probabilities of models by their effects, likeliest first.
 
     Returns:
-        Names and probabilities; of a model that has a function, ``"function"`` is last.
+        Names and probabilities; for a model with a function, ``"function"`` is last.
     """
     weights: dict[tuple[str, ...], float] = {}
     for model in selected.models:
@@ -35,18 +35,18 @@ def verdict(
     selected: Selected, names: tuple[str, ...], *, functions: bool, small: bool,
     more_than_noise: bool,
 ) -> tuple[str, tuple[str, ...]]:  # fmt: skip
-    """The verdict, and which effects it claims.
+    """Return the verdict, and the claimed effects.
 
     Args:
         selected: models with their probabilities.
-        names: of the library's effects that the fitted machine has.
-        functions: whether it has functions.
-        small: whether it has geometric errors or springs.
-        more_than_noise: whether it leaves more than noise.
+        names: names of the library's effects of the fitted machine.
+        functions: whether the model has functions.
+        small: whether the model has geometric errors or springs.
+        more_than_noise: whether the model's residual is more than noise.
 
     Returns:
         ``"none_needed"``, ``"explained"``, ``"learned"``, ``"ambiguous"`` or
-        ``"outside_library"``, and the names claimed.
+        ``"outside_library"``, and the claimed names.
     """
     if more_than_noise:
         return OUTSIDE_LIBRARY, ()

@@ -9,16 +9,16 @@ from validation.diagnosis.columns import Columns
 from validation.diagnosis.elements import Element
 from validation.diagnosis.prior_sizes import Eigen
 
-NARROW = 50  # most columns of an element that are kept beside those of all cells
+NARROW = 50  # largest number of columns of an element whose fitted cells are cached
 _RANK = 1e-9  # relative singular value of a dependent column
-NONE = (0.0, 0.0)  # noise in common
+NONE = (0.0, 0.0)  # no noise in common
 
 
 class WeightedReadings:
     """Readings of the fitted cells, weighted; the device's frame is projected out.
 
     Attributes:
-        columns: of all N cells.
+        columns: columns of all N cells.
         given: (n,) whitened residual of the fitted cells.
         cells: (N,) mask of the fitted cells.
         weights: (n,) relative precision, 1 for a good reading.
@@ -27,8 +27,8 @@ class WeightedReadings:
         sampled: (n,) cells of the rows by which functions are scored first.
         whiten: map of the fitted cells to independent noise.
         flat: (n, f) orthonormal columns of the measuring frame.
-        z: (n,) what is given, whitened, without the measuring frame.
-        small: (n, k) columns of the nuisance parameters, likewise.
+        z: (n,) whitened residual without the measuring frame.
+        small: (n, k) columns of the nuisance parameters without the measuring frame.
         gram: (k, k) their inner products.
         count: number of independent readings.
     """
@@ -62,7 +62,7 @@ class WeightedReadings:
         return columns - self.flat @ (self.flat.T @ columns)
 
     def sample(self, common: tuple[float, float]) -> "WeightedReadings":
-        """The sampled rows alone, with some noise in common."""
+        """Return the sampled rows alone, with given noise in common."""
         cells, some = self.cells.copy(), self.sampled
         cells[cells] = some
         return WeightedReadings(
@@ -79,7 +79,7 @@ class WeightedReadings:
         return B
 
     def products(self, elements: Sequence[Element]) -> tuple[NDArray, NDArray]:
-        """Inner products of m columns: (k, m) with the nuisance parameters, (m, m)."""
+        """Return inner products of m columns: (k, m) with nuisance columns, (m, m)."""
         for i, e in enumerate(elements):
             missing = [o for o in (None, *elements[: i + 1])
                        if (e, o) not in self._inner]  # fmt: skip
@@ -109,6 +109,6 @@ class WeightedReadings:
         return z
 
     def forget(self) -> None:
-        """Drop columns and inner products, which can be computed again."""
+        """Drop cached columns and inner products."""
         for one in (self._own, self._inner, self._eigen):
             one.clear()

@@ -1,7 +1,7 @@
-r"""Noise that the points of one measurement have in common, made independent.
+r"""Transformation of noise that the points of a measurement share to independent noise.
 
-A measurement reads several points of the platform at once.  The noise of its cells,
-over the stated sigma, is e + L n: e independent of variance 1/w, n of k independent
+A measurement reads several points of the platform together.  The noise of its cells,
+over the stated sigma, is e + L n: e independent of variance 1/w, and n of k independent
 standard normal numbers that all its cells share.
 
 ======  ==============  =======  =====================================================
@@ -12,8 +12,8 @@ L       ``loadings``    (n, k)   change of the cells over sigma per number in co
 W       ``matrix``      (n, n)   block-diagonal, W (w^-1 + L L') W' = 1
 ======  ==============  =======  =====================================================
 
-Of all such W this is the one nearest to w^1/2: W = (1 + K K')^-1/2 w^1/2 with
-K = w^1/2 L, by the singular values of the blocks of K.
+Of all such W this is the nearest to w^1/2: W = (1 + K K')^-1/2 w^1/2 with K = w^1/2 L,
+by the singular values of the blocks of K.
 """
 
 from collections.abc import Iterator
@@ -48,7 +48,7 @@ class Whitening:
         return values * (self.root if values.ndim == 1 else self.root[:, None])
 
     def inverse(self, values: NDArray) -> NDArray:
-        """Return the (n,) values over sigma that the map takes to given ones."""
+        """Return the (n,) values over sigma that the map transforms to given ones."""
         if self.matrix is not None:
             return np.asarray(spsolve(self.matrix, values))
         return values / self.root
@@ -58,7 +58,7 @@ def whitening(root: NDArray, loadings: NDArray | None, visit: NDArray) -> Whiten
     """Return the map of n cells; diagonal without loadings.
 
     ``root`` (n,) are square roots of the relative precisions, ``loadings`` (n, k)
-    changes over sigma per number in common, ``visit`` (n,) is the same for cells of a
+    changes over sigma per number in common, ``visit`` (n,) is equal for cells of a
     measurement.
     """
     if loadings is None or not loadings.any():
@@ -89,7 +89,7 @@ def _of_one_size(visit: NDArray) -> Iterator[NDArray]:
 
 
 def whitening_of(campaign: Campaign, cells: NDArray) -> Whitening:
-    """The map of cells (R, 6) bool by a campaign's sigma and noise in common."""
+    """Return the map of cells (R, 6) bool by a campaign's sigma and noise in common."""
     row, _ = np.nonzero(cells)
     loadings = None
     if campaign.common is not None:
@@ -101,7 +101,7 @@ def whitening_of(campaign: Campaign, cells: NDArray) -> Whitening:
 def independent(campaign: Campaign, residual: NDArray) -> NDArray:
     """Return a residual (R, 6) [rad, m] over its noise, independent in the N cells.
 
-    (N,), of unit variance if it is noise; what is not finite counts as zero.
+    (N,), of unit variance if it is noise; values that are not finite count as zero.
     """
     cells = campaign.cells
     z = np.nan_to_num(residual[cells] / campaign.sigma[cells])
@@ -109,23 +109,23 @@ def independent(campaign: Campaign, residual: NDArray) -> NDArray:
 
 
 def size_of_noise(campaign: Campaign) -> NDArray:
-    """(R, 6) [rad, m] standard deviation of every reading, noise in common included."""
+    """Return (R, 6) [rad, m] standard deviation of readings, with noise in common."""
     if campaign.common is None:
         return campaign.sigma
     return np.sqrt(campaign.sigma**2 + np.sum(campaign.common**2, axis=2))
 
 
 def platform_motions(campaign: Campaign, reading: NDArray) -> NDArray | None:
-    """What a small motion of the platform changes in the readings.
+    """Return the change of the readings by small motions of the platform.
 
     Args:
-        campaign: of R rows.
+        campaign: campaign of R rows.
         reading: (R, 6, 6) change of the readings per screw of the platform at its
             origin, base axes.
 
     Returns:
         (R, 6, 6) [rad, m] per rotation about the centre of the points measured, and per
-        translation; None where no measurement reads several points.
+        translation; None if no measurement reads several points.
     """
     visit = campaign.measured_at_once[campaign.cells.any(axis=1)]
     if len(np.unique(visit)) == len(visit):

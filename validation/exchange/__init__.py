@@ -1,4 +1,4 @@
-"""Measuring devices' own files, made into campaigns.
+"""Import of measuring devices' files as campaigns.
 
 Begin at ``tracker.py``.
 """

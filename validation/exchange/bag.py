@@ -1,7 +1,7 @@
-"""ROS bags as a device's file: points, poses and transforms, read by ``rosbags``.
+"""Import of ROS bags: points, poses and transforms, read by ``rosbags``.
 
-A rosbag2 folder (SQLite or MCAP) or a ROS 1 ``.bag``.  A reading is named by its topic
-and its frame, its time is the message's stamp, lengths are metres.
+A bag is a rosbag2 folder (SQLite or MCAP) or a ROS 1 ``.bag``.  A reading is named by
+its topic and its frame; its time is the message's stamp; lengths are in metres.
 """
 
 import os
@@ -23,17 +23,17 @@ _MESSAGES = {
 
 
 def is_bag(path: Path | str) -> bool:
-    """Whether a path is a bag: a folder with ``metadata.yaml``, or a ``.bag`` file."""
+    """Return whether a path is a bag: a folder with ``metadata.yaml``, or ``.bag``."""
     path = Path(path)
     return path.suffix.lower() == ".bag" or os.path.isfile(path / "metadata.yaml")
 
 
 def read_bag(path: Path | str, oriented: bool = False) -> list[Reading]:
-    """Readings of all points, poses and transforms in a bag.
+    """Return the readings of all points, poses and transforms in a bag.
 
     Args:
         path: a rosbag2 folder or a ROS 1 bag.
-        oriented: whether orientations are read; otherwise they are passed over.
+        oriented: whether orientations are read; otherwise they are ignored.
 
     Returns:
         The readings in the order recorded.
@@ -72,7 +72,7 @@ def read_bag(path: Path | str, oriented: bool = False) -> list[Reading]:
 
 
 def _places(message: Any) -> Iterator[tuple[str, Any, Any, Any]]:
-    """Frame, header, position and quaternion (or None) of a message's points."""
+    """Yield frame, header, position and quaternion (or None) of a message's points."""
     for one in getattr(message, "transforms", [message]):
         if hasattr(one, "transform"):
             T = one.transform
@@ -87,10 +87,10 @@ def _places(message: Any) -> Iterator[tuple[str, Any, Any, Any]]:
 def _reading(
     path: str, number: int, names: tuple[str, ...], header: Any, place: Any, turn: Any
 ) -> Reading:
-    """One point of a bag; ``line`` is the message's number."""
+    """Return one point of a bag; ``line`` is the message's number."""
     position = np.array([place.x, place.y, place.z], dtype=float)
     if np.isnan(position).any():
-        position[:] = np.nan  # the device saw nothing
+        position[:] = np.nan  # the device saw no target
     elif not (np.abs(position) <= LARGEST).all():
         raise BadInput(
             f"{path}: message {number}: found {position.tolist()}, expected a place [m]"

@@ -20,15 +20,15 @@ def columns_of(
     commands: Commands, rows: Rows, gaps: NDArray, turns: NDArray, frame: DeviceFrame,
     names: Sequence[str],
 ) -> dict[str, NDArray]:  # fmt: skip
-    """Columns of the campaign's table, SI.
+    """Return the columns of the campaign's table, SI.
 
     Args:
-        commands: what was commanded.
-        rows: of the campaign.
-        gaps: (R, T, 3) [m] deviation of each target; NaN where not read.
-        turns: (R, 3) [rad] of the platform; NaN where not read.
-        frame: where the device stood.
-        names: of the targets.
+        commands: the commands.
+        rows: rows of the campaign.
+        gaps: (R, T, 3) [m] deviation of each target; NaN if not read.
+        turns: (R, 3) [rad] of the platform; NaN if not read.
+        frame: pose of the device.
+        names: names of the targets.
 
     Returns:
         The columns by name.
@@ -56,15 +56,15 @@ def columns_of(
 
 
 def spreads(rows: Rows, frame: DeviceFrame, names: Sequence[str]) -> NDArray:
-    """Standard deviations of readings along the base's axes.
+    """Return the standard deviations of readings along the base's axes.
 
     Args:
-        rows: of the campaign.
-        frame: where the device stood.
-        names: of the targets.
+        rows: rows of the campaign.
+        frame: pose of the device.
+        names: names of the targets.
 
     Returns:
-        (R, T, 3) [m], NaN where not stated.
+        (R, T, 3) [m], NaN if not stated.
     """
     sigma = np.full((len(rows), len(names), 3), np.nan)
     for i, (_, readings) in enumerate(rows):
@@ -75,11 +75,11 @@ def spreads(rows: Rows, frame: DeviceFrame, names: Sequence[str]) -> NDArray:
 
 
 def labels_of(commands: Commands, rows: Rows) -> list[str]:
-    """Ids of the rows: the command's, numbered where it is there again.
+    """Return the ids of the rows: the command's, numbered if it occurs again.
 
     Args:
-        commands: what was commanded.
-        rows: of the campaign.
+        commands: the commands.
+        rows: rows of the campaign.
 
     Returns:
         A label for each.
@@ -94,26 +94,26 @@ def labels_of(commands: Commands, rows: Rows) -> list[str]:
 
 
 def cell(value: float) -> str:
-    """A number with all its digits, nothing where there is none."""
+    """Return a number as text with all its digits, empty for NaN."""
     return repr(float(value)) if np.isfinite(value) else ""
 
 
 def declaration(
     declared: TargetsFile, folder: Path, spread: NDArray, turned: bool
 ) -> str:
-    """Text of ``campaign.toml``.
+    """Return the text of ``campaign.toml``.
 
     Args:
         declared: the targets file.
-        folder: of the campaign.
-        spread: (..., 3) [m] stated with the readings, NaN where not.
+        folder: folder of the campaign.
+        spread: (..., 3) [m] stated with the readings, NaN if not.
         turned: whether orientations were read.
 
     Returns:
         The text.
 
     Raises:
-        BadInput: a reading states no standard deviation, nor does the targets file.
+        BadInput: neither a reading nor the targets file states a standard deviation.
     """
     name = declared.robot_name
     path = declared.file.parent / name

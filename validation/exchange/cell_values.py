@@ -1,4 +1,4 @@
-"""Numbers of a device's table: lengths in metres, and cells that hold no reading."""
+"""Numbers of a device's table: lengths in metres, and cells without a reading."""
 
 from dataclasses import dataclass
 
@@ -14,18 +14,18 @@ _NO_READING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---"}
 
 
 def missing(cell: str) -> bool:
-    """Whether a cell says that nothing was read."""
+    """Return whether a cell means that nothing was read."""
     return cell.lower() in _NO_READING
 
 
 @dataclass(frozen=True, eq=False)
 class CellValues:
-    """Cells of a table as numbers.
+    """Numeric values of a table's cells.
 
     Attributes:
         sheet: the table.
         header: its columns.
-        writing: what it does not say itself.
+        writing: declared format, used where the table states none.
     """
 
     sheet: Sheet
@@ -33,12 +33,12 @@ class CellValues:
     writing: Writing
 
     def length(self, line: int, k: int, cell: str) -> float:
-        """[m] of a cell of column k."""
+        """Return the length [m] of a cell of column k."""
         name = self.header.cells[k]
         return self.number(line, name, cell) * self.unit(self.header.columns[k].unit)
 
     def unit(self, stated: str) -> float:
-        """[m] of a column's unit: its own, else as declared, else as the file says."""
+        """Return unit [m] of a column: its own, else as declared, else the file's."""
         path, declared, found = self.sheet.file, self.writing.unit, self.header.unit
         if not stated and declared and found:
             if LENGTHS[found] != LENGTHS[declared]:
@@ -58,7 +58,7 @@ class CellValues:
         return LENGTHS[unit]
 
     def number(self, line: int, column: str, cell: str) -> float:
-        """A finite number of a cell."""
+        """Return a cell's finite number."""
         decimal = self.sheet.decimal
         value = parse_number(cell, decimal)
         if abs(value) <= LARGEST:

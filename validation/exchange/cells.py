@@ -1,4 +1,4 @@
-"""The text and the cells of a device's table, in the encodings that programs write.
+"""Text and cells of a device's table, in the encodings of common programs.
 
 Excel and Leica write UTF-16 or Latin-1, others UTF-8; a cell that begins with an
 apostrophe is text in Excel.
@@ -15,10 +15,11 @@ from pathlib import Path
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.table import read_bytes
 
-_MARKS = (";", "\t", ",")  # between cells, the likeliest first
+_MARKS = (";", "\t", ",")  # marks between cells, the likeliest first
 _BLANK = " "
-_LONGEST = 1000  # characters of a cell; the search for units in it is quadratic
-_SAMPLE = 2000  # lines by which the mark between cells is found
+# largest number of characters of a cell; the search for units in it is quadratic
+_LONGEST = 1000
+_SAMPLE = 2000  # number of lines by which the mark between cells is found
 
 
 @dataclass(frozen=True)
@@ -38,11 +39,11 @@ class Sheet:
 
 
 def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
-    """Cells of a table.
+    """Return the cells of a table.
 
     Args:
         path: a text file in UTF-8, UTF-16 or Latin-1.
-        decimal: the decimal mark declared; a table parted by commas has points.
+        decimal: the declared decimal mark; a comma-separated table has points.
 
     Returns:
         The table.
@@ -73,7 +74,7 @@ def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
 def _with_names_of_words(
     lines: Sequence[tuple[int, str]], rows: Sequence[tuple[int, list[str]]]
 ) -> list[tuple[int, list[str]]]:
-    """Rows, in which two blanks part a header of words, such as Point Name."""
+    """Return rows with a header of words joined, where two blanks separate cells."""
     usual = Counter(len(cells) for _, cells in rows).most_common(1)[0][0]
     return [
         (number, wide)
@@ -85,7 +86,7 @@ def _with_names_of_words(
 
 
 def _text(path: Path | str) -> str:
-    """Text of a file in UTF-8, UTF-16 or Latin-1, with its line ends made one."""
+    """Return the text of a file in UTF-8, UTF-16 or Latin-1, with equal line ends."""
     content = read_bytes(path)
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         encodings = ["utf-16"]
@@ -108,7 +109,7 @@ def _text(path: Path | str) -> str:
 
 
 def _mark(lines: Sequence[str], decimal: str) -> str:
-    """The mark between cells: of most lines, the likeliest where there are several."""
+    """Return the mark between cells of most lines; the likeliest of several."""
     for mark in _MARKS:
         if 2 * sum(mark in line for line in lines) < len(lines):
             continue
@@ -120,11 +121,11 @@ def _mark(lines: Sequence[str], decimal: str) -> str:
 
 
 def _cells(line: str, mark: str) -> list[str]:
-    """Cells of a line."""
+    """Return the cells of a line."""
     if mark == _BLANK:
         line = re.sub(r"\s+(?=\[)", "", line.replace("\t", _BLANK).strip())  # X [mm]
     try:
         row = next(csv.reader([line], delimiter=mark, skipinitialspace=True))
-    except csv.Error:  # a cell without end: no table
+    except csv.Error:  # a quote without end: no table
         row = line.split(mark)
     return [cell.strip().strip('"').removeprefix("'").strip() for cell in row]

@@ -1,4 +1,4 @@
-"""Times as devices and controllers write them, in seconds."""
+"""Times of devices and controllers, in seconds."""
 
 import re
 from datetime import UTC, datetime
@@ -15,18 +15,18 @@ _CLOCK = re.compile(r"\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?(?: ?[APap][Mm])?")
 
 
 def parse_time(place: str, text: str, writing: Writing) -> float:
-    """[s] of a time: seconds, a time of day, ISO 8601, 14 digits, or a date.
+    """Return the [s] of a time: seconds, time of day, ISO 8601, 14 digits, or date.
 
     Args:
         place: file and line, for messages.
         text: the cell, or date and time.
-        writing: its decimal mark, and what comes first where a date has slashes.
+        writing: its decimal mark, and the order of dates with slashes.
 
     Returns:
-        Seconds on a clock of its own; only differences mean something.
+        Seconds on the file's own clock; only differences have a meaning.
 
     Raises:
-        BadInput: none of these.
+        BadInput: the text has none of these forms.
     """
     number = parse_number(text, writing.decimal)
     digits = text.isascii() and text.isdigit() and len(text) == 14
@@ -59,18 +59,18 @@ def parse_time(place: str, text: str, writing: Writing) -> float:
 
 
 def _dated(year: str, month: str, day: str, clock: str) -> float:
-    """[s] of a date and a time of day such as 10:30:00.25 or 9:30:00 PM."""
+    """Return the [s] of a date and a time of day, 10:30:00.25 or 9:30:00 PM."""
     clock = clock.replace(",", ".")
     half = clock[-2:].upper() if clock[-1:] in {"M", "m"} else ""
     clock = clock[: len(clock) - len(half)].strip()
     style = ("%I:%M:%S" if half else "%H:%M:%S") + (".%f" if "." in clock else "")
     if "." in clock:
-        clock = clock[: clock.index(".") + 7]  # microseconds are the finest known
+        clock = clock[: clock.index(".") + 7]  # microseconds are the finest possible
     suffix = " %p" if half else ""
     text = f"{year}-{month}-{day} {clock} {half}".strip()
     return _seconds(text, f"%Y-%m-%d {style}{suffix}")
 
 
 def _seconds(text: str, style: str) -> float:
-    """[s] since 1970 of a time in UTC."""
+    """Return the [s] since 1970 of a time in UTC."""
     return datetime.strptime(text, style).replace(tzinfo=UTC).timestamp()

@@ -1,4 +1,4 @@
-"""What a column of a device's table holds, by its name alone."""
+"""Meaning of a column of a device's table, from its name alone."""
 
 import re
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ _NUMBERED = re.compile("(?:quaternion|quat|q)([0-3])")
 _ANGLE = re.compile("(?:euler|rotation|rot|orientation|ori|angle|r)([xyz])")
 _NAMED_ANGLES = {
     "roll": "x", "pitch": "y", "yaw": "z", "omega": "x", "phi": "y", "kappa": "z",
-    "c": "x", "b": "y", "a": "z",  # KUKA's
+    "c": "x", "b": "y", "a": "z",  # KUKA's names
 }  # fmt: skip
 _UNIT = re.compile(
     r"\[\s*([^\]]*?)\s*\]|\(\s*([^)\d][^)]*?)\s*\)"
@@ -32,14 +32,14 @@ _WORDS = {"meter": "m", "millimeter": "mm", "centimeter": "cm", "micrometer": "u
 
 @dataclass(frozen=True)
 class Column:
-    """What a column holds.
+    """Meaning of a column.
 
     Attributes:
         kind: ``"axis"``, ``"sigma"``, ``"U"``, ``"quaternion"``, ``"angle"``,
-            ``"name"``, ``"time"``, or ``""`` for what is passed over.
+            ``"name"``, ``"time"``, or ``""`` for an ignored column.
         axis: x, y, z, or w of a quaternion.
-        unit: as stated in its name, or empty.
-        target: that it belongs to, or empty.
+        unit: unit stated in the column's name, or empty.
+        target: the target of the column, or empty.
     """
 
     kind: str
@@ -49,13 +49,13 @@ class Column:
 
 
 def column_of(cell: str) -> Column:
-    """What a column holds, by its name alone.
+    """Return the meaning of a column from its name alone.
 
     Args:
-        cell: of the header.
+        cell: cell of the header.
 
     Returns:
-        Its meaning, of no target.
+        Its meaning, without a target.
     """
     stated = _UNIT.search(cell)
     unit = (stated[1] or stated[2] or "") if stated else ""
@@ -84,13 +84,13 @@ def column_of(cell: str) -> Column:
 
 
 def unit_word(text: str) -> str:
-    """Short name of a unit.
+    """Return the short name of a unit.
 
     Args:
-        text: such as Millimeters, inch, ° or mm.
+        text: text such as Millimeters, inch, ° or mm.
 
     Returns:
-        The name, empty if it is none of lengths and angles.
+        The name, empty if it is no unit of length or angle.
     """
     word = text.strip().strip("[]()").lower().replace("metre", "meter")
     if len(word) > 2:

@@ -1,4 +1,4 @@
-"""The commands of an import: what the machine was told, row by row."""
+"""The commands of an import, row by row."""
 
 import re
 from collections.abc import Mapping
@@ -18,20 +18,21 @@ from validation.exchange.clock import parse_time
 from validation.exchange.reading import Writing
 
 _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]$")
-_TEMPERATURES = {"K": 1.0, "degC": 1.0, "°C": 1.0, "C": 1.0}  # of a deviation
+# of a temperature difference
+_TEMPERATURES = {"K": 1.0, "degC": 1.0, "°C": 1.0, "C": 1.0}
 _INCHES = {"cm": 1e-2, "in": 0.0254, "inch": 0.0254}
 
 
 @dataclass(frozen=True, eq=False)
 class Commands:
-    """What was commanded.
+    """Commands of a machine.
 
     Attributes:
         file: the table, for messages.
         ids: labels, unique.
         times: (C,) [s] of each command, NaN without one.
         columns: (C,) in SI by the name that a campaign has for it.
-        postures: of the declared robot, one for each command.
+        postures: postures of the declared robot, one for each command.
     """
 
     file: str
@@ -45,12 +46,11 @@ def read_commands(path: Path | str, robot: Robot, writing: Writing) -> Commands:
     """Read a table of commands.
 
     Args:
-        path: a table with ``id``, ``q.<frame>`` or ``pose.*``, and ``time``,
-            ``load.*``, ``cov.*`` where there are any; in SI, or with a unit such as
-            ``[deg]``.  Covariates other than time and temperature are taken as they
-            are, whatever their unit.
-        robot: that was commanded.
-        writing: of numbers and times.
+        path: a table with ``id``, ``q.<frame>`` or ``pose.*``, and optionally ``time``,
+            ``load.*``, ``cov.*``; in SI, or with a unit such as ``[deg]``.  Covariates
+            other than time and temperature are taken unchanged, in any unit.
+        robot: the robot that was commanded.
+        writing: format of numbers and times.
 
     Returns:
         The commands, every configuration placed.
@@ -106,7 +106,7 @@ def read_commands(path: Path | str, robot: Robot, writing: Writing) -> Commands:
 
 
 def _check_label(place: str, label: str, seen: Mapping[str, int]) -> None:
-    """Refuse a label that is missing or another row's."""
+    """Reject a missing label, or one that another row has."""
     if not label:
         raise BadInput(f"{place}: empty; expected a label")
     if label in seen:
@@ -117,7 +117,7 @@ def _check_label(place: str, label: str, seen: Mapping[str, int]) -> None:
 
 
 def _decimal_hint(cell: str, decimal: str) -> str:
-    """What declares the decimal mark of a cell that is a number with the other."""
+    """Return the key for the decimal mark of a cell with the other mark."""
     other = "," if decimal == "." else "."
     if not np.isfinite(parse_number(cell, other)):
         return ""
@@ -125,7 +125,7 @@ def _decimal_hint(cell: str, decimal: str) -> str:
 
 
 def _factor(path: Path | str, name: str, column: str, robot: Robot) -> float:
-    """What a number of a column is times in SI."""
+    """Return the factor to SI of a column's numbers."""
     stated = _UNIT.search(column)
     if not stated:
         return 1.0
@@ -140,7 +140,7 @@ def _factor(path: Path | str, name: str, column: str, robot: Robot) -> float:
 
 
 def _units(name: str, robot: Robot) -> Mapping[str, float] | None:
-    """Units that a column may have, with their factors; None where any."""
+    """Return the units that a column may have, with factors; None for any unit."""
     lengths = UNITS["command_position"] | _INCHES
     if name in {"time", "cov.time"}:
         return UNITS["time"]
@@ -160,7 +160,7 @@ def _placed(
     path: Path | str, robot: Robot, ids: list[str], columns: dict[str, NDArray],
     joints: list[str],
 ) -> list[Posture]:  # fmt: skip
-    """The posture of each command."""
+    """Return the posture of each command."""
     given = [name for name in joints if name in columns]
     posed = any(name.startswith("pose.") for name in columns)
     if posed == bool(given) or (given and len(given) < len(joints)):

@@ -1,8 +1,8 @@
-"""Exports whose lengths or axes are not what they are taken for.
+"""Checks of the unit of lengths and of the axes of an export.
 
-A wrong unit multiplies all distances by one factor; a left-handed export is a mirror
-image, which no place of the device explains.  Both are refused, never corrected: the
-same setting of the device may have touched what cannot be seen here.
+A wrong unit multiplies all distances by one factor.  A left-handed export is a mirror
+image, which no pose of the device explains.  Both are refused, never corrected: the
+same setting of the device may affect data that cannot be checked here.
 
 Sources:
     Umeyama (1991), Least-squares estimation of transformation parameters between two
@@ -21,23 +21,26 @@ from validation.exchange.device_frame import robust_frame, scatter_of
 from validation.exchange.reading import LENGTHS
 
 _UNITS = {**LENGTHS, "ft": 0.3048}
-_FAR_BETTER = 0.25  # of the scatter must be left for another reading to be believed
-_SCALED = 0.02  # scatter of ratios of distances that have one factor
-_UNIT = 0.05  # by which a factor may miss that of two units: the robot has errors too
-_PAIRED = 10  # readings that follow, to each of which the distance is taken
-_APART = 0.1  # of the distance declared between two targets: worth a remark
-_MIRRORED = np.array([1.0, -1.0, 1.0])  # any axis: a turn makes them equal
+# relative to the scatter: another reading is accepted if less remains
+_FAR_BETTER = 0.25
+_SCALED = 0.02  # largest scatter of ratios of distances with one factor
+# accepted error of the factor of two units, since the robot has errors too
+_UNIT = 0.05
+_PAIRED = 10  # number of following readings, to each of which the distance is taken
+# relative to the declared distance of two targets: larger differences are reported
+_APART = 0.1
+_MIRRORED = np.array([1.0, -1.0, 1.0])  # any axis: a rotation makes them equal
 
 
 def check_axes(
     file: Path, measured: NDArray, nominal: NDArray, known: bool
 ) -> None:  # fmt: skip
-    """Refuse lengths of another unit, mirrored axes, and axes exchanged.
+    """Reject lengths in another unit, mirrored axes, and exchanged axes.
 
     Args:
         file: the targets file, for messages.
         measured: (N, 3) [m] readings, device axes.
-        nominal: (N, 3) [m] where they should be, base axes.
+        nominal: (N, 3) [m] nominal positions, base axes.
         known: whether the device's axes are the base's.
 
     Raises:
@@ -67,15 +70,15 @@ def check_axes(
 def check_targets(
     file: Path, places: Mapping[str, NDArray], measured: NDArray
 ) -> list[str]:
-    """Compare distances between targets with those declared.
+    """Compare distances between targets with the declared ones.
 
     Args:
         file: the targets file, for messages.
         places: (3,) [m] of each target, platform axes, by name.
-        measured: (R, T, 3) [m] their readings, row by row; NaN where not read.
+        measured: (R, T, 3) [m] their readings, row by row; NaN if not read.
 
     Returns:
-        Remarks on pairs that are not as far apart as declared.
+        Remarks on pairs whose distance differs from the declared one.
 
     Raises:
         BadInput: all distances differ by one factor.
@@ -106,7 +109,7 @@ def check_targets(
 
 
 def _units_of(factor: float) -> tuple[float, str]:
-    """The factor of two units near a factor, and which they are; 1 and "" if none."""
+    """Return a factor of two units near a factor, with their names; else 1 and ""."""
     found = [
         (_UNITS[b] / _UNITS[a], f"as {b} taken for {a}", a, b)
         for a, b in permutations(_UNITS, 2)
@@ -117,10 +120,10 @@ def _units_of(factor: float) -> tuple[float, str]:
 
 
 def _factor(measured: NDArray, nominal: NDArray, known: bool) -> float:
-    """How many times larger nominal distances are; robust against blunders."""
+    """Return the ratio of nominal to measured distances; robust against blunders."""
     if known:
         pairs = [(measured, nominal)]
-    else:  # between readings: wherever the device stood
+    else:  # between readings, independent of the device's pose
         shifts = range(1, min(len(measured), _PAIRED))
         pairs = [
             (measured - np.roll(measured, k, axis=0), nominal - np.roll(nominal, k, 0))
@@ -133,7 +136,7 @@ def _factor(measured: NDArray, nominal: NDArray, known: bool) -> float:
 
 
 def _scatter(measured: NDArray, nominal: NDArray, known: bool) -> float:
-    """[m] scatter about the frame that fits best, or about the base's own."""
+    """Return the scatter [m] about the best frame, or about the base's own."""
     if known:
         return scatter_of(np.linalg.norm(measured - nominal, axis=1))
     return robust_frame(measured, nominal)[1]
@@ -142,7 +145,7 @@ def _scatter(measured: NDArray, nominal: NDArray, known: bool) -> float:
 def _check_known_axes(
     file: Path, measured: NDArray, nominal: NDArray, scatter: float
 ) -> None:
-    """Refuse axes of the device that are others of the base, or reversed."""
+    """Reject device axes that are exchanged or reversed axes of the base."""
     best, found = scatter, ""
     for order, signs in product(permutations(range(3)), product((1, -1), repeat=3)):
         tried = _scatter(measured[:, list(order)] * signs, nominal, known=True)

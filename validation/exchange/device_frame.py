@@ -1,4 +1,4 @@
-"""Where the device stood, targets exchanged, and readings that are blunders.
+"""Pose of the device, exchanged targets, and blunders among readings.
 
 Sources:
     Kabsch (1976), A solution for the best rotation to relate two sets of vectors, Acta
@@ -14,14 +14,14 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-_GROSS = 20.0  # times the scatter of all readings: no machine does that in one place
-_BETTER = 0.25  # of the misfit must be left for an exchange to be believed
-_MOST = 6  # targets whose exchanges are all tried: 720
+_GROSS = 20.0  # times the scatter of all readings: impossible for a machine
+_BETTER = 0.25  # relative to the misfit: an exchange is accepted if less remains
+_MOST = 6  # largest number of targets whose exchanges are all tried: 720
 
 
 @dataclass(frozen=True, eq=False)
 class DeviceFrame:
-    """Base axes seen from where the device stood: base = rotation @ device + shift.
+    """Base axes seen from the device's pose: base = rotation @ device + shift.
 
     Attributes:
         rotation: (3, 3).
@@ -32,12 +32,12 @@ class DeviceFrame:
     shift: NDArray
 
     def to_base(self, points: NDArray) -> NDArray:
-        """(..., 3) [m] points of the device in base axes."""
+        """Return the (..., 3) [m] points of the device in base axes."""
         return points @ self.rotation.T + self.shift
 
 
 def fit_frame(measured: NDArray, nominal: NDArray) -> DeviceFrame:
-    """The frame that brings measured points nearest to nominal ones.
+    """Return the frame that brings measured points nearest to nominal ones.
 
     Args:
         measured: (N, 3) [m] device axes.
@@ -54,13 +54,13 @@ def fit_frame(measured: NDArray, nominal: NDArray) -> DeviceFrame:
 
 
 def spans_a_plane(points: NDArray) -> bool:
-    """Whether (N, 3) points are not all on one line, so that they fix a frame."""
+    """Return whether (N, 3) points are not on one line, so that they fix a frame."""
     sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     return len(points) > 2 and bool(sizes[1] > 1e-6 * sizes[0] > 0)
 
 
 def robust_frame(measured: NDArray, nominal: NDArray) -> tuple[DeviceFrame, float]:
-    """The frame with gross readings left aside, and the scatter about it.
+    """Return the frame without gross readings, and the scatter about it.
 
     Args:
         measured: (N, 3) [m] device axes.
@@ -82,27 +82,27 @@ def robust_frame(measured: NDArray, nominal: NDArray) -> tuple[DeviceFrame, floa
 
 
 def scatter_of(gaps: NDArray) -> float:
-    """[m] robust scatter of (N,) distances; rounding where all are zero."""
+    """Return the [m] robust scatter of (N,) distances; rounding where all are zero."""
     # the median length of a Gaussian vector in space is 1.538 of one component's sigma
     return float(np.median(gaps)) / 1.538 + 1e-12
 
 
 def is_gross(gap: float, scatter: float) -> bool:
-    """Whether a distance [m] is beyond any scatter [m]."""
+    """Return whether a distance [m] is beyond the scatter [m]."""
     return gap > _GROSS * scatter
 
 
 def exchanged_throughout(
     measured: Sequence[NDArray], nominal: Sequence[NDArray]
 ) -> tuple[int, ...] | None:
-    """An order of the targets that fits far better than the one they are named in.
+    """Return an order of the targets that fits far better than the given one.
 
     Args:
         measured: for each target (R, 3) [m] device axes, NaN where not read.
-        nominal: likewise in base axes.
+        nominal: for each target (R, 3) [m] base axes.
 
     Returns:
-        For each target the number of the one it really is; None if the names are right.
+        For each target the index of the actual one; None if the names are right.
     """
     count = len(measured)
     if not 2 <= count <= _MOST:
@@ -123,15 +123,15 @@ def exchanged_throughout(
 def exchanged_here(measured: NDArray, nominal: NDArray, scatter: float) -> (
     tuple[int, ...] | None
 ):  # fmt: skip
-    """Targets of one row that were taken for each other.
+    """Return the targets of one row that were confused.
 
     Args:
-        measured: (k, 3) [m] base axes already.
+        measured: (k, 3) [m] in base axes.
         nominal: (k, 3) [m].
         scatter: [m] of all readings.
 
     Returns:
-        For each target the number of the one it is; None if none was.
+        For each target the index of the actual one; None if none was confused.
     """
     count = len(measured)
     own = np.linalg.norm(measured - nominal, axis=1).max(initial=0.0)

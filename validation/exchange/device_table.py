@@ -1,10 +1,10 @@
-"""Exports of measuring devices: points by name, in any table that says its units.
+"""Exports of measuring devices: points by name, in any table that states its units.
 
-SpatialAnalyzer text (``collection::group::point``), exports of Leica, FARO, API, Vicon
-and OptiTrack software, plain tables: blanks, tabs, semicolons or commas between cells,
-a header or none, lines before it.  What is not certain is not guessed: units stand in
-the table or in the targets file, a decimal comma and orders of dates and angles in the
-targets file.
+Accepted are SpatialAnalyzer text (``collection::group::point``), exports of Leica,
+FARO, API, Vicon and OptiTrack software, and plain tables: blanks, tabs, semicolons or
+commas between cells, a header or none, lines before it.  The reader does not guess:
+units are stated in the table or in the targets file; a decimal comma and orders of
+dates and angles in the targets file.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,19 +33,19 @@ from validation.exchange.reading import Reading, Writing
 def read_device_table(
     path: Path | str, writing: Writing, targets: Mapping[str, NDArray]
 ) -> list[Reading]:
-    """Points of an export.
+    """Return the points of an export.
 
     Args:
         path: the file.
-        writing: what it does not say itself.
-        targets: (3,) [m] each, platform axes, by name; a table may have columns for
-            each of them.
+        writing: declared format, used where the file states none.
+        targets: (3,) [m] by name, platform axes; a table may have columns for each of
+            them.
 
     Returns:
-        The readings in their order; a row of several targets is as many readings.
+        The readings in their order; a row of several targets yields several readings.
 
     Raises:
-        BadInput: no coordinates, no unit, a cell that is no number or no time.
+        BadInput: no coordinates, no unit, or a cell that is no number or no time.
     """
     sheet = read_sheet(path, writing.decimal)
     writing = replace(writing, decimal=sheet.decimal)
@@ -65,24 +65,24 @@ def read_device_table(
 
 
 def _lacking(cells: Sequence[str]) -> str:
-    """The first axis that a line of names does not have."""
+    """Return the first axis that a line of names does not have."""
     words = " ".join(cells).lower().split()
     return next((axis for axis in "xyz" if axis not in words), "x")
 
 
 def _is_data(cells: Sequence[str], decimal: str) -> bool:
-    """Whether a line is a row already."""
+    """Return whether a line is a row of data."""
     return int(np.isfinite([parse_number(c, decimal) for c in cells]).sum()) >= 3
 
 
 @dataclass(frozen=True, eq=False)
 class _HeadedRows:
-    """Rows under a header, made into readings."""
+    """Rows under a header, converted to readings."""
 
     values: CellValues
 
     def readings(self, line: int, cells: list[str]) -> list[Reading]:
-        """Readings of a row: one for each target that has columns."""
+        """Return the readings of a row: one for each target that has columns."""
         header = self.values.header
         place = f"{self.values.sheet.file}: line {line}"
         while len(cells) > len(header.cells) and not cells[-1]:
@@ -103,14 +103,14 @@ class _HeadedRows:
         return readings
 
     def _time(self, place: str, parts: list[tuple[str, str]]) -> float:
-        """[s] of a row, NaN without a time: date and time of day, in this order."""
+        """Return the [s] of a row, NaN without a time, from date and time of day."""
         stamp = " ".join(cell for _, cell in sorted(parts))
         if missing(stamp.strip()):
             return np.nan
         return parse_time(place, stamp, self.values.writing)
 
     def _has_place(self, own: list[int]) -> bool:
-        """Whether columns hold a point: x, y, z, each once."""
+        """Return whether columns hold a point: x, y, z, each once."""
         columns = self.values.header.columns
         axes = [columns[k].axis for k in own if columns[k].kind == "axis"]
         twice = [axis for axis in axes if axes.count(axis) > 1]
@@ -125,7 +125,7 @@ class _HeadedRows:
         self, line: int, cells: list[str], names: tuple[str, ...], own: list[int],
         time: float,
     ) -> Reading:  # fmt: skip
-        """A target's reading of a row."""
+        """Return a target's reading of a row."""
         columns, writing = self.values.header.columns, self.values.writing
         position, sigma = np.full(3, np.nan), np.full(3, np.nan)
         for k in own:
@@ -139,13 +139,13 @@ class _HeadedRows:
                 wide = writing.coverage if kind == "U" else 1.0
                 sigma["xyz".index(axis)] = self._spread(line, k, value / wide)
         if np.isnan(position).any():
-            position[:] = np.nan  # a point of which a coordinate is missing
+            position[:] = np.nan  # a point without one of its coordinates
         rotation = self._rotation(line, cells, own) if writing.oriented else None
         file = self.values.sheet.file
         return Reading(file, line, names, position, sigma, time, rotation)
 
     def _spread(self, line: int, k: int, value: float) -> float:
-        """A standard deviation [m]; one that was rounded to zero is not stated."""
+        """Return a standard deviation [m]; zero by rounding counts as not stated."""
         if value < 0:
             name = self.values.header.cells[k]
             place = f"{self.values.sheet.file}: line {line}, {name}"
@@ -153,7 +153,7 @@ class _HeadedRows:
         return value if value > 0 else np.nan
 
     def _rotation(self, line: int, cells: list[str], own: list[int]) -> NDArray | None:
-        """The target's axes seen from the device's; None where it has none."""
+        """Return the target's axes seen from the device's; None without them."""
         header, writing = self.values.header, self.values.writing
         place = f"{self.values.sheet.file}: line {line}"
         kind, at = orientation_columns(header.columns, own)

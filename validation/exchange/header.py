@@ -1,4 +1,4 @@
-"""The header of a device's table: where it is, and which target a column is of."""
+"""The header of a device's table: its position, and the target of each column."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,7 +16,7 @@ from validation.exchange.column_names import (
 
 _STATED = re.compile(r"\bunits?\b(.*)", re.IGNORECASE)
 _KINDS = {"rotation", "position", "translation", "orientation"}
-_PREAMBLE = 100  # lines before a header, at most
+_PREAMBLE = 100  # largest number of lines before a header
 
 
 @dataclass(frozen=True)
@@ -24,11 +24,11 @@ class Header:
     """The columns of a table.
 
     Attributes:
-        first: number of the first row of data among the rows of the sheet.
-        cells: of the header as written; empty without one.
-        columns: what they mean.
-        unit: of lengths, as stated before the header, or empty.
-        unit_line: where, for messages.
+        first: index of the first row of data among the rows of the sheet.
+        cells: cells of the header as written; empty without one.
+        columns: their meaning.
+        unit: unit of lengths, as stated before the header, or empty.
+        unit_line: line of the unit, for messages.
     """
 
     first: int
@@ -41,10 +41,10 @@ class Header:
 def find_header(
     rows: Sequence[tuple[int, list[str]]], targets: Iterable[str]
 ) -> Header | None:
-    """The header of a table, after what a program may write before it.
+    """Return the header of a table, after the lines before it.
 
     Args:
-        rows: of the sheet, by line.
+        rows: rows of the sheet, by line.
         targets: their names.
 
     Returns:
@@ -76,10 +76,10 @@ def find_header(
 
 
 def without_header(rows: Sequence[tuple[int, list[str]]], decimal: str) -> Header:
-    """Where rows of names and numbers begin, and the unit stated before them.
+    """Return the start of rows without header, and the unit stated before them.
 
     Args:
-        rows: of the sheet, by line.
+        rows: rows of the sheet, by line.
         decimal: the decimal mark.
 
     Returns:
@@ -95,13 +95,13 @@ def without_header(rows: Sequence[tuple[int, list[str]]], decimal: str) -> Heade
 def _by_target(
     cells: Sequence[str], before: Sequence[tuple[int, list[str]]], targets: list[str]
 ) -> list[Column]:
-    """Columns of a table with several targets a row; none if it is not such a table.
+    """Return columns of a table with several targets a row; empty for other tables.
 
-    Targets are named in the columns, in a row above them, or, where the groups of
-    columns are as many as targets, by their order.
+    Targets are named in the columns, or in a row above them; if there are as many
+    groups of columns as targets, their order is used.
 
     Args:
-        cells: of the header.
+        cells: cells of the header.
         before: the rows above it.
         targets: their names.
 
@@ -135,7 +135,7 @@ def _by_target(
 
 
 def _by_order(columns: Sequence[Column], targets: list[str]) -> list[Column]:
-    """Groups of x, y, z given to the targets in their order, if as many."""
+    """Assign groups of x, y, z to the targets in order, if their numbers are equal."""
     groups = -1
     ordered = []
     for column in columns:
@@ -148,7 +148,7 @@ def _by_order(columns: Sequence[Column], targets: list[str]) -> list[Column]:
 
 
 def _complete(columns: Sequence[Column], least: int = 1) -> bool:
-    """Whether every target that has a coordinate has all three, once."""
+    """Return whether every target that has a coordinate has all three, once."""
     axes: dict[str, str] = {}
     for column in columns:
         if column.kind == "axis" and column.target:
@@ -157,7 +157,7 @@ def _complete(columns: Sequence[Column], least: int = 1) -> bool:
 
 
 def _of_target(cell: str, targets: Sequence[str]) -> tuple[Column, str]:
-    """Meaning of a column that names a target before or after what it holds."""
+    """Return the meaning of a column that names a target before or after its kind."""
     for target in sorted(targets, key=len, reverse=True):
         name = re.escape(target)
         before = re.search(rf"(?:^|[^a-z0-9]){name}(?=[^a-z0-9]|[xyz]\b)", cell, re.I)
@@ -174,14 +174,14 @@ def _of_target(cell: str, targets: Sequence[str]) -> tuple[Column, str]:
 
 
 def _only(label: str, targets: Sequence[str]) -> str:
-    """The target that a label names, as in arm:SMR1; empty if it names none."""
+    """Return the target that a label names, as in arm:SMR1; empty if it names none."""
     words = re.split(r"[:./|\s]+", label)
     found = [target for target in targets if target in words or target == label]
     return found[0] if len(found) == 1 else ""
 
 
 def _with_kinds(cells: list[str], above: Sequence[str]) -> list[str]:
-    """Names of columns with the kind written above: Rotation, Position (OptiTrack)."""
+    """Return column names with the kind above: Rotation, Position (OptiTrack)."""
     kinds = [word if word.lower() in _KINDS else "" for word in above]
     if not any(kinds) or len(above) > len(cells):
         return cells
@@ -190,7 +190,7 @@ def _with_kinds(cells: list[str], above: Sequence[str]) -> list[str]:
 
 
 def _filled(cells: Sequence[str], count: int) -> list[str]:
-    """Labels of merged cells: an empty one has the label before it."""
+    """Return the labels of merged cells: an empty one has the label before it."""
     labels: list[str] = []
     for cell in [*cells, *[""] * count][:count]:
         labels.append(cell or (labels[-1] if labels else ""))
@@ -198,7 +198,7 @@ def _filled(cells: Sequence[str], count: int) -> list[str]:
 
 
 def _stated(rows: Sequence[tuple[int, list[str]]]) -> tuple[int, str]:
-    """Line and unit of lengths stated before a header; 0 and empty without one."""
+    """Return line and unit of lengths stated before a header; 0 and empty if none."""
     for line, cells in rows:
         if match := _STATED.search(" ".join(cells)):
             words = re.findall(r"[A-Za-zµμ]+", match[1])[:4]
@@ -209,15 +209,15 @@ def _stated(rows: Sequence[tuple[int, list[str]]]) -> tuple[int, str]:
 
 
 def _is_number(cell: str, decimal: str = ".") -> bool:
-    """Whether a cell is a number."""
+    """Return whether a cell is a number."""
     return bool(np.isfinite(parse_number(cell, decimal)))
 
 
 def by_target(columns: Sequence[Column]) -> Mapping[str, list[int]]:
-    """Numbers of the columns of each target; of none, under the empty name.
+    """Return the columns of each target; without a target, under the empty name.
 
     Args:
-        columns: of a table.
+        columns: columns of a table.
 
     Returns:
         The columns by target, in the order in which targets are first named.

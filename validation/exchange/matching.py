@@ -1,4 +1,4 @@
-"""Which reading belongs to which target and which command."""
+"""Assignment of readings to targets and commands."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,18 +13,18 @@ from validation.exchange.reading import Reading
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """Readings in their places.
+    """Readings assigned to targets and commands.
 
     Attributes:
-        how: ``"name"``, ``"time"`` or ``"order"``: what joined them to commands.
+        how: ``"name"``, ``"time"`` or ``"order"``: the method of the assignment.
         rows: for each row of the campaign its command and its readings by target;
             a target read again at a command makes a further row.
-        strangers: readings of no target, as of points on the ground.
-        unmatched: readings of targets that belong to no command.
-        missing: readings at which the device saw nothing.
-        duplicates: readings that a file has twice, to the last digit; left out.
-        copies: readings that another file has too, to the last digit; kept, as a
-            device of few digits repeats them.
+        strangers: readings of other points, such as points on the ground.
+        unmatched: readings of targets without a command.
+        missing: readings without a position.
+        duplicates: readings that a file has twice, with equal digits; left out.
+        copies: readings that another file has too, with equal digits; kept, as a device
+            of few digits repeats them.
     """
 
     how: str
@@ -42,11 +42,11 @@ def match(
     targets: Iterable[str],
     window: float,
 ) -> Match:
-    """Join readings to commands: by name, else by time, else by order.
+    """Assign readings to commands: by name, else by time, else by order.
 
     Args:
-        readings: in the order taken.
-        commands: in the order given.
+        readings: readings in the order taken.
+        commands: commands in the order given.
         targets: their names.
         window: [s] between a command and its readings.
 
@@ -54,7 +54,7 @@ def match(
         The rows.
 
     Raises:
-        BadInput: no reading of any target, one of two, or no way to join them.
+        BadInput: no reading of a target, a reading of two targets, or no assignment.
     """
     ours = _of_targets(readings, list(targets))
     lost = {id(reading) for reading, _ in ours}
@@ -99,7 +99,7 @@ def match(
 
 
 def _repeated(readings: Sequence[Reading]) -> str:
-    """Which reading is there twice, if that is why they are too many."""
+    """Return the reading that occurs twice, if this makes them too many."""
     seen: dict[object, Reading] = {}
     for reading in readings:
         digits = (reading.names, reading.position.tobytes(), str(reading.time))
@@ -110,7 +110,7 @@ def _repeated(readings: Sequence[Reading]) -> str:
 
 
 def _same(a: Reading, b: Reading) -> bool:
-    """Whether two readings are equal to the last digit, of one name and time."""
+    """Return whether two readings have equal digits, name and time."""
     timed = a.time == b.time or bool(np.isnan(a.time) and np.isnan(b.time))
     return timed and a.names == b.names and np.array_equal(a.position, b.position)
 
@@ -118,7 +118,7 @@ def _same(a: Reading, b: Reading) -> bool:
 def _of_targets(
     readings: Sequence[Reading], targets: list[str]
 ) -> list[tuple[Reading, str]]:
-    """Readings of targets; without a name, all are of the only target."""
+    """Return the readings of targets; unnamed ones belong to a single target."""
     ours = []
     for reading in readings:
         named = [part for part in reading.names if part in targets]
@@ -140,13 +140,13 @@ def _of_targets(
 
 
 def _nearest(reading: Reading, commands: Commands, window: float) -> int:
-    """Row of the command nearest in time, -1 if none is within the window."""
+    """Return row of the command nearest in time, -1 if none is within the window."""
     gaps = np.abs(commands.times - reading.time)
     return int(np.argmin(gaps)) if gaps.min() <= window else -1
 
 
 def _in_order(ours: list[tuple[Reading, str]], commands: Commands) -> list[int]:
-    """The k-th reading of a target belongs to the k-th command."""
+    """Assign the k-th reading of a target to the k-th command."""
     named = [target for _, target in ours]
     first = ours[0][0]
     counts: Mapping[str, int] = Counter(named)

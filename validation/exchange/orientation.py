@@ -1,6 +1,6 @@
-"""Orientations that a device reads: quaternions, or three angles of a stated order.
+"""Orientations of a device: quaternions, or three angles in a stated order.
 
-They turn the target's axes into the device's: p_device = R p_target.
+They transform the target's axes to the device's: p_device = R p_target.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,19 +16,19 @@ from validation.exchange.column_names import QUATERNION, Column
 
 ROTATION_VECTOR = "rotation_vector"
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180}
-_FAR_BETTER = 0.25  # of the scatter must be left for the inverse to be believed
-_GROSS = 20.0  # times the scatter: left out of the mean
+_FAR_BETTER = 0.25  # relative to the scatter: the inverse is accepted if less remains
+_GROSS = 20.0  # times the scatter: readings left out of the mean
 _MEDIAN = 1.538  # median length of a Gaussian vector in space, of one component's sigma
-_ROUNDING = 1e-12  # [rad]
-_UNIT_NORM = 0.01  # by which rounded quaternions may miss their norm of 1
+_ROUNDING = 1e-12  # [rad] scatter of rounding
+_UNIT_NORM = 0.01  # accepted error of the norm of rounded quaternions
 
 
 def orders() -> tuple[str, ...]:
-    """What ``orientation`` of a targets file may be.
+    """Return the possible values of ``orientation`` in a targets file.
 
     Returns:
-        ``rotation_vector`` and the 24 orders of three angles, small letters about
-        fixed axes, capital letters about axes that move along.
+        They are ``rotation_vector`` and the 24 orders of three angles, small letters
+        about fixed axes, capital letters about rotating axes.
     """
     axes = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
     return (ROTATION_VECTOR, *axes, *(axis.upper() for axis in axes))
@@ -37,18 +37,18 @@ def orders() -> tuple[str, ...]:
 def orientation_columns(
     columns: Sequence[Column], own: Sequence[int]
 ) -> tuple[str, dict[str, int]]:
-    """Columns of a target's orientation.
+    """Return the columns of a target's orientation.
 
     Args:
-        columns: of the table.
-        own: numbers of the target's.
+        columns: columns of the table.
+        own: indices of the target's columns.
 
     Returns:
         ``"quaternion"``, ``"angles"`` or empty, and the column of each component.
     """
     w = {columns[k].axis: k for k in own if columns[k].kind == "quaternion"}
     angles = {columns[k].axis: k for k in own if columns[k].kind == "angle"}
-    if "w" in w:  # Rotation X, Y, Z beside a W are no angles
+    if "w" in w:  # Rotation X, Y, Z next to a W are no angles
         w = angles | w
     if set(w) >= set(QUATERNION):
         return "quaternion", {axis: w[axis] for axis in QUATERNION}
@@ -58,7 +58,7 @@ def orientation_columns(
 
 
 def from_quaternion(place: str, values: Sequence[float]) -> NDArray:
-    """(3, 3) target axes seen from the device's, of a quaternion w x y z.
+    """Return the (3, 3) target axes seen from the device's, from a quaternion w x y z.
 
     Args:
         place: file and line, for messages.
@@ -80,18 +80,18 @@ def from_quaternion(place: str, values: Sequence[float]) -> NDArray:
 def from_angles(
     place: str, angles: Mapping[str, float], order: str | None
 ) -> NDArray:  # fmt: skip
-    """(3, 3) target axes seen from the device's, of three angles [rad].
+    """Return the (3, 3) target axes seen from the device's, from three angles [rad].
 
     Args:
         place: file and line, for messages.
-        angles: by axis in the order of the columns.
-        order: as in the targets file, or None.
+        angles: angles by axis, in the order of the columns.
+        order: order in the targets file, or None.
 
     Returns:
         The rotation.
 
     Raises:
-        BadInput: no order is declared, which cannot be guessed.
+        BadInput: no order is declared.
     """
     if order is None:
         raise BadInput(
@@ -113,7 +113,7 @@ class Turns:
 
     Attributes:
         deviation: (R, 3) [rad] rotation vector of actual against nominal, base axes;
-            NaN where not read.
+            NaN if not read.
         mount: (3, 3) the target's axes seen from the platform's.
         scatter: [rad] of one component.
     """
@@ -126,14 +126,14 @@ class Turns:
 def turns_of(
     file: Path, seen: NDArray, base: NDArray, nominal: NDArray, mount: NDArray | None
 ) -> Turns:
-    """Deviations of orientations read.
+    """Return the deviations of orientations read.
 
     Args:
         file: the targets file, for messages.
-        seen: (R, 3, 3) the target's axes seen from the device's; NaN where not read.
+        seen: (R, 3, 3) the target's axes seen from the device's; NaN if not read.
         base: (3, 3) the device's axes seen from the base's.
-        nominal: (R, 3, 3) the platform's, of the declared robot.
-        mount: the target's axes seen from the platform's; None: that fit best.
+        nominal: (R, 3, 3) the platform's axes, of the declared robot.
+        mount: the target's axes seen from the platform's; None: fitted.
 
     Returns:
         The deviations.
@@ -153,7 +153,7 @@ def turns_of(
 
 
 def _turns(read: NDArray, nominal: NDArray, mount: NDArray | None) -> Turns:
-    """Deviations about a mount declared or fitted, without asking whether they fit."""
+    """Return deviations about a declared or fitted mount, without a check."""
     taken = np.isfinite(read).all(axis=(1, 2))
     seen = Rotation.from_matrix(np.swapaxes(nominal[taken], 1, 2) @ read[taken])
     if mount is None:

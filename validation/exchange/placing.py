@@ -1,4 +1,4 @@
-"""Readings in the base's axes: where the device stood, and what cannot be there."""
+"""Readings in the base's axes: pose of the device, and impossible readings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.errors import BadInput, quoted
+from forcefit.results.text import in_unit
 from stiffness.screws import rotation_matrix, rotation_vector
 from validation.exchange.commands_table import Commands
 from validation.exchange.device_axes import check_axes, check_targets
@@ -23,7 +24,7 @@ from validation.exchange.orientation import turns_of
 from validation.exchange.reading import Reading
 from validation.exchange.targets_file import TargetsFile
 
-_ASTRAY = 0.1  # of the spread of the commands: no machine is as wrong as that
+_ASTRAY = 0.1  # relative to the spread of the commands: larger than any machine's error
 _HERE = DeviceFrame(np.eye(3), np.zeros(3))
 
 Rows = Sequence[tuple[int, Mapping[str, Reading]]]  # command, and readings by target
@@ -34,15 +35,15 @@ class Placed:
     """Readings as deviations from the declared robot.
 
     Attributes:
-        frame: where the device stood.
+        frame: pose of the device.
         scatter: [m] of one component of all readings.
-        read: (R, T) whether a target was read where it can be.
-        gaps: (R, T, 3) [m] deviation of each target, base axes; NaN where not read.
-        turns: (R, 3) [rad] of the platform, base axes; NaN where not read.
+        read: (R, T) whether a target has a possible reading.
+        gaps: (R, T, 3) [m] deviation of each target, base axes; NaN if not read.
+        turns: (R, 3) [rad] of the platform, base axes; NaN if not read.
         mounts: (3,) [rad] rotation vector from the platform's axes to those of each
             target whose orientation was read.
-        left_out: readings that cannot be where they were read, in words.
-        remarks: what else does not fit, in words.
+        left_out: impossible readings, in words.
+        remarks: other inconsistencies, in words.
     """
 
     frame: DeviceFrame
@@ -56,18 +57,18 @@ class Placed:
 
 
 def place(declared: TargetsFile, commands: Commands, rows: Rows) -> Placed:
-    """Find where the device stood, and bring the readings into base axes.
+    """Estimate the pose of the device, and transform the readings to base axes.
 
     Args:
         declared: the targets file.
-        commands: what was commanded.
+        commands: the commands.
         rows: readings by command.
 
     Returns:
         The deviations.
 
     Raises:
-        BadInput: the readings do not say where the device stood, or fit far better in
+        BadInput: the readings do not determine the device's pose, or fit far better in
             another unit, mirrored, or with targets exchanged.
     """
     names = list(declared.places)
@@ -110,7 +111,7 @@ def place(declared: TargetsFile, commands: Commands, rows: Rows) -> Placed:
 
 
 def _misfit(nominal: NDArray, measured: NDArray, scatter: float) -> list[str]:
-    """A remark on readings that do not follow the commands, and the likely reason."""
+    """Return a remark on readings that do not follow the commands, with a reason."""
     spread = np.linalg.norm(nominal - nominal.mean(axis=(0, 1)), axis=2)
     reach = float(np.sqrt(np.mean(spread**2)))
     if scatter < _ASTRAY * reach:
@@ -131,7 +132,7 @@ def _misfit(nominal: NDArray, measured: NDArray, scatter: float) -> list[str]:
 
 
 def _mean(turns: NDArray) -> NDArray:
-    """(R, 3) mean of (R, T, 3) over the targets read; NaN where none was."""
+    """Return the (R, 3) mean of (R, T, 3) over the targets read; NaN without any."""
     read = np.isfinite(turns).all(axis=2)
     total = np.where(read[..., None], turns, 0.0).sum(axis=1)
     count = read.sum(axis=1)[:, None]
@@ -142,7 +143,7 @@ def _turns(
     declared: TargetsFile, commands: Commands, rows: Rows, nominal: NDArray,
     frame: DeviceFrame, name: str, left_out: list[str],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """(R, 3) [rad] deviations by a target's orientations, and its mount (3,) [rad]."""
+    """Return (R, 3) [rad] deviations by a target's orientations, and its mount."""
     seen = np.full((len(rows), 3, 3), np.nan)
     for i, (_, readings) in enumerate(rows):
         rotation = readings[name].rotation if name in readings else None
@@ -165,7 +166,7 @@ def _turns(
 def _suspects(
     base: NDArray, nominal: NDArray, read: NDArray, scatter: float, names: list[str]
 ) -> list[tuple[int, str]]:
-    """Targets of one command, read where they cannot stand, and why."""
+    """Return the targets of one command at impossible positions, and the reasons."""
     suspects = []
     ks = np.flatnonzero(read)
     order = exchanged_here(base[ks], nominal[ks], scatter)
@@ -175,7 +176,7 @@ def _suspects(
             other = quoted(names[ks[order[place]]])
             suspects.append((k, f"it is {other}, exchanged"))
         elif is_gross(gap, scatter):
-            reason = f"{1e3 * gap:.4g} mm off, the others {1e3 * scatter:.2g}"
+            reason = f"{in_unit(gap, 'mm')} off, the others {in_unit(scatter, 'mm', 2)}"
             suspects.append((k, reason))
     return suspects
 
@@ -183,7 +184,7 @@ def _suspects(
 def _frame(
     declared: TargetsFile, measured: NDArray, nominal: NDArray, names: list[str]
 ) -> tuple[DeviceFrame, float]:
-    """Where the device stood, and the scatter about the declared robot."""
+    """Return the pose of the device, and the scatter about the declared robot."""
     read = np.isfinite(measured).all(axis=2)
     if declared.registration == "known":
         check_axes(declared.file, measured[read], nominal[read], known=True)

@@ -1,4 +1,4 @@
-"""Rows of a device's table that has no header: names, then numbers."""
+"""Rows of a device's table without a header: names, then numbers."""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,8 +10,8 @@ from validation.campaign.dialect import parse_number
 from validation.exchange.cell_values import CellValues, missing
 from validation.exchange.reading import Reading
 
-_COUNTERS = 3  # columns that may stand before the targets': a counter, a time
-_ALIKE = 0.1  # of the scatter of distances is left where the right columns are taken
+_COUNTERS = 3  # columns that may precede the targets': a counter, a time
+_ALIKE = 0.1  # relative to the scatter of distances: right columns leave less
 
 
 def read_plain_rows(
@@ -19,13 +19,13 @@ def read_plain_rows(
     rows: Sequence[tuple[int, list[str]]],
     targets: Mapping[str, NDArray],
 ) -> list[Reading]:
-    """Readings of rows without a header.
+    """Return the readings of rows without a header.
 
     Args:
-        values: of the cells.
-        rows: by line; a name and x, y, z, or numbers alone: of one point, or of all
-            targets in their order.  What follows is passed over.
-        targets: (3,) [m] each, platform axes, by name.
+        values: values of the cells.
+        rows: rows by line; a name and x, y, z, or only numbers: of one point, or of all
+            targets in their order.  Further cells are ignored.
+        targets: (3,) [m] by name, platform axes.
 
     Returns:
         The readings in their order.
@@ -42,25 +42,25 @@ def read_plain_rows(
 
 
 def _nameless(cells: Sequence[str], decimal: str) -> bool:
-    """Whether a row begins with a number, or with nothing read."""
+    """Return whether a row begins with a number, or with a missing reading."""
     return missing(cells[0]) or bool(np.isfinite(parse_number(cells[0], decimal)))
 
 
 def _first_column(
     rows: Sequence[Sequence[str]], decimal: str, targets: Mapping[str, NDArray]
 ) -> int:
-    """Where x, y, z of all targets begin in rows of numbers alone.
+    """Return the first column of x, y, z in rows of numbers alone.
 
-    A counter or a time may stand before them: targets then are as far from one another
-    as declared if that column is left out.
+    A counter or a time may precede them.  If that column is left out, the distances of
+    the targets agree with the declared ones.
 
     Args:
-        rows: in cells.
+        rows: rows of cells.
         decimal: the decimal mark.
         targets: (3,) [m] each, platform axes.
 
     Returns:
-        Number of the column.
+        Index of the column.
     """
     places = np.array(list(targets.values()))
     width = 3 * len(places)
@@ -81,7 +81,7 @@ def _first_column(
 
 
 def _of_one(values: CellValues, line: int, cells: list[str], counted: bool) -> Reading:
-    """A row of names, then x, y, z; ``counted``: its first whole number is a name."""
+    """Return a row of names, then x, y, z; ``counted``: a first integer is a name."""
     names, cells = [], list(cells)
     decimal = values.sheet.decimal
     while cells and not np.isfinite(parse_number(cells[0], decimal)):
@@ -102,7 +102,7 @@ def _of_all(
     values: CellValues, line: int, cells: list[str], first: int,
     targets: Mapping[str, NDArray],
 ) -> list[Reading]:  # fmt: skip
-    """A row of numbers alone: x, y, z of each target in their order."""
+    """Return a row of numbers alone: x, y, z of each target in order."""
     found = len(cells) - first
     if found < 3 * len(targets):
         raise BadInput(
@@ -118,7 +118,7 @@ def _of_all(
 def _reading(
     values: CellValues, line: int, xyz: list[str], names: tuple[str, ...]
 ) -> Reading:
-    """A reading of three cells."""
+    """Return a reading of three cells."""
     position = nothing = np.full(3, np.nan)
     if not any(map(missing, xyz)):
         numbers = [values.number(line, a, c) for a, c in zip("xyz", xyz, strict=True)]

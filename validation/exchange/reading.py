@@ -1,4 +1,4 @@
-"""What a device read, and how its exports are written."""
+"""A reading of a device, and the format of its exports."""
 
 from dataclasses import dataclass
 
@@ -7,22 +7,22 @@ from numpy.typing import NDArray
 from forcefit.inputs.errors import quoted
 
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "inch": 0.0254}
-LARGEST = 1e12  # of any number of a table
+LARGEST = 1e12  # largest number in a table
 
 
 @dataclass(frozen=True)
 class Writing:
-    """How an export is written, where it does not say so itself.
+    """Declared format of an export, used where the export states none.
 
     Attributes:
-        unit: of lengths, None if its header says so.
+        unit: unit of lengths, None if the header states it.
         decimal: the decimal mark of exports.
-        commands_decimal: of the table of commands.
+        commands_decimal: decimal separator of the table of commands.
         dates: ``"day_first"`` or ``"month_first"`` for dates with slashes, or None.
-        coverage: what an uncertainty (U95, U) is times one standard deviation.
+        coverage: ratio of an uncertainty (U95, U) to one standard deviation.
         orientation: order of three angles (:func:`.orientation.orders`), or None.
-        angle_unit: of angles whose header has none, or None.
-        oriented: whether orientations are read; otherwise they are passed over.
+        angle_unit: unit of angles if the header states none, or None.
+        oriented: whether orientations are read; otherwise they are ignored.
     """
 
     unit: str | None = None
@@ -41,9 +41,9 @@ class Reading:
 
     Attributes:
         file: its file, for messages.
-        line: there.
+        line: its line there.
         names: parts of its name, the point's own last.
-        position: (3,) [m] in the device's axes; NaN where the device saw nothing.
+        position: (3,) [m] in the device's axes; NaN if the device saw no target.
         sigma: (3,) [m] one standard deviation, NaN where not stated.
         time: [s] on the clock of the file, NaN without one.
         rotation: (3, 3) the target's axes seen from the device's, or None.

@@ -1,4 +1,4 @@
-"""The targets file of an import: what was measured on, how exports are written."""
+"""The targets file of an import: targets, and format of the exports."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -22,21 +22,21 @@ _MARKS = (".", ",")
 
 @dataclass(frozen=True, eq=False)
 class TargetsFile:
-    """What a targets file says.
+    """The content of a targets file.
 
     Attributes:
         file: its path.
-        robot: as declared.
+        robot: robot as declared.
         robot_name: built-in name, or path from the targets file's folder.
         places: (3,) [m] of each target, platform axes.
-        registration: ``"unknown"``: the device stands somewhere, or ``"known"``: its
+        registration: ``"unknown"``: the device's pose is unknown, or ``"known"``: its
             axes are the base's.
         window: [s] between a command and its readings.
         noise: [m] one standard deviation of a reading that states none, or None.
-        noise_rotation: [rad] likewise of an orientation; None if none is read.
-        rotations: (3,) [rad] rotation vector from the platform's axes to a target's,
-            for those declared; the others' are found.
-        writing: of the exports.
+        noise_rotation: [rad] the same for an orientation; None if none is read.
+        rotations: (3,) [rad] rotation vector from the platform's axes to a target's, if
+            declared; others are fitted.
+        writing: notation of the exports.
     """
 
     file: Path
@@ -55,16 +55,16 @@ def read_targets(path: Path | str) -> TargetsFile:
     """Read a targets file.
 
     Args:
-        path: a TOML file with ``robot``, ``[targets]`` (name = [x, y, z] in m), and
-            ``unit``, ``decimal``, ``dates``, ``coverage``, ``registration``,
-            ``window``, ``noise``, ``noise_rotation``, ``orientation``,
-            ``angle_unit``, ``[rotations]`` where the defaults do not hold.
+        path: a TOML file with ``robot``, ``[targets]`` (name = [x, y, z] in m), and, to
+            change defaults, ``unit``, ``decimal``, ``dates``, ``coverage``,
+            ``registration``, ``window``, ``noise``, ``noise_rotation``,
+            ``orientation``, ``angle_unit``, ``[rotations]``.
 
     Returns:
-        What it says.
+        The content.
 
     Raises:
-        BadInput: a key is unknown, missing, or holds something else.
+        BadInput: a key is unknown, missing, or has an invalid value.
     """
     root = read_toml(path)
     name = root.text("robot", expected="a built-in robot or a robot file")
@@ -111,12 +111,12 @@ def read_targets(path: Path | str) -> TargetsFile:
 
 
 def _choice(root: Table, key: str, valid: Iterable[str]) -> str | None:
-    """A word out of a few, None where it is not given."""
+    """Return one of several words, None if not given."""
     return root.choice(key, valid) if root.has(key) else None
 
 
 def _decimals(root: Table) -> tuple[str, str]:
-    """Decimal marks of the exports and of the commands."""
+    """Return the decimal marks of the exports and of the commands."""
     if not isinstance(root.get("decimal"), dict):
         mark = root.choice("decimal", _MARKS, ".")
         return mark, mark
@@ -127,7 +127,7 @@ def _decimals(root: Table) -> tuple[str, str]:
 
 
 def _rotations(root: Table, places: Mapping[str, NDArray]) -> dict[str, NDArray]:
-    """(3,) [rad] rotation vectors of targets, platform axes."""
+    """Return the (3,) [rad] rotation vectors of targets, platform axes."""
     if not root.has("rotations"):
         return {}
     table = root.table("rotations")

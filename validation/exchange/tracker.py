@@ -1,4 +1,4 @@
-"""``forcefit validation import``: a tracker's files and the commands, as a campaign."""
+"""``forcefit validation import``: a tracker's files and the commands as a campaign."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import check_new_folder, whole_folder, write_text
+from forcefit.results.text import in_unit
 from validation.exchange.bag import is_bag, read_bag
 from validation.exchange.campaign_text import (
     cell,
@@ -26,7 +27,7 @@ from validation.exchange.placing import Placed, place
 from validation.exchange.reading import Reading
 from validation.exchange.targets_file import TargetsFile, read_targets
 
-_MOST_LEFT_OUT = 0.2  # of all readings; more means that something else is wrong
+_MOST_LEFT_OUT = 0.2  # largest share of all readings; more means another error
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,17 +36,18 @@ class Import:
 
     Attributes:
         robot: its name.
-        how: what joined readings to commands: ``"name"``, ``"time"``, ``"order"``.
+        how: method of assignment of readings to commands: ``"name"``, ``"time"``,
+            ``"order"``.
         header: columns of the table.
         cells: its rows.
         declaration: text of ``campaign.toml``.
-        frame: where the device stood.
+        frame: pose of the device.
         scatter: [m] of one component about the declared robot.
-        readings: taken over.
-        left_out: readings that were not, with the reason, in words.
+        readings: number of readings used.
+        left_out: readings not used, with the reason, in words.
         mounts: (3,) [rad] rotation vector from the platform's axes to those of each
             target whose orientation was read.
-        remarks: what else does not fit, in words.
+        remarks: other inconsistencies, in words.
     """
 
     robot: str
@@ -61,7 +63,7 @@ class Import:
     remarks: tuple[str, ...]
 
     def table(self) -> dict[str, Any]:
-        """Plain values for ``--json``."""
+        """Return plain values for ``--json``."""
         return {
             "robot": self.robot,
             "joined_by": self.how,
@@ -78,11 +80,11 @@ class Import:
         }
 
     def text(self) -> str:
-        """A few lines for people."""
+        """Return a few lines for people."""
         lines = [
             f"{self.robot}: {self.readings} readings in {len(self.cells)} rows, joined "
             f"to commands by {self.how}",
-            f"scatter about the declared robot {1e6 * self.scatter:.4g} um",
+            f"scatter about the declared robot {in_unit(self.scatter, 'um')}",
         ]
         lines += [
             f"axes of {name} on the platform: {np.round(turn, 7).tolist()} rad"
@@ -99,17 +101,17 @@ def import_readings(
     """Make a campaign of a device's files.
 
     Args:
-        files: exports of the device, or ROS bags of what it read.
-        targets: what was measured on (:mod:`validation.exchange.targets_file`).
-        commands: what was commanded (:mod:`validation.exchange.commands_table`).
+        files: exports of the device, or ROS bags.
+        targets: the targets file (:mod:`validation.exchange.targets_file`).
+        commands: the table of commands (:mod:`validation.exchange.commands_table`).
         folder: to be written; it must be absent or empty.
 
     Returns:
-        What was written.
+        The campaign written.
 
     Raises:
         BadInput: a file breaks a rule, the readings fit far better in another unit,
-            mirrored or with targets exchanged, or too many would be left out; nothing
+            mirrored or with targets exchanged, or too many would be left out; no file
             is written then.
     """
     folder = Path(folder)
@@ -129,7 +131,7 @@ def import_readings(
 
 
 def _read(file: Path | str, declared: TargetsFile) -> list[Reading]:
-    """Readings of a table or a bag."""
+    """Return the readings of a table or a bag."""
     if is_bag(file):
         return read_bag(file, declared.writing.oriented)
     return read_device_table(file, declared.writing, declared.places)
@@ -138,7 +140,7 @@ def _read(file: Path | str, declared: TargetsFile) -> list[Reading]:
 def _campaign(
     declared: TargetsFile, commands: Commands, joined: Match, folder: Path, total: int
 ) -> Import:
-    """The campaign's two texts, and what was left out."""
+    """Return the campaign's two texts, and the readings left out."""
     names = list(declared.places)
     placed = place(declared, commands, joined.rows)
     left_out = _left_out(joined, placed, total)
@@ -168,7 +170,7 @@ def _campaign(
 
 
 def _left_out(joined: Match, placed: Placed, total: int) -> list[str]:
-    """Readings that are not in the campaign, in words; too many are refused."""
+    """Return the readings left out of the campaign, in words; refuse too many."""
     why = {"time": "no command near it in time"}.get(
         joined.how, "no command's id in its name"
     )
@@ -192,7 +194,7 @@ def _left_out(joined: Match, placed: Placed, total: int) -> list[str]:
 
 
 def _remarks(declared: TargetsFile, joined: Match, placed: Placed) -> list[str]:
-    """What a user should know of readings that are in the campaign."""
+    """Return remarks on readings in the campaign."""
     remarks = []
     if joined.copies:
         remarks.append(

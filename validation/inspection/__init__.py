@@ -1,4 +1,4 @@
-"""What measured data can and cannot tell, before any diagnosis.
+"""Effects that a campaign can show and cannot show, before any diagnosis.
 
-Begin at ``inspection.py``.
+Begin with ``inspection.py``.
 """

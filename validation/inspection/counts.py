@@ -1,4 +1,4 @@
-"""What a campaign holds, counted: rows, loads, readings, covariates."""
+"""Numbers of a campaign's rows, loads, readings and covariates."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,13 +7,13 @@ from validation.campaign.campaign import LOAD, READING, Campaign
 
 
 def row_counts(kinds: NDArray) -> dict:
-    """How many rows each kind has."""
+    """Return how many rows each kind has."""
     _, rows = np.unique(kinds, return_counts=True)
     return {"count": len(rows), "rows_each": [rows.min(), np.median(rows), rows.max()]}
 
 
 def load_counts(c: Campaign) -> dict:
-    """Levels, sizes and directions of the load."""
+    """Return the levels, magnitudes and directions of the load."""
     force = np.linalg.norm(c.loads[:, 3:], axis=1)
     moment = np.linalg.norm(c.loads[:, :3], axis=1)
     pairs = np.unique(np.column_stack([c.configuration, c.repeat]), axis=0)
@@ -28,7 +28,7 @@ def load_counts(c: Campaign) -> dict:
 
 
 def reading_counts(c: Campaign) -> dict:
-    """Each component: cells, size, sigma."""
+    """Return number of cells, size and sigma of each component."""
     counts = {}
     for k, name in enumerate(READING):
         cells = c.cells[:, k]
@@ -45,7 +45,7 @@ def reading_counts(c: Campaign) -> dict:
 
 
 def covariate_counts(c: Campaign) -> dict:
-    """Each covariate: range, levels, and with what it varies."""
+    """Return range and levels of each covariate, and the ones correlated with it."""
     return {
         name: {
             "range": [x.min(), x.max()],
@@ -62,7 +62,7 @@ def covariate_counts(c: Campaign) -> dict:
 
 
 def correlation(x: NDArray, y: NDArray) -> float:
-    """Of two columns; 0 if one of them does not vary."""
+    """Return correlation of two columns; 0 if one of them does not vary."""
     x, y = x - x.mean(), y - y.mean()
     size = float(np.linalg.norm(x) * np.linalg.norm(y))
     return float(x @ y) / size if size > 0 else 0.0

@@ -1,4 +1,4 @@
-"""What a campaign's design can and cannot tell, in plain words."""
+"""Sentences on the effects that a campaign's design can and cannot show."""
 
 from itertools import combinations
 
@@ -14,21 +14,22 @@ from validation.inspection.remark import CAREFUL, FINE, LOST, Remark
 from validation.inspection.repeat_remarks import on_repeats
 from validation.inspection.repeats import RepeatNoise
 
-_EXPANSION = 2.4e-5  # [1/K] aluminium, about the most a machine's body expands
+_EXPANSION = 2.4e-5  # [1/K] of aluminium, about the largest of a machine's materials
 _TOGETHER = 0.9  # correlation above which two covariates count as one
-_UNIT = 0.02  # of the robot: larger deviations are hardly manufacturing errors
+# fraction of the robot's size; larger deviations are hardly manufacturing errors
+_UNIT = 0.02
 
 
 def remarks_on(
     campaign: Campaign, repeats: Revisits, visits: Revisits, noise: RepeatNoise | None
 ) -> list[Remark]:
-    """All remarks, those on what is lost first.
+    """Return all remarks on a campaign, those on lost effects first.
 
     Args:
-        campaign: of R rows.
-        repeats: how its repeats lie in the session.
-        visits: how its configurations lie in the session.
-        noise: as the repeats show it, None if there are none.
+        campaign: campaign of R rows.
+        repeats: order of its repeats in the session.
+        visits: order of its configurations in the session.
+        noise: noise computed from the repeats; None without repeats.
 
     Returns:
         Remarks.
@@ -43,7 +44,7 @@ def remarks_on(
 
 
 def _on_readings(campaign: Campaign) -> list[Remark]:
-    """Components never measured, stuck, rounded, or suspiciously large."""
+    """Return remarks on components never measured, constant, rounded or too large."""
     remarks = []
     measured, sigma = campaign.measured, campaign.sigma
     absent = ", ".join(campaign.not_measured)
@@ -76,7 +77,7 @@ def _on_readings(campaign: Campaign) -> list[Remark]:
 
 
 def _on_configurations(campaign: Campaign, visits: Revisits) -> list[Remark]:
-    """Joints that never moved, and configurations measured in one go."""
+    """Return remarks on joints that never moved and on the order of configurations."""
     remarks = []
     robot = campaign.robot
     still = [
@@ -105,7 +106,7 @@ def _on_configurations(campaign: Campaign, visits: Revisits) -> list[Remark]:
 
 
 def _on_loads(campaign: Campaign) -> list[Remark]:
-    """Load levels, and whether load and configuration vary separately."""
+    """Return remarks on load levels, and on loads that vary with the configuration."""
     loads = campaign.loads
     if not loads.any():
         text = (
@@ -142,7 +143,7 @@ def _on_loads(campaign: Campaign) -> list[Remark]:
 
 
 def _on_temperature(campaign: Campaign) -> list[Remark]:
-    """Whether thermal expansion could show at all."""
+    """Return remarks on whether thermal expansion can show."""
     temperature = campaign.covariates.get("temperature")
     if temperature is None:
         text = (
@@ -173,7 +174,7 @@ def _on_temperature(campaign: Campaign) -> list[Remark]:
 
 
 def _on_approach(campaign: Campaign) -> list[Remark]:
-    """Whether friction could show at all."""
+    """Return remarks on whether friction can show."""
     side = campaign.covariates.get("approach")
     if side is None:
         text = "No cov.approach: friction can be neither found nor excluded."
@@ -194,7 +195,7 @@ def _on_approach(campaign: Campaign) -> list[Remark]:
 
 
 def _on_time(campaign: Campaign) -> list[Remark]:
-    """Whether a drift could show at all."""
+    """Return remarks on whether a drift can show."""
     if np.ptp(campaign.covariates.get("time", np.zeros(1))) == 0.0:
         text = (
             "No cov.time, or the same in every row: a drift can be neither found nor "
@@ -205,7 +206,7 @@ def _on_time(campaign: Campaign) -> list[Remark]:
 
 
 def _on_covariates(campaign: Campaign) -> list[Remark]:
-    """Covariates that rise and fall together."""
+    """Return remarks on correlated covariates."""
     columns = dict(campaign.covariates)
     for name, values in zip(LOAD, campaign.loads.T, strict=True):
         columns[f"load.{name}"] = values
@@ -222,5 +223,5 @@ def _on_covariates(campaign: Campaign) -> list[Remark]:
 
 
 def _in_both(configuration: NDArray, side: NDArray) -> int:
-    """Number of configurations approached from both sides."""
+    """Return the number of configurations approached from both sides."""
     return len(np.intersect1d(configuration[side > 0], configuration[side < 0]))

@@ -1,4 +1,4 @@
-"""What each effect of the library would do to a campaign's readings."""
+"""Changes of a campaign's readings by each effect of the library."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,20 +16,20 @@ from validation.diagnosis.registration import register
 from validation.diagnosis.signatures import Tangents, conditions_of, loaded_components
 from validation.inspection.repeats import slow_changes
 
-# finite motions have no unknown, and their exact model takes seconds a row
+# finite motions have no unknown, and their exact model takes seconds for each row
 _NOT_COMPARED = tuple(name for name, effect in LIBRARY.items() if effect.finite)
 
 
 @dataclass(frozen=True, eq=False)
 class DesignSignatures:
-    """Changes of the readings over sigma, each unknown at a plausible size.
+    """Changes of the readings over sigma, by unknowns of plausible size.
 
     Attributes:
-        columns: (N, k) by effect; every frame has unknowns of its own, but clearance is
-            the same in all joints (in each it takes another branch with the load).
-        nuisance: (N, p) what an unknown registration does.
-        untestable: why an effect has no columns, by effect.
-        unregistered: why an unknown registration cannot be found; empty if it can.
+        columns: (N, k) changes by effect.  Each frame has its own unknowns; clearance
+            is the same in all joints; the load decides the position within it.
+        nuisance: (N, p) changes by an unknown registration.
+        untestable: reason why an effect has no columns, by effect.
+        unregistered: why the registration cannot be estimated; empty if it can.
     """
 
     columns: dict[str, NDArray]
@@ -41,14 +41,14 @@ class DesignSignatures:
 def design_signatures(
     campaign: Campaign, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> DesignSignatures:
-    """Signatures of all effects of the library on a campaign.
+    """Return the signatures of all effects of the library on a campaign.
 
-    An unknown registration is fitted first, so that signatures are read in the axes of
-    the measuring device; where it cannot be found they are read in the base's.
+    An unknown registration is estimated first, to compute the signatures in the axes of
+    the measuring device.  If it cannot be estimated, the base's axes are used.
 
     Args:
-        campaign: of N measured cells.
-        progress: called with effects done and their number.
+        campaign: campaign of N measured cells.
+        progress: called with the number of effects done and their total.
 
     Returns:
         The signatures.
@@ -95,15 +95,15 @@ def design_signatures(
 def changes_between_repeats(
     campaign: Campaign, signatures: DesignSignatures
 ) -> dict[str, NDArray]:
-    """Columns for :func:`validation.inspection.repeats.repeat_noise`.
+    """Return the columns for :func:`validation.inspection.repeats.repeat_noise`.
 
     Args:
-        campaign: of N measured cells.
-        signatures: of the library on it.
+        campaign: campaign of N measured cells.
+        signatures: signatures of the library's effects on the campaign.
 
     Returns:
-        Those of :func:`validation.inspection.repeats.slow_changes`, with what heat and
-        friction do in each configuration.
+        The columns of :func:`validation.inspection.repeats.slow_changes`, and those of
+        thermal expansion and friction in each configuration.
     """
     slow = slow_changes(campaign)
     acts = {"temperature": "thermal_expansion", "approach": "friction_hysteresis"}
@@ -114,7 +114,7 @@ def changes_between_repeats(
 
 
 def _one_each(every: list[Hypothesis]) -> dict[str, Hypothesis]:
-    """One hypothesis for each effect; of shapes looked at, the middle one."""
+    """Return one hypothesis for each effect; the middle one of several shapes."""
     hypotheses: dict[str, Hypothesis] = {}
     for name in dict.fromkeys(h.effect for h in every):
         of = [h for h in every if h.effect == name]
@@ -129,7 +129,7 @@ def _one_each(every: list[Hypothesis]) -> dict[str, Hypothesis]:
 
 
 def _at_plausible_sizes(tangents: Tangents, hypothesis: Hypothesis) -> NDArray:
-    """(N, k) change of the readings with one unknown at a time at its size."""
+    """Return (N, k) changes of the readings by one unknown at a time, at its size."""
     effect = LIBRARY[hypothesis.effect]
     shapes = {n: s.start for s in hypothesis.slots if s.shape for n in s.names}
     rest = {
@@ -150,5 +150,5 @@ def _at_plausible_sizes(tangents: Tangents, hypothesis: Hypothesis) -> NDArray:
 
 
 def _given(campaign: Campaign, covariate: str) -> bool:
-    """Whether a covariate is there and not zero throughout."""
+    """Return whether a covariate is given and not zero in every row."""
     return bool(np.any(campaign.covariates.get(covariate, 0.0)))

@@ -1,4 +1,4 @@
-"""A campaign looked at before any diagnosis: what is there, and what it can tell."""
+"""Inspection of a campaign before any diagnosis: its content, and what it can show."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from numpy.typing import NDArray
 
 from assembly.measurement.predict import predict
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 from validation.campaign.campaign import READING, Campaign
 from validation.diagnosis.separability import Separability, compare_signatures
 from validation.diagnosis.signatures import conditions_of
@@ -29,17 +29,17 @@ from validation.inspection.repeats import RepeatNoise, repeat_noise
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """What a campaign's design can and cannot tell.
+    """The effects that a campaign's design can and cannot show.
 
     Attributes:
-        campaign: of R rows.
-        repeats: how rows of the same configuration and load lie in the session.
-        visits: how rows of the same configuration lie in it.
-        noise: as the repeats show it, None if nothing was measured twice.
-        signatures: of the library's effects.
-        separability: their angles.
-        remarks: sentences, those on what is lost first.
-        open: (R,) bool, rows where the robot's declared clearances leave its pose free.
+        campaign: campaign of R rows.
+        repeats: order of rows of the same configuration and load in the session.
+        visits: order of rows of the same configuration in the session.
+        noise: noise computed from the repeats; None if nothing was measured twice.
+        signatures: signatures of the library's effects.
+        separability: angles between the signatures.
+        remarks: sentences, those on lost effects first.
+        open: (R,) bool, rows whose pose is free within the declared clearances.
     """
 
     campaign: Campaign
@@ -54,7 +54,7 @@ class Inspection:
     __repr__, _repr_html_ = short_repr, html_table
 
     def table(self) -> dict:
-        """Everything, in plain values for JSON."""
+        """Return the whole inspection in plain values for JSON."""
         c = self.campaign
         return {
             "campaign": c.name,
@@ -84,7 +84,7 @@ class Inspection:
         }  # fmt: skip
 
     def _effect_table(self) -> dict:
-        """Each effect: how much of it would show."""
+        """Return how much of each effect would show."""
         table: dict[str, dict] = {
             name: {"testable": False, "why": why}
             for name, why in self.signatures.untestable.items()
@@ -106,14 +106,14 @@ class Inspection:
 def inspect_campaign(
     campaign: Campaign, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> Inspection:
-    """Look at a campaign's design.
+    """Inspect a campaign's design.
 
     Args:
-        campaign: as read.
-        progress: called with effects done and their number.
+        campaign: campaign to inspect.
+        progress: called with the number of effects done and their total.
 
     Returns:
-        What it can and cannot tell.
+        The inspection.
     """
     signatures = design_signatures(campaign, progress)
     noise = repeat_noise(campaign, changes_between_repeats(campaign, signatures))
@@ -137,7 +137,7 @@ def inspect_campaign(
 
 
 def _noise_table(c: Campaign, noise: RepeatNoise | None) -> dict | None:
-    """Noise from repeats against the stated one, suspects by their labels."""
+    """Return noise from repeats and the stated noise, with suspects by their labels."""
     if noise is None:
         return None
     return {

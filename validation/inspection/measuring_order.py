@@ -1,7 +1,7 @@
-"""In which order a campaign was measured: repeats spread over the session, or in a row.
+"""Order in which a campaign was measured: repeats spread over the session or in a row.
 
-Under a slow drift repeats in a row agree with each other better than with anything
-else, so the noise looks smaller than what the drift does to the rest.
+Under a slow drift, repeats in a row agree better with each other than with the other
+rows.  Their noise is then smaller than the effect of the drift on the other rows.
 """
 
 from dataclasses import dataclass
@@ -11,20 +11,21 @@ from numpy.typing import NDArray
 
 from validation.campaign.campaign import Campaign
 
-_FEW, _MOST = 0.2, 0.8  # share of repeats that follow each other directly
-_SHORT = 0.1  # of the session, between the first and the last of a set
+_FEW, _MOST = 0.2, 0.8  # shares of repeats that directly follow each other
+_SHORT = 0.1  # share of the session between the first and the last row of a set
 
 
 @dataclass(frozen=True)
 class Revisits:
-    """How rows of one kind lie in the session.
+    """Order of rows of one kind in the session.
 
     Attributes:
-        sets: kinds that were measured more than once.
-        rows: rows in these sets.
-        others: rows of no set.
-        adjacent: share of the revisits that follow the visit before directly.
-        span: median time from the first to the last visit, as a share of the session.
+        sets: number of kinds that were measured more than once.
+        rows: number of rows in these sets.
+        others: number of rows in no set.
+        adjacent: share of the repeats that directly follow another one of their set.
+        span: median time from the first to the last row of a set, as a share of the
+            session.
     """
 
     sets: int
@@ -37,7 +38,7 @@ class Revisits:
     def order(self) -> str:
         """``"interleaved"``, ``"back to back"``, ``"mixed"``, ``"all"``, ``"none"``.
 
-        All: the whole campaign is one set.
+        ``"all"`` means that the whole campaign is one set.
         """
         if self.sets == 0:
             return "none"
@@ -51,17 +52,17 @@ class Revisits:
 
 
 def revisits(campaign: Campaign, kinds: NDArray) -> Revisits:
-    """How often, and when, the same was measured again.
+    """Return order in the session of rows that were measured more than once.
 
     Args:
-        campaign: of R rows; their order is that of ``cov.time``, else of the file.
+        campaign: campaign of R rows, ordered by ``cov.time`` or else as in the file.
         kinds: (R,) int, such as ``campaign.repeat`` or ``campaign.configuration``.
 
     Returns:
-        The answer.
+        The order.
     """
     clock = session_clock(campaign)
-    # rows that read points at once are one visit
+    # rows of several points measured at once count as one row
     visit = campaign.measured_at_once
     _, first = np.unique(np.column_stack([kinds, visit]), axis=0, return_index=True)
     kinds, clock, visit = kinds[first], clock[first], visit[first]
@@ -85,13 +86,14 @@ def revisits(campaign: Campaign, kinds: NDArray) -> Revisits:
 
 
 def session_clock(campaign: Campaign) -> NDArray:
-    """(R,) from 0 at the first to 1 at the last measurement.
+    """Return (R,) times from 0 at the first to 1 at the last measurement.
 
     Args:
-        campaign: whose ``cov.time``, if it varies, or else whose order is taken.
+        campaign: campaign with a varying ``cov.time``; else the order of its rows is
+            used.
 
     Returns:
-        The clock.
+        The times.
     """
     order = np.arange(len(campaign), dtype=float)
     time = campaign.covariates.get("time", order)

@@ -1,14 +1,15 @@
-r"""Rows of a campaign that tell candidate effects apart, before anything is measured.
+r"""Choice of a campaign's rows that discriminate between effects, before measurement.
 
-Of many rows that could be measured, those are chosen by exchange for which
+An exchange algorithm chooses, out of many possible rows, those for which
 
     sum over e, f of ln(1 + l_ef),
     l_ef = tr(S_ee - S_ef (S_ff + I)^-1 S_fe) / k_e,
 
-is largest: l_ef is the mean non-centrality of effect e where effect f is fitted in its
-place (Atkinson and Fedorov's criterion, averaged over a normal prior), S the sums over
-the rows of products of signatures.  Its slope in the weight of a row is known for all
-rows at once, so that rows of the least slope are exchanged for those of the largest.
+is largest.  Here l_ef is the mean non-centrality of effect e where effect f is fitted
+instead (Atkinson and Fedorov's criterion, averaged over a normal prior).  S contains
+the sums over the rows of products of signatures.  The criterion's derivative by the
+weight of a row is known for all rows, so rows of the smallest derivative are exchanged
+for those of the largest.
 
 Sources:
     Atkinson, Fedorov (1975), The design of experiments for discriminating between two
@@ -34,28 +35,28 @@ from validation.inspection.design_signatures import design_signatures
 from validation.synthetic.design import CampaignDesign, CampaignPlan, plan_campaign
 from validation.synthetic.generator import Synthetic
 
-_POOL = 600  # rows to choose from
-_TRIED = 4  # rows of the least and of the largest slope that are tried together
-_BETTER = 1e-3  # in the criterion
-_AVERAGE = 20  # draws of random rows that the plan is compared with
-_PACE = 60.0  # [s] a row takes
-_SWING = 2400.0  # [s] in which a machine warms and cools
-_FEWEST = 8  # rows and configurations: fewer cannot be judged by held-out rows
+_POOL = 600  # number of rows to choose from
+_TRIED = 4  # rows of the least and of the largest derivative that are tried together
+_BETTER = 1e-3  # increase of the criterion that counts as an improvement
+_AVERAGE = 20  # number of random plans that the plan is compared with
+_PACE = 60.0  # [s] time to measure a row
+_SWING = 2400.0  # [s] period in which the temperature of a machine rises and falls
+_FEWEST = 8  # least rows and configurations that held-out rows can judge
 
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """Rows to be measured.
+    """A plan of rows to be measured.
 
     Attributes:
-        robot: declared.
-        plan: in the order of measuring.
-        design: what may be varied how far.
-        sigma: [rad, m] of the device.
-        effects: names of those compared.
-        apart: (e, e) [-] by row: mean non-centrality of an effect that shows by one
-            sigma a reading, where the column's is fitted in its place.
-        random: (e, e) the same of as many rows drawn at random, on average.
+        robot: declared robot.
+        plan: rows in the order of measuring.
+        design: quantities that may be varied, and their ranges.
+        sigma: [rad, m] noise of the measuring device.
+        effects: names of the effects compared.
+        apart: (e, e) [-] mean non-centrality of the row's effect, of one sigma for each
+            reading, where the column's effect is fitted instead.
+        random: (e, e) mean of ``apart`` over plans of as many random rows.
     """
 
     robot: Robot
@@ -72,28 +73,29 @@ def plan_rows(
     seed: int = 0,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Planned:  # fmt: skip
-    """Choose rows that tell the library's effects apart.
+    """Choose rows that discriminate between the library's effects.
 
     Args:
-        robot: declared.
-        rows: how many.
-        design: what may be varied how far; configurations to choose from.
-        sigma: [rad, m] of the device.
-        seed: of the rows to choose from.
-        progress: told how many effects' signatures are known, and of how many.
+        robot: declared robot.
+        rows: number of rows to choose.
+        design: quantities that may be varied, their ranges, and the configurations.
+        sigma: [rad, m] noise of the measuring device.
+        seed: seed of the random rows to choose from.
+        progress: called with the number of effects done and their total.
 
     Returns:
-        The rows.
+        The plan.
 
     Raises:
-        BadInput: fewer rows than can be judged, or hardly any configuration closes.
+        BadInput: the rows are too few to be judged, or hardly any configuration closes.
     """
     if rows < _FEWEST:
         raise BadInput(f"--rows: found {rows}, expected at least {_FEWEST}")
     rng = np.random.default_rng(seed)
     count = max(_POOL, 4 * rows)
     pool = _pool(robot, replace(design, rows=count, corners=True), rows, rng)
-    # where declared clearances rest is found row by row, and hardly matters here
+    # the pose within declared clearances takes long to compute and has little effect
+    # here
     tight = without_joint_clearances(robot)
     campaign = rows_as_campaign(tight, pool, design, sigma)
     columns = {
@@ -119,8 +121,8 @@ def plan_rows(
 def _pool(
     robot: Robot, design: CampaignDesign, wanted: int, rng: np.random.Generator
 ) -> CampaignPlan:
-    """Rows to choose from, in the time that the rows wanted take."""
-    # the machine warms and cools slowly: rows at one time have one temperature
+    """Return the rows to choose from, within the duration of the required rows."""
+    # the temperature changes slowly: rows at one time have one temperature
     plan = plan_campaign(robot, design, rng)
     time = np.array([row.covariates["time"] for row in plan.rows])
     time = (time % (_PACE * wanted)).round(1)
@@ -140,13 +142,13 @@ def rows_as_campaign(
     robot: Robot, plan: CampaignPlan, design: CampaignDesign,
     sigma: tuple[float, float],
 ) -> Campaign:  # fmt: skip
-    """A plan as a campaign that read nothing but zeros.
+    """Return a plan as a campaign whose readings are all zero.
 
     Args:
-        robot: declared.
-        plan: its rows.
-        design: by which they were drawn.
-        sigma: [rad, m] of the device.
+        robot: declared robot.
+        plan: rows of the campaign.
+        design: design by which the rows were drawn.
+        sigma: [rad, m] noise of the measuring device.
 
     Returns:
         The campaign.
@@ -171,13 +173,13 @@ def rows_as_campaign(
 
 
 def _alike(columns: NDArray) -> NDArray:
-    """Columns of an effect that shows by one sigma a reading, all unknowns together."""
+    """Return columns of an effect, scaled to one sigma for each reading in total."""
     size = np.sqrt(np.mean(np.sum(columns**2, axis=1)))
     return columns / size
 
 
 def _ordered(plan: CampaignPlan, chosen: NDArray) -> CampaignPlan:
-    """Rows in the order of measuring."""
+    """Return the rows in the order of measuring."""
     time = [plan.rows[i].covariates["time"] for i in chosen]
     order = chosen[np.argsort(time, kind="stable")]
     return CampaignPlan(
@@ -187,7 +189,7 @@ def _ordered(plan: CampaignPlan, chosen: NDArray) -> CampaignPlan:
 
 
 class _Criterion:
-    """How well rows tell effects apart, and what every other row would add."""
+    """Discrimination between effects by the chosen rows, and by each further row."""
 
     def __init__(self, blocks: list[NDArray], rows: int) -> None:
         begin = np.cumsum([0, *(X.shape[1] for X in blocks)])
@@ -195,11 +197,11 @@ class _Criterion:
         self._X = np.hstack(blocks).reshape(rows, -1, begin[-1])
 
     def apart(self, chosen: NDArray) -> NDArray:
-        """(e, e) mean non-centrality of one effect where another is fitted."""
+        """Return (e, e) mean non-centrality of one effect where another is fitted."""
         return self._value(chosen)[0]
 
     def _value(self, chosen: NDArray) -> tuple[NDArray, NDArray]:
-        """The same, and (rows,) slope of the criterion in the weight of every row."""
+        """Return ``apart``, and (rows,) derivatives of the criterion by weights."""
         X = self._X[chosen].reshape(-1, self._X.shape[2])
         S = X.T @ X
         G, apart = np.zeros_like(S), np.full((len(self._own),) * 2, np.nan)
@@ -220,7 +222,7 @@ class _Criterion:
         return apart, slope
 
     def exchanged(self, start: NDArray) -> NDArray:
-        """Rows exchanged one for one while that tells more."""
+        """Return rows after exchanges of one row each that increase the criterion."""
         chosen = start.copy()
         apart, slope = self._value(chosen)
         best, going = _told(apart), True
@@ -241,12 +243,12 @@ class _Criterion:
 
 
 def _told(apart: NDArray) -> float:
-    """The criterion."""
+    """Return the criterion."""
     return float(np.nansum(np.log1p(apart)))
 
 
 def table(planned: Planned) -> dict[str, Any]:
-    """A plan for machines: pairs of effects, the hardest to tell apart first."""
+    """Return a plan in plain values: pairs of effects, the hardest pairs first."""
     names = planned.effects
     pairs = [
         {
@@ -264,7 +266,7 @@ def table(planned: Planned) -> dict[str, Any]:
 
 
 def text(planned: Planned) -> str:
-    """The same for people: the five hardest pairs."""
+    """Return the text of a plan, with the five pairs hardest to separate."""
     shown = table(planned)
     lines = [f"{shown['rows']} rows of {shown['configurations']} configurations"]
     lines.append("hardest to tell apart, with as many random rows in brackets [sigma]:")
@@ -278,7 +280,7 @@ def text(planned: Planned) -> str:
 
 
 def unmeasured(planned: Planned) -> Synthetic:
-    """A plan as a campaign whose readings are all missing, to be written and filled."""
+    """Return a plan as a campaign without readings, as a file to be filled in."""
     missing = np.full((len(planned.plan.rows), 6), np.nan)
     return Synthetic(
         robot=planned.robot, plan=planned.plan,

@@ -1,7 +1,7 @@
-"""A sentence on a campaign, and how much it matters.
+"""A sentence on a campaign, and its importance.
 
-It is about something lost (no analysis can bring it back), something to be careful
-about, or something that is as it should be.
+The subject is something lost (no analysis can recover it), something that needs care,
+or something that is as it should be.
 """
 
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ LOST, CAREFUL, FINE = "lost", "careful", "fine"
 
 @dataclass(frozen=True)
 class Remark:
-    """One sentence on a design.
+    """A sentence on a campaign's design.
 
     Attributes:
-        about: its subject.
+        about: subject of the sentence.
         weight: ``"lost"``, ``"careful"`` or ``"fine"``.
         text: the sentence.
     """

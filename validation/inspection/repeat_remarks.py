@@ -1,4 +1,4 @@
-"""What the repeats of a campaign say about its noise, in plain words."""
+"""Sentences on the noise computed from the repeats of a campaign."""
 
 import numpy as np
 from scipy.stats import chi2
@@ -9,19 +9,19 @@ from validation.inspection.measuring_order import Revisits, session_clock
 from validation.inspection.remark import CAREFUL, FINE, LOST, Remark
 from validation.inspection.repeats import MOST, RepeatNoise
 
-_FEW = 20  # degrees of freedom below which noise is known worse than to +-30 %
-_SEVERAL = 4  # suspects that may form a pattern
+_FEW = 20  # degrees of freedom; with fewer the noise is known to worse than +-30 %
+_SEVERAL = 4  # number of suspect readings that may have a common cause
 
 
 def on_repeats(
     campaign: Campaign, repeats: Revisits, noise: RepeatNoise | None
 ) -> list[Remark]:
-    """What the repeats say about the noise.
+    """Return remarks on the noise computed from the repeats.
 
     Args:
-        campaign: of R rows.
-        repeats: how its repeats lie in the session.
-        noise: as they show it, None if there are none.
+        campaign: campaign of R rows.
+        repeats: order of its repeats in the session.
+        noise: noise computed from the repeats; None without repeats.
 
     Returns:
         Remarks.
@@ -70,7 +70,7 @@ def on_repeats(
 
 
 def _on_suspects(campaign: Campaign, noise: RepeatNoise) -> list[Remark]:
-    """Whether readings far from their repeats look like single mistakes."""
+    """Return remark on readings far from their repeats: single errors or a pattern."""
     suspects = noise.suspects
     if len(suspects) < _SEVERAL:
         return []

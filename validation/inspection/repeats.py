@@ -1,22 +1,22 @@
-"""Repeats: what a machine and its measuring device scatter when nothing changes.
+"""Noise of a machine and its measuring device, computed from repeated rows.
 
-Rows of the same configuration and load share a mean; what is left is noise, plus
-whatever changed between them.  Slow changes (time, temperature, side of approach) are
-fitted to all sets at once and taken out, so that drift does not count as noise.
+Rows of the same configuration and load have a common mean; the residuals are noise and
+changes between the rows.  Slow changes (with time, temperature and side of approach)
+are fitted to all sets together and subtracted, so drift does not count as noise.
 
 ======  =============  =========  ================================================
 symbol  code           shape      meaning
 ======  =============  =========  ================================================
 z       ``whitened``   (N,)       readings / stated sigma, measured cells row by row
 B       ``slow``       (N, p)     columns of slow changes / sigma
-e       ``rest``       (N,)       z less its set's mean and the best B x
-h       ``leverage``   (N,)       what a cell has contributed to its own fit
+e       ``rest``       (N,)       z minus its set's mean and the fitted B x
+h       ``leverage``   (N,)       weight of a cell in its own fitted value
 ======  =============  =========  ================================================
 
 Sources:
-    Cook, Weisberg (1982), Residuals and influence in regression: the deleted residual
-    e / (s sqrt(1 - h)), s without the cell, is Student's t; the largest of N is judged
-    by Bonferroni's bound.
+    Cook, Weisberg (1982), Residuals and influence in regression: the deleted residual e
+    / (s sqrt(1 - h)), with s computed without the cell, has Student's t distribution;
+    the largest of N is judged by Bonferroni's bound.
 """
 
 from collections.abc import Iterable, Mapping
@@ -31,8 +31,8 @@ from validation.campaign.campaign import READING, Campaign
 from validation.diagnosis.separability import orthonormal_basis
 from validation.inspection.measuring_order import session_clock
 
-_LEVEL = 0.01  # chance that a sound campaign has a suspect row
-MOST = 20  # suspects that are looked for
+_LEVEL = 0.01  # probability that a campaign without errors has a suspect row
+MOST = 20  # most suspects that are searched for
 
 
 @dataclass(frozen=True)
@@ -40,10 +40,10 @@ class Suspect:
     """A reading too far from its repeats.
 
     Attributes:
-        rows: its row; both rows of a set of two, which cannot tell which is wrong.
-        component: of the reading.
+        rows: row of the reading; both rows of a set of two, where either may be wrong.
+        component: component of the reading.
         size: [-] deleted residual, Student's t.
-        chance: that noise alone gives one so large anywhere in the campaign.
+        chance: probability that noise alone gives so large a residual in the campaign.
     """
 
     rows: tuple[int, ...]
@@ -54,19 +54,21 @@ class Suspect:
 
 @dataclass(frozen=True, eq=False)
 class RepeatNoise:
-    """Noise as the repeats show it.  Intervals are of 90 %.
+    """Noise computed from repeats, with 90 % confidence intervals.
 
     Attributes:
-        ratio: [-] scatter over stated sigma, all components together.
-        degrees: of freedom behind it.
-        interval: of the ratio.
-        plain: the ratio if slow changes are left in.
-        taken_out: slow changes that were fitted and taken out, by name: the chance
-            that noise alone looks so much like them.
-        component: (6,) [rad, m] one standard deviation; NaN where nothing repeats.
-        component_degrees: (6,) of freedom.
-        component_interval: (6, 2) [rad, m].
-        suspects: readings too far from their repeats, left out of all the above.
+        ratio: [-] standard deviation over stated sigma, of all components.
+        degrees: degrees of freedom of the ratio.
+        interval: interval of the ratio.
+        plain: the ratio without subtraction of slow changes.
+        taken_out: names of the slow changes that were fitted and subtracted, each with
+            the probability that noise alone gives so large a change.
+        component: (6,) [rad, m] standard deviations; NaN for components without
+            repeats.
+        component_degrees: (6,) degrees of freedom.
+        component_interval: (6, 2) [rad, m] intervals.
+        suspects: readings too far from their repeats, excluded from all the figures
+            above.
     """
 
     ratio: float
@@ -83,15 +85,14 @@ class RepeatNoise:
 def repeat_noise(
     campaign: Campaign, slow: Mapping[str, NDArray] | None = None
 ) -> RepeatNoise | None:
-    """Noise from the repeats of a campaign, slow changes taken out.
+    """Return the noise from a campaign's repeats, with slow changes subtracted.
 
-    They are left in where they would use up more than half of what the repeats can
-    tell.
+    They are not subtracted if they need more than half of the degrees of freedom.
 
     Args:
-        campaign: of N measured cells.
-        slow: (N, p) columns by name, over sigma, of what may change between repeats;
-            those of :func:`slow_changes` if absent.
+        campaign: campaign of N measured cells.
+        slow: (N, p) columns over sigma, by name, of changes between repeats; by default
+            those of :func:`slow_changes`.
 
     Returns:
         The noise; None if nothing was measured twice.
@@ -112,15 +113,15 @@ def repeat_noise(
 
 
 def slow_changes(campaign: Campaign) -> dict[str, NDArray]:
-    """What may change between repeats, alike in every configuration.
+    """Return columns of slow changes, alike in every configuration.
 
     Args:
-        campaign: of N measured cells.
+        campaign: campaign of N measured cells.
 
     Returns:
-        (N, p) columns over sigma by name: a settling and a cubic in time (in the order
-        of the file if no time is given), and a shift with temperature and with the side
-        of approach where they vary; for each component its own.
+        (N, p) columns over sigma by name, separate for each component: a settling and a
+        cubic in time (in the file's order if no time is given).  There are also shifts
+        with temperature and side of approach, if these vary.
     """
     clock = 2 * session_clock(campaign) - 1
     shapes = {
@@ -137,14 +138,14 @@ def slow_changes(campaign: Campaign) -> dict[str, NDArray]:
 
 
 def for_each_component(campaign: Campaign, shapes: NDArray) -> NDArray:
-    """Columns that shift the components one by one.
+    """Return the columns that shift the components one by one.
 
     Args:
-        campaign: of R rows, N measured cells.
-        shapes: (R, p) how the shift changes from row to row.
+        campaign: campaign of R rows and N measured cells.
+        shapes: (R, p) values of the changes in each row.
 
     Returns:
-        (N, 6 p) over sigma.
+        (N, 6 p) columns over sigma.
     """
     cells = campaign.cells
     row, component = np.nonzero(cells)
@@ -153,13 +154,13 @@ def for_each_component(campaign: Campaign, shapes: NDArray) -> NDArray:
 
 
 def _sets(campaign: Campaign) -> NDArray:
-    """(N,) number of the set of repeats of each measured cell."""
+    """Return the (N,) number of the set of repeats of each measured cell."""
     row, component = np.nonzero(campaign.cells)
     return campaign.repeat[row] * 6 + component
 
 
 def _repeated_cells(campaign: Campaign, out: set[int]) -> NDArray:
-    """(N,) bool: measured cells with another of their set, rows left out aside."""
+    """Return (N,) bool, cells with another one in their set, some rows excluded."""
     row, _ = np.nonzero(campaign.cells)
     kept = ~np.isin(row, list(out))
     sets = _sets(campaign)
@@ -168,7 +169,7 @@ def _repeated_cells(campaign: Campaign, out: set[int]) -> NDArray:
 
 
 class _RepeatFit:
-    """Set means and slow changes fitted to repeated cells."""
+    """A fit of set means and slow changes to repeated cells."""
 
     def __init__(
         self, campaign: Campaign, cells: NDArray, slow: Mapping[str, NDArray]
@@ -193,13 +194,13 @@ class _RepeatFit:
         self.rss = float(self.rest @ self.rest)
 
     def _centred(self, columns: NDArray) -> NDArray:
-        """Columns less their mean in every set."""
+        """Return the columns less their mean in every set."""
         sums = np.zeros((len(self.count), columns.shape[1]))
         np.add.at(sums, self.set, columns)
         return columns - (sums / self.count[:, None])[self.set]
 
     def suspect(self) -> Suspect | None:
-        """The reading farthest from its repeats, if noise hardly gives such a one."""
+        """Return reading farthest from its repeats; None if noise alone explains it."""
         if self.degrees < 2 or self.rss == 0.0:
             return None
         free = np.maximum(1 - self.leverage, 1e-12)
@@ -216,7 +217,7 @@ class _RepeatFit:
         )
 
     def noise(self, suspects: list[Suspect]) -> RepeatNoise:
-        """The answer."""
+        """Return the noise without the suspects."""
         free, rest = 1 - self.leverage, self.rest**2
         degrees = np.bincount(self.component, free, 6)
         cells = np.maximum(np.bincount(self.component, minlength=6), 1)
@@ -243,7 +244,7 @@ class _RepeatFit:
         )
 
     def _chance(self, name: str) -> float:
-        """That noise alone looks so much like one slow change, the others known."""
+        """Return probability that noise alone gives so large a slow change."""
         others = [B for key, B in self.slow.items() if key != name]
         basis = _basis(others, len(self.z))
         rest = self.z - basis @ (basis.T @ self.z)
@@ -255,11 +256,11 @@ class _RepeatFit:
 
 
 def _basis(blocks: Iterable[NDArray], rows: int) -> NDArray:
-    """(rows, rank) orthonormal basis of all columns."""
+    """Return the (rows, rank) orthonormal basis of all columns."""
     return orthonormal_basis(np.column_stack([np.zeros((rows, 0)), *blocks]))
 
 
 def _interval(degrees: float) -> tuple[float, float]:
-    """90 % interval of a standard deviation, as factors on its estimate."""
+    """Return 90 % interval of a standard deviation, as factors of its estimate."""
     low, high = chi2.ppf([0.05, 0.95], degrees)
     return float(np.sqrt(degrees / high)), float(np.sqrt(degrees / low))

@@ -1,4 +1,4 @@
-"""The forced assembly in Exudyn: shares nothing with the model but the robot.
+"""The forced assembly in Exudyn, independent of the model except for the robot.
 
 Begin at ``simulation.py``.
 """

@@ -1,7 +1,7 @@
 """Beams of the simulation: their axes and the stiffness of their sections.
 
-Written apart from :mod:`assembly.model.links`: only a section's own constants are
-shared.
+This module is independent of :mod:`assembly.model.links`, except for a section's
+constants.
 """
 
 import math
@@ -16,7 +16,7 @@ from validation.multibody.motion import turned
 
 
 def beam_span(frame: Frame, link: BeamLink) -> tuple[float, NDArray]:
-    """[m] length of a beam, and (3,) its direction in the frame's axes, any length."""
+    """Return [m] length of a beam, and (3,) its direction in the frame's axes."""
     if link.length is not None and link.axis is not None:
         return link.length, np.array(link.axis)
     x = turned(frame.rotation).T @ frame.translation
@@ -24,7 +24,7 @@ def beam_span(frame: Frame, link: BeamLink) -> tuple[float, NDArray]:
 
 
 def beam_axes(x: NDArray, up: Sequence[float] | None) -> NDArray:
-    """Columns: along the beam, across, up; up is y unless the beam lies along y."""
+    """Return axes as columns: along the beam, across, up; y is up by default."""
     x = x / np.linalg.norm(x)
     if up is None:
         up = (0.0, 0.0, 1.0) if math.hypot(x[0], x[2]) < 1e-9 else (0.0, 1.0, 0.0)
@@ -34,10 +34,11 @@ def beam_axes(x: NDArray, up: Sequence[float] | None) -> NDArray:
 
 
 def element_stiffness(link: BeamLink, step: float) -> NDArray:
-    """EA, GA_y, GA_z, GJ, EI_y, EI_z for elements of a length, corrected.
+    """Return EA, GA_y, GA_z, GJ, EI_y, EI_z for elements of a length, corrected.
 
     An element of constant strain lacks the deflection step^3 / 12 EI of its own
-    bending; given to its shear, the tip of a cantilever is exact for any number.
+    bending. If its shear stiffness includes it, the tip of a cantilever is exact for
+    any number.
 
     Args:
         link: the beam.

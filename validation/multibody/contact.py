@@ -5,12 +5,12 @@ and RZ.  At distance r from the middle of a cone of size c,
 
     x = (r^2 - c^2) / 2c,   P = (x + sqrt(x^2 + w^2)) / 2,   energy = k P^2 / 2,
 
-so the force is k P P' r / c: none inside, a stiff spring outside, smooth everywhere, at
-the middle too (smoothing r - c instead is singular there).  The width w is first three
-times c, which centres the joint weakly, and is then reduced to 3e-4.
+so the force is k P P' r / c: none inside, a stiff spring outside, smooth everywhere,
+also at the middle (where smoothing r - c would be singular).  The width w is at first
+three times c, which centres the joint weakly, and is then reduced to 3e-4.
 
-A pin in two bushes touches at two places, at +-h along z: each is a disc of its own for
-the pin's axis there, (TX + h RY, TY - h RX), and the cone for (RX, RY) is gone.
+A pin in two bushes touches at two points, at +-h along z.  Each is a disc for the pin's
+axis there, (TX + h RY, TY - h RX), in place of the cone for (RX, RY).
 """
 
 import math
@@ -19,22 +19,23 @@ from dataclasses import dataclass, replace
 
 from assembly.model.robot import Clearance, Frame
 
-TURN_STIFFNESS = 1e9  # [N m/rad] of the contact
-SHIFT_STIFFNESS = 1e12  # [N/m]
-WIDE, NARROW = 3.0, 3e-4  # [-] widths of the smoothing in sizes of the cone
+TURN_STIFFNESS = 1e9  # [N m/rad] rotational stiffness of the contact
+SHIFT_STIFFNESS = 1e12  # [N/m] translational stiffness of the contact
+# [-] first and last width of the smoothing, in sizes of the cone
+WIDE, NARROW = 3.0, 3e-4
 _UNBOUNDED = 0.5  # [rad, m] larger bounds of own motions are checked afterwards
 _CONES = (("tilt", (0, 1)), ("spin", (2,)), ("radial", (3, 4)), ("axial", (5,)))
 
 
 @dataclass(frozen=True)
 class ClearanceCone:
-    """A disc or an interval.
+    """A disc or an interval that bounds components of a screw.
 
     Attributes:
-        rows: of the screw, those it bounds together.
+        rows: rows of the screw, which it bounds together.
         size: [rad or m] > 0.
         stiffness: [N m/rad or N/m] of the contact.
-        arm: [m] along z from the joint's middle to where it touches; radial discs only.
+        arm: [m] along z from the joint's middle to the contact; radial discs only.
     """
 
     rows: tuple[int, ...]
@@ -43,7 +44,7 @@ class ClearanceCone:
     arm: float = 0.0
 
     def offsets(self, screw: Sequence[float]) -> list[float]:
-        """[rad or m] one or two components that it bounds, of a screw (6,)."""
+        """Return one or two components [rad or m] of a screw (6,) that it bounds."""
         if self.arm:
             return [
                 screw[3] + self.arm * screw[1],
@@ -54,10 +55,10 @@ class ClearanceCone:
 
 @dataclass(frozen=True)
 class JointClearance:
-    """How a joint may move besides its springs.
+    """Possible motions of a joint in addition to its springs.
 
     Attributes:
-        cones: what bounds it.
+        cones: the bounds.
         free: rows without a bound.
     """
 
@@ -65,7 +66,7 @@ class JointClearance:
     free: tuple[int, ...]
 
     def softened(self, factor: float) -> "JointClearance":
-        """The same with the stiffness of its contacts times a factor."""
+        """Return the clearance with the stiffness of its contacts times a factor."""
         cones = (replace(c, stiffness=factor * c.stiffness) for c in self.cones)
         return replace(self, cones=tuple(cones))
 
@@ -80,14 +81,14 @@ class JointClearance:
 def joint_clearance(
     frame: Frame, scale: float = 1.0, bushes: bool = False
 ) -> JointClearance:
-    """Clearances of a frame's joint, and its own motion if no spring resists it.
+    """Return clearances of a frame's joint, and its own motion if it has no spring.
 
     Args:
-        frame: of a robot.
+        frame: frame of a robot.
         scale: factor on the clearances.
         bushes: whether a joint with both radial clearance and tilt is a pin in two
-            bushes, each with that radial clearance, so far apart that it can tilt as
-            much.
+            bushes.  Each has that radial clearance, and their distance allows that
+            tilt.
 
     Returns:
         The clearance; without one and without own motion, every row is locked.
@@ -113,11 +114,11 @@ def joint_clearance(
 def cone_forces(
     cone: ClearanceCone, screw: Sequence[float], width: float
 ) -> Iterator[tuple[int, float]]:
-    """Contact forces of a cone on a joint that has moved from its middle.
+    """Yield contact forces of a cone on a joint displaced from its middle.
 
     Args:
         cone: the bound.
-        screw: (6,) [rad, m] how the joint has moved.
+        screw: (6,) [rad, m] displacement of the joint.
         width: [-] of the smoothing, in sizes of the cone.
 
     Yields:
@@ -135,14 +136,14 @@ def cone_forces(
 
 
 def cone_energy(cone: ClearanceCone, screw: Sequence[float], width: float) -> float:
-    """[J] of the contact of a joint with a cone; arguments of ``cone_forces``."""
+    """Return the [J] energy of a joint's contact with a cone; see ``cone_forces``."""
     return cone.stiffness * _overlap(cone, cone.offsets(screw), width)[0] ** 2 / 2
 
 
 def _overlap(
     cone: ClearanceCone, offsets: list[float], width: float
 ) -> tuple[float, float]:
-    """P and sqrt(x^2 + w^2) of the head of this module."""
+    """Return P and sqrt(x^2 + w^2) of the module's docstring."""
     squared = sum(u * u for u in offsets)
     x = (squared - cone.size**2) / (2 * cone.size)
     w = width * cone.size

@@ -1,9 +1,9 @@
-"""Central differences at step zero, and how well they are known.
+"""Central differences extrapolated to step zero, with their uncertainty.
 
-Differences of falling steps are off by the steps' square and by rounding over the
-step: large steps leave the one, small ones the other.  Two neighbouring steps are
-extrapolated to none, and of all such pairs that is taken which differs least from the
-one before it; by so much it is known.
+The error of differences has a part of the step's square and a part of rounding over the
+step: the first dominates for large steps, the second for small ones.  Two neighbouring
+steps are extrapolated to step zero.  Of all pairs the one is taken that differs least
+from the one before it; this difference is its uncertainty.
 
 Sources:
     Ridders (1982), Accurate computation of F'(x) and F'(x) F''(x).
@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 def without_squares(
     steps: Sequence[float], differences: Sequence[NDArray]
 ) -> list[NDArray]:
-    """Neighbouring differences extrapolated to no step.
+    """Return the neighbouring differences extrapolated to step zero.
 
     Args:
         steps: k of them, falling.
-        differences: of the same shape, one for each step.
+        differences: values of the same shape, one for each step.
 
     Returns:
-        k - 1 arrays, without the error that grows with the step's square.
+        k - 1 arrays, without the error of the step's square.
     """
     squares = [(one / two) ** 2 for one, two in pairwise(steps)]
     pairs = zip(squares, pairwise(differences), strict=True)
@@ -36,11 +36,11 @@ def without_squares(
 def steadiest(
     found: Sequence[NDArray], size: Callable[[NDArray], float]
 ) -> tuple[NDArray, NDArray]:
-    """The one that differs least from the one before it.
+    """Return the array that differs least from the one before it.
 
     Args:
         found: at least two arrays of the same shape.
-        size: of a change, so that changes can be compared.
+        size: size of a change, which makes changes comparable.
 
     Returns:
         The array, and its absolute change.

@@ -1,9 +1,9 @@
 """An Exudyn model while it is built: bodies, springs, beams, contacts, closures, loads.
 
-Bodies are massless to the static solver; places are points and axes fixed to bodies;
-elastic parts and locked joints stand between two places.  Exudyn orders screws and
-wrenches [T R]; everything in and out of here is [R T] like in the whole library.
-The solution is in :mod:`validation.multibody.exudyn_solver`, its evaluation in
+Bodies are massless for the static solver.  Places are points and axes fixed to bodies;
+elastic parts and locked joints connect two places.  Exudyn orders screws and wrenches
+[T R]; arguments and results here are [R T] as in the whole library.  The solution is in
+:mod:`validation.multibody.exudyn_solver`, its evaluation in
 :mod:`validation.multibody.exudyn_reading`.
 """
 
@@ -23,22 +23,23 @@ from validation.multibody.exudyn_parts import Closure, Contact, Elastic, Place
 from validation.multibody.motion import inverse, shifted
 
 _SWAP = np.r_[3:6, 0:3]  # our [R T] <-> Exudyn's [T R]
-IDLE_STIFFNESS = 1e-6  # [N m/rad, N/m] that remains on motions that nothing resists
+IDLE_STIFFNESS = 1e-6  # [N m/rad, N/m] residual stiffness of free motions
 HOLDING_STIFFNESS = 1e-2  # [N m/rad, N/m] on free motions while closures are closed
-_CENTRING = 1e3  # [N/m] of clearances; 1e-3 of it in N m/rad, 1e-6 about own axes
+# [N/m] springs of clearances; times 1e-3 in N m/rad, times 1e-6 about own axes
+_CENTRING = 1e3
 
 
 @dataclass(frozen=True)
 class Regularisation:
-    """Springs and tolerances of the simulation that belong to no robot.
+    """Springs and tolerances of the simulation that do not belong to a robot.
 
     Attributes:
         closing: [N m/rad, N/m] of the connectors that close the closures.
-        idle: [N m/rad, N/m] that remains on motions that nothing resists.
+        idle: [N m/rad, N/m] residual stiffness of free motions.
         narrow: [-] last width of the smoothing of contacts, which centres clearances.
         tolerance: [m, rad, -] of Newton's last increment; convergence is quadratic.
         contact: factor on the stiffness of contacts.
-        conservative: springs act by the gradient of their energy, not half-way.
+        conservative: whether springs act by the gradient of their energy, not half-way.
     """
 
     closing: float
@@ -54,15 +55,15 @@ class Model:
 
     Attributes:
         robot: its name, for messages.
-        regularisation: springs and tolerances that belong to no robot.
+        regularisation: springs and tolerances that do not belong to a robot.
         ground: the base.
         width: [-] of the contacts' smoothing, in sizes of their cones.
         deadline: [s] of ``time.monotonic``, after which the solver stops.
-        callback_error: what was raised in a user function of Exudyn, which reports only
-            that there was an error.
+        callback_error: exception of a user function; Exudyn itself reports only that
+            there was an error.
         idle: Exudyn's numbers of the springs of free motions, and their axes.
         recorded: places whose motion from open to closed is recorded.
-        history: of them, (places, 4, 4) at each step.
+        history: (places, 4, 4) of these places at each step.
     """
 
     def __init__(
@@ -86,13 +87,13 @@ class Model:
         self.history: list[NDArray] = []
 
     def discard(self) -> None:
-        """Give the memory back; Exudyn keeps models and user functions otherwise."""
+        """Release the memory, which Exudyn's models and functions otherwise keep."""
         self.mbs.SetPreStepUserFunction(0)
         self.mbs.Reset()
         self.container.Reset()
 
     def add_body(self, T: NDArray) -> Place:
-        """A rigid body built at ``T``; statics never sees its mass."""
+        """Return a rigid body built at ``T``; its mass has no effect in statics."""
         x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat()
         node = self.item.NodeRigidBodyEP(referenceCoordinates=[*T[:3, 3], w, x, y, z])
         body = self.item.ObjectRigidBody(
@@ -101,14 +102,14 @@ class Model:
         return Place(int(self.mbs.AddObject(body)), T, np.eye(4))
 
     def add_marker(self, place: Place) -> int:
-        """A marker at a place."""
+        """Return a marker at a place."""
         marker = self.item.MarkerBodyRigid(
             bodyNumber=place.body, localHT=self.transform(place.local)
         )
         return int(self.mbs.AddMarker(marker))
 
     def add_spring(self, place: Place, K: NDArray) -> Elastic:
-        """A new body at the place, held there by a spring; ``inf`` locks an axis."""
+        """Add a body at the place, held there by a spring; ``inf`` locks an axis."""
         far = self.add_body(place.built)
         markers = [self.add_marker(place), self.add_marker(far)]
         soft = np.isfinite(np.diag(K))
@@ -118,13 +119,13 @@ class Model:
             self.mbs.AddObject(joint)
         K = np.where(np.outer(soft, soft), K, 0.0)
         spring = self._connect(markers, K)
-        # about or along one axis Exudyn's own law is the gradient
+        # about or along a single axis Exudyn's own law is the gradient
         if self.regularisation.conservative and soft.sum() > 1:
             self._follow_energy(spring, markers[1], K)
         return Elastic(place, far, (spring,))
 
     def add_idle(self, place: Place, axis: int) -> Elastic:
-        """A new body at the place, free along one axis but for a weak spring."""
+        """Return a new body at the place, free along one axis but for a weak spring."""
         K = np.diag(np.where(np.arange(6) == axis, HOLDING_STIFFNESS, np.inf))
         spring = self.add_spring(place, K)
         self.idle.append((spring.parts[0], axis))
@@ -137,13 +138,13 @@ class Model:
             self.mbs.SetObjectParameter(part, "stiffness", K[np.ix_(_SWAP, _SWAP)])
 
     def rest_idle(self, motions: NDArray) -> None:
-        """Set how far the free motions (j,) [rad or m] are where nothing holds them."""
+        """Set the rest coordinates (j,) [rad or m] of the free motions' springs."""
         for (part, axis), motion in zip(self.idle, motions, strict=True):
             rest = np.where(np.arange(6) == axis, motion, 0.0)
             self.mbs.SetObjectParameter(part, "offset", rest[_SWAP].tolist())
 
     def add_contact(self, place: Place, clearance: JointClearance) -> Contact:
-        """A new body at the place within a clearance; a weak spring centres it."""
+        """Add a body at the place within a clearance; a weak spring centres it."""
         clearance = clearance.softened(self.regularisation.contact)
         rows = np.array(clearance.unlocked, dtype=int)
         centring = np.full(6, np.inf)
@@ -163,12 +164,12 @@ class Model:
         return Contact(place, spring.far, clearance)
 
     def set_law(self, connector: int, law: Callable[[list[float]], Any]) -> None:
-        """Let a connector's wrench be any function.
+        """Set a connector's wrench to any function.
 
         Args:
             connector: Exudyn's number of it.
-            law: from the screw between its ends to the wrench half-way between them,
-                (6,) [R T], which resists.
+            law: function of the screw between its ends that returns the wrench half-way
+                between them, (6,) [R T], which resists.
         """
 
         def wrench(
@@ -189,15 +190,15 @@ class Model:
         self, base: Place, length: float, K: NDArray, elements: int,
         inertia: NDArray,
     ) -> tuple[tuple[int, ...], tuple[Place, ...]]:  # fmt: skip
-        """Elements along the base's x, clamped there, and their ends.
+        """Return the elements along the base's x, clamped there, and their ends.
 
         Args:
-            base: where it begins.
+            base: place of its start.
             length: [m].
             K: (6, 6) [N, N m^2] of the section.
             elements: number of them.
-            inertia: (3,) mass [kg/m] and its second moments about y and z [kg m], of
-                use to vibrations alone.
+            inertia: (3,) mass [kg/m] and its second moments about y and z [kg m], which
+                only vibrations need.
 
         Returns:
             The elements' numbers, and the places between them.
@@ -221,7 +222,7 @@ class Model:
         return tuple(parts), tuple(bodies)
 
     def add_closure(self, first: Place, second: Place, closed: NDArray) -> Closure:
-        """A connector that is stress-free while the closure is open."""
+        """Return a connector that is stress-free while the closure is open."""
         gap = inverse(first.built) @ second.built
         marker = self.add_marker(first.moved(gap))
         markers = [marker, self.add_marker(second)]
@@ -229,7 +230,7 @@ class Model:
         return Closure(first, second, marker, connector, closed)
 
     def add_load(self, place: Place, wrench: NDArray) -> None:
-        """A wrench at a place, base axes, whose direction stays."""
+        """Add a wrench at a place, in base axes, of constant direction."""
         torque = self.item.LoadTorqueVector(
             markerNumber=self.add_marker(place), loadVector=wrench[:3].tolist()
         )
@@ -237,7 +238,7 @@ class Model:
         self.add_force(place, wrench[3:])
 
     def add_force(self, place: Place, force: NDArray) -> None:
-        """A force (3,) [N] at a place, base axes, whose direction stays."""
+        """Add a force (3,) [N] at a place, in base axes, of constant direction."""
         load = self.item.LoadForceVector(
             markerNumber=self.add_marker(place), loadVector=force.tolist()
         )
@@ -249,15 +250,15 @@ class Model:
             raise TimeoutError
 
     def node(self, place: Place) -> Any:
-        """Exudyn's node of a place's body."""
+        """Return Exudyn's node of a place's body."""
         return self.mbs.GetObjectParameter(place.body, "nodeNumber")
 
     def transform(self, T: NDArray) -> Any:
-        """Exudyn's own kind of transform."""
+        """Return Exudyn's kind of transform."""
         return self.exu.HT(rotation=T[:3, :3], translation=T[:3, 3])
 
     def _follow_energy(self, spring: int, far: int, K: NDArray) -> None:
-        """Let a spring's wrenches be the gradient of its energy, on both its ends."""
+        """Set a spring's wrenches to the gradient of its energy, on both its ends."""
         rows, lacking = K.tolist(), [0.0] * 3
 
         def law(screw: list[float]) -> list[float]:
@@ -266,8 +267,8 @@ class Model:
             return wrench
 
         # Exudyn evaluates connectors before loads.  Where it differentiates loads it
-        # moves the far end alone, for which the couple is not to change: it hardly
-        # does if the near end moves along
+        # moves the far end alone, and the couple must not change; it hardly changes if
+        # the near end moves along
         load = self.item.LoadTorqueVector(
             markerNumber=far, bodyFixed=True,
             loadVectorUserFunction=lambda mbs, t, load: lacking,
@@ -276,7 +277,7 @@ class Model:
         self.set_law(spring, law)
 
     def _connect(self, markers: list[int], K: NDArray) -> int:
-        """A 6 by 6 spring between two markers."""
+        """Return a 6 by 6 spring between two markers."""
         spring = self.item.RigidBodySpringDamper(
             markerNumbers=markers,
             stiffness=K[np.ix_(_SWAP, _SWAP)],

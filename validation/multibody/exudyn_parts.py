@@ -1,6 +1,6 @@
 """Parts of a simulation model: places on bodies, and elements between them.
 
-Numbers are Exudyn's; screws and wrenches are ordered [R T] like in the whole library.
+Numbers are Exudyn's; screws and wrenches are ordered [R T] as in the whole library.
 """
 
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ class SimulationFailed(RuntimeError):
 
     Attributes:
         robot: name of the robot.
-        status: what happened, in a few words.
+        status: description in a few words.
     """
 
     def __init__(self, robot: str, status: str) -> None:
@@ -35,8 +35,8 @@ class Place:
 
     Attributes:
         body: Exudyn's number of the body.
-        start: (4, 4) where the body is built, seen from the base.
-        local: (4, 4) the place seen from the body.
+        start: (4, 4) pose in which the body is built, seen from the base.
+        local: (4, 4) pose of the place in the body.
     """
 
     body: int
@@ -45,25 +45,25 @@ class Place:
 
     @property
     def built(self) -> NDArray:
-        """(4, 4) where the place is built, seen from the base."""
+        """(4, 4) pose in which the place is built, seen from the base."""
         return self.start @ self.local
 
     def moved(self, T: NDArray) -> "Place":
-        """Another place on the same body; ``T`` is how this one sees it."""
+        """Return another place on the same body; ``T`` is its pose in this one."""
         return replace(self, local=self.local @ T)
 
 
 @dataclass(frozen=True, eq=False)
 class Elastic:
-    """An elastic part between two places that coincide when it is stress-free.
+    """An elastic part between two places that coincide without stress.
 
     Attributes:
         near: place on the inner body.
         far: place on the outer body.
         parts: Exudyn's numbers, of one connector or of the elements of a beam.
-        beam: which of the two.
+        beam: whether the part is a beam.
         nodes: places along a beam, from base to tip, at equal distances.
-        modes: of a meshed body, which is one part and no beam; None otherwise.
+        modes: modes of a meshed body, which is a single part; None otherwise.
     """
 
     near: Place
@@ -83,7 +83,7 @@ class MeshedSolid:
         stiffness: (3n, 3n) [N/m] sparse; row 3 i + k is direction k of node i.
         base: (k,) nodes of the interface at the parent's side.
         tip: (m,) nodes of the interface at the frame's side.
-        centers: (2, 3) [m] where base and tip are read.
+        centers: (2, 3) [m] points at which base and tip are read.
     """
 
     nodes: NDArray
@@ -95,7 +95,7 @@ class MeshedSolid:
 
 @dataclass(frozen=True, eq=False)
 class MeshBody:
-    """A solid put where a robot has it.
+    """A solid at its pose in a robot.
 
     Attributes:
         solid: shared by all links of one shape; it is condensed once.
@@ -128,9 +128,10 @@ class Closure:
     Attributes:
         first: place on the first chain.
         second: place on the second chain.
-        marker: Exudyn's number of the connector's end on the first chain; it is moved.
+        marker: Exudyn's number of the connector's end on the first chain, which is
+            moved.
         connector: Exudyn's number of the connector.
-        closed: (4, 4) the second place seen from the first when closed, nominally.
+        closed: (4, 4) nominal pose of the second place in the first when closed.
     """
 
     first: Place
@@ -147,7 +148,7 @@ class Contact:
     Attributes:
         near: place on the inner body.
         far: place on the outer body.
-        clearance: how it may move.
+        clearance: its possible motions.
     """
 
     near: Place

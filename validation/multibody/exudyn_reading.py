@@ -12,31 +12,31 @@ from validation.multibody.motion import inverse, logarithm, matrix
 
 
 def pose(model: Model, place: Place) -> NDArray:
-    """(4, 4) where a place is now, seen from the base."""
+    """Return the (4, 4) present pose of a place, seen from the base."""
     read, kind = model.mbs.GetObjectOutputBody, model.exu.OutputVariableType
     R = np.reshape(read(place.body, kind.RotationMatrix), (3, 3))
     return matrix(R, read(place.body, kind.Position)) @ place.local
 
 
 def closure_error(model: Model, closure: Closure) -> NDArray:
-    """(6,) [rad, m] screw from the closed position to the present one."""
+    """Return the (6,) [rad, m] screw from the closed position to the present one."""
     first = pose(model, closure.first) @ closure.closed
     return logarithm(inverse(first) @ pose(model, closure.second))
 
 
 def screw_between(model: Model, part: Elastic | Contact) -> NDArray:
-    """(6,) [rad, m] logarithm of the far place seen from the near one."""
+    """Return the (6,) [rad, m] logarithm of the far place seen from the near one."""
     return logarithm(inverse(pose(model, part.near)) @ pose(model, part.far))
 
 
 def idle_motions(model: Model, idle: Mapping[str, Elastic]) -> NDArray:
-    """(j,) [rad or m] how far the joints have moved that nothing resists."""
+    """Return the (j,) [rad or m] displacements of joints without stiffness."""
     axes = zip(idle.values(), model.idle, strict=True)
     return np.array([screw_between(model, part)[axis] for part, (_, axis) in axes])
 
 
 def energy(model: Model, part: Elastic) -> float:
-    """[J] stored in an elastic part."""
+    """Return the [J] energy stored in an elastic part."""
     if part.modes is not None:
         q = _mode_coordinates(model, part.modes)
         return float(q @ part.modes.stiffness @ q) / 2
@@ -46,7 +46,7 @@ def energy(model: Model, part: Elastic) -> float:
 
 
 def contact_energy(model: Model, contact: Contact) -> float:
-    """[J] stored in the contact's compliance."""
+    """Return the [J] energy stored in the contact's compliance."""
     screw = screw_between(model, contact).tolist()
     return sum(
         cone_energy(cone, screw, model.width) for cone in contact.clearance.cones
@@ -54,7 +54,7 @@ def contact_energy(model: Model, contact: Contact) -> float:
 
 
 def wrench(model: Model, part: Elastic) -> NDArray:
-    """(6,) [N m, N] on the outer side, at the outer place, in its axes."""
+    """Return the (6,) [N m, N] wrench on the outer side, at and in the outer place."""
     if part.modes is not None:
         near, far = (pose(model, p)[:3, :3] for p in (part.near, part.far))
         halves = part.modes.wrench @ _mode_coordinates(model, part.modes)
@@ -72,7 +72,7 @@ def wrench(model: Model, part: Elastic) -> NDArray:
 
 
 def closure_wrench(model: Model, closure: Closure, point: NDArray) -> NDArray:
-    """(6,) [N m, N] on the first chain, at a point of the base, base axes."""
+    """Return the (6,) [N m, N] wrench on the first chain, at a point, in base axes."""
     T = pose(model, closure.second)
     own = connector_wrench(model, closure.connector).reshape(2, 3)
     moment, force = (T[:3, :3] @ half for half in own)
@@ -80,7 +80,7 @@ def closure_wrench(model: Model, closure: Closure, point: NDArray) -> NDArray:
 
 
 def connector_wrench(model: Model, number: int) -> NDArray:
-    """(6,) [N m, N] K times the screw of its outer end."""
+    """Return (6,) [N m, N] product of K and the screw of a connector's outer end."""
     kind, read = model.exu.OutputVariableType, model.mbs.GetObjectOutput
     return np.concatenate([
         read(number, kind.TorqueLocal),
@@ -89,6 +89,6 @@ def connector_wrench(model: Model, number: int) -> NDArray:
 
 
 def _mode_coordinates(model: Model, modes: Modes) -> NDArray:
-    """(6,) of a meshed body."""
+    """Return the (6,) mode coordinates of a meshed body."""
     kind = model.exu.OutputVariableType.Coordinates
     return np.array(model.mbs.GetNodeOutput(modes.node, kind))

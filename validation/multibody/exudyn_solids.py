@@ -19,14 +19,14 @@ from validation.multibody.motion import matrix, shifted
 
 
 def add_mesh(model: Model, place: Place, body: MeshBody) -> Elastic:
-    """A meshed body in its floating frame, clamped so that its tip is at the place.
+    """Add a meshed body in its floating frame, clamped so that its tip is at the place.
 
-    Its modes are the static ones of rigid interfaces (Hurty-Craig-Bampton), found
-    by Exudyn from the full stiffness matrix.
+    Its modes are the static ones of rigid interfaces (Hurty-Craig-Bampton), computed by
+    Exudyn from the full stiffness matrix.
 
     Args:
-        model: to add it to.
-        place: where the frame is while the body is free of stress.
+        model: the model to be extended.
+        place: pose of the frame while the body is free of stress.
         body: the solid.
 
     Returns:
@@ -57,10 +57,10 @@ def add_mesh(model: Model, place: Place, body: MeshBody) -> Elastic:
 
 
 def _interface(model: Model, number: int, solid: MeshedSolid, side: int) -> int:
-    """A marker that moves with an interface, 0 the base and 1 the tip."""
+    """Return a marker that moves with an interface, 0 the base and 1 the tip."""
     nodes = (solid.base, solid.tip)[side]
     arms = solid.nodes[nodes] - solid.centers[side]
-    # weights whose mean is the centre: an offset would not turn with the nodes
+    # weights whose mean is the centre: an offset would not rotate with the nodes
     rows = np.vstack([np.ones(len(arms)), arms.T / np.abs(arms).max()])
     weights = np.linalg.lstsq(rows, np.array([1.0, 0.0, 0.0, 0.0]))[0]
     marker = model.item.MarkerSuperElementRigid(
@@ -70,7 +70,7 @@ def _interface(model: Model, number: int, solid: MeshedSolid, side: int) -> int:
 
 
 def _tip_wrenches(body: MeshBody, basis: NDArray, K: NDArray) -> NDArray:
-    """(6, 6) wrench at the tip, frame's axes, of unit mode coordinates."""
+    """Return the (6, 6) wrench at the tip, frame's axes, of unit mode coordinates."""
     solid = body.solid
     arms = solid.nodes[solid.tip] - solid.centers[1]
     rigid = np.zeros((len(arms), 3, 6))
@@ -87,7 +87,7 @@ _CONDENSED: WeakKeyDictionary[MeshedSolid, Any] = WeakKeyDictionary()
 
 
 def _floating(fem: Any, solid: MeshedSolid) -> Any:
-    """Exudyn's floating body of a solid, condensed at its first use."""
+    """Return Exudyn's floating body of a solid, condensed at its first use."""
     if solid not in _CONDENSED:
         link = fem.FEMinterface()
         link.nodes = {"Position": solid.nodes}

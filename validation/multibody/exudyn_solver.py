@@ -1,12 +1,12 @@
-"""From the open robot to its equilibrium: Exudyn's static solver, stage by stage.
+"""Exudyn's static solver, from the open robot to its equilibrium, in stages.
 
-Closures are closed while loads grow; contacts stiffen, if there are any, and motions
-that nothing resists are released; the remaining closure errors are then subtracted from
-the closures' targets until they vanish.
+Closures are closed while loads increase.  Then contacts stiffen, if there are any, and
+free motions are released.  The remaining closure errors are subtracted from the
+closures' targets until they vanish.
 
 A solution keeps its time limit: Exudyn counts processor time and stops between two
-steps, and its user functions check the clock.  Exceptions raised there, Ctrl-C among
-them, are raised again.
+steps, and its user functions check the clock.  Exceptions raised there, including
+Ctrl-C, are raised again.
 """
 
 import time
@@ -29,11 +29,13 @@ from validation.multibody.motion import exponential, inverse, logarithm
 
 _CLOSED = 1e-12  # [rad, m] largest component of a closure error
 _LOAD_STEPS = 4
-_RELEASING_STEPS = 4  # of motions that nothing resists
-_NARROWING_STEPS = 30  # of the smoothing of contacts, geometrically
+_RELEASING_STEPS = 4  # number of steps that release free motions
+# number of steps of the contacts' smoothing, geometrically spaced
+_NARROWING_STEPS = 30
 _CLOSING_STEPS = 30
-_RELAXING_STEPS = 4  # what is left falls a million times in each
-_RESTS = 1e-10  # [rad, m] by which free motions are at rest
+# largest number of steps; the residual falls a million times in each
+_RELAXING_STEPS = 4
+_RESTS = 1e-10  # [rad, m] change of free motions at rest
 _STAGES = (
     "closures are pulled shut and loads grow",
     "contacts harden and free motions are released",
@@ -47,17 +49,17 @@ def solve(
     """Close the closures in steps, then correct their targets until they are closed.
 
     Args:
-        model: built; it is left in its equilibrium.
+        model: built; afterwards it is in its equilibrium.
         closures: to be closed.
         narrow: whether there are contacts, whose smoothing is reduced in between.
         steps: least number of steps in which closures are closed.
 
     Returns:
-        What :func:`close` goes on from, if loads change.
+        The shifts with which :func:`close` continues if loads change.
 
     Raises:
-        SimulationFailed: no equilibrium was found; :class:`OutOfTime` if because the
-            model's deadline has passed.
+        SimulationFailed: no equilibrium was found; :class:`OutOfTime` if the model's
+            deadline has passed.
     """
     shift = np.zeros((2, len(closures), 6))  # of the targets, at 2 times
     model.mbs.SetPreStepUserFunction(_before_step(model, closures, shift))
@@ -73,12 +75,12 @@ def close(model: Model, closures: list[Closure], shift: NDArray) -> None:
     """Correct the closures' targets until they are closed.
 
     Args:
-        model: solved, but for the last gaps.
+        model: solved, except for the last gaps.
         closures: to be closed.
         shift: (2, closures, 6) [rad, m] of the targets, changed in place.
 
     Raises:
-        SimulationFailed: as above.
+        SimulationFailed: no equilibrium was found.
     """
     for _ in range(_CLOSING_STEPS):
         if largest_gap(model, closures) <= _CLOSED:
@@ -97,19 +99,19 @@ def close(model: Model, closures: list[Closure], shift: NDArray) -> None:
 def relax(
     model: Model, closures: list[Closure], idle: Mapping[str, Elastic], shift: NDArray
 ) -> None:
-    """Let the weak springs of free motions rest where the model stands.
+    """Set the rest positions of free motions' weak springs to the present state.
 
-    They pull it away from the equilibrium that it has without them.  A robot that is
-    soft along such a motion and bends as it moves has another stiffness there.
+    Otherwise these springs displace the equilibrium.  A robot that is soft along such a
+    motion and bends while moving would then have another stiffness.
 
     Args:
         model: solved.
         closures: to be kept closed.
         idle: the springs of free motions.
-        shift: as above.
+        shift: (2, closures, 6) [rad, m] of the targets, changed in place.
 
     Raises:
-        SimulationFailed: as above.
+        SimulationFailed: no equilibrium was found.
     """
     for _ in range(_RELAXING_STEPS):
         motions = idle_motions(model, idle)
@@ -123,7 +125,7 @@ def relax(
 def _before_step(
     model: Model, closures: list[Closure], shift: NDArray
 ) -> Callable[[Any, float], bool]:
-    """Exudyn's function before each step: moves targets, narrows contacts."""
+    """Return Exudyn's function before each step: it moves targets, narrows contacts."""
     opened = [
         logarithm(inverse(c.first.built @ c.closed) @ c.second.built) for c in closures
     ]
@@ -151,13 +153,13 @@ def _before_step(
 
 
 def equilibrate(model: Model, start: float, steps: int) -> None:
-    """Exudyn's static solver, from the last state, over one unit of its time.
+    """Run Exudyn's static solver from the last state, over one unit of its time.
 
     Args:
         model: assembled.
-        start: 0: closures are closed and loads grow; 1: contacts stiffen; 2: the
+        start: 0: closures are closed and loads increase; 1: contacts stiffen; 2: the
             closures' targets are corrected.
-        steps: to begin with; a step that fails is cut.
+        steps: first number of steps; a failed step is divided.
 
     Raises:
         SimulationFailed: the shortest step fails, or the deadline has passed.
@@ -175,7 +177,7 @@ def equilibrate(model: Model, start: float, steps: int) -> None:
         status = f"no equilibrium while {stage} (Exudyn: {reason})"
         raise SimulationFailed(model.robot, status) from None
     finally:
-        timer.timeout = -1.0  # the timer is common to all models
+        timer.timeout = -1.0  # all models have one timer in common
     if model.mbs.sys["staticSolver"].output.simulationTimeout:
         model.callback_error = TimeoutError()
     raise_callback_error(model, stage)
@@ -185,8 +187,8 @@ def raise_callback_error(model: Model, stage: str) -> None:
     """Raise the exception of a user function, if there was one.
 
     Args:
-        model: whose function it was.
-        stage: in which, for the message.
+        model: the model of the function.
+        stage: present stage, for the message.
 
     Raises:
         OutOfTime: its deadline has passed.
@@ -201,7 +203,7 @@ def raise_callback_error(model: Model, stage: str) -> None:
 
 
 def static_settings(model: Model, start: float, steps: int) -> Any:
-    """Exudyn's settings of :func:`equilibrate`."""
+    """Return Exudyn's settings of :func:`equilibrate`."""
     settings = model.exu.SimulationSettings()
     settings.linearSolver.solverType = model.exu.LinearSolverType.EigenSparse
     settings.solution.file.write = False
@@ -212,7 +214,7 @@ def static_settings(model: Model, start: float, steps: int) -> Any:
     static.useLoadFactor = start == 0.0
     static.minimumStepSize = 1e-3
     newton = static.newton
-    newton.residualMode = 1  # of increments: weak springs make residuals small
+    newton.residualMode = 1  # of increments, since weak springs make residuals small
     newton.absoluteTolerance = newton.relativeTolerance = model.regularisation.tolerance
     newton.maxIterations = 25
     newton.numericalDifferentiation.relativeEpsilon = 1e-8  # of user functions
@@ -226,6 +228,6 @@ def _record(model: Model) -> None:
 
 
 def largest_gap(model: Model, closures: list[Closure]) -> float:
-    """[rad, m] largest component of the closure errors."""
+    """Return the [rad, m] largest component of the closure errors."""
     gaps = [np.abs(closure_error(model, closure)).max() for closure in closures]
     return float(max(gaps, default=0.0))

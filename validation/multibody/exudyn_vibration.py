@@ -1,8 +1,8 @@
 """Small vibrations of an Exudyn model about its equilibrium.
 
-Exudyn linearises the model and projects it onto the motions that its joints leave.  Of
-the bodies only those that were given a mass have one, so that the mass matrix is
-singular: what follows without inertia is condensed, not an infinite frequency.
+Exudyn linearises the model and projects it onto the motions that its joints allow.
+Only bodies with a given mass have one, so the mass matrix is singular: degrees of
+freedom without inertia are condensed, instead of having an infinite frequency.
 """
 
 import numpy as np
@@ -12,15 +12,15 @@ from validation.multibody.exudyn_model import Model
 from validation.multibody.exudyn_parts import Place
 
 _SIX = (np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1]))  # Exudyn's order
-_NOTHING = 1e-12  # of the largest: no inertia
+_NOTHING = 1e-12  # relative to the largest: smaller inertias count as zero
 
 
 def set_masses(model: Model, bodies: list[tuple[Place, float]]) -> None:
-    """Give the model's rigid bodies point masses in place of those it was built with.
+    """Set point masses of the model's rigid bodies, in place of their first masses.
 
     Args:
         model: solved.
-        bodies: where each is, and [kg].
+        bodies: place of each, and [kg].
     """
     for item in range(model.mbs.systemData.NumberOfObjects()):
         if model.mbs.GetObject(item)["objectType"] == "RigidBody":
@@ -28,7 +28,7 @@ def set_masses(model: Model, bodies: list[tuple[Place, float]]) -> None:
 
 
 def _set_mass(model: Model, body: int, points: list[tuple[Place, float]]) -> None:
-    """Mass, centre and inertia about its reference point of one body."""
+    """Set mass, centre and inertia about its reference point of one body."""
     mass = sum(m for _, m in points)
     centres = np.array([p.local[:3, 3] for p, _ in points]).reshape(-1, 3)
     masses = np.array([m for _, m in points])
@@ -42,13 +42,13 @@ def _set_mass(model: Model, body: int, points: list[tuple[Place, float]]) -> Non
 
 
 def natural_frequencies(model: Model) -> NDArray:
-    """(k,) [Hz] of a solved model, lowest first.
+    """Return the (k,) [Hz] natural frequencies of a solved model, lowest first.
 
     Args:
-        model: in its equilibrium.
+        model: model in its equilibrium.
 
     Returns:
-        As many as there are inertias.
+        One for each inertia.
     """
     M, K, *_ = model.mbs.ComputeLinearizedSystem(projectIntoConstraintNullspace=True)
     M, K = (M + M.T) / 2, (K + K.T) / 2

@@ -1,15 +1,14 @@
 """The platform's compliance by the simulation's own linearised system.
 
-Exudyn's residual is differentiated at its equilibrium, with the forces that are there:
-loads, and reactions of joints and closures, kept while everything else moves.  It is
-differentiated along the motions that joints and closures leave, so that nothing stiff
-that cannot move enters with its noise.  These are taken along the modes of Exudyn's own
-Jacobian, which keeps soft ones apart from stiff ones, and differences are extrapolated
-to no step.
+Exudyn's residual is differentiated at its equilibrium, with the forces there (loads,
+and reactions of joints and closures) held constant.  It is differentiated along the
+motions that joints and closures allow, so that stiff directions that cannot move add no
+noise. These motions follow the modes of Exudyn's own Jacobian, which separates soft
+from stiff ones, and differences are extrapolated to step zero.
 
-Weak springs hold what nothing resists, to be solved at all.  Without them the
-compliance is more by k X (1 - k B)^-1 X', X how the platform and B how their joints
-answer to loads on these joints (Woodbury), which is added again.
+Weak springs hold free motions, so that the model can be solved.  Without them the
+compliance is larger by k X (1 - k B)^-1 X' (Woodbury), which is added.  X and B are the
+responses of the platform and of the free joints to loads on these joints.
 """
 
 from collections.abc import Callable
@@ -37,20 +36,20 @@ from validation.multibody.open_robot import OpenTree
 # within some nm, and pressed by less
 _STEPS, _CONTACT_STEPS = (2e-4, 1e-4, 5e-5), (1e-8, 3e-9, 1e-9, 3e-10)
 _GAP_STEP = 1e-5
-_RANK = 1e-7  # relative size of a gap's derivative that counts as none
+_RANK = 1e-7  # relative size below which a gap's derivative counts as zero
 _ROLLS = 1e-4  # of a joint's motion that its idle spring alone does not resist
-_POLISH = 2  # steps of Newton's method: closures' rounding moves soft robots
+_POLISH = 2  # Newton steps at the end, because rounding of closures moves soft robots
 
 
 def linearised_compliance(
     model: Model, tree: OpenTree, platform: str
 ) -> tuple[NDArray, float, bool]:
-    """Compliance at the equilibrium in which a model stands.
+    """Return the compliance at the present equilibrium of a model.
 
     Args:
         model: solved.
-        tree: what it consists of.
-        platform: its frame.
+        tree: its parts.
+        platform: name of its frame.
 
     Returns:
         (6, 6) [rad/(N m) .. m/N] of small motions at the platform's present origin,
@@ -80,11 +79,11 @@ _LAW = "springForceTorqueUserFunction"
 
 
 def _freeze(model: Model, closure: Closure) -> None:
-    """Let a closed closure's wrench be what it is, whatever moves.
+    """Hold a closed closure's wrench constant.
 
-    The connector pulls half-way between the closed place and a target behind it, off
-    by its own deformation, a mm under 1e5 N; the wrench that stays is read where it is
-    closed.
+    The connector acts half-way between the closed place and a target behind it,
+    displaced by its own deformation, a mm under 1e5 N.  The constant wrench is read at
+    the closed place.
     """
     wrench = connector_wrench(model, closure.connector)
     screw = wrench / model.regularisation.closing
@@ -98,7 +97,7 @@ def _freeze(model: Model, closure: Closure) -> None:
 def _compliance(
     model: Model, motion: Callable[[NDArray, NDArray, float], NDArray], tree: OpenTree
 ) -> tuple[NDArray, float, bool]:
-    """V Z (Z'KZ)^-1 Z'V' over the motions Z that keep joints and closures."""
+    """Return V Z (Z'KZ)^-1 Z'V' over the motions Z that keep joints and closures."""
     solver, settings = model.exu.MainSolverStatic(), static_settings(model, 2.0, 1)
     solver.InitializeSolver(model.mbs, settings)
     count = solver.GetODE2size()
@@ -112,7 +111,7 @@ def _compliance(
         ahead, back = ([forces(q + sign * step * z) for z in Z.T] for sign in (1, -1))
         return Z.T @ (np.array(ahead) - np.array(back)).T / (2 * step)
 
-    # softer or harder pressed, a contact is another one: nothing is polished there
+    # contacts change with the pressure, so no Newton steps are made with them
     steps, polish = (_CONTACT_STEPS, 0) if tree.contacts else (_STEPS, _POLISH)
     q = np.array(model.mbs.systemData.GetODE2Coordinates())
     forces(q)
@@ -145,8 +144,8 @@ def _compliance(
 
 
 def _is_stable(model: Model, K: NDArray, V: NDArray) -> bool:
-    """Whether no motion lowers the potential by more than K is known to."""
-    # what nothing resists is rounding, of either sign
+    """Return whether no motion lowers the potential by more than K's uncertainty."""
+    # the curvature of free motions is rounding, of either sign
     K = K + 1e3 * model.regularisation.idle * V[6:].T @ V[6:]
     size = 1.0 / np.sqrt(np.abs(np.diag(K)))
     scaled = (K + K.T) / 2 * np.outer(size, size)
@@ -154,23 +153,23 @@ def _is_stable(model: Model, K: NDArray, V: NDArray) -> bool:
 
 
 def _held(model: Model, K: NDArray, V: NDArray) -> NDArray:
-    """The modes' stiffness with the idle springs."""
+    """Return the modes' stiffness with the idle springs."""
     return K + model.regularisation.idle * V[6:].T @ V[6:]
 
 
 def _by_modes(model: Model, K: NDArray, V: NDArray) -> NDArray:
-    """Compliance from the modes' stiffness and motions, without the idle springs."""
+    """Return the compliance by the modes' stiffness, without the idle springs."""
     whole = V @ _solve(_held(model, K, V), V.T)
     k, coupled = model.regularisation.idle, whole[:6, 6:]
     held, ways = np.linalg.eigh(np.eye(len(whole) - 6) - k * whole[6:, 6:])
-    # what moves the idle springs alone, such as a rod that rolls, moves no other body
+    # motions of idle springs alone, such as a rolling rod's, move no other body
     ways, held = ways[:, held > _ROLLS], held[held > _ROLLS]
     ways = coupled @ ways / np.sqrt(held)
     return whole[:6, :6] + k * ways @ ways.T
 
 
 def _solve(K: NDArray, right: NDArray) -> NDArray:
-    """K^-1 right, of stiffnesses far apart."""
+    """Return K^-1 right, for stiffnesses of very different size."""
     K = (K + K.T) / 2
     size = 1.0 / np.sqrt(np.abs(np.diag(K)))
     scaled = K * np.outer(size, size)
@@ -180,7 +179,7 @@ def _solve(K: NDArray, right: NDArray) -> NDArray:
 def _motion(
     model: Model, tree: OpenTree, platform: str, q: NDArray, Z: NDArray, step: float
 ) -> NDArray:
-    """Derivatives along Z of gaps, of the platform's pose, of idle joints."""
+    """Return derivatives along Z of gaps, of the platform's pose, of idle joints."""
     system, place = model.mbs.systemData, tree.before[platform]
 
     def read(q: NDArray) -> tuple[NDArray, NDArray, NDArray]:

@@ -1,9 +1,10 @@
-"""The platform's compliance by small loads, with an error of its own.
+"""The platform's compliance by small loads, with its uncertainty.
 
-At its equilibrium the simulation is loaded a little along each axis, both ways, by
-steps that fall; half the difference of the platform's motions per load is the
-compliance but for the steps' square.  How far that is depends on what moves inside:
-a joint may turn a hundred times as much as the platform.  So they are extrapolated.
+At its equilibrium the simulation is loaded slightly along each axis, in both
+directions, by decreasing steps.  Half the difference of the platform's motions per load
+is the compliance, with an error of the step's square.  The size of this error depends
+on internal motions: a joint may rotate a hundred times as much as the platform.  So the
+differences are extrapolated.
 """
 
 from functools import partial
@@ -19,11 +20,12 @@ from validation.multibody.exudyn_reading import idle_motions, pose
 from validation.multibody.exudyn_solver import close, equilibrate
 from validation.multibody.open_robot import OpenTree
 
-_LARGEST, _RATIO, _SIZES = 4e-3, 5.0, 4  # [rad, m] of the platform, and how they fall
+# [rad, m] of the platform: largest step, ratio and number of steps
+_LARGEST, _RATIO, _SIZES = 4e-3, 5.0, 4
 
 
 def add_step_loads(model: Model, tree: OpenTree, platform: str) -> tuple[int, int]:
-    """Moment and force on the platform, none at first; before the model is solved."""
+    """Add moment and force on the platform, zero at first, before the solution."""
     marker = model.add_marker(tree.before[platform])
     item = model.item
     moment = item.LoadTorqueVector(markerNumber=marker, loadVector=[0.0] * 3)
@@ -35,22 +37,22 @@ def stepped_compliance(
     model: Model, tree: OpenTree, platform: str, loads: tuple[int, int], shift: NDArray,
     sizes: NDArray,
 ) -> tuple[NDArray, float]:  # fmt: skip
-    """Compliance by differences at the equilibrium in which a model stands.
+    """Return the compliance by differences at the present equilibrium of a model.
 
     Args:
         model: solved.
-        tree: what it consists of.
-        platform: its frame.
-        loads: of :func:`add_step_loads`.
-        shift: of :func:`validation.multibody.exudyn_solver.solve`.
-        sizes: (6,) [rad or m per N m or N] largest motion under unit loads, about.
+        tree: its parts.
+        platform: name of its frame.
+        loads: loads of :func:`add_step_loads`.
+        shift: shift for :func:`validation.multibody.exudyn_solver.solve`.
+        sizes: (6,) [rad or m per N m or N] approximate largest motion under unit loads.
 
     Returns:
         (6, 6) [rad/(N m) .. m/N] of small motions at the platform's present origin,
         base axes; and its uncertainty, of entries over sqrt(C_ii C_jj).
 
     Raises:
-        SimulationFailed: no equilibrium near by, not even under the smallest loads.
+        SimulationFailed: no equilibrium nearby, even under the smallest loads.
         OutOfTime: the model's deadline has passed; a :class:`SimulationFailed`.
     """
     system, initial = model.mbs.systemData, model.exu.ConfigurationType.Initial
@@ -59,7 +61,7 @@ def stepped_compliance(
     def moved(step: float, unit: NDArray, drift: NDArray) -> tuple[NDArray, ...]:
         for number, part in zip(loads, np.split(step * unit, 2), strict=True):
             model.mbs.SetLoadParameter(number, "loadVector", part.tolist())
-        # targets move with the load: what a step before has shown is nearly right
+        # targets move with the load: the motion of the last step is a good guess
         shift[:] = first[1] + step * drift
         system.SetSystemState(start, configuration=initial)
         equilibrate(model, 2.0, 1)
@@ -83,7 +85,7 @@ def stepped_compliance(
             except OutOfTime:
                 raise
             except SimulationFailed:
-                # a large step may leave what any equilibrium carries
+                # a large step may leave the range of equilibria
                 if step <= _LARGEST / size / _RATIO ** (_SIZES - 3):
                     raise
                 slopes.clear()
@@ -106,5 +108,5 @@ def stepped_compliance(
 
 
 def _relative(sizes: NDArray, change: NDArray) -> float:
-    """The largest of a change of the platform's motion, of its size along each axis."""
+    """Return the largest change of the platform's motion, relative to its size."""
     return float((change[:6] / sizes).max())

@@ -1,7 +1,7 @@
 """Finite rigid motions as 4 by 4 matrices, for the simulation's side of a comparison.
 
-Written apart from :mod:`stiffness.screws` on purpose: a mistake in the placement of
-frames must not reach both sides.
+This module is independent of :mod:`stiffness.screws` on purpose: a mistake in the
+placement of frames must not affect both sides.
 """
 
 import math
@@ -12,20 +12,20 @@ from scipy.spatial.transform import Rotation
 
 
 def matrix(rotation: NDArray, translation: ArrayLike) -> NDArray:
-    """(4, 4) from axes (3, 3) and origin (3,) [m]."""
+    """Return the (4, 4) matrix of axes (3, 3) and origin (3,) [m]."""
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = rotation, translation
     return T
 
 
 def turned(rotation_vector: ArrayLike) -> NDArray:
-    """(3, 3) rotation by a vector [rad]."""
+    """Return the (3, 3) rotation by a vector [rad]."""
     return Rotation.from_rotvec(np.array(rotation_vector, dtype=float)).as_matrix()
 
 
 def turn_of(R: NDArray) -> NDArray:
-    """(3,) [rad] rotation vector, of length at most pi, of a rotation (3, 3)."""
-    # by the quaternion, of which the largest component comes first (Shepperd 1978)
+    """Return (3,) [rad] rotation vector, of length at most pi, of a rotation (3, 3)."""
+    # by the quaternion, whose largest component is computed first (Shepperd 1978)
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R.tolist()
     trace = xx + yy + zz
     largest = max(trace, xx, yy, zz)
@@ -44,22 +44,22 @@ def turn_of(R: NDArray) -> NDArray:
 
 
 def placement(rotation_vector: ArrayLike, translation: ArrayLike) -> NDArray:
-    """(4, 4) of a rotation vector [rad] and a translation [m], both in the old axes."""
+    """Return (4, 4) of a rotation vector [rad] and a translation [m] in old axes."""
     return matrix(turned(rotation_vector), translation)
 
 
 def shifted(translation: ArrayLike) -> NDArray:
-    """(4, 4) of a translation alone."""
+    """Return the (4, 4) of a translation alone."""
     return matrix(np.eye(3), translation)
 
 
 def inverse(T: NDArray) -> NDArray:
-    """(4, 4) the motion back."""
+    """Return the (4, 4) inverse motion."""
     return matrix(T[:3, :3].T, -T[:3, :3].T @ T[:3, 3])
 
 
 def exponential(screw: NDArray) -> NDArray:
-    """Finite motion of a constant screw acting for unit time.
+    """Return the finite motion of a constant screw acting for unit time.
 
     Args:
         screw: (6,) ``[RX RY RZ TX TY TZ]`` [rad, m].
@@ -71,7 +71,7 @@ def exponential(screw: NDArray) -> NDArray:
 
 
 def logarithm(T: NDArray) -> NDArray:
-    """Constant screw that makes a finite motion in unit time.
+    """Return the constant screw that makes a finite motion in unit time.
 
     Args:
         T: (4, 4) of a rotation by less than pi.
@@ -84,7 +84,7 @@ def logarithm(T: NDArray) -> NDArray:
 
 
 def _mean_turn(angles: NDArray) -> NDArray:
-    """(3, 3) mean of the rotations by t times a rotation vector, t from 0 to 1."""
+    """Return (3, 3) mean of rotations by t times a rotation vector, t from 0 to 1."""
     a = float(np.linalg.norm(angles))
     x, y, z = angles
     W = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

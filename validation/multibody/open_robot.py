@@ -1,8 +1,8 @@
-"""The open, stress-free robot: bodies as their chains place them, errors included.
+"""The open robot without stress: bodies in their chains, with errors.
 
-At a frame the body's error comes first, then the link's deformation, then the joint's,
+At a frame the body's error acts first, then the link's deformation, then the joint's,
 as in the paper; rotation vector and translation of an error are both in the frame's
-axes.  Passive joints without a spring turn or slide freely along their own z.
+axes.  Passive joints without a spring rotate or slide freely along their own z.
 """
 
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ from validation.multibody.motion import inverse, matrix, placement, shifted
 
 
 class PostureLike(Protocol):
-    """The part of a posture that the simulation uses."""
+    """The properties of a posture that the simulation uses."""
 
     @property
     def robot(self) -> Robot:
@@ -37,19 +37,20 @@ class PostureLike(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """The model to be built.
+    """Description of the model to be built.
 
     Attributes:
         posture: the robot and its joint coordinates.
         scale: factor on its geometric errors and clearances.
-        springs: by frame, K_E of links that are springs; see :func:`link_springs`.
-        meshes: by frame, links that are solids.
-        elements: of each other link, a beam.
+        springs: by frame, K_E of links that are springs; see
+            :func:`link_springs`.
+        meshes: meshes by frame, links that are solids.
+        elements: number of elements of each other link, a beam.
         clearances: whether joints have their clearances.
         bushes: whether pins have two bushes each.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
-        couple: (3,) [N m] on the platform besides, base axes, by dead forces.
+        couple: (3,) [N m] additional couple on the platform, base axes, by dead forces.
     """
 
     posture: PostureLike
@@ -70,10 +71,10 @@ def link_springs(
     given: Mapping[str, NDArray],
     meshes: Mapping[str, MeshBody],
 ) -> dict[str, NDArray]:
-    """Stiffness of every link that is to be neither a beam nor a mesh.
+    """Return the stiffness of every link that becomes neither a beam nor a mesh.
 
     Args:
-        robot: any.
+        robot: any robot.
         links: ``"beam"`` or ``"spring"``.
         given: K_E (6, 6) [N m/rad .. N/m] by frame.
         meshes: solids by frame.
@@ -114,7 +115,7 @@ class OpenTree:
         joints: joint springs by frame.
         idle: the springs of free motions by frame.
         contacts: joints with clearance by frame.
-        closures: in the robot's order.
+        closures: closures in the robot's order.
     """
 
     platform: NDArray
@@ -128,14 +129,14 @@ class OpenTree:
 
 
 def build(model: Model, case: Case) -> OpenTree:
-    """The open, stress-free robot with its errors, its closures and its loads.
+    """Build the open robot without stress, with errors, closures and loads.
 
     Args:
         model: empty.
-        case: what is to be built.
+        case: the description.
 
     Returns:
-        Where everything is in the model.
+        The parts of the model.
     """
     posture, robot = case.posture, case.posture.robot
     nominal = _nominal(posture)
@@ -161,7 +162,7 @@ def build(model: Model, case: Case) -> OpenTree:
 def _add_frame(
     model: Model, case: Case, frame: Frame, parent: Place, tree: OpenTree
 ) -> Place:
-    """A body with its error, its link and its joint; where its own motion begins."""
+    """Add a body with its error, link and joint; return the place before its motion."""
     error = case.scale * frame.geometric_error
     place = parent.moved(placement(frame.rotation, frame.translation))
     place = place.moved(placement(error[:3], error[3:]))
@@ -191,7 +192,7 @@ def _add_frame(
 
 
 def _nominal(posture: PostureLike) -> dict[str, NDArray]:
-    """(4, 4) of every frame without imperfections, before its own motion."""
+    """Return the (4, 4) of every frame without imperfections, before its own motion."""
     T: dict[str, NDArray] = {}
     after = {BASE: np.eye(4)}
     for frame, q in zip(posture.robot.frames, posture.coordinates, strict=True):
@@ -202,14 +203,14 @@ def _nominal(posture: PostureLike) -> dict[str, NDArray]:
 
 
 def _own_motion(frame: Frame, q: float) -> NDArray:
-    """(4, 4) the joint's motion about or along z."""
+    """Return the (4, 4) motion of the joint about or along z."""
     if frame.joint == "prismatic":
         return shifted([0.0, 0.0, q])
     return placement([0.0, 0.0, q if frame.joint == "revolute" else 0.0], np.zeros(3))
 
 
 def _add_beam(model: Model, place: Place, frame: Frame, elements: int) -> Elastic:
-    """A straight beam, clamped to the place's body so that it ends at the place."""
+    """Add a straight beam, clamped to the place's body so that it ends at the place."""
     link = frame.link
     assert isinstance(link, BeamLink)
     length, x = beam_span(frame, link)
@@ -224,7 +225,7 @@ def _add_beam(model: Model, place: Place, frame: Frame, elements: int) -> Elasti
 
 
 def _add_couple(model: Model, place: Place, nominal: NDArray, couple: NDArray) -> None:
-    """A couple: along each axis an arm of 1 m, at its end a force m x axis / 2."""
+    """Add a couple: along each axis an arm of 1 m with a force m x axis / 2."""
     for axis, arm in zip(nominal[:3, :3].T, np.eye(3), strict=True):
         force = np.cross(couple, axis) / 2
         model.add_force(place.moved(shifted(arm)), force)
@@ -232,12 +233,12 @@ def _add_couple(model: Model, place: Place, nominal: NDArray, couple: NDArray) -
 
 
 def _add_weights(model: Model, robot: Robot, tree: OpenTree, gravity: NDArray) -> None:
-    """Loads of everything that has a mass.
+    """Add the weights of all masses.
 
-    A beam's weight acts at its nodes, with the moments at its ends of a clamped beam
-    under uniform load: the tip of a cantilever is then exact for any number of nodes.
-    The moments are pairs of forces on arms that turn with the ends, as the weight of
-    the cubic between the nodes is: weight keeps its direction and has a potential.
+    A beam's weight acts at its nodes, with the end moments of a clamped beam under
+    uniform load: the tip of a cantilever is then exact for any number of nodes.  The
+    moments are pairs of forces on arms that rotate with the ends, like the weight of
+    the cubic between the nodes: weight keeps its direction and has a potential.
     """
     for frame in robot.frames:
         if frame.mass:

@@ -1,13 +1,13 @@
 """The forced assembly as a multibody simulation, independent of the linear model.
 
-Every body is placed open and stress-free, with its full geometric error; the closures
-are then closed by force, and Exudyn finds the static equilibrium with finite
-rotations.  Nothing but the robot's data and its joint coordinates is shared with the
-virtual-joint model: placement, beams and equilibrium are found again.
+Every body is placed open and without stress, with its full geometric error.  The
+closures are then closed by force, and Exudyn computes the static equilibrium with
+finite rotations.  Only the robot's data and its joint coordinates are shared with the
+virtual-joint model; placement, beams and equilibrium are computed independently.
 
-At a frame the body's error comes first, then the link's deformation, then the joint's,
+At a frame the body's error acts first, then the link's deformation, then the joint's,
 as in the paper; rotation vector and translation of an error are both in the frame's
-axes.  Without clearances passive joints turn or slide freely along their own z.  A
+axes.  Without clearances passive joints rotate or slide freely along their own z.  A
 closure is closed by a connector whose target is corrected until the closure error
 vanishes, so overconstrained rigid loops (parallelograms) are no special case.
 
@@ -28,8 +28,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput
+from forcefit.results.display import html_table, short_repr
 from validation.multibody.exudyn_model import (
     HOLDING_STIFFNESS,
     IDLE_STIFFNESS,
@@ -58,17 +58,19 @@ from validation.multibody.open_robot import (
 )
 
 LINKS = ("beam", "spring")
-TIME_LIMIT = 600.0  # [s] for one simulation; the slowest took 26 on an idle core
-_FINEST = 1e-10  # [m, rad, -] no tolerance is smaller
+# [s] largest time of a simulation; the slowest took 26 s on an idle core
+TIME_LIMIT = 600.0
+_FINEST = 1e-10  # [m, rad, -] smallest tolerance
 # tried in turn; with contacts closures must not be much softer than these, and a rod
 # between two spherical joints may roll by radians under its weight unless it is held
 _TIGHT = (
     Regularisation(1e10, IDLE_STIFFNESS),
     Regularisation(1e10, HOLDING_STIFFNESS),
 )
-# a joint without contact is undetermined within its clearance: rounding of forces moves
-# it by 1e-3 m in the first, by 1e-7 m in the third, which is a little smoother.  At
-# small scales clearances are of that size too; softer contacts round forces less
+# a joint without contact is undetermined within its clearance.  Rounding of forces
+# moves it by 1e-3 m with the first, by 1e-7 m with the third, which is a little
+# smoother.  At small scales clearances have that size too; softer contacts round forces
+# less
 WITH_CLEARANCES = (
     Regularisation(1e12, IDLE_STIFFNESS),
     Regularisation(1e10, IDLE_STIFFNESS, contact=0.1),
@@ -80,21 +82,22 @@ WITH_CLEARANCES = (
 
 @dataclass(frozen=True, eq=False)
 class SimulationModel:
-    """How links and joints are modelled.
+    """Options for the modelling of links and joints.
 
     Attributes:
         links: ``"beam"``: links with a section are geometrically exact beams, the
             others 6 by 6 springs; ``"spring"``: all of them are springs.
-        stiffness: by frame, K_E (6, 6) [N m/rad .. N/m] at the frame, in its axes, of
-            links that become springs and whose matrix the robot does not give.
-        meshes: by frame, links that are solids of finite elements in a floating frame.
+        stiffness: stiffness by frame, K_E (6, 6) [N m/rad .. N/m] at the frame, in its
+            axes, of links that become springs and whose matrix the robot does not give.
+        meshes: meshes by frame, links that are solids of finite elements in a floating
+            frame.
         elements: beam elements per link.
         clearances: whether joints have their clearances, scaled like the errors.
         bushes: whether joints with radial clearance and tilt are pins in two bushes,
             see :func:`validation.multibody.contact.joint_clearance`, not a disc and a
             cone.
-        hold: hold motions that nothing resists from the first; otherwise only where no
-            equilibrium is found without.
+        hold: hold free motions from the start; otherwise only if no equilibrium is
+            found without.
     """
 
     links: str = "beam"
@@ -117,29 +120,29 @@ _STANDARD = SimulationModel()
 
 @dataclass(frozen=True, eq=False)
 class MultibodyAssembly:
-    """A robot forced together, as the simulation found it.
+    """A robot assembled by the simulation.
 
     Rows are frames in the robot's order; screws and wrenches are at the frame, in its
-    axes, zero where the frame has no such spring.
+    axes, zero for a frame without such a spring.
 
     Attributes:
         platform_screw: (6,) [rad, m] rotation vector of R_actual R_nominal^T and
             difference of the platform's origin, base axes.
         energy: [J] of all links and joint springs.
         link_screws: (n, 6) [rad, m] deformations: logarithm of the relative motion.
-        link_wrenches: (n, 6) [N m, N] what acts on the link's tip from outside.
+        link_wrenches: (n, 6) [N m, N] outer wrenches on the links' tips.
         joint_screws: (n, 6) [rad, m] deformations of the joint springs.
-        joint_wrenches: (n, 6) [N m, N] what acts on their outer side.
+        joint_wrenches: (n, 6) [N m, N] wrenches on their outer side.
         clearance_screws: (n, 6) [rad, m] of joints, and own motions of passive ones.
-        closure_wrenches: (closures, 6) [N m, N] what each closure's second chain
-            exerts on its first, at the platform's nominal origin, base axes.
+        closure_wrenches: (closures, 6) [N m, N] of each closure's second chain on its
+            first, at the platform's nominal origin, base axes.
         transforms: (n, 4, 4) frames seen from the base, before their own motion.
         gap: [rad, m] largest component of a closure error.
-        idle_energy: [J] in the springs that hold free motions; a check, nearly zero.
+        idle_energy: [J] in the springs of free motions; a check, nearly zero.
         contact_energy: [J] in the compliance of contacts.
-        held: whether motions that nothing resists are held by 0.01 N m/rad or N/m,
-            since no equilibrium was found without.
-        seconds: [s] taken.
+        held: whether free motions are held by 0.01 N m/rad or N/m, since no equilibrium
+            was found without.
+        seconds: [s] computing time.
     """
 
     platform_screw: NDArray
@@ -175,18 +178,19 @@ def simulate_assembly(
     couple: ArrayLike | None = None,
     time_limit: float = TIME_LIMIT,
 ) -> MultibodyAssembly:
-    """Force a robot together in Exudyn.
+    """Assemble a robot by force in Exudyn.
 
     Args:
         posture: the robot and its joint coordinates; actuated joints are locked there.
         scale: factor on the robot's geometric errors.
-        model: how links and joints are modelled.
-        load: (6,) [N m, N] on the platform at its origin, base axes; its direction
-            stays.
+        model: options for links and joints.
+        load: (6,) [N m, N] on the platform at its origin, base axes, of constant
+            direction.
         gravity: (3,) [m/s^2] base axes: bodies with a mass and beams with a density
-            weigh; other links, whose mass is not known, do not.
-        couple: (3,) [N m] on the platform besides, base axes, by forces whose direction
-            stays on arms that turn with it: it has a potential, a moment has none.
+            have weight; other links, of unknown mass, have none.
+        couple: (3,) [N m] additional couple on the platform, base axes.  Forces of
+            constant direction act on arms that rotate with it, so that it has a
+            potential, which a moment has not.
         time_limit: [s] after which the simulation fails.
 
     Returns:
@@ -195,7 +199,7 @@ def simulate_assembly(
     Raises:
         BadInput: a spring's stiffness is missing.
         SimulationFailed: no equilibrium was found.
-        OutOfTime: it was not found in time; a :class:`SimulationFailed`.
+        OutOfTime: the solution was not found in time; a :class:`SimulationFailed`.
     """
     started = time.monotonic()
     given = {name: np.asarray(K, dtype=float) for name, K in model.stiffness.items()}
@@ -226,16 +230,16 @@ def simulate_assembly(
 
 
 def _vector(given: ArrayLike | None, size: int) -> NDArray:
-    """(size,) what is given, or zeros."""
+    """Return the (size,) vector given, or zeros."""
     return np.zeros(size) if given is None else np.asarray(given, dtype=float)
 
 
 def _simulate(
     case: Case, regularisation: Regularisation, started: float, limit: float
 ) -> MultibodyAssembly:
-    """Build, solve, read, and give the memory back."""
+    """Build and solve a model, read its results, and release the memory."""
     robot = case.posture.robot
-    # accepted steps stay as small beside the clearances at every scale
+    # steps are accepted at the same size relative to the clearances at every scale
     tolerance = max(regularisation.tolerance * min(case.scale, 1.0), _FINEST)
     regularisation = replace(regularisation, tolerance=tolerance)
     model = Model(*import_exudyn(), robot.name, regularisation)
@@ -251,19 +255,19 @@ def _simulate(
 def simulated_frequencies(
     posture: PostureLike, count: int = 6, elements: int = 8
 ) -> NDArray:
-    """Natural frequencies of a robot in Exudyn, drives held, as it stands nominally.
+    """Return natural frequencies of a robot in Exudyn at its nominal pose, drives held.
 
     Args:
-        posture: as in :func:`simulate_assembly`; links with a section are beams with
+        posture: see :func:`simulate_assembly`; links with a section are beams with
             consistent masses, the others must be given by a matrix and have none.
-        count: how many at most.
-        elements: of each beam.
+        count: largest number of frequencies.
+        elements: number of elements of each beam.
 
     Returns:
         (k,) [Hz] lowest first; free motions are held by 1e-6 N m/rad or N/m.
 
     Raises:
-        BadInput: a link's stiffness is not known.
+        BadInput: a link's stiffness is unknown.
         SimulationFailed: no equilibrium was found.
     """
     robot = without_clearance(posture.robot)
@@ -295,12 +299,12 @@ def closing_sequence(
     scale: float = 1.0,
     load: ArrayLike | None = None,
 ) -> NDArray:
-    """Frames of a robot without clearances while its closures are closed.
+    """Return the frames of a robot without clearances while its closures are closed.
 
     Args:
-        posture: as in :func:`simulate_assembly`; links with a section are beams, the
+        posture: see :func:`simulate_assembly`; links with a section are beams, the
             others must be given by a matrix.
-        steps: in which the closures are closed, at least 4.
+        steps: number of steps that close the closures, at least 4.
         scale: factor on the geometric errors.
         load: (6,) [N m, N] on the platform, which grows meanwhile.
 
@@ -309,7 +313,7 @@ def closing_sequence(
         last; k is at least ``steps + 1``.
 
     Raises:
-        BadInput: a link's stiffness is not known.
+        BadInput: a link's stiffness is unknown.
         SimulationFailed: no equilibrium was found.
     """
     robot = posture.robot
@@ -338,10 +342,10 @@ def closing_sequence(
 
 
 def without_clearance(robot: Robot) -> Robot:
-    """The same robot without clearances, to compare with a simulation.
+    """Return the same robot without clearances, to compare with a simulation.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
         The robot; its passive joints move along their z without bound.
@@ -353,7 +357,7 @@ def without_clearance(robot: Robot) -> Robot:
 def _read(
     model: Model, robot: Robot, tree: OpenTree, started: float
 ) -> MultibodyAssembly:
-    """The equilibrium's screws, wrenches and energies."""
+    """Return the equilibrium's screws, wrenches and energies."""
     count = len(robot.frames)
     screws = {kind: np.zeros((count, 6)) for kind in ("link", "joint", "clearance")}
     wrenches = {kind: np.zeros((count, 6)) for kind in ("link", "joint")}
@@ -394,7 +398,7 @@ def _read(
 
 
 def import_exudyn() -> tuple[Any, Any, Any]:
-    """Exudyn without windows and without a word on the console."""
+    """Import Exudyn without windows and console output."""
     with contextlib.redirect_stdout(io.StringIO()):
         import exudyn
         from exudyn import FEM, itemInterface

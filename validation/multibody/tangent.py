@@ -1,7 +1,7 @@
-"""The platform's compliance in the simulation, at an equilibrium, by two roads.
+"""The platform's compliance in the simulation, at an equilibrium, by two methods.
 
-Errors, loads and weight count as in :func:`.simulation.simulate_assembly`; springs act
-by the gradient of their energy, so that the tangent is one of a potential.
+Errors, loads and weight act as in :func:`.simulation.simulate_assembly`; springs act by
+the gradient of their energy, so that the tangent is that of a potential.
 """
 
 import time
@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 from validation.multibody.exudyn_model import Model, Regularisation
 from validation.multibody.exudyn_parts import OutOfTime, SimulationFailed
 from validation.multibody.exudyn_reading import pose
@@ -26,29 +26,28 @@ from validation.multibody.simulation import (
     import_exudyn,
 )
 
-# closures' forces are rounded to 1e-16 of their stiffness, and move soft robots by it
+# closures' forces are rounded to 1e-16 of their stiffness, which moves soft robots
 _REGULARISATIONS = (
     Regularisation(1e8, 1e-8), Regularisation(1e8, 1e-6), Regularisation(1e10, 1e-6)
 )  # fmt: skip
 
-# large load steps may go past a fork onto the equilibrium that has become unstable
+# large load steps may pass a bifurcation and reach an unstable equilibrium
 _SMALLER_STEPS = (16, 64)
 
 
 @dataclass(frozen=True, eq=False)
 class SimulatedTangent:
-    """A compliance found twice in one simulation.
+    """A compliance computed by two methods in one simulation.
 
     Attributes:
         linearised: (6, 6) [rad/(N m) .. m/N] of small motions at the platform's present
             origin, base axes, by the linearised system.
-        stepped: (6, 6) by small loads; NaN where they were not asked for.
-        linearised_error: [-] own uncertainty of the first, of entries over
-            sqrt(C_ii C_jj).
-        stepped_error: [-] of the second.
-        platform: (4, 4) where the platform stands, seen from the base.
-        stable: whether the equilibrium is.
-        seconds: [s] taken.
+        stepped: (6, 6) by small loads; NaN if not requested.
+        linearised_error: [-] uncertainty of the first, of entries over sqrt(C_ii C_jj).
+        stepped_error: [-] uncertainty of the second.
+        platform: (4, 4) present pose of the platform, seen from the base.
+        stable: whether the equilibrium is stable.
+        seconds: [s] computing time.
     """
 
     linearised: NDArray
@@ -70,30 +69,30 @@ def simulated_tangent(
     steps: bool = True,
     time_limit: float = TIME_LIMIT,
 ) -> SimulatedTangent:
-    """The platform's compliance at the equilibrium of errors, load and weight.
+    """Return the platform's compliance at the equilibrium of errors, load and weight.
 
     Args:
-        posture: where the robot stands; its errors count.
-        model: of its links; its clearances count if they do in the model, in contacts
-            of 1e12 N/m that are smoothed, and then there are no load steps.
+        posture: the robot's configuration, with its errors.
+        model: model of its links.  Clearances are included if they are in the model, in
+            smoothed contacts of 1e12 N/m; then there are no load steps.
         load: (6,) [N m, N] on the platform at its origin, base axes: a dead force, and
             a moment as a couple of dead forces.
         gravity: (3,) [m/s^2] base axes.
-        steps: by small loads too.
-        time_limit: [s] of all of it.
+        steps: whether small loads are used too.
+        time_limit: [s] of the whole computation.
 
     Returns:
         Both compliances, at a stable equilibrium unless smaller load steps than usual
-        lead to an unstable one, too.
+        lead to an unstable one as well.
 
     Raises:
         BadInput: a spring's stiffness is missing.
         SimulationFailed: no equilibrium was found.
-        OutOfTime: it was not found in time; a :class:`SimulationFailed`.
+        OutOfTime: the solution was not found in time; a :class:`SimulationFailed`.
     """
     started = time.monotonic()
     case = _case(posture, model, load, gravity)
-    # where no spring is bent its law does not matter, and Exudyn's own is faster
+    # without bent springs their law does not matter, and Exudyn's own is faster
     bent = is_bent(posture.robot.errors, load, gravity)
     hard = tuple(r for r in WITH_CLEARANCES if r.contact == 1.0)
     tried = hard[:2] if model.clearances else _REGULARISATIONS
@@ -111,7 +110,7 @@ def _first(
     case: Case, ways: list[Regularisation], load_steps: int, steps: bool,
     started: float, limit: float,
 ) -> SimulatedTangent:  # fmt: skip
-    """The answer by the first regularisation that has one in time."""
+    """Return the result of the first regularisation that succeeds in time."""
     *first, last = ways
     for way in first:
         try:
@@ -124,7 +123,7 @@ def _first(
 
 
 def is_bent(*causes: ArrayLike | None) -> bool:
-    """Whether any of errors, load and weight is there, so that springs are bent."""
+    """Return whether there are errors, load or weight, so that springs are bent."""
     return any(np.any(cause) for cause in causes if cause is not None)
 
 
@@ -132,7 +131,7 @@ def _case(
     posture: PostureLike, model: SimulationModel,
     load: ArrayLike | None, gravity: ArrayLike | None,
 ) -> Case:  # fmt: skip
-    """What is to be built."""
+    """Return the description of the model."""
     given = {name: np.asarray(K, dtype=float) for name, K in model.stiffness.items()}
     solids = dict(model.meshes)
     wrench = np.zeros(6) if load is None else np.asarray(load, dtype=float)
@@ -150,7 +149,7 @@ def _tangent(
     case: Case, regularisation: Regularisation, load_steps: int, steps: bool,
     started: float, limit: float,
 ) -> SimulatedTangent:  # fmt: skip
-    """Build, solve, differentiate, and give the memory back."""
+    """Build, solve and differentiate a model, and release the memory."""
     robot = case.posture.robot
     program = Model(*import_exudyn(), robot.name, regularisation)
     program.deadline = started + limit

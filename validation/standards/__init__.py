@@ -1,4 +1,4 @@
-"""Figures of a machine as standards define them, from the repeats of a campaign.
+"""Accuracy and repeatability by standards, from the repeats of a campaign.
 
-Begin at ``figures.py``.
+Begin with ``figures.py``.
 """

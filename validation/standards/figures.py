@@ -1,5 +1,6 @@
-"""Figures of ISO 9283 and ISO 230-2 from a campaign's repeats."""
+"""Characteristics of ISO 9283 and ISO 230-2 from a campaign's repeats."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from itertools import combinations, islice
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.errors import BadInput, quoted
+from forcefit.results.text import in_unit, table_lines
 from validation.campaign.campaign import READING, Campaign, number_rows
 from validation.standards.iso230 import AxisFigures, axis_figures
 from validation.standards.iso9283 import (
@@ -20,7 +22,7 @@ from validation.standards.iso9283 import (
     position_repeatability,
 )
 
-_MOST_PAIRS = 2000  # of positions whose distances are looked at
+_MOST_PAIRS = 2000  # most pairs of positions whose distances are evaluated
 
 
 @dataclass(frozen=True)
@@ -28,13 +30,13 @@ class PoseFigures:
     """ISO 9283 at one pose, load and side of approach; None where not measured.
 
     Attributes:
-        label: id of its first row.
-        cycles: n.
+        label: id of the first row.
+        cycles: number of cycles n.
         accuracy: AP_P [m].
         repeatability: RP_l [m].
         angles: AP_a, AP_b, AP_c [rad].
         angle_repeatability: RP_a, RP_b, RP_c [rad].
-        drift: of AP_P [m].
+        drift: drift of AP_P [m].
     """
 
     label: str
@@ -48,11 +50,11 @@ class PoseFigures:
 
 @dataclass(frozen=True)
 class DistanceFigures:
-    """ISO 9283 of the distance between two poses.
+    """ISO 9283 characteristics of the distance between two poses.
 
     Attributes:
-        labels: of the poses.
-        commanded: [m] between them.
+        labels: ids of the first rows of the poses.
+        commanded: [m] commanded distance.
         accuracy: AD_P [m], with its sign.
         repeatability: RD [m].
     """
@@ -65,17 +67,18 @@ class DistanceFigures:
 
 @dataclass(frozen=True)
 class StandardFigures:
-    """All figures of a campaign.
+    """All characteristics of a campaign by ISO 9283 and ISO 230-2.
 
     Attributes:
-        campaign: its name.
-        registration: ``"known"`` or ``"unknown"``; AP counts from where the device was
-            taken to stand.
-        poses: repeated at least once.
-        distances: between two of them that were measured under one load, in one
-            session, at one point, and were approached from one side.
-        axes: ISO 230-2 of each reading approached from both sides, by its name; where
-            loads, sessions or points differ, each apart, with the id of its first row.
+        campaign: name of the campaign.
+        registration: ``"known"`` or ``"unknown"``; AP includes the error of the
+            registration used.
+        poses: poses measured at least twice.
+        distances: distances of pairs of poses with equal load, session, point and side
+            of approach.
+        axes: ISO 230-2 characteristics of each reading approached from both sides, by
+            name; separate for each load, session and point, named by the first row's
+            id.
     """
 
     campaign: str
@@ -85,7 +88,7 @@ class StandardFigures:
     axes: dict[str, AxisFigures]
 
     def table(self) -> dict[str, Any]:
-        """Plain values for ``--json``."""
+        """Return plain values for JSON."""
         return {
             "campaign": self.campaign,
             "registration": self.registration,
@@ -98,12 +101,17 @@ class StandardFigures:
 
     def text(self) -> str:
         """A table for people, the worst of each in the last line."""
-        lines = [f"{self.campaign}: ISO 9283, {len(self.poses)} poses with repeats",
-                 "pose              cycles  AP [um]  RP [um]  drift [um]"]  # fmt: skip
-        for pose in self.poses:
-            values = (pose.accuracy, pose.repeatability, pose.drift)
-            shown = "  ".join(_micro(value) for value in values)
-            lines.append(f"{pose.label[:16]:16}  {pose.cycles:6}  {shown}")
+        rows = {
+            pose.label: [
+                pose.cycles,
+                *(math.nan if value is None else 1e6 * value
+                  for value in (pose.accuracy, pose.repeatability, pose.drift)),
+            ]
+            for pose in self.poses
+        }  # fmt: skip
+        head = ("pose", "cycles", "AP [um]", "RP [um]", "drift [um]")
+        lines = [f"{self.campaign}: ISO 9283, {len(rows)} poses with repeats",
+                 *table_lines(head, rows, digits=4)]  # fmt: skip
         if self.registration == "unknown":
             lines.append("registration unknown: AP includes where the device stood")
         if self.distances:
@@ -111,32 +119,28 @@ class StandardFigures:
             a, b = worst.labels
             lines.append(
                 f"distance accuracy, worst of {len(self.distances)}: "
-                f"{1e6 * worst.accuracy:.4g} um of {worst.commanded:.4g} m, {a} to "
-                f"{b}; repeatability {1e6 * worst.repeatability:.4g} um"
+                f"{in_unit(worst.accuracy, 'um')} of {worst.commanded:.4g} m, {a} to "
+                f"{b}; repeatability {in_unit(worst.repeatability, 'um')}"
             )
         for name, axis in self.axes.items():
             unit = "urad" if name.startswith("r") else "um"
             lines.append(
-                f"ISO 230-2 {name} [{unit}]: B {1e6 * axis.reversal:.4g}, "
-                f"R {1e6 * axis.repeatability:.4g}, E "
-                f"{1e6 * axis.systematic_deviation:.4g}, A {1e6 * axis.accuracy:.4g}"
+                f"ISO 230-2 {name}: B {in_unit(axis.reversal, unit)}, "
+                f"R {in_unit(axis.repeatability, unit)}, E "
+                f"{in_unit(axis.systematic_deviation, unit)}, "
+                f"A {in_unit(axis.accuracy, unit)}"
             )
         return "\n".join(lines)
 
 
-def _micro(value: float | None) -> str:
-    """A length in um, in eight characters."""
-    return f"{'-':>7}" if value is None else f"{1e6 * value:7.4g}"
-
-
 def standard_figures(campaign: Campaign) -> StandardFigures:
-    """Figures of ISO 9283 and ISO 230-2 of a campaign.
+    """Return the characteristics of ISO 9283 and ISO 230-2 of a campaign.
 
     Args:
-        campaign: with rows measured more than once.
+        campaign: campaign with rows measured more than once.
 
     Returns:
-        The figures; sides of approach are apart in ISO 9283, as its cycles are.
+        The characteristics; ISO 9283 evaluates the sides of approach separately.
 
     Raises:
         BadInput: no row is repeated.
@@ -160,13 +164,13 @@ def standard_figures(campaign: Campaign) -> StandardFigures:
 
 
 def _in_time(campaign: Campaign, rows: NDArray) -> NDArray:
-    """Rows in the order measured."""
+    """Return the rows in the order of measurement."""
     time = campaign.covariates.get("time")
     return rows if time is None else rows[np.argsort(time[rows], kind="stable")]
 
 
 def _pose(campaign: Campaign, rows: NDArray) -> PoseFigures:
-    """ISO 9283 of one set of repeats."""
+    """Return ISO 9283 characteristics of one set of repeats."""
     turns, shifts = campaign.measured[rows, :3], campaign.measured[rows, 3:]
     turns, shifts = (d[np.isfinite(d).all(axis=1)] for d in (turns, shifts))
     placed, turned = len(shifts) > 1, len(turns) > 1
@@ -184,7 +188,7 @@ def _pose(campaign: Campaign, rows: NDArray) -> PoseFigures:
 
 
 def _circumstances(campaign: Campaign) -> NDArray:
-    """(R,) number of the load, session and point of each row, from 0 by first use."""
+    """Return (R,) number of each row's load, session and point, by first use."""
     names = [
         np.unique(column, return_inverse=True)[1]
         for column in (campaign.session, campaign.point)
@@ -194,13 +198,13 @@ def _circumstances(campaign: Campaign) -> NDArray:
 
 
 def _distances(campaign: Campaign, sets: list[NDArray]) -> Iterator[DistanceFigures]:
-    """ISO 9283 of distances, cycle by cycle, between poses that differ.
+    """Yield ISO 9283 characteristics of distances between different poses.
 
-    The standard's cycles go from one pose to the other under one load: poses of two
-    loads differ by a deflection, poses of two sessions by where the device stood.
+    The standard's cycles go from one pose to the other under one load.  Poses of two
+    loads differ by a deflection, poses of two sessions by the position of the device.
 
     Yields:
-        Figures of each pair.
+        Characteristics of each pair.
     """
     T = campaign.transforms[:, campaign.robot.index(campaign.robot.platform)]
     nominal = T[:, :3, 3] + np.einsum("rij,rj->ri", T[:, :3, :3], campaign.targets)
@@ -220,7 +224,7 @@ def _distances(campaign: Campaign, sets: list[NDArray]) -> Iterator[DistanceFigu
 
 
 def _axes(campaign: Campaign) -> Iterator[tuple[str, AxisFigures]]:
-    """ISO 230-2 of each reading, load, session and point."""
+    """Yield ISO 230-2 characteristics of each reading, load, session and point."""
     apart = _circumstances(campaign)
     for k, name in enumerate(READING):
         for number in range(int(apart.max()) + 1):
@@ -232,7 +236,7 @@ def _axes(campaign: Campaign) -> Iterator[tuple[str, AxisFigures]]:
 
 
 def _axis(campaign: Campaign, k: int) -> AxisFigures | None:
-    """Figures of a reading taken at least twice from both sides; None without."""
+    """Return characteristics of a reading repeated from both sides; else None."""
     side, values = campaign.covariates.get("approach"), campaign.measured[:, k]
     if side is None:
         return None

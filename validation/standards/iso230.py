@@ -1,4 +1,4 @@
-"""Reversal and repeatability of ISO 230-2, by its formulas.
+"""Reversal and repeatability by the formulas of ISO 230-2.
 
 Sources:
     ISO 230-2:2014, Test code for machine tools, part 2: determination of accuracy and
@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 
 @dataclass(frozen=True)
 class AxisFigures:
-    """Figures of one component over m positions [m or rad].
+    """Characteristics of one component over m positions [m or rad].
 
     Attributes:
-        reversal: B, the largest reversal in size.
+        reversal: B, the largest absolute reversal.
         mean_reversal: B-bar, with its sign.
         repeatability_forward: R up.
         repeatability_backward: R down.
@@ -41,15 +41,15 @@ class AxisFigures:
 def axis_figures(
     forward: Sequence[ArrayLike], backward: Sequence[ArrayLike]
 ) -> AxisFigures:
-    """Figures of ISO 230-2 from repeated approaches to m positions.
+    """Return characteristics of ISO 230-2 from repeated approaches to m positions.
 
     Args:
-        forward: for each position the deviations [m or rad], approached from below;
-            at least two.
-        backward: likewise from above.
+        forward: for each position at least two deviations [m or rad], approached from
+            below.
+        backward: for each position the deviations approached from above.
 
     Returns:
-        The figures.
+        The characteristics.
     """
     (mean_up, s_up), (mean_down, s_down) = _moments(forward), _moments(backward)
     reversal = mean_up - mean_down
@@ -70,6 +70,6 @@ def axis_figures(
 
 
 def _moments(positions: Sequence[ArrayLike]) -> tuple[NDArray, NDArray]:
-    """(m,) means and (m,) standard deviations."""
+    """Return the (m,) means and (m,) standard deviations."""
     rows = [np.asarray(row, dtype=float) for row in positions]
     return np.array([r.mean() for r in rows]), np.array([r.std(ddof=1) for r in rows])

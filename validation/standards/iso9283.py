@@ -1,22 +1,23 @@
-"""Pose accuracy and repeatability of ISO 9283, by its formulas.
+"""Pose accuracy and repeatability by the formulas of ISO 9283.
 
 Sources:
     ISO 9283:1998, Manipulating industrial robots, performance criteria and related test
-    methods: 7.2 (AP, RP), 7.3 (AD, RD), 7.6 (drift of AP).  The standard measures 30
-    cycles; here as many as there are.
+    methods: 7.2 (AP, RP), 7.3 (AD, RD), 7.6 (drift of AP).  The standard requires 30
+    cycles; here any number is allowed.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-DRIFT_CYCLES = 10  # of each block whose AP is compared with the first block's
+# cycles of each block whose AP is compared with that of the first block
+DRIFT_CYCLES = 10
 
 
 def position_accuracy(deviations: ArrayLike) -> float:
-    """AP_P [m]: from the commanded position to the barycentre of those attained.
+    """Return AP_P [m], distance of the commanded position from the mean attained one.
 
     Args:
-        deviations: (n, 3) [m] attained less commanded.
+        deviations: (n, 3) [m] attained minus commanded positions.
 
     Returns:
         The distance.
@@ -25,10 +26,10 @@ def position_accuracy(deviations: ArrayLike) -> float:
 
 
 def position_repeatability(deviations: ArrayLike) -> float:
-    """RP_l [m]: radius of the sphere about the barycentre, mean plus three S_l.
+    """Return RP_l [m], radius of a sphere about the mean: mean distance + 3 S_l.
 
     Args:
-        deviations: (n, 3) [m] attained less commanded, n >= 2.
+        deviations: (n, 3) [m] attained minus commanded positions, n >= 2.
 
     Returns:
         The radius.
@@ -39,10 +40,10 @@ def position_repeatability(deviations: ArrayLike) -> float:
 
 
 def orientation_accuracy(angles: ArrayLike) -> NDArray:
-    """AP_a, AP_b, AP_c (3,) [rad]: mean attained less commanded angle about each axis.
+    """Return AP_a, AP_b, AP_c (3,) [rad], mean attained minus commanded angles.
 
     Args:
-        angles: (n, 3) [rad] attained less commanded.
+        angles: (n, 3) [rad] attained minus commanded angles.
 
     Returns:
         The differences, with their signs.
@@ -51,13 +52,13 @@ def orientation_accuracy(angles: ArrayLike) -> NDArray:
 
 
 def orientation_repeatability(angles: ArrayLike) -> NDArray:
-    """RP_a, RP_b, RP_c (3,) [rad]: three standard deviations of each angle.
+    """Return RP_a, RP_b, RP_c (3,) [rad]: three standard deviations of each angle.
 
     Args:
-        angles: (n, 3) [rad] attained less commanded, n >= 2.
+        angles: (n, 3) [rad] attained minus commanded angles, n >= 2.
 
     Returns:
-        Half the widths.
+        Half of the widths.
     """
     return 3 * np.std(np.asarray(angles, dtype=float), axis=0, ddof=1)
 
@@ -65,29 +66,29 @@ def orientation_repeatability(angles: ArrayLike) -> NDArray:
 def distance_accuracy(
     first: ArrayLike, second: ArrayLike, commanded: float
 ) -> tuple[float, float]:
-    """AD_P and RD [m] of the distance between two positions.
+    """Return AD_P and RD [m] of the distance between two positions.
 
     Args:
-        first: (n, 3) [m] attained, cycle by cycle.
-        second: (n, 3) [m] likewise, n >= 2.
-        commanded: [m] the distance asked for.
+        first: (n, 3) [m] attained positions, cycle by cycle.
+        second: (n, 3) [m] attained positions, n >= 2.
+        commanded: [m] commanded distance.
 
     Returns:
-        Mean attained less commanded distance, and three standard deviations of it.
+        Mean attained minus commanded distance, and three standard deviations of it.
     """
     lengths = np.linalg.norm(np.asarray(first) - np.asarray(second), axis=1)
     return float(lengths.mean() - commanded), float(3 * lengths.std(ddof=1))
 
 
 def accuracy_drift(deviations: ArrayLike, cycles: int = DRIFT_CYCLES) -> float | None:
-    """dAP_P [m]: largest change of AP_P from the first block of cycles to a later one.
+    """Return dAP_P [m], largest change of AP_P from the first to a later block.
 
     Args:
-        deviations: (n, 3) [m] attained less commanded, in the order measured.
-        cycles: of a block; what is left over at the end is not looked at.
+        deviations: (n, 3) [m] attained minus commanded, in the order of measurement.
+        cycles: cycles of a block; an incomplete last block is ignored.
 
     Returns:
-        The change, None with fewer than two blocks.
+        The change; None with fewer than two blocks.
     """
     d = np.asarray(deviations, dtype=float)
     count = len(d) // cycles

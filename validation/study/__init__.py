@@ -1,4 +1,4 @@
-"""The main job: every check of a study file, one report.
+"""Study: all checks of a study file, in one report.
 
-Begin at ``study.py``.
+Begin with ``study.py``.
 """

@@ -1,4 +1,4 @@
-"""What governs the worst case: the certified bound with one part made perfect."""
+"""Certified error bound with one part of the robot made perfect at a time."""
 
 from dataclasses import replace
 from typing import Any
@@ -14,23 +14,24 @@ from assembly.model.robot import Frame, Robot
 from assembly.solvers.conic import SolverFailed
 
 ERROR, CLEARANCE = "geometric error", "clearance"
-_KEYS = ("tilt", "spin", "radial", "axial")  # as the bounds of clearance_bounds
+_KEYS = ("tilt", "spin", "radial", "axial")  # names of the bounds in clearance_bounds
 
 
 def governing(posture: Posture, assumption: str = "frozen") -> list[dict[str, Any]]:
-    """Largest pose error (27) with one frame's error or one joint's clearance removed.
+    """Return error bounds (27) without one frame's error or one joint's clearance.
 
-    The errors are those that the robot has: two of them may cancel each other, and then
-    the bound rises when one is removed.
+    The robot's given errors are used.  Two of them may compensate each other; the bound
+    then increases when one is removed.
 
     Args:
-        posture: of a robot with errors or clearances.
-        assumption: of problem (27).
+        posture: configuration of a robot with errors or clearances.
+        assumption: assumption of problem (27).
 
     Returns:
-        For each frame with errors and each joint with clearances its name (``part``),
+        For each frame with errors and each joint with clearances: its name (``part``),
         ``what`` is removed, and the upper bounds ``rotation`` [rad] and ``translation``
-        [m] without it, the smallest translation first; None where there is no answer.
+        [m] without it.  The smallest translation is first; bounds are None without a
+        solution.
     """
     rows: list[dict[str, Any]] = []
     for part, what, robot in _improved(posture.robot):
@@ -49,14 +50,14 @@ def governing(posture: Posture, assumption: str = "frozen") -> list[dict[str, An
 
 
 def _by_translation(row: dict[str, Any]) -> tuple[float, float]:
-    """The smallest bound first, those without an answer last."""
+    """Return key that sorts the smallest bound first, missing bounds last."""
     if row["translation"] is None:
         return (np.inf, np.inf)
     return (row["translation"], row["rotation"])
 
 
 def _improved(robot: Robot) -> list[tuple[str, str, Robot]]:
-    """The robot with each of its imperfections removed, one at a time."""
+    """Return robots that each lack one of the robot's imperfections."""
     cases = []
     for i, frame in enumerate(robot.frames):
         if robot.errors[i].any():
@@ -72,7 +73,7 @@ def _improved(robot: Robot) -> list[tuple[str, str, Robot]]:
 
 
 def _tight(frame: Frame) -> Frame | None:
-    """A joint without its clearances, its own motion left; None if it has none."""
+    """Return the joint without its clearances; None if it has none."""
     own = own_cone(frame)
     clearances = [key for k, key in enumerate(_KEYS) if k != own]
     if not any(getattr(frame.clearance, key, None) for key in clearances):

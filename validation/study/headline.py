@@ -1,7 +1,7 @@
-"""Conclusions of a study in a few sentences: assembly, pose error, checks.
+"""Conclusions of a study in a few sentences: assembly, pose error and checks.
 
 The first pose error is the certified bound over all positions within the clearances;
-every other one is given with its assumption on the clearances.
+each other one names its assumption on the clearances.
 """
 
 from typing import Any
@@ -9,27 +9,29 @@ from typing import Any
 import numpy as np
 
 from assembly.model.statuses import BEYOND_LIMITS, SINGULAR
+from forcefit.results.text import in_unit
 from validation.study.study import StudyResults
 
-WORST = "frozen"  # assumption of (27): all clearance motions without spring deformation
+# assumption of (27): all motions within the clearances, without elastic deformation
+WORST = "frozen"
 _CHECKED = {
     "energy": "energy", "margin": "zone margin", "margin_free": "free zone margin"
 }  # fmt: skip
-_OUTCOMES = ("passed", "failed", "not decided")  # of a check that ran
-_NO_CLEARANCE = 1e-6  # [-] of the clearances: less is rounding
+_OUTCOMES = ("passed", "failed", "not decided")  # results of a check
+_NO_CLEARANCE = 1e-6  # [-] share of the clearances; less is a rounding error
 
 
 def worst_clearance(results: StudyResults) -> dict[str, Any]:
-    """Certified upper bounds of the platform's error over all clearance positions.
+    """Return certified upper bounds of the platform's error within the clearances.
 
     Args:
-        results: of :func:`validation.study.study.run_study`.
+        results: results of :func:`validation.study.study.run_study`.
 
     Returns:
-        ``rotation`` [rad] and ``translation`` [m], by ``frozen`` of (27), at the
-        study's pose (``pose``) and the largest over its ``map``, with the number of
-        ``points`` they are over, ``of`` all; None where there is none.  Infinite where
-        nothing bounds the platform.
+        ``rotation`` [rad] and ``translation`` [m] by ``frozen`` of (27), at the study's
+        pose (``pose``) and the largest over its ``map``, with the number of ``points``
+        with bounds out of all (``of``).  None where there is no bound; infinite where
+        the pose is unbounded.
     """
     parts = ("rotation", "translation")
     error = results.error.get(WORST)
@@ -48,13 +50,13 @@ def worst_clearance(results: StudyResults) -> dict[str, Any]:
 
 
 def verdict(results: StudyResults) -> str:
-    """The conclusions of a study, in a few sentences.
+    """Return the conclusions of a study, in a few sentences.
 
-    The pose error is the certified bound over all clearance positions, and over the map
-    if there is one; beside it the error at least energy.
+    The pose error is the certified bound within the clearances, and over the map if
+    there is one; the error at least energy follows.
 
     Args:
-        results: of :func:`validation.study.study.run_study`.
+        results: results of :func:`validation.study.study.run_study`.
 
     Returns:
         Plain text.
@@ -72,13 +74,13 @@ def verdict(results: StudyResults) -> str:
 
 
 def by_force(results: StudyResults) -> bool:
-    """Whether it goes together, and only by force, whatever its clearances do.
+    """Return whether the robot can be assembled, and only with elastic deformation.
 
     Args:
-        results: of :func:`validation.study.study.run_study`.
+        results: results of :func:`validation.study.study.run_study`.
 
     Returns:
-        False too where it does not go together at all.
+        False also if the robot cannot be assembled.
     """
     if results.solution["status"] != "ok":
         return False
@@ -88,7 +90,7 @@ def by_force(results: StudyResults) -> bool:
 
 
 def _assembly_text(results: StudyResults) -> str:
-    """Whether clearances suffice, or the energy that is needed."""
+    """Return a sentence: the clearances suffice, or the energy needed."""
     zone, assembly = results.solution["zone"], results.assembly
     assert assembly is not None
     if not by_force(results):
@@ -105,7 +107,7 @@ def _assembly_text(results: StudyResults) -> str:
 
 
 def _pose_error_text(results: StudyResults) -> str:
-    """The platform's pose error: the certified bound first."""
+    """Return the platform's pose error: the certified bound first."""
     worst = worst_clearance(results)
     screw = results.solution["platform_screw"]
     turn, shift = (float(np.linalg.norm(half)) for half in (screw[:3], screw[3:]))
@@ -131,7 +133,7 @@ def _pose_error_text(results: StudyResults) -> str:
 
 
 def _other_assumptions(results: StudyResults) -> str:
-    """Bounds of the other assumptions, where they are more than one per cent larger."""
+    """Return bounds of the other assumptions that are over one per cent larger."""
     text = ""
     own = results.error[WORST]
     for assumption, error in results.error.items():
@@ -143,7 +145,7 @@ def _other_assumptions(results: StudyResults) -> str:
 
 
 def _bound_text(bounds: dict[str, float]) -> str:
-    """A pose error that is not exceeded."""
+    """Return the text of a pose error that is not exceeded."""
     if not all(np.isfinite([bounds["rotation"], bounds["translation"]])):
         return "free to move without bound"
     return f"at most {_pose_text(bounds['rotation'], bounds['translation'])}"
@@ -151,17 +153,17 @@ def _bound_text(bounds: dict[str, float]) -> str:
 
 def _pose_text(rotation: float, translation: float) -> str:
     """Sizes of a pose error [rad, m] in mm and mrad."""
-    return f"{1e3 * translation:.3g} mm and {1e3 * rotation:.3g} mrad"
+    return f"{in_unit(translation, 'mm', 3)} and {in_unit(rotation, 'mrad', 3)}"
 
 
 def covered(results: StudyResults) -> list[str]:
-    """What each independent check that ran says something about, and its outcome.
+    """Return the object and the result of each independent check that was run.
 
     Args:
-        results: of :func:`validation.study.study.run_study`.
+        results: results of :func:`validation.study.study.run_study`.
 
     Returns:
-        A phrase for each check; checks without a signal are left out.
+        A phrase for each check; checks with nothing to compare are left out.
     """
     phrases = []
     verdicts = results.verdicts
@@ -183,7 +185,7 @@ def covered(results: StudyResults) -> list[str]:
 
 
 def _checks_text(results: StudyResults) -> str:
-    """What was checked independently, with the outcome, and what was not."""
+    """Return a sentence on the independent checks, their results and missing checks."""
     phrases, missing = covered(results), results.unchecked
     text = "No independent check was asked for."
     if phrases:

@@ -1,4 +1,4 @@
-"""The study report's section on the grid: what varies over it, where it is largest."""
+"""The report's section on the grid: variation and largest values over it."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -10,10 +10,10 @@ from assembly.model.tables import component_unit
 from forcefit.page.charts import Axis, Layer, value_map
 from forcefit.page.page import paragraph, section
 from forcefit.page.tables import Cell, Value, table
-from forcefit.page.words import unit_of
+from forcefit.results.quantities import unit_of
 from stiffness.screws import WRENCH
 
-# of the maps: key, words
+# quantities shown as maps: name in the results, words
 MAPPED = {
     "translation_error": "largest shift, eq. (27), clearances anywhere",
     "rotation_error": "largest turn, eq. (27), clearances anywhere",
@@ -25,13 +25,13 @@ _UNITS = {"tx": "m", "ty": "m", "tz": "m", "rx": "rad", "ry": "rad", "rz": "rad"
 
 
 class Mapped(NamedTuple):
-    """One quantity over the grid.
+    """A quantity over the grid.
 
     Attributes:
-        key: its name.
-        words: that name it on the page.
-        unit: SI.
-        values: over the points, NaN without an answer.
+        key: name in the results.
+        words: name on the page.
+        unit: SI unit.
+        values: values at the points; NaN without a solution.
     """
 
     key: str
@@ -41,13 +41,13 @@ class Mapped(NamedTuple):
 
 
 def mapped(maps: Any) -> Iterator[Mapped]:
-    """The quantities of a study's maps; of pose errors the certified upper bound.
+    """Yield the quantities of a study's maps; of pose errors the upper bound.
 
     Args:
         maps: data set over the grid.
 
     Yields:
-        Those of every study, then those of the robot at work.
+        The quantities of every study, then those of the robot under load.
     """
     for key, words in MAPPED.items():
         one = maps[key].sel(bound="upper") if "bound" in maps[key].dims else maps[key]
@@ -74,7 +74,7 @@ def mapped(maps: Any) -> Iterator[Mapped]:
 
 
 def finite(one: Mapped) -> NDArray:
-    """Values of a map with an answer; pose errors that nothing bounds stay infinite."""
+    """Return the values of a map; NaN without a solution, infinite without a bound."""
     values = np.asarray(one.values, dtype=float).ravel()
     if one.key.endswith("_error"):
         return values[~np.isnan(values)]
@@ -82,15 +82,16 @@ def finite(one: Mapped) -> NDArray:
 
 
 def maps_section(maps: Any, summary: dict[str, Any]) -> str:
-    """Maps over the grid, their values under the pointer.
+    """Return the section with the maps over the grid.
 
     Args:
         maps: data set over the grid.
-        summary: of :func:`validation.study.report.map_summary`.
+        summary: result of :func:`validation.study.report.map_summary`.
 
     Returns:
-        Counts, a table of least, median and largest values and where that is, and the
-        map; over more than two axes that of two, the others held.
+        Counts, a table of the least, median and largest values with the place of the
+        largest, and the map.  Of more than two axes, the map shows two and holds the
+        others.
     """
     title = "Over the workspace"
     counts = ", ".join(f"{k}: {v}" for k, v in summary["status"].items())
@@ -115,11 +116,11 @@ def maps_section(maps: Any, summary: dict[str, Any]) -> str:
 
 
 def _drawn(maps: Any, first: Mapped) -> str:
-    """The map over two axes; of further ones a sentence says where they are held."""
+    """Return map over two axes, with a sentence on the values of the others."""
     names = [str(d) for d in maps["energy"].dims if maps.sizes[d] > 1]
     if not names:
         return ""
-    # the axes with most values; of equal ones the first
+    # the axes with the most values; the first of equal ones
     axes = sorted(sorted(names, key=lambda n: -maps.sizes[n])[:2], key=names.index)
     at = {name: i for name, i in _largest(first).items() if name not in axes}
     held = {name: i for name, i in at.items() if name in names}
@@ -142,7 +143,7 @@ def _drawn(maps: Any, first: Mapped) -> str:
 
 
 def _largest(one: Mapped) -> dict[str, int]:
-    """Place along each axis of the largest value."""
+    """Return the index along each axis of the largest value."""
     values = np.nan_to_num(np.asarray(one.values, dtype=float), nan=-np.inf)
     if not one.key.endswith("_error"):
         values = np.where(np.isposinf(values), -np.inf, values)
@@ -151,7 +152,7 @@ def _largest(one: Mapped) -> dict[str, int]:
 
 
 def _where(maps: Any, one: Mapped) -> str:
-    """Where a map is largest, in words."""
+    """Return the text of the place where a map is largest."""
     known = finite(one)
     bounded = bool(np.isfinite(known).all())
     if bounded and np.ptp(known) <= 1e-9 * np.abs(known).max():
@@ -160,7 +161,7 @@ def _where(maps: Any, one: Mapped) -> str:
 
 
 def _place(maps: Any, at: dict[str, int]) -> str:
-    """Coordinates of a point in words."""
+    """Return the text of a point's coordinates."""
     return ", ".join(
         f"{name} = {float(maps[name].values[i]):.6g} {_UNITS.get(name, '')}".rstrip()
         for name, i in at.items()

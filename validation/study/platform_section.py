@@ -1,4 +1,4 @@
-"""The study report's section on the platform's stiffness."""
+"""The report's section on the platform's stiffness."""
 
 from typing import Any
 
@@ -11,13 +11,13 @@ from stiffness.screws import SCREW
 
 
 def platform_section(stiffness: dict[str, Any]) -> str:
-    """K_C at the study's pose, and which part gives way, as HTML.
+    """Return K_C at the study's pose, and the most compliant parts, as HTML.
 
     Args:
-        stiffness: of :func:`assembly.report.platform_stiffness.stiffness_of`.
+        stiffness: result of :func:`assembly.report.platform_stiffness.stiffness_of`.
 
     Returns:
-        Headings, tables and the chart of shares.
+        Headings, tables and the chart of the parts' shares.
     """
     K = np.asarray(stiffness["stiffness"])
     size = np.sqrt(np.abs(np.nan_to_num(np.diag(K))))
@@ -50,7 +50,7 @@ def platform_section(stiffness: dict[str, Any]) -> str:
 
 
 def _chart(shares: dict[str, list[float]]) -> str:
-    """The largest shares, a bar for each direction."""
+    """Return chart of the largest shares, a bar for each direction."""
     traces = [
         {"type": "bar", "name": label(name), "x": list(DIRECTIONS), "y": row}
         for name, row in shares.items()

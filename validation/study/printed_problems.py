@@ -1,32 +1,40 @@
-"""Problems (21) and (22) as the paper prints them, in cvxpy, against our solutions."""
+"""Problems (21) and (22) as the paper prints them, solved by cvxpy, for comparison."""
 
 import math
 from typing import Any
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import Assembly
-from assembly.model.statuses import FAILS, NO_SIGNAL, UNDECIDED
+from assembly.model.statuses import (
+    FAILED,
+    FAILS,
+    NO_ANSWER,
+    NO_SIGNAL,
+    OK,
+    PASSED,
+    UNDECIDED,
+)
 from validation.crosscheck.verdict import Check
 
 TOLERANCE = 1e-6  # relative, of energies and margins
-# what cvxpy's solver leaves open: [J], and [-] of a margin
+# tolerance of cvxpy's solver: [J], and [-] of a margin
 _NOISE_ENERGY, _NOISE_MARGIN = 1e-12, 1e-10
 
 
 def compare_printed(
     posture: Posture, assembly: Assembly, zone: dict[str, Any]
 ) -> dict[str, Any]:
-    """Solve the printed problems, and compare energy and margins with ours.
+    """Solve the printed problems, and compare energy and margins with forcefit's.
 
     Args:
-        posture: where the robot stands.
-        assembly: ours, without loads.
-        zone: our ``margin`` and ``margin_free``.
+        posture: the robot's configuration.
+        assembly: forcefit's solution, without loads.
+        zone: forcefit's ``margin`` and ``margin_free``.
 
     Returns:
-        Their ``energy``, ``platform_screw``, ``margin`` and ``margin_free``; by name
-        the ``relative_difference``, NaN where there is nothing to compare; ``checks``,
-        the verdict on each; ``verdict`` and ``passed``.  Where cvxpy has no solution,
+        cvxpy's ``energy``, ``platform_screw``, ``margin`` and ``margin_free``; the
+        ``relative_difference`` of each, NaN where nothing can be compared; ``checks``,
+        the verdict on each; ``verdict`` and ``passed``.  If cvxpy finds no solution,
         only the ``reason``.
     """
     from assembly.linear.reference.as_printed import (
@@ -36,16 +44,16 @@ def compare_printed(
 
     try:
         energy, screw = energy_as_printed(posture)
-        margin, free = (margin_as_printed(posture, key) for key in ("rigid", "free"))
+        margin, free = (margin_as_printed(posture, free) for free in (False, True))
     except RuntimeError as error:
-        return {"verdict": "no answer", "passed": False, "reason": str(error)}
+        return {"verdict": NO_ANSWER, "passed": False, "reason": str(error)}
     checks = {
         "energy": _energy_check(assembly, energy),
         "margin": _margin_check(zone["margin"], margin),
         "margin_free": _margin_check(zone["margin_free"], free),
     }
     outcomes = {check.verdict for check in checks.values()}
-    bad, some = bool(outcomes & {FAILS, UNDECIDED}), "ok" in outcomes
+    bad, some = bool(outcomes & {FAILS, UNDECIDED}), OK in outcomes
     return {
         "energy": energy,
         "platform_screw": screw,
@@ -57,13 +65,13 @@ def compare_printed(
         },
         "tolerance": TOLERANCE,
         "checks": {name: check.verdict for name, check in checks.items()},
-        "verdict": "failed" if bad else "passed" if some else NO_SIGNAL,
+        "verdict": FAILED if bad else PASSED if some else NO_SIGNAL,
         "passed": some and not bad,
     }
 
 
 def _energy_check(assembly: Assembly, energy: float) -> Check:
-    """Energies; inside an assembly zone they are zero but for rounding."""
+    """Return check of the energies; both are about zero in an assembly zone."""
     tight = assembly.energy_without_clearance
     scale = max(assembly.energy, 1e-6 * tight, _NOISE_ENERGY / TOLERANCE)
     return Check(
@@ -73,7 +81,7 @@ def _energy_check(assembly: Assembly, energy: float) -> Check:
 
 
 def _margin_check(ours: float | None, theirs: float | None) -> Check:
-    """Margins; nothing to compare where neither exists, or no clearance is needed."""
+    """Return check of margins; no verdict without margins or without need for one."""
     if ours is None or theirs is None:
         value = 0.0 if ours is theirs else math.inf
         return Check(value, TOLERANCE, signal=False)

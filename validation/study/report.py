@@ -8,11 +8,11 @@ import numpy as np
 
 from assembly.linear.assembled import Assembly, without_rounding
 from assembly.linear.zone import ASSEMBLABLE
-from forcefit.inputs.display import largest_row
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import write_json, write_text
 from forcefit.page.page import Page, Provenance, Tile, command_line, page
 from forcefit.page.tables import Value
+from forcefit.results.display import largest_row
 from validation.study.headline import by_force, covered, verdict, worst_clearance
 from validation.study.map_section import finite, mapped, maps_section
 from validation.study.platform_section import platform_section

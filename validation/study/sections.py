@@ -13,7 +13,7 @@ from assembly.solvers.conic import SolverFailed
 from forcefit.page.charts import GREY, Axis, chart, matrix
 from forcefit.page.page import paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
-from forcefit.page.words import in_words, unit_of
+from forcefit.results.quantities import in_words, unit_of
 from stiffness.link import scaled
 from stiffness.screws import SCREW
 from validation.crosscheck.verdict import verdict_text
@@ -32,7 +32,7 @@ _UNITS = {"tx": "m", "ty": "m", "tz": "m", "rx": "rad", "ry": "rad", "rz": "rad"
 
 
 def unchecked_section(results: StudyResults) -> str:
-    """What could not be checked, and why."""
+    """Return section on checks that were not done, and the reasons."""
     rows = [[in_words(name), why] for name, why in results.unchecked.items()]
     return section("What could not be checked", table(["check", "why"], rows)) if (
         rows
@@ -40,7 +40,7 @@ def unchecked_section(results: StudyResults) -> str:
 
 
 def robot_section(results: StudyResults) -> str:
-    """The forced robot, to be turned and closed."""
+    """Return the forced robot, to be turned and closed."""
     if results.assembly is None or "picture" not in results.study.checks:
         return ""
     caption = (
@@ -59,7 +59,7 @@ def robot_section(results: StudyResults) -> str:
 
 
 def _error_body(results: StudyResults) -> ErrorBody | None:
-    """The shifts that clearances leave the platform; None where nothing bounds them."""
+    """Return translations free within the clearances; None if they are unbounded."""
     assert results.assembly is not None
     reach = reachable_screws(results.assembly, WORST)
     if reach.unbounded(3):
@@ -71,7 +71,7 @@ def _error_body(results: StudyResults) -> ErrorBody | None:
 
 
 def governing_section(results: StudyResults) -> str:
-    """The certified worst case with one part perfect."""
+    """Return the certified worst case with one part perfect."""
     worst = worst_clearance(results)["pose"]
     if worst is None or not results.governing:
         return ""
@@ -96,7 +96,7 @@ def governing_section(results: StudyResults) -> str:
 
 
 def _change(one: dict[str, Any], worst: dict[str, float], part: str) -> list[Any]:
-    """A bound without a part, and its change in per cent."""
+    """Return a bound without a part, and its change in per cent."""
     value = one[part]
     if value is None or not np.isfinite([value, worst[part]]).all():
         return ["none" if value is None else Value(value, unit_of(part)), "-"]
@@ -106,7 +106,7 @@ def _change(one: dict[str, Any], worst: dict[str, float], part: str) -> list[Any
 
 
 def solution_section(results: StudyResults) -> str:
-    """The assembly at the study's pose, with its certificate."""
+    """Return the assembly at the study's pose, with its certificate."""
     solution = results.solution
     pose = [
         text
@@ -141,7 +141,7 @@ def solution_section(results: StudyResults) -> str:
 
 
 def _linearisation_rows(error: dict[str, Any]) -> list[list[Any]]:
-    """What linear closures cost against finite motions."""
+    """Return rows on the error of linear closures, compared with finite motions."""
     if error["status"] != "ok":
         return [["linearisation error", error["status"]]]
     turn, shift = (float(np.linalg.norm(error[k])) for k in ("rotation", "translation"))
@@ -153,7 +153,7 @@ def _linearisation_rows(error: dict[str, Any]) -> list[list[Any]]:
 
 
 def _pose_error(results: StudyResults) -> str:
-    """Bounds of (27) in each assumption."""
+    """Return the bounds of (27) in each assumption."""
     rows = [
         [
             assumption,
@@ -176,7 +176,7 @@ def _pose_error(results: StudyResults) -> str:
 
 
 def _wrenches(results: StudyResults) -> str:
-    """Wrench through each elastic link."""
+    """Return the wrench through each elastic link."""
     frames = results.solution["frames"]
     elastic = [f.name for f in results.robot.frames if f.link is not None]
     wrenches = without_rounding(
@@ -196,7 +196,7 @@ def _wrenches(results: StudyResults) -> str:
 
 
 def reference_section(results: StudyResults) -> str:
-    """The printed problems solved again."""
+    """Return the printed problems solved again."""
     reference, solution = results.reference, results.solution
     title = "The same problems as printed, in cvxpy"
     if reference is None:
@@ -222,7 +222,7 @@ def reference_section(results: StudyResults) -> str:
 
 
 def stiffness_section(results: StudyResults) -> str:
-    """Beam against finite elements."""
+    """Return the beam against finite elements."""
     if not results.stiffness:
         return ""
     stiffness = results.stiffness
@@ -259,18 +259,18 @@ def stiffness_section(results: StudyResults) -> str:
 
 
 def _stiffness_unit(i: int, j: int) -> str:
-    """SI unit of an entry of a stiffness matrix."""
+    """Return SI unit of an entry of a stiffness matrix."""
     return ("N m/rad", "N", "N/m")[int(i > 2) + int(j > 2)]
 
 
 def _significant(K: NDArray) -> NDArray:
-    """(6, 6) bool: entries above a thousandth of sqrt(K_ii K_jj)."""
+    """Return the (6, 6) bool: entries above a thousandth of sqrt(K_ii K_jj)."""
     size = np.sqrt(np.diag(K))
     return np.abs(K) > 1e-3 * np.outer(size, size)
 
 
 def crosscheck_section(results: StudyResults) -> str:
-    """VJM against the multibody simulation."""
+    """Return VJM against the multibody simulation."""
     check, title = results.crosscheck, "Against a multibody simulation"
     if check is None:
         if not results.crosscheck_failure:
@@ -290,7 +290,7 @@ def crosscheck_section(results: StudyResults) -> str:
 
 
 def _slope_chart(check: Any) -> str:
-    """Differences against the scale of the errors, beside a line of slope 2."""
+    """Return differences against the scale of the errors, beside a line of slope 2."""
     scales = np.asarray(check.scales)
     traces: list[dict[str, Any]] = []
     for name, values in check.metric.differences.items():
@@ -311,12 +311,12 @@ def _slope_chart(check: Any) -> str:
 
 
 def _slope_text(slope: float) -> str:
-    """The slope measured, if there is one."""
+    """Return the slope measured, if there is one."""
     if np.isnan(slope):
         return "Nothing separates the two here, so there is no slope."
     return f"Measured: {slope:.3f}."
 
 
 def _number(value: float | None, unit: str, digits: int = 6) -> str | Value:
-    """A number, or that there is none."""
+    """Return a number, or that there is none."""
     return "none" if value is None else Value(value, unit, digits)

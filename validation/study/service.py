@@ -1,7 +1,7 @@
-"""The robot at work: its platform under load and weight, its stiffness, frequencies.
+"""The robot under load and weight: platform deflection, stiffness and frequencies.
 
-A study file asks for them under ``[service]``.  At the study's pose they are answered
-in full; over the grid they are further variables of the maps.
+The table ``[service]`` of a study file asks for them.  At the study's pose all of them
+are computed; over the grid they are further variables of the maps.
 """
 
 from collections.abc import Callable, Mapping
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.posture import Posture
 from assembly.model.robot import Robot
+from assembly.model.statuses import OK
 from assembly.platform_stiffness.vibration import check_masses
 from assembly.report.results import solution_of
 from assembly.report.vibration import vibration_of
@@ -25,19 +26,19 @@ from forcefit.inputs.table import BadInput, Table
 if TYPE_CHECKING:
     import xarray
 
-_MODES = 1000  # that can be asked for, as on the command line
+_MODES = 1000  # most frequencies that can be asked for, as on the command line
 _KEPT = ("stiffness", "eigen_stiffness", "stiffness_condition", "share", "frequency")
 
 
 @dataclass(frozen=True, eq=False)
 class Service:
-    """What a study asks of the robot at work.
+    """The results that a study asks for on the robot under load.
 
     Attributes:
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
-        stiffness: whether over the grid too, along each axis.
-        frequencies: how many natural frequencies.
+        stiffness: whether to compute stiffness over the grid along each axis.
+        frequencies: number of natural frequencies.
     """
 
     load: NDArray
@@ -52,17 +53,18 @@ class Service:
 
 
 def read_service(root: Table, robot: Robot) -> Service | None:
-    """The table ``[service]`` of a study file; None where there is none.
+    """Return the table ``[service]`` of a study file; None if it is absent.
 
     Args:
-        root: of the file.
-        robot: of the study.
+        root: root table of the file.
+        robot: robot of the study.
 
     Returns:
-        What is asked.
+        The results asked for.
 
     Raises:
-        BadInput: it breaks a rule, or asks for frequencies of what has no mass.
+        BadInput: the table breaks a rule, or asks for frequencies of a robot without
+            mass.
     """
     if not root.has("service"):
         return None
@@ -87,21 +89,21 @@ def read_service(root: Table, robot: Robot) -> Service | None:
 
 
 def at_pose(posture: Posture, service: Service, unloaded: Mapping) -> dict[str, Any]:
-    """The robot at work at one pose.
+    """Return the results of the robot under load at one pose.
 
     Args:
-        posture: of the robot.
-        service: what is asked.
-        unloaded: its solution without loads, keys of ``assembly solve``.
+        posture: the robot's configuration.
+        service: the results asked for.
+        unloaded: solution without loads, with the keys of ``assembly solve``.
 
     Returns:
-        ``status`` and perhaps ``reason``; ``load`` and ``gravity``; where they are not
-        zero ``solution``, the keys of ``assembly solve`` under them, and
-        ``deflection``, (6,) the platform's screw with them minus without, clearances
-        at least energy; ``frequencies``, keys of ``assembly frequencies``.
+        ``status`` and perhaps ``reason``; ``load`` and ``gravity``; ``frequencies``
+        with the keys of ``assembly frequencies``.  With a load or gravity also
+        ``solution`` with the keys of ``assembly solve``, and ``deflection``: (6,) the
+        platform's screw with loads minus that without, with clearances at least energy.
     """
     found: dict[str, Any] = {
-        "status": "ok", "load": service.load, "gravity": service.gravity
+        "status": OK, "load": service.load, "gravity": service.gravity
     }  # fmt: skip
     if service.loaded:
         solution = solution_of(posture, service.load, service.gravity)
@@ -122,18 +124,18 @@ def over_grid(
     maps: "xarray.Dataset", robot: Robot, service: Service,
     grid: Mapping[str, NDArray], progress: Callable[[int, int], None],
 ) -> "xarray.Dataset":  # fmt: skip
-    """The maps of a study with those of the robot at work.
+    """Return the maps of a study with those of the robot under load.
 
     Args:
-        maps: without loads.
-        robot: of the study.
-        service: what is asked.
+        maps: maps without loads.
+        robot: robot of the study.
+        service: the results asked for.
         grid: axes of the maps.
-        progress: called with the number of points done, and of all.
+        progress: called with the number of points done and their total.
 
     Returns:
-        The maps with ``deflection``, as in :func:`at_pose`, and ``loaded_status``;
-        with ``stiffness`` and its further variables, and ``frequency``.
+        The maps with ``deflection``, as in :func:`at_pose`, and ``loaded_status``; also
+        with ``stiffness`` and its further variables, and ``frequency``, if asked for.
     """
     targets = grid_targets(grid)
     question = Question(

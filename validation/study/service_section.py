@@ -1,4 +1,4 @@
-"""The study report's section on the robot at work, under load and weight."""
+"""The report's section on the robot under load and weight."""
 
 from typing import Any
 
@@ -12,10 +12,11 @@ _POSE = ("rad", "rad", "rad", "m", "m", "m")
 
 
 def service_section(service: dict[str, Any] | None) -> str:
-    """Load, weight, what they do to the platform, and natural frequencies, as HTML.
+    """Return loads, platform deflection and natural frequencies as HTML.
 
     Args:
-        service: of :func:`validation.study.service.at_pose`; None for no section.
+        service: result of :func:`validation.study.service.at_pose`; None for no
+            section.
 
     Returns:
         A table for the loads and one for the frequencies.
@@ -31,7 +32,7 @@ def service_section(service: dict[str, Any] | None) -> str:
 
 
 def _loaded(service: dict[str, Any]) -> list[str]:
-    """The platform under load and weight."""
+    """Return table of the platform under load and weight."""
     load = ", ".join(f"{v:.6g}" for v in service["load"])
     weight = ", ".join(f"{v:.6g}" for v in service["gravity"])
     about = paragraph(
@@ -52,12 +53,12 @@ def _loaded(service: dict[str, Any]) -> list[str]:
 
 
 def _frequencies(found: dict[str, Any]) -> str:
-    """Natural frequencies, and the parts whose motion each mode is."""
+    """Return table of natural frequencies and the parts that move in each mode."""
     if "frequencies" not in found:
         return paragraph(f"Frequencies: {found['status']}, {found['reason']}.")
     rows: list[list[Cell]] = []
     for k, mode in enumerate(found["modes"], 1):
-        parts = list(mode["shares"].items())[:3]  # the largest first
+        parts = list(mode["shares"].items())[:3]  # the three largest
         shares = ", ".join(f"{name} {100 * share:.3g} %" for name, share in parts)
         rows.append([str(k), Value(mode["frequency"], "Hz", 5), shares])
     return paragraph(
@@ -67,7 +68,7 @@ def _frequencies(found: dict[str, Any]) -> str:
 
 
 def service_tile(service: dict[str, Any] | None) -> list[Tile]:
-    """What load and weight move the platform by, and the lowest frequency."""
+    """Return the platform's deflection under load and the lowest frequency."""
     if service is None:
         return []
     tiles = []

@@ -1,7 +1,7 @@
 """A study: every check of a study file on one robot.
 
-:mod:`validation.study.study_file` reads it, :mod:`validation.study.report` writes the
-results.
+:mod:`validation.study.study_file` reads the file, :mod:`validation.study.report` writes
+the results.
 """
 
 from collections.abc import Callable
@@ -18,14 +18,22 @@ from assembly.linear.reference.pose_error import ASSUMPTIONS
 from assembly.model.links import link_compliance
 from assembly.model.mesh_link import mesh_link_stiffness
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from assembly.model.statuses import (
+    NO_ANSWER,
+    NO_EQUILIBRIUM,
+    NO_SIGNAL,
+    NOT_RUN,
+    OK,
+    PASSED,
+)
 from assembly.report.first_order import posture_status
 from assembly.report.platform_stiffness import stiffness_of
 from assembly.report.pose_errors import pose_error_of
 from assembly.report.results import solution_of
 from assembly.sweeps.sweep import sweep_poses
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.packages import need
 from forcefit.inputs.table import BadInput
+from forcefit.results.display import html_table, short_repr
 from validation.crosscheck.crosscheck import Crosscheck, attempt, crosscheck
 from validation.crosscheck.verdict import verdict
 from validation.multibody.simulation import (
@@ -40,7 +48,7 @@ from validation.study.study_file import Study
 
 Progress = Callable[[str, int, int], None]
 THEORIES = ("euler", "timoshenko")
-_PACKAGES = {  # that a check asks, and what keeps its results
+_PACKAGES = {  # packages that each check needs, and that write its results
     "stiffness": ("pyvista", "pytetwild"),
     "reference": ("cvxpy",),
     "maps": ("xarray", "h5netcdf", "h5py"),
@@ -50,25 +58,25 @@ _PACKAGES = {  # that a check asks, and what keeps its results
 
 @dataclass(frozen=True, eq=False)
 class StudyResults:
-    """Results of a study; parts that were not asked for are None.
+    """Results of a study; results that were not asked for are None.
 
     Attributes:
-        study: what was asked.
-        robot: with the links used.
-        solution: keys of ``assembly solve`` at the study's pose.
-        assembly: of the solution, None if it cannot be assembled.
-        error: bounds of (27) by assumption, as ``assembly error`` gives them.
-        reference: of :func:`validation.study.printed_problems.compare_printed`.
-        stiffness: by frame: K_E of the beam and of the finite elements.
+        study: content of the study file.
+        robot: robot with the links used.
+        solution: solution at the study's pose, with the keys of ``assembly solve``.
+        assembly: assembly of the solution; None if the robot cannot be assembled.
+        error: bounds (27) by assumption, with the keys of ``assembly error``.
+        reference: result of :func:`validation.study.printed_problems.compare_printed`.
+        stiffness: K_E of the beam and of the finite elements, by frame.
         maps: data set over the grid.
-        crosscheck: against the multibody simulation.
-        crosscheck_failure: why there is none although it was asked for; empty if so.
-        platform_stiffness: K_C there, as ``assembly stiffness`` gives it.
-        governing: bounds of (27) with one part made perfect, as
-            :func:`validation.study.governing.governing` gives them.
-        service: the robot at work, of :func:`validation.study.service.at_pose`.
-        closing: (k, n, 4, 4) frames while the simulation closes the closures, None
-            where it cannot.
+        crosscheck: comparison with the multibody simulation.
+        crosscheck_failure: why the simulation failed; empty if it did not.
+        platform_stiffness: K_C at the pose, with the keys of ``assembly stiffness``.
+        governing: bounds (27) with one part made perfect, from
+            :func:`validation.study.governing.governing`.
+        service: the robot under load, from :func:`validation.study.service.at_pose`.
+        closing: (k, n, 4, 4) frames while the simulation closes the closures; None if
+            it cannot.
     """
 
     study: Study
@@ -90,51 +98,51 @@ class StudyResults:
 
     @property
     def verdicts(self) -> dict[str, str]:
-        """Of each independent check that was asked for.
+        """Verdict of each independent check that was asked for.
 
-        ``"passed"``, ``"failed"``, ``"not decided"``, ``"no signal"`` where there was
-        nothing to compare, ``"not run"`` where there is no assembly to check.
+        ``"passed"``, ``"failed"``, ``"not decided"``, ``"no signal"`` if there is
+        nothing to compare, ``"not run"`` if there is no assembly to check.
         """
         independent = ("reference", "crosscheck")
-        verdicts = {n: "not run" for n in independent if n in self.study.checks}
+        verdicts = {n: NOT_RUN for n in independent if n in self.study.checks}
         if self.reference is not None:
             verdicts["reference"] = self.reference["verdict"]
         if self.crosscheck is not None:
             verdicts["crosscheck"] = verdict(self.crosscheck)
         elif self.crosscheck_failure:
-            verdicts["crosscheck"] = "no answer"
+            verdicts["crosscheck"] = NO_ANSWER
         return verdicts
 
     @property
     def unchecked(self) -> dict[str, str]:
-        """What could not be checked, and why."""
+        """Checks that were not done, and the reasons."""
         silent = "its errors need neither springs nor clearances at this pose"
         if not self.robot.errors.any():
             silent = "the robot has no geometric errors; [errors] would give it some"
-        why = {"not run": "there is no assembly to check", "no signal": silent}
+        why = {NOT_RUN: "there is no assembly to check", NO_SIGNAL: silent}
         reasons = {k: why[v] for k, v in self.verdicts.items() if v in why}
         if self.reference is not None and "reason" in self.reference:
             reasons["reference"] = self.reference["reason"]
         if self.crosscheck_failure:
             reasons["crosscheck"] = self.crosscheck_failure
-        if self.service is not None and self.service["status"] != "ok":
-            reasons["service"] = str(self.service.get("reason", "no equilibrium"))
+        if self.service is not None and self.service["status"] != OK:
+            reasons["service"] = str(self.service.get("reason", NO_EQUILIBRIUM))
         if self.maps is not None and not points_solved(self.maps):
             reasons["maps"] = "none of the grid's points has an answer"
         return reasons
 
     @property
     def passed(self) -> bool:
-        """Whether there is a certified solution and every check holds.
+        """Whether there is a certified solution and every check passed.
 
-        A check with nothing to compare does not hold if it was asked for, or if no
-        other one ran.
+        A check with nothing to compare has not passed if it was asked for, or if no
+        other check was run.
         """
         verdicts, missing = self.verdicts, self.unchecked
-        ran = [v for v in verdicts.values() if v != "no signal"]
+        ran = [v for v in verdicts.values() if v != NO_SIGNAL]
         return (
-            self.solution["status"] == "ok"
-            and all(v == "passed" for v in ran)
+            self.solution["status"] == OK
+            and all(v == PASSED for v in ran)
             and (bool(ran) or not verdicts)
             and not set(missing) & set(self.study.asked)
         )
@@ -144,18 +152,19 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
     """Run every check of a study.
 
     Args:
-        study: of :func:`validation.study.study_file.read_study`.
-        progress: called with a check's name, the steps done and their number.
+        study: study from :func:`validation.study.study_file.read_study`.
+        progress: called with a check's name, the steps done and their total.
 
     Returns:
-        The results; nothing is written yet.
+        The results; no file is written.
 
     Raises:
-        BadInput: the pose is out of reach, or a surface is not usable.
+        BadInput: the robot does not reach the pose, or a surface is not usable.
         ModuleNotFoundError: a package that a check needs is missing.
     """
     wanted = set(study.checks)
-    # before the long work: what is missing, and what is out of reach
+    # before the long computations: raise errors on missing packages and unreachable
+    # poses
     need(*(one for check in sorted(wanted) for one in _PACKAGES.get(check, ())))
     place_robot(study.robot, pose=study.pose)
     stiffness, robot = None, study.robot
@@ -164,7 +173,7 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
     posture = place_robot(robot, pose=study.pose)
     progress("assembly", 0, 1)
     solution = solution_of(posture) | posture_status(posture)
-    solved = solution["status"] == "ok"
+    solved = solution["status"] == OK
     assembly = solve_assembly(posture) if solved else None
     error = pose_error_of(posture, ASSUMPTIONS)["error"] if solved else None
     progress("assembly", 1, 1)
@@ -211,12 +220,12 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
 
 
 def points_solved(maps: Any) -> int:
-    """Number of a grid's points that have a solution."""
-    return int((maps["status"] == "ok").sum())
+    """Return the number of a grid's points that have a solution."""
+    return int((maps["status"] == OK).sum())
 
 
 def _closing(posture: Posture) -> NDArray | None:
-    """Frames while the closures are closed; none where links are not known."""
+    """Return frames while the closures close; None if links are not known."""
     tight = replace(posture, robot=without_clearance(posture.robot))
     try:
         return closing_sequence(tight)
@@ -227,7 +236,7 @@ def _closing(posture: Posture) -> NDArray | None:
 def _compare_links(
     study: Study, progress: Progress
 ) -> tuple[dict[str, dict[str, Any]], Robot]:
-    """Beam and finite elements side by side; links replaced where asked."""
+    """Return K_E by beam theory and by finite elements; replace links if asked for."""
     compared: dict[str, dict[str, Any]] = {}
     links: dict[str, MatrixLink] = {}
     for done, (name, mesh) in enumerate(study.meshes.items()):
@@ -250,7 +259,7 @@ def _compare_links(
 
 
 def _beams(frame: Frame) -> dict[str, NDArray]:
-    """K_E of a frame's beam by both theories."""
+    """Return K_E of a frame's beam by both beam theories."""
     assert isinstance(frame.link, BeamLink)
     links = {name: replace(frame.link, theory=name) for name in THEORIES}
     return {

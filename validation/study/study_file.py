@@ -1,7 +1,7 @@
-"""A study file: one robot, and every check to be run on it.
+"""A study file: a robot and the checks to be run on it.
 
-TOML; ``docs/study.md`` describes it, ``examples/irsbot2.toml`` is one.  Everything in
-it is read and checked before any work begins.
+The file is TOML; ``docs/study.md`` describes it, ``examples/irsbot2.toml`` is an
+example.  The whole content is checked before any computation.
 """
 
 import os.path
@@ -19,8 +19,8 @@ from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_n
 from assembly.model.robot import BeamLink, MeshLink, Robot
 from assembly.robots import BUILT_IN
 from assembly.sweeps.targets import parse_grid
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
+from forcefit.results.display import html_table, short_repr
 from stiffness.surface.surface import UNITS
 from stiffness.surface.surface_files import named_solid
 from validation.crosscheck.verdict import SCALES, check_scales
@@ -34,20 +34,20 @@ class Study:
     """The content of a study file.
 
     Attributes:
-        title: of the report.
-        robot: with its errors, before links are replaced.
-        errors: one sentence on where the errors come from.
-        source: of the links' stiffness, ``"beam"`` (as declared) or ``"fea"``.
+        title: title of the report.
+        robot: robot with its errors, before links are replaced.
+        errors: sentence on the origin of the errors.
+        source: source of the links' stiffness, ``"beam"`` (as declared) or ``"fea"``.
         meshes: mesh link by frame, for the comparison and for ``"fea"``.
-        accuracy: asked of the finite elements.
+        accuracy: required accuracy of the finite elements.
         pose: nominal platform pose of the detailed checks.
         grid: axes of the maps by pose component; empty for none.
-        scales: of the errors in the cross-check; empty for none.
+        scales: scales of the errors in the cross-check; empty for none.
         checks: names of the checks to run.
-        asked: those of them that the file asks for by name, by a grid or by scales.
-        folder: to write.
-        files: that were read: the study's own, a robot's, a surface's.
-        service: what is asked of the robot at work; None for nothing.
+        asked: checks that the file asks for by name, by a grid or by scales.
+        folder: folder of the report.
+        files: files that were read: the study's own, a robot's, a surface's.
+        service: results asked for on the robot under load; None for none.
     """
 
     title: str
@@ -69,17 +69,17 @@ class Study:
 
 
 def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
-    """A study from its file.
+    """Return a study from its file.
 
     Args:
-        path: of the TOML file.
-        folder: to write, instead of the one the file names.
+        path: path of the TOML file.
+        folder: folder of the report, instead of the one in the file.
 
     Returns:
-        The study, everything in it checked.
+        The study, with all its content checked.
 
     Raises:
-        BadInput: the file, or the robot it names, breaks a rule.
+        BadInput: the study file or the robot file breaks a rule.
     """
     path = Path(path)
     root = read_toml(path)
@@ -126,7 +126,7 @@ def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
 
 
 def _files(path: Path, root: Table, meshes: dict[str, MeshLink]) -> tuple[Path, ...]:
-    """The files that a study is made of, each once."""
+    """Return the files of a study, each once."""
     robot = path.parent / root.text("robot")
     surfaces = (named_solid(mesh.surface)[0] for mesh in meshes.values())
     return tuple(
@@ -135,7 +135,7 @@ def _files(path: Path, root: Table, meshes: dict[str, MeshLink]) -> tuple[Path, 
 
 
 def _robot(root: Table, folder: Path) -> Robot:
-    """The robot: built in, or a file beside the study's; its closures made to hold."""
+    """Return the robot, built in or from a file, with closures made to hold."""
     name = root.text("robot", expected="a built-in robot or a robot file")
     if name in BUILT_IN:
         return _closed(root, name)
@@ -148,7 +148,7 @@ def _robot(root: Table, folder: Path) -> Robot:
 
 
 def _closed(root: Table, name: Path | str) -> Robot:
-    """The robot, its closures made to hold as the study's keys ask."""
+    """Return the robot with closures made to hold as the study's keys ask."""
     rest = root.text("rest") if root.has("rest") else None
     mismatch = root.choice("mismatch", ("spring",)) if root.has("mismatch") else None
     own_errors = not root.has("errors")
@@ -163,7 +163,7 @@ def _closed(root: Table, name: Path | str) -> Robot:
 
 
 def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
-    """The robot with the errors asked for, and a sentence about them."""
+    """Return the robot with the errors asked for, and a sentence on them."""
     if not root.has("errors"):
         return robot, "geometric errors as in the robot file"
     closing = root.has("rest") or root.has("mismatch")
@@ -196,7 +196,7 @@ def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
 
 
 def _frames(table: Table, robot: Robot, default: list[str]) -> tuple[str, ...]:
-    """Frames named by the key ``frames``."""
+    """Return the frames named by the key ``frames``."""
     names = table.get("frames", default)
     if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
         raise table.bad("frames", "expected a list of frame names")
@@ -204,7 +204,7 @@ def _frames(table: Table, robot: Robot, default: list[str]) -> tuple[str, ...]:
 
 
 def _known(table: Table, key: str, robot: Robot, names: list[str]) -> tuple[str, ...]:
-    """Full names of frames; an unknown one is named with its place in the file."""
+    """Return full names of frames; the error for an unknown one has its place."""
     try:
         return frames_named(robot, names)
     except BadInput as error:
@@ -212,7 +212,7 @@ def _known(table: Table, key: str, robot: Robot, names: list[str]) -> tuple[str,
 
 
 def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
-    """Where link stiffnesses come from, and the meshes of beams to compare."""
+    """Return source of the links' stiffness, and meshes of the beams to compare."""
     if not root.has("links"):
         return "beam", {}, 0.005
     table = root.table("links")
@@ -247,7 +247,7 @@ def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
 
 
 def _pose(root: Table) -> dict[str, float]:
-    """The pose of the detailed checks; home if not given."""
+    """Return the pose of the detailed checks; home by default."""
     if not root.has("pose"):
         return {}
     table = root.table("pose")
@@ -257,7 +257,7 @@ def _pose(root: Table) -> dict[str, float]:
 
 
 def _scales(root: Table) -> tuple[float, ...]:
-    """Scales of the cross-check."""
+    """Return the scales of the cross-check."""
     if not root.has("scales"):
         return SCALES
     value = root.get("scales")
@@ -276,7 +276,7 @@ def _scales(root: Table) -> tuple[float, ...]:
 def _checks(
     root: Table, meshes: bool, grid: bool, scales: bool
 ) -> tuple[tuple[str, ...], set[str]]:
-    """Checks to run, all that the file gives the input of; and those it names."""
+    """Return the checks to run, by default all with input, and those asked for."""
     possible = {"stiffness": meshes, "maps": grid, "crosscheck": scales}
     if not root.has("checks"):
         return tuple(c for c in _CHECKS if possible.get(c, True)), set()

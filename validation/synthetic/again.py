@@ -1,7 +1,7 @@
-"""A simulated machine commanded again: how far it stands from where it should.
+"""A simulated machine commanded again: its distance from the wanted poses.
 
-The distance is measured at the machine, without noise and without what the measuring
-device adds, so that a correction is judged by something that it was not fitted to.
+The distance is measured at the machine, without noise and without errors of the
+measuring device, so that a correction is judged independently of its data.
 """
 
 from collections.abc import Sequence
@@ -29,14 +29,14 @@ def distances(
     coordinates: NDArray,
     program: str = "multibody",
 ) -> NDArray:
-    """How far a machine stands from the poses wanted.
+    """Return the distances of a machine from the wanted poses.
 
     Args:
         robot: declared.
-        effects: that the machine has; those of the device alone do not count.
-        targets: commands at which the nominal robot would stand as wanted.
-        coordinates: (R, n) [rad or m] nominal coordinates of what is commanded.
-        program: that simulates.
+        effects: effects of the machine; those of the device alone have no effect.
+        targets: commands at which the nominal robot would have the wanted poses.
+        coordinates: (R, n) [rad or m] nominal coordinates of the commands.
+        program: name of the simulation program.
 
     Returns:
         (R, 2) distance of the reference points [m], and angle [rad].

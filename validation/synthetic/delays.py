@@ -1,4 +1,4 @@
-"""What follows the recorded temperature with a time constant."""
+"""Temperatures that lag behind the recorded one by a time constant."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -8,19 +8,20 @@ from validation.synthetic.effects import Row
 
 
 def behind(time_constant: float) -> str:
-    """Name of what follows the temperature [K] with a time constant."""
+    """Return the name of a temperature [K] with a lag."""
     return f"behind {time_constant!r}"
 
 
 def with_delays(rows: Sequence[Row], time_constants: Iterable[float]) -> list[Row]:
-    """Rows with what follows the temperature, which is straight between them.
+    """Return rows with lagged temperatures, by linear interpolation between rows.
 
     Args:
-        rows: in the order of time.
-        time_constants: [s] each.
+        rows: rows in the order of time.
+        time_constants: [s] one for each lagged temperature.
 
     Returns:
-        Rows with a covariate more for each; in the first row it is the temperature.
+        Rows with a lagged temperature for each; in the first row it is the recorded
+        one.
     """
     rows = list(rows)
     for late in dict.fromkeys(time_constants):
@@ -31,7 +32,8 @@ def with_delays(rows: Sequence[Row], time_constants: Iterable[float]) -> list[Ro
             step = (row.covariates["time"] - before["time"]) / late
             if step == 0.0:
                 warm = now
-            else:  # behind a ramp, once what was there at its start has gone
+            # the response to a ramp, plus the decay of the difference at its start
+            else:
                 lag = (now - before["temperature"]) / step
                 start = warm - before["temperature"] + lag
                 warm = now - lag + start * math.exp(-step)

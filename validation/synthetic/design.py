@@ -1,4 +1,4 @@
-"""Which configurations, loads and conditions a synthetic campaign measures."""
+"""Configurations, loads and conditions of a synthetic campaign."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
@@ -14,10 +14,10 @@ from forcefit.inputs.errors import BadInput, checked
 from validation.synthetic.effects import Row
 
 TEMPERATURES = ("swing", "around", "constant")
-_PERIOD = 2400.0  # [s] of the temperature's swing
+_PERIOD = 2400.0  # [s] period of the temperature
 _STEP = 60.0  # [s] between measurements
-_DRAWS = 40  # times the configurations asked for, before giving up
-_DIGITS = 6  # of commanded coordinates
+_DRAWS = 40  # factor on the number of configurations: largest number of draws
+_DIGITS = 6  # digits of commanded coordinates
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,22 +25,22 @@ class CampaignDesign:
     """Design of a campaign.
 
     Attributes:
-        configurations: number of different ones.
+        configurations: number of distinct configurations.
         rows: number of measurements, interleaved over the session.
-        reach: [rad] largest change of a turning drive from its home position; of a
-            sliding one this much times ``size``.
-        size: [m] see reach.
+        reach: [rad] largest change of a revolute drive from its home position; of a
+            prismatic one this times ``size``.
+        size: [m] length for ``reach``.
         load: [N] largest force on the platform.
-        levels: of the load: ``"many"`` sizes and directions; ``"one"``: always the
-            same force.
+        levels: levels of the load: ``"many"`` sizes and directions; ``"one"``: always
+            the same force.
         temperature: ``"swing"``: -0.5 ... 6.5 K; ``"around"``: -4 ... 4 K;
             ``"constant"``: 6 K.
-        command: ``"joints"`` or ``"pose"``, what is written as commanded.
+        command: ``"joints"`` or ``"pose"``, the form of commands in the file.
         humidity: whether a covariate of that name is recorded [%].
         tilt: [rad] size of a covariate of that name, 0 if it is not recorded.
         gravity: [m/s^2] recorded, straight down.
         reference_point: [m] the point measured, where loads act, platform axes.
-        corners: whether half of the configurations have every drive at an end of its
+        corners: whether in half of the configurations every drive is at an end of its
             reach.
     """
 
@@ -83,11 +83,11 @@ class CampaignDesign:
 
 
 def varied_for(design: CampaignDesign, names: Iterable[str]) -> CampaignDesign:
-    """A design that varies what effects depend on.
+    """Return a design that varies the covariates of effects.
 
     Args:
-        design: any.
-        names: of the effects.
+        design: any design.
+        names: names of the effects.
 
     Returns:
         The design with more conditions, if the effects need them.
@@ -110,9 +110,9 @@ class CampaignPlan:
     """The rows of a design on a robot.
 
     Attributes:
-        rows: in the order of measurement.
+        rows: rows in the order of measurement.
         configuration: (rows,) number of each row's configuration.
-        commands: (rows, m) as written.
+        commands: (rows, m) as written to the file.
         columns: names of the m columns.
     """
 
@@ -129,8 +129,8 @@ def plan_campaign(
 
     Args:
         robot: declared.
-        design: of the campaign.
-        rng: of the draws.
+        design: design of the campaign.
+        rng: random number generator of the draws.
 
     Returns:
         The plan.
@@ -173,7 +173,7 @@ def plan_campaign(
 def _configurations(
     robot: Robot, design: CampaignDesign, rng: np.random.Generator
 ) -> NDArray:
-    """(k, n) joint coordinates at which the nominal closures hold."""
+    """Return the (k, n) joint coordinates at which the nominal closures hold."""
     home = home_posture(robot)
     spans = np.array([
         0.0 if not f.actuated
@@ -202,7 +202,7 @@ def _configurations(
 def _commands(
     robot: Robot, design: CampaignDesign, coordinates: NDArray
 ) -> tuple[NDArray, tuple[str, ...], NDArray]:
-    """What is written as commanded, its columns, and what it makes the coordinates."""
+    """Return the commands as written, their columns, and the resulting coordinates."""
     driven = [i for i, f in enumerate(robot.frames) if f.actuated]
     if design.command == "joints":
         columns = tuple(f"q.{robot.frames[i].name}" for i in driven)
@@ -221,14 +221,14 @@ def _commands(
 
 
 def _interleaved(design: CampaignDesign, rng: np.random.Generator) -> NDArray:
-    """(rows,) configuration of each row: every pass visits all in another order."""
+    """Return (rows,) configuration of each row: each pass visits all in new order."""
     passes = -(-design.rows // design.configurations)
     orders = [rng.permutation(design.configurations) for _ in range(passes)]
     return np.concatenate(orders)[: design.rows]
 
 
 def _loads(design: CampaignDesign, order: NDArray, rng: np.random.Generator) -> NDArray:
-    """(rows, 6) [N m, N]: of each configuration's rows two repeat an earlier load."""
+    """Return (rows, 6) [N m, N]: two rows of each configuration repeat a load."""
     loads = np.zeros((design.rows, 6))
     if design.levels == "one":
         loads[:, 3:] = (design.load * _direction(rng)).round(3)
@@ -246,7 +246,7 @@ def _loads(design: CampaignDesign, order: NDArray, rng: np.random.Generator) -> 
 
 
 def _load(largest: float, rng: np.random.Generator) -> NDArray:
-    """(3,) [N] along an axis, in full or by half, or in any direction."""
+    """Return the (3,) [N] along an axis, full or half, or in a random direction."""
     if rng.random() < 0.5:
         axis = np.zeros(3)
         axis[rng.integers(3)] = rng.choice([-1.0, -0.5, 0.5, 1.0])
@@ -255,7 +255,7 @@ def _load(largest: float, rng: np.random.Generator) -> NDArray:
 
 
 def _direction(rng: np.random.Generator) -> NDArray:
-    """(3,) unit vector of any direction."""
+    """Return a (3,) unit vector of random direction."""
     vector = rng.normal(size=3)
     return vector / np.linalg.norm(vector)
 
@@ -263,7 +263,7 @@ def _direction(rng: np.random.Generator) -> NDArray:
 def _temperature(
     design: CampaignDesign, time: NDArray, rng: np.random.Generator
 ) -> NDArray:
-    """(rows,) [K]."""
+    """Return the (rows,) [K] temperatures."""
     if design.temperature == "constant":
         return np.full(len(time), 6.0)
     middle, size = (3.0, 3.5) if design.temperature == "swing" else (0.0, 4.0)

@@ -14,32 +14,32 @@ from validation.synthetic.outside import OUTSIDE
 _SHAPES = (
     "phase", "exponent", "time_constant", "order", "at", "period", "knee",
 )  # fmt: skip
-SLIDING = ("_lead", "_lead_backlash")  # effects of slides alone
+SLIDING = ("_lead", "_lead_backlash")  # effects of prismatic joints only
 
 
 class NotApplicable(ValueError):
-    """A robot has nothing on which an effect acts."""
+    """A robot has no place where an effect acts."""
 
 
 def draw_effect(
     name: str, robot: Robot, duration: float, rng: np.random.Generator
 ) -> Hidden:
-    """An effect with plausible parameters, some at one place and some at all.
+    """Return an effect with plausible parameters, at one place or at all.
 
     Args:
-        name: of the effect.
-        robot: that is to have it.
+        name: name of the effect.
+        robot: the robot with the effect.
         duration: [s] of the session.
-        rng: of the draws.
+        rng: random number generator of the draws.
 
     Returns:
-        The effect; its strength is for :func:`strengthened` to set.
+        The effect; :func:`strengthened` sets its strength.
 
     Raises:
         BadInput: there is no such effect.
-        NotApplicable: the robot has nothing on which it acts.
+        NotApplicable: the robot has no place where it acts.
     """
-    if name not in (*LIBRARY, *OUTSIDE):  # those outside are for proofs
+    if name not in (*LIBRARY, *OUTSIDE):  # those outside the library are for tests
         raise BadInput(
             f'effect: found "{name[:60]}", expected one of {", ".join(LIBRARY)}'
         )
@@ -47,10 +47,10 @@ def draw_effect(
 
 
 def strengthened(effect: Hidden, factor: float) -> Hidden:
-    """The same effect, its contribution to the readings scaled by about a factor.
+    """Return the effect with its contribution to the readings scaled by a factor.
 
     Args:
-        effect: any.
+        effect: any effect.
         factor: [-] > 0.
 
     Returns:
@@ -66,7 +66,7 @@ def strengthened(effect: Hidden, factor: float) -> Hidden:
         elif name == "contact_stiffening":
             exponent = given[key.removesuffix("coefficient") + "exponent"]
             given[key] = value / factor**exponent
-        elif name == "modulus_scale":  # its compliance grows in proportion
+        elif name == "modulus_scale":  # its compliance is proportional to it
             given[key] = 1.0 / max(1.0 + factor * (1.0 / value - 1.0), 0.05)
         elif key == "factor":
             given[key] = 1.0 + factor * (value - 1.0)
@@ -76,7 +76,7 @@ def strengthened(effect: Hidden, factor: float) -> Hidden:
 
 
 def _some(frames: list[Frame], rng: np.random.Generator) -> list[str]:
-    """One of the frames, or all of them."""
+    """Return one of the frames, or all of them."""
     if not frames:
         raise NotApplicable("no frame that the effect could act on")
     if rng.random() < 0.5:
@@ -89,7 +89,7 @@ def _beams(robot: Robot) -> list[Frame]:
 
 
 def _bodies(robot: Robot) -> list[Frame]:
-    """Beams, or all bodies of some length of a robot that has none."""
+    """Return the beams, or, without beams, all bodies with a length."""
     return _beams(robot) or [f for f in robot.frames if f.translation.any()]
 
 
@@ -143,7 +143,7 @@ def _lengths(robot: Robot, duration: float, rng: np.random.Generator) -> Paramet
 
 
 def _errors(names: list[str], rng: np.random.Generator) -> Parameters:
-    """1e-4 rad or m, either sign, none of them much smaller."""
+    """Return errors of about 1e-4 rad or m, of either sign."""
     signs = rng.choice([-1.0, 1.0], len(names)) * rng.uniform(0.4, 1.0, len(names))
     return dict(zip(names, (1e-4 * signs).tolist(), strict=True))
 

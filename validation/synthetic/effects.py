@@ -1,14 +1,14 @@
 """Effects of a simulated machine, modelled by their physics.
 
 A machine is a robot of frames, and most effects are additional frames: an elastic drive
-is a spring after its joint, an encoder error is a finite rotation after it, an
-elastic foundation is a spring below everything.  Others change a body (a beam is longer
-or softer, a joint gets clearance), the load (weight, a load that is not the recorded
+is a spring after its joint, an encoder error is a finite rotation after it, an elastic
+foundation is a spring below all frames.  Others change a body (a beam is longer or
+softer, a joint has clearance), the load (weight, a load that differs from the recorded
 one), the measuring frame, or the reading alone.
 
-Nothing of this is shared with the effects that a diagnosis fits: an error in those must
-not reach the data by which they are tested.  Names and parameters are the public ones;
-joints are sprung, turned and slid about or along their own z.
+No code is shared with the effects that a diagnosis fits, because an error in those must
+not affect the data by which they are tested.  Names and parameters are the public ones;
+springs, rotations and translations of joints act about or along their own z.
 """
 
 import math
@@ -38,7 +38,7 @@ class Row:
         coordinates: [rad or m] of every joint in the nominal configuration, by frame.
         load: (6,) [N m, N] recorded, at the reference point, base axes.
         covariates: ``temperature`` [K], ``time`` [s], ``approach`` and any others;
-            ``gravity.x`` .. ``gravity.z`` [m/s^2] act.
+            ``gravity.x`` .. ``gravity.z`` [m/s^2] act as gravity.
     """
 
     coordinates: Mapping[str, float]
@@ -51,10 +51,10 @@ class Machine:
     """The simulated machine of a row.
 
     Attributes:
-        robot: with the frames that effects have added; its platform is where the load
-            acts and the pose is read.
+        robot: robot with the frames that effects have added; the load acts and the pose
+            is read at its platform.
         coordinates: [rad or m] of every joint, 0 where absent.
-        load: (6,) [N m, N] that acts.
+        load: (6,) [N m, N] applied.
         gravity: (3,) [m/s^2] base axes.
         laws: by frame, nonlinear laws of its spring or position; see
             :mod:`validation.synthetic.rest`.
@@ -89,26 +89,26 @@ Moved = Callable[[NDArray, Row, Parameters], NDArray]
 
 
 def insert_after(robot: Robot, name: str, suffix: str, **given: Any) -> Robot:
-    """A robot with a fixed frame between a joint and its children."""
+    """Return a robot with a fixed frame between a joint and its children."""
     new = f"{name}~{suffix}"
     frames = [replace(f, parent=new) if f.parent == name else f for f in robot.frames]
     return replace(robot, frames=(*frames, Frame(new, name, **given)))
 
 
 def along_own_axis(frame: Frame, value: float, others: float = 0.0) -> NDArray:
-    """(6,) a value along a joint's motion, another one everywhere else."""
+    """Return a (6,) with a value along a joint's motion, and another elsewhere."""
     screw = np.full(6, others)
     screw[frame.own_axis] = value
     return screw
 
 
 def sprung(frame: Frame, stiffness: float) -> NDArray:
-    """(6, 6) stiffness along a joint's own motion, rigid otherwise."""
+    """Return the (6, 6) stiffness along a joint's own motion, rigid otherwise."""
     return np.diag(along_own_axis(frame, stiffness, math.inf))
 
 
 def beam_length(robot: Robot, name: str) -> float:
-    """[m] declared length of a frame's beam, or between its body's joints."""
+    """Return the declared length [m] of a frame's beam, or of its body."""
     frame = robot.frame(name)
     if not isinstance(frame.link, BeamLink):
         return float(np.linalg.norm(frame.translation))
@@ -116,7 +116,7 @@ def beam_length(robot: Robot, name: str) -> float:
 
 
 def lengthened(robot: Robot, name: str, change: float) -> Robot:
-    """A robot one of whose bodies is built longer [m], along its own actual axis."""
+    """Return a robot with a body longer by [m], along its own actual axis."""
     frame = robot.frame(name)
     if not isinstance(frame.link, BeamLink):  # along the line between its joints
         longer = 1.0 + change / float(np.linalg.norm(frame.translation))
@@ -130,20 +130,20 @@ def lengthened(robot: Robot, name: str, change: float) -> Robot:
 
 
 def with_frame(robot: Robot, frame: Frame) -> Robot:
-    """The same robot with the frame of that name replaced."""
+    """Return the same robot with the frame of that name replaced."""
     frames = (frame if f.name == frame.name else f for f in robot.frames)
     return replace(robot, frames=tuple(frames))
 
 
 def misread(machine: Machine, name: str, suffix: str, change: float) -> Machine:
-    """A machine one of whose joints deviates from its command [rad or m]."""
+    """Return a machine with a joint that deviates from its command by [rad or m]."""
     screw = along_own_axis(machine.robot.frame(name), change)
     robot = insert_after(machine.robot, name, suffix, geometric_error=screw)
     return replace(machine, robot=robot)
 
 
 def own_compliance(frame: Frame) -> float:
-    """[rad/(N m) or m/N] of a declared joint along its own motion, 0 if rigid."""
+    """Return the compliance of a declared joint along its own motion, 0 if rigid."""
     K = frame.springs
     if K is None or not np.isfinite(K[frame.own_axis, frame.own_axis]):
         return 0.0
@@ -228,7 +228,7 @@ def _joint_clearance(machine: Machine, row: Row, given: Parameters) -> Machine:
     for name in dict.fromkeys(key.rpartition(".")[0] for key in given):
         kinds = ("radial", "axial", "tilt")
         clearance = Clearance(**{k: given.get(f"{name}.{k}") for k in kinds})
-        if robot.closures:  # the simulation finds the joints' positions
+        if robot.closures:  # the simulation computes the joints' positions
             robot = with_frame(robot, replace(robot.frame(name), clearance=clearance))
             continue
         K = np.repeat(SENSOR, 3)
@@ -263,7 +263,7 @@ def _load_gain(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _body_mass(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """A body is heavier [kg]; its centre moves by moment [kg m] over its mass."""
+    """Make a body heavier [kg]; its centre moves by moment [kg m] over its mass."""
     robot = machine.robot
     keys = ("mass", "moment.x", "moment.y", "moment.z")
     for name in dict.fromkeys(n for key in keys for n in named(given, key)):
@@ -281,7 +281,7 @@ def _geometric_stiffening(machine: Machine, row: Row, given: Parameters) -> Mach
 
 
 def _registration(pose: NDArray, row: Row, given: Parameters) -> NDArray:
-    """Offset of the measured point, and displacement of the measuring frame."""
+    """Return the pose seen by a moved measuring frame at a moved point."""
     screw = np.array([given.get(f"base.{k}", 0.0) for k in SCREW])
     tool = [given.get(f"tool.{k}", 0.0) for k in SCREW[3:]]
     measured = pose.copy()
@@ -290,7 +290,7 @@ def _registration(pose: NDArray, row: Row, given: Parameters) -> NDArray:
 
 
 def _device_scale(pose: NDArray, row: Row, given: Parameters) -> NDArray:
-    """All lengths that the device measures from its origin are too long."""
+    """Return the pose with all lengths from the device's origin too long."""
     measured = pose.copy()
     measured[:3, 3] *= given["factor"]
     return measured
@@ -304,7 +304,7 @@ def _drift(reading: NDArray, row: Row, given: Parameters) -> NDArray:
 
 
 def named(given: Parameters, component: str) -> list[str]:
-    """Frames that a component is given for, as in ``<frame>.<component>``."""
+    """Return frames with a component, as in ``<frame>.<component>``."""
     end = f".{component}"
     return [key.removesuffix(end) for key in given if key.endswith(end)]
 
@@ -326,12 +326,12 @@ CHANGES: dict[str, Change] = {
     "body_mass": _body_mass,
     "geometric_stiffening": _geometric_stiffening,
 }
-POSES: dict[str, Moved] = {  # of the pose (4, 4)
+POSES: dict[str, Moved] = {  # effects on the pose (4, 4)
     "registration": _registration,
     "device_scale": _device_scale,
 }
-READINGS: dict[str, Moved] = {"drift": _drift}  # of the reading (6,)
-COVARIATES: dict[str, tuple[str, ...]] = {  # that change the machine
+READINGS: dict[str, Moved] = {"drift": _drift}  # effects on the reading (6,)
+COVARIATES: dict[str, tuple[str, ...]] = {  # covariates that change the machine
     "thermal_expansion": ("temperature",),
     "friction_hysteresis": ("approach",),
 }

@@ -1,13 +1,14 @@
 """Effects that a campaign's design cannot distinguish from the hidden ones.
 
-Every public effect's signature, to first order and whitened by the noise, is computed
-by the program of springs, not by the model under test.  A set of effects whose
-signatures span the contribution of the hidden ones, to within the noise, explains the
-data as well, and naming it is not wrong.
+The first-order signature of every public effect, whitened by the noise, is computed by
+the spring program, not by the model under test.  A set of effects whose signatures span
+the contribution of the hidden ones, to within the noise, explains the data as well, so
+naming it is not wrong.
 
-Signatures of one turned drive or lengthened beam depend on the configuration only, and
-those of temperature, approach and contact follow from them: 600 solutions for an arm,
-not 5000.  Clearance and geometric stiffening have no linear signature and are left out.
+Signatures of one rotated drive or lengthened beam depend on the configuration only, and
+those of temperature, approach and contact follow from them: 600 solutions for an arm
+instead of 5000.  Clearance and geometric stiffening have no linear signature and are
+left out.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,12 +24,12 @@ from validation.synthetic.effects import SCREW, WRENCH, Row, own_compliance
 from validation.synthetic.generator import Synthetic
 from validation.synthetic.machine import Hidden, simulate_readings
 
-SAME = 10.0  # left of a chi square below which noise hides the difference
+SAME = 10.0  # residual chi square below which noise hides the difference
 _DRIFTS = (0.1, 0.3, 1.0)  # time constants tried, in durations
-_STEP = 1e-5  # [rad, m] of a finite difference
-_GRAM = 1e-3  # [kg, kg m] likewise
+_STEP = 1e-5  # [rad, m] step of a finite difference
+_GRAM = 1e-3  # [kg, kg m] step of a finite difference
 MOMENTS = ("moment.x", "moment.y", "moment.z")
-_SOFT = 1e9  # [N m/rad, N/m] of a spring put in for a finite difference
+_SOFT = 1e9  # [N m/rad, N/m] stiffness of a spring added for a finite difference
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +37,7 @@ class Alternative:
     """A set of effects compared with the hidden ones.
 
     Attributes:
-        names: of the effects.
+        names: names of the effects.
         parameters: their number.
         residual: [-] chi square that they do not explain, without noise.
     """
@@ -47,14 +48,14 @@ class Alternative:
 
 
 def alternatives(campaign: Synthetic, size: int = 1) -> list[Alternative]:
-    """All small sets of public effects, best first.
+    """Return all small sets of public effects, best first.
 
     Args:
-        campaign: with what is hidden in it.
-        size: of the largest sets.
+        campaign: campaign with its hidden effects.
+        size: size of the largest sets.
 
     Returns:
-        Sets with what each leaves of the contribution of the hidden effects.
+        Sets with their residuals of the contribution of the hidden effects.
     """
     known = np.isfinite(campaign.readings)
     target = (campaign.added / campaign.sigma)[known]
@@ -72,7 +73,7 @@ def alternatives(campaign: Synthetic, size: int = 1) -> list[Alternative]:
 
 
 def _residual(A: NDArray, target: NDArray) -> float:
-    """Squared part of a vector outside the span of columns."""
+    """Return the squared part of a vector outside the span of columns."""
     norms = np.linalg.norm(A, axis=0)
     A = A[:, norms > 0] / norms[norms > 0]
     if not A.shape[1]:
@@ -84,10 +85,10 @@ def _residual(A: NDArray, target: NDArray) -> float:
 
 
 def signatures(campaign: Synthetic) -> dict[str, NDArray]:
-    """Whitened columns of every public effect that applies to the robot.
+    """Return the whitened columns of every public effect that applies to the robot.
 
     Args:
-        campaign: whose design and noise are used.
+        campaign: campaign with the design and the noise.
 
     Returns:
         By name ``(6 rows, parameters)``, drift by its time constant.
@@ -102,7 +103,7 @@ def signatures(campaign: Synthetic) -> dict[str, NDArray]:
 
 
 def _raw(campaign: Synthetic) -> Iterator[tuple[str, NDArray]]:
-    """(rows, 6, parameters) by effect."""
+    """Return the (rows, 6, parameters) by effect."""
     differences = _FiniteDifferences(campaign)
     covariate = {
         name: np.array([row.covariates[name] for row in campaign.plan.rows])[:, None]
@@ -117,7 +118,7 @@ def _of_drives_and_lengths(
     campaign: Synthetic, differences: "_FiniteDifferences",
     covariate: Mapping[str, NDArray],
 ) -> Iterator[tuple[str, NDArray]]:  # fmt: skip
-    """Effects that turn a drive or lengthen a beam, by the same derivatives."""
+    """Return effects that rotate a drive or lengthen a beam, by common derivatives."""
     robot, rows = campaign.robot, campaign.plan.rows
     drives = [f.name for f in robot.frames if f.actuated]
     turning = [f.name for f in robot.frames if f.actuated and f.joint == "revolute"]
@@ -151,7 +152,7 @@ def _of_drives_and_lengths(
 def _of_loads(
     campaign: Synthetic, differences: "_FiniteDifferences"
 ) -> Iterator[tuple[str, NDArray]]:
-    """Effects of what the machine carries: springs, weight, wrong loads."""
+    """Return effects of loads: springs, weight, wrong loads."""
     beams = [f for f in campaign.robot.frames if isinstance(f.link, BeamLink)]
     base = [
         differences.loaded("base_compliance", f"stiffness.{k}", _SOFT, 1 / _SOFT)
@@ -178,7 +179,7 @@ def _of_loads(
 def _of_the_device(
     differences: "_FiniteDifferences", time: NDArray
 ) -> Iterator[tuple[str, NDArray]]:
-    """Effects of the measuring device: where it stands, and how it drifts."""
+    """Return effects of the measuring device: its pose, and its drift."""
     keys = [*(f"base.{k}" for k in SCREW), "tool.tx", "tool.ty", "tool.tz"]
     frame = [differences.unloaded("registration", key, _STEP) for key in keys]
     yield "registration", _columns(frame)
@@ -190,7 +191,7 @@ def _of_the_device(
 
 
 def _columns(screws: Sequence[NDArray]) -> NDArray:
-    """(rows, 6, parameters)."""
+    """Return the (rows, 6, parameters) of screws."""
     return np.stack(screws, axis=-1) if screws else np.zeros((0, 6, 0))
 
 
@@ -210,19 +211,20 @@ class _FiniteDifferences:
         return simulate_readings(self._robot, self._point, rows, effects, "springs")
 
     def loaded(self, name: str, key: str, value: float, step: float) -> NDArray:
-        """(rows, 6) derivative of the readings by a parameter of an effect."""
+        """Return (rows, 6) derivative of the readings by a parameter of an effect."""
         readings = self._read(self._rows, [Hidden(name, {key: value})])
         return (readings - self._loaded_readings) / step
 
     def unloaded(self, name: str, key: str, step: float) -> NDArray:
-        """The same of an effect that no load changes: once for each configuration."""
+        """Return same for an effect independent of the load, once a configuration."""
         readings = self._read(self._unloaded, [Hidden(name, {key: step})])
         return ((readings - self._unloaded_readings) / step)[self._of]
 
 
 def _stiffening(softer: NDArray, offset: NDArray) -> NDArray:
-    """A Hertz contact: the offset times load^(2/3), known from the drive's spring."""
-    scale = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])  # [1/m] lengths like angles
+    """Return Hertz contact's columns: offset x load^(2/3), by the drive's spring."""
+    # [1/m] makes lengths comparable with angles
+    scale = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
     a, b = softer * scale, offset * scale
     moments = (a * b).sum(axis=1) / (b * b).sum(axis=1)
     return offset * (np.sign(moments) * np.abs(moments) ** (2 / 3))[:, None]

@@ -1,12 +1,12 @@
 """Synthetic campaigns: measured data of a simulated machine with hidden effects.
 
 The machine is simulated in Exudyn with finite rotations and geometrically exact beams,
-not by the model that is fitted later.  Each effect is made as strong as asked
-for: the rms of what it alone adds to the readings is a multiple of the noise.  Weight
-and geometric stiffening have no strength of their own; with them the noise is set.
+not by the model that is fitted later.  Each effect has the requested strength: the rms
+of its own contribution to the readings is a multiple of the noise.  Weight and
+geometric stiffening have a fixed strength; for them the noise is set.
 
-The folder written holds what a measuring machine would hand over.  What was hidden is
-kept apart from it, in the layout of the practice campaigns' truth.
+The folder written holds the data of a measuring machine.  The hidden effects are stored
+separately, in the layout of the practice campaigns' truth.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from assembly.files.robot_file import write_robot
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.errors import BadInput, checked
 from forcefit.inputs.writing import whole_folder, write_text
+from forcefit.results.display import html_table, short_repr
 from validation.synthetic.design import CampaignDesign, CampaignPlan, plan_campaign
 from validation.synthetic.draws import NotApplicable, draw_effect, strengthened
 from validation.synthetic.effects import SCREW, WRENCH, Row
@@ -29,13 +29,13 @@ from validation.synthetic.machine import Hidden, simulate_readings
 
 _GIVEN_STRENGTH = ("self_weight", "geometric_stiffening")
 _TRIES = 5
-_DRAWS = 6  # of an effect's parameters, until the readings show it
-_CLOSE = 0.05  # relative, of a strength to the one asked for
+_DRAWS = 6  # largest number of draws of an effect's parameters, until it is visible
+_CLOSE = 0.05  # relative: accepted difference of a strength from the requested one
 _MOST = (
     1000.0  # times its plausible size: an effect that needs more is hardly observable
 )
 _SMALL = 1e-2  # scale of errors and load at which the machine is linear
-_BLUNDER = 40.0  # [-] sigmas of an outlier
+_BLUNDER = 40.0  # [-] size of an outlier in sigmas
 
 Progress = Callable[[str, int, int], None]
 Draw = Callable[[str], Hidden]
@@ -43,11 +43,11 @@ Draw = Callable[[str], Hidden]
 
 @dataclass(frozen=True, eq=False)
 class Synthetic:
-    """A synthetic campaign and what is hidden in it.
+    """A synthetic campaign and its hidden effects.
 
     Attributes:
         robot: declared.
-        plan: what was commanded.
+        plan: the commands.
         reference_point: (3,) [m] platform axes.
         registration: ``"known"``, or ``"unknown"`` with a hidden measuring frame.
         sigma: (6,) [rad, m] of the noise.
@@ -55,7 +55,7 @@ class Synthetic:
         exact: (rows, 6) [rad, m] the same without noise and blunders.
         added: (rows, 6) [rad, m] contribution of the hidden effects, without the frame.
         effects: hidden, with their parameters.
-        strength: by name, rms of what each effect alone adds, in sigmas.
+        strength: strength by name, rms of each effect's own contribution, in sigmas.
         outliers: rows with a blunder.
         hidden_base: (6,) screw of the measuring frame, None if known.
     """
@@ -120,22 +120,22 @@ def generate_campaign(
 
     Args:
         robot: declared, its geometric errors known.
-        wanted: effects by name, whose parameters are drawn, or effects with
-            parameters; with the multiple of the noise that each alone is to reach.
-        design: what is measured.
+        wanted: effects by name, whose parameters are drawn, or effects with parameters;
+            with the multiple of the noise for each alone.
+        design: design of the campaign.
         noise: errors of the readings.
-        seed: of all draws.
+        seed: seed of all draws.
         program: ``"multibody"`` or, much faster, ``"springs"``.
-        update: called with a stage, the rows done and their total.
+        update: function called with a stage, the rows done and their total.
 
     Returns:
         The campaign.
 
     Raises:
         BadInput: an unknown effect, more blunders than rows, or a design that the robot
-            cannot do.
-        NotApplicable: the robot has nothing that an effect could act on, or the
-            readings hardly show it wherever it is drawn.
+            cannot execute.
+        NotApplicable: the robot has no place where an effect could act, or the effect
+            is hardly visible in every draw.
         SimulationFailed: a row has no equilibrium.
     """
     design, noise = design or CampaignDesign(), noise or Noise()
@@ -180,11 +180,11 @@ def generate_campaign(
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """Hidden effects that the readings show.
+    """Hidden effects that are visible in the readings.
 
     Attributes:
-        effects: with their parameters.
-        strength: of each alone, by name, in sigmas.
+        effects: effects with their parameters.
+        strength: strength of each alone, by name, in sigmas.
         declared: (rows, 6) [rad, m] readings without them.
         exact: (rows, 6) [rad, m] readings with all of them.
         sigma: (6,) [rad, m] noise.
@@ -208,7 +208,7 @@ class _SimulatedMachine:
     update: Progress | None
 
     def read(self, effects: Sequence[Hidden], stage: str) -> NDArray:
-        """Readings of all rows without noise."""
+        """Return the readings of all rows without noise."""
         update = self.update
         progress = None if update is None else (lambda d, n: update(stage, d, n))
         return simulate_readings(
@@ -220,8 +220,8 @@ def _shown_effects(
     machine: _SimulatedMachine, wanted: Sequence[tuple[Hidden, float]], sigma: NDArray,
     redraw: Draw | None,
 ) -> _Shown:  # fmt: skip
-    """Each effect scaled to its multiple of the noise, then all together."""
-    # what has no strength of its own sets the noise, before the others follow it
+    """Return all effects, each scaled to its multiple of the noise."""
+    # effects of fixed strength set the noise, before the others are scaled to it
     wanted = sorted(wanted, key=lambda pair: pair[0].name not in _GIVEN_STRENGTH)
     declared = machine.read((), "declared")
     if any(effect.name == "geometric_stiffening" for effect, _ in wanted):
@@ -243,8 +243,8 @@ def _shown_effect(
     machine: _SimulatedMachine, effect: Hidden, multiple: float, sigma: NDArray,
     declared: NDArray, redraw: Draw | None,
 ) -> tuple[Hidden, NDArray, NDArray]:  # fmt: skip
-    """The effect scaled; drawn again where the readings hardly show what was drawn."""
-    # a force whose line meets a drive's axis does not load its spring, say
+    """Return the effect scaled; draw again while it is hardly visible."""
+    # for example, a force whose line meets a drive's axis does not load its spring
     for _ in range(_DRAWS - 1):
         try:
             return _scaled_effect(machine, effect, multiple, sigma, declared)
@@ -262,7 +262,7 @@ def _scaled_effect(
     sigma: NDArray,
     declared: NDArray,
 ) -> tuple[Hidden, NDArray, NDArray]:
-    """The effect scaled to a strength, its readings, and the noise."""
+    """Return the effect scaled to a strength, its readings, and the noise."""
     factor = 1.0
     for attempt in range(_TRIES):
         tried = strengthened(effect, factor) if attempt else effect
@@ -286,7 +286,7 @@ def _scaled_effect(
 
 
 def _linear(machine: _SimulatedMachine) -> NDArray:
-    """(rows, 6) readings of the machine linear in its errors and its load."""
+    """Return (rows, 6) readings of the machine to first order in errors and load."""
     ends = []
     for scale in (_SMALL, -_SMALL):
         small = machine.robot.with_errors(scale * machine.robot.errors)
@@ -298,7 +298,7 @@ def _linear(machine: _SimulatedMachine) -> NDArray:
 def _measured(
     exact: NDArray, sigma: NDArray, noise: Noise, rng: np.random.Generator
 ) -> tuple[NDArray, tuple[int, ...]]:
-    """Readings with noise, blunders and gaps; and the rows with blunders."""
+    """Return the readings with noise, blunders and gaps; and rows with blunders."""
     readings = exact + sigma * rng.normal(size=exact.shape)
     blunders = rng.choice(len(exact), noise.outliers, replace=False)
     columns = rng.integers(6, size=noise.outliers)
@@ -310,7 +310,7 @@ def _measured(
 
 
 def _rms(values: NDArray) -> float:
-    """Root mean square of all that was measured."""
+    """Return the root mean square of all measured values."""
     return float(np.sqrt(np.nanmean(values**2)))
 
 
@@ -318,11 +318,11 @@ def write_campaign(campaign: Synthetic, folder: Path | str) -> None:
     """Write campaign.toml, measurements.csv and robot.toml, all or none of them.
 
     Args:
-        campaign: to be written; nothing hidden is.
+        campaign: to be written; hidden effects are not written.
         folder: new, or empty.
 
     Raises:
-        BadInput: the folder holds something already or cannot be written.
+        BadInput: the folder is not empty or cannot be written.
     """
     with whole_folder(folder) as part:
         write_robot(campaign.robot, part / "robot.toml")
@@ -331,7 +331,7 @@ def write_campaign(campaign: Synthetic, folder: Path | str) -> None:
 
 
 def _toml(campaign: Synthetic) -> str:
-    """The text of campaign.toml."""
+    """Return the text of campaign.toml."""
     return (
         'robot = "robot.toml"\n'
         'measurements = "measurements.csv"\n'
@@ -344,7 +344,7 @@ def _toml(campaign: Synthetic) -> str:
 
 
 def _table(campaign: Synthetic) -> str:
-    """The text of measurements.csv."""
+    """Return the text of measurements.csv."""
     plan = campaign.plan
     loads = np.array([row.load for row in plan.rows])
     loaded = [k for k in range(6) if loads[:, k].any()]

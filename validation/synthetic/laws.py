@@ -1,4 +1,4 @@
-"""Laws of a simulated joint that are not linear."""
+"""Nonlinear laws of a simulated joint."""
 
 from dataclasses import dataclass
 
@@ -18,18 +18,18 @@ class PowerLawSpring:
     exponent: float
 
     def secant(self, deflection: float) -> float:
-        """[N m/rad or N/m] at a deflection, of a nanometre at least."""
+        """Return [N m/rad or N/m] secant at a deflection of at least a nanometre."""
         bent = max(abs(deflection), 1e-9)
         return float(self.coefficient * bent ** (self.exponent - 1.0))
 
 
 @dataclass(frozen=True)
 class TwoStepSpring:
-    """A joint spring that is softer, or stiffer, above some load.
+    """A joint spring that is softer, or stiffer, above a load.
 
     Attributes:
         below: [rad/(N m) or m/N] compliance up to the knee.
-        above: the same of what exceeds it.
+        above: compliance for the part of the load above the knee.
         knee: [N m or N] > 0.
     """
 
@@ -38,7 +38,7 @@ class TwoStepSpring:
     knee: float
 
     def secant(self, load: float) -> float:
-        """[N m/rad or N/m] under a load, of a millionth of the knee at least."""
+        """Return [N m/rad or N/m] secant under a load above a millionth of the knee."""
         size = max(abs(load), 1e-6 * self.knee)
         more = max(size - self.knee, 0.0)
         return size / (self.below * (size - more) + self.above * more)

@@ -35,8 +35,8 @@ class Hidden:
     """An effect that the declared model lacks.
 
     Attributes:
-        name: a public one, or one that begins with an underscore.
-        parameters: as in the public formats.
+        name: public name, or one that begins with an underscore.
+        parameters: parameters as in the public formats.
     """
 
     name: str
@@ -51,16 +51,16 @@ def simulate_readings(
     program: str = "multibody",
     update: Progress | None = None,
 ) -> NDArray:
-    """Deviations of a simulated machine at the rows of a design, without noise.
+    """Return deviations of a simulated machine at the rows of a design, without noise.
 
-    Rows whose machine is the same are simulated once.
+    Rows with the same machine are simulated once.
 
     Args:
         robot: declared; every joint is tight unless it has a clearance.
-        reference_point: (3,) [m] where the load acts and the pose is read, platform
-            axes.
+        reference_point: (3,) [m] point at which the load acts and the pose is read,
+            platform axes.
         rows: commanded configurations, loads and covariates.
-        effects: of the machine, which the declared model lacks.
+        effects: effects of the machine, which the declared model lacks.
         program: ``"multibody"``: Exudyn; ``"springs"``: much faster.
         update: called with the number of machines done and their total.
 
@@ -99,18 +99,18 @@ def simulate_readings(
 
 
 def acts_on_machine(name: str) -> bool:
-    """Whether an effect changes the machine; otherwise only what a device reads."""
+    """Return whether an effect changes the machine, not only the reading."""
     return name in _ALL_CHANGES
 
 
 def with_point(robot: Robot, reference_point: NDArray) -> Robot:
-    """The robot with its reference point as the platform."""
+    """Return the robot with its reference point as the platform."""
     point = Frame("platform~point", robot.platform, translation=reference_point)
     return replace(robot, platform=point.name, frames=(*robot.frames, point))
 
 
 def nominal_pose(robot: Robot, row: Row) -> NDArray:
-    """(4, 4) nominal platform of the robot, along its chain."""
+    """Return the (4, 4) nominal platform of the robot, along its chain."""
     T, frame = np.eye(4), robot.frame(robot.platform)
     while True:
         own = np.array([0.0, 0.0, row.coordinates.get(frame.name, 0.0)])
@@ -125,7 +125,7 @@ def nominal_pose(robot: Robot, row: Row) -> NDArray:
 
 
 def _machine(robot: Robot, row: Row, changing: Sequence[Hidden]) -> Machine:
-    """The machine of a row, with the effects that change it."""
+    """Return the machine of a row, with the effects that change it."""
     gravity = np.array([row.covariates.get(f"gravity.{k}", 0.0) for k in "xyz"])
     machine = Machine(robot, row.coordinates, row.load, gravity)
     for effect in changing:
@@ -137,7 +137,7 @@ def _machine(robot: Robot, row: Row, changing: Sequence[Hidden]) -> Machine:
 def _read(
     pose: NDArray, nominal: NDArray, row: Row, effects: Sequence[Hidden]
 ) -> NDArray:
-    """(6,) [rad, m] reading of the measuring device at a pose."""
+    """Return the (6,) [rad, m] reading of the measuring device at a pose."""
     for effect in effects:
         if effect.name in POSES:
             pose = POSES[effect.name](pose, row, effect.parameters)

@@ -1,7 +1,7 @@
 """Effects outside the library, to test whether a diagnosis reports them as such.
 
-Each occurs in real machines, and none of the public effects describes it.  Their
-names begin with an underscore.
+Each occurs in real machines, and no public effect describes it.  Their names begin with
+an underscore.
 """
 
 import math
@@ -30,7 +30,7 @@ from validation.synthetic.laws import ClearanceLaw, TwoStepSpring
 
 
 def _pose_stiffness(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """A drive's compliance is mean (1 + cos 3q): as gear teeth mesh."""
+    """Apply a drive's compliance of mean (1 + cos 3q), as of a gear mesh."""
     robot = machine.robot
     for name, softest in given.items():
         share = 1.0 + math.cos(3 * row.coordinates[name])
@@ -40,12 +40,12 @@ def _pose_stiffness(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _humidity(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """A beam swells by a strain per per cent of humidity."""
+    """Apply a beam's swelling: a strain per per cent of humidity."""
     return _swollen(machine, given, row.covariates["humidity"] - 40.0)
 
 
 def _quadratic_temperature(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """A beam's strain grows with the square of the temperature."""
+    """Apply a beam's strain that grows with the square of the temperature."""
     return _swollen(machine, given, row.covariates["temperature"] ** 2)
 
 
@@ -57,7 +57,7 @@ def _swollen(machine: Machine, given: Parameters, cause: float) -> Machine:
 
 
 def _second_harmonic(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """An encoder's error has twice the period of eccentricity: a disc that wobbles."""
+    """Apply an encoder's error of half the period of eccentricity: a wobbling disc."""
     for name in (key[: -len(".amplitude")] for key in given if "amplitude" in key):
         angle = 2 * row.coordinates[name] + given[f"{name}.phase"]
         change = given[f"{name}.amplitude"] * math.sin(angle)
@@ -66,12 +66,12 @@ def _second_harmonic(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _growth(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """A beam grows by a strain per second: wear, or a creep far from its end."""
+    """Apply a beam's growth by a strain per second: wear, or a long creep."""
     return _swollen(machine, given, row.covariates["time"])
 
 
 def _gear(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """A drive's angle has waves of a gear: so many a turn."""
+    """Apply waves of a gear to a drive's angle, several a turn."""
     for name in (key[: -len(".order")] for key in given if key.endswith(".order")):
         angle = given[f"{name}.order"] * row.coordinates[name] + given[f"{name}.phase"]
         change = given[f"{name}.amplitude"] * math.sin(angle)
@@ -80,7 +80,7 @@ def _gear(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _uneven_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Backlash that is wider on one side of a gear than on the other."""
+    """Apply a backlash that is wider on one side of a gear than on the other."""
     for name in (key[: -len(".phase")] for key in given if key.endswith(".phase")):
         share = 1.0 + 0.8 * math.sin(row.coordinates[name] + given[f"{name}.phase"])
         change = given[f"{name}.amplitude"] * row.covariates["approach"] * share
@@ -89,7 +89,7 @@ def _uneven_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _load_friction(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """A drive stops short by what grows with the size of the load: c f/100 N."""
+    """Apply a drive's friction that grows with the size of the load: c f/100 N."""
     pressed = float(np.linalg.norm(row.load[3:])) / 100 * row.covariates["approach"]
     for name, short in given.items():
         machine = misread(machine, name, "friction", -short * pressed)
@@ -97,14 +97,14 @@ def _load_friction(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _cable(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """A cable pulls down by what grows with the coordinate of a drive."""
+    """Apply a cable's weight, which grows with the coordinate of a drive."""
     load = machine.load.copy()
     load[5] -= sum(rate * row.coordinates[name] for name, rate in given.items())
     return replace(machine, load=load)
 
 
 def _slipped(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """A drive's zero jumps at a time."""
+    """Apply a jump of a drive's zero at a time."""
     for name in (key[: -len(".at")] for key in given if key.endswith(".at")):
         late = row.covariates["time"] >= given[f"{name}.at"]
         machine = misread(machine, name, "slip", given[f"{name}.jump"] * late)
@@ -112,7 +112,7 @@ def _slipped(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _lead(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """A slide's position has waves of its screw: one each so many metres."""
+    """Apply waves of the screw to a slide's position, one per period."""
     for name in named(given, "period"):
         turns = row.coordinates[name] / given[f"{name}.period"]
         wave = math.sin(2 * math.pi * turns + given[f"{name}.phase"])
@@ -122,7 +122,7 @@ def _lead(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _lead_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Backlash of a screw that varies over its turn."""
+    """Apply a screw's backlash that varies over its turn."""
     for name in named(given, "period"):
         turns = row.coordinates[name] / given[f"{name}.period"]
         share = 1.0 + 0.8 * math.sin(2 * math.pi * turns + given[f"{name}.phase"])
@@ -132,7 +132,7 @@ def _lead_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _two_steps(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """A joint has one compliance below a load, and another for what exceeds it."""
+    """Apply a joint's compliance that changes above a load."""
     robot, laws = machine.robot, dict(machine.laws)
     for name in named(given, "knee"):
         keys = ("below", "above", "knee")
@@ -144,7 +144,7 @@ def _two_steps(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _torque_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """A gear's teeth touch on the side to which the drive's load pushes them."""
+    """Apply a gear's backlash on the side to which the load pushes the drive."""
     robot, laws = machine.robot, dict(machine.laws)
     for name, clearance in given.items():
         frame = robot.frame(name)
@@ -157,7 +157,7 @@ def _torque_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _tilting(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """The ground turns, by a factor of what a sensor on it reads."""
+    """Apply a tilt of the ground, proportional to a sensor's reading."""
     new, screw = "base~tilt", np.zeros(6)
     screw[0] = given["gain"] * row.covariates["tilt"]
     frames = [
@@ -168,13 +168,13 @@ def _tilting(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _stand(reading: NDArray, row: Row, given: Parameters) -> NDArray:
-    """The device's stand yields with the square of the load: c (f/100 N)^2."""
+    """Apply a device stand's deflection by the squared load: c (f/100 N)^2."""
     squared = float(row.load[3:] @ row.load[3:]) / 1e4
     return reading + squared * np.array([given.get(f"c.{k}", 0.0) for k in SCREW])
 
 
 def _sag(reading: NDArray, row: Row, given: Parameters) -> NDArray:
-    """The measured target sags with the size of the load, whatever its direction."""
+    """Apply a sag of the measured target that grows with the size of the load."""
     sag = np.zeros(6)
     sag[5] = -given["rate"] * np.linalg.norm(row.load[3:])
     return reading + sag

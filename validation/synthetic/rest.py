@@ -1,13 +1,14 @@
-"""Equilibria of a simulated machine, nonlinear laws of its joints included.
+"""Equilibria of a simulated machine with nonlinear laws of its joints.
 
 A law is solved by fixed-point iteration: the machine is simulated with a linear spring
-or an offset in the joint, and its load determines the next spring or offset, until
-nothing changes.
+or an offset in the joint, and the joint's load determines the next spring or offset,
+until the change is below a tolerance.
 
-- A stiffening contact takes its secant stiffness.  It moves less than its last
-  stiffness predicts, so each step reduces the error at least by 1 - 1/n.
+- A stiffening contact has its secant stiffness.  It moves less than its last stiffness
+  predicts, so each step reduces the error at least by 1 - 1/n.
 - A joint with clearance is displaced by its load up to its bounds.  On an open chain
   the load does not depend on the clearance.  A weak spring (grease, seals) keeps it
+  near the middle under small loads: otherwise rounding would decide.
   near the middle under small loads: otherwise rounding would decide.
 """
 
@@ -32,10 +33,13 @@ from validation.synthetic.effects import (
 from validation.synthetic.laws import ClearanceLaw, PowerLawSpring, TwoStepSpring
 from validation.synthetic.springs import rest_on_springs
 
-_ELEMENTS = 2  # of a beam; corrected ones need no more at deflections this small
+# elements of a beam; corrected elements are accurate at these small deflections
+_ELEMENTS = 2
 _STEPS = 60
-_SETTLED = 1e-11  # [rad, m] of power-law springs
-_SETTLED_CLEARANCE = 5e-9  # [rad, m] rounding of the sensor under a small load
+_SETTLED = 1e-11  # [rad, m] change of power-law springs at convergence
+# [rad, m] change of clearances at convergence, with the sensor's rounding at small
+# loads
+_SETTLED_CLEARANCE = 5e-9
 _CENTRING = {"radial": 3e3, "axial": 3e3, "tilt": 3e2, "spin": 3e2}  # [N/m, N m/rad]
 Progress = Callable[[int, int], None]
 _ROWS = {"tilt": [0, 1], "spin": [2], "radial": [3, 4], "axial": [5]}
@@ -44,10 +48,10 @@ _ROWS = {"tilt": [0, 1], "spin": [2], "radial": [3, 4], "axial": [5]}
 def rest_poses(
     machines: Sequence[Machine], program: str, update: Progress | None = None
 ) -> NDArray:
-    """Equilibria of machines of one structure under their loads.
+    """Return the equilibria of machines of one structure under their loads.
 
     Args:
-        machines: with all their effects.
+        machines: machines with all their effects.
         program: one of :data:`PROGRAMS`.
         update: called with the number of machines at rest and their total.
 
@@ -55,7 +59,7 @@ def rest_poses(
         (k, 4, 4) of their platforms, seen from the base.
 
     Raises:
-        SimulationFailed: one has none, or the joints' laws do not converge.
+        SimulationFailed: no equilibrium, or the joints' laws do not converge.
     """
     poses = np.zeros((len(machines), 4, 4))
     waiting = dict(enumerate(machines))
@@ -74,7 +78,7 @@ def rest_poses(
 
 
 def _updated(machine: Machine, equilibrium: Rest) -> tuple[Machine, float]:
-    """The machine with its laws evaluated under these loads; change in tolerances."""
+    """Return the machine with laws evaluated under its loads; change in tolerances."""
     largest, robot = 0.0, machine.robot
     for name, law in machine.laws.items():
         i, frame = robot.index(name), robot.frame(name)
@@ -101,7 +105,7 @@ def _updated(machine: Machine, equilibrium: Rest) -> tuple[Machine, float]:
 
 
 def _clearance_position(law: ClearanceLaw, wrench: NDArray) -> NDArray:
-    """(6,) [rad, m] position of a joint within its clearance, under a load."""
+    """Return the (6,) [rad, m] position of a joint in its clearance under a load."""
     position = np.zeros(6)
     for name, rows in _ROWS.items():
         bound = getattr(law.clearance, name) or 0.0
@@ -113,14 +117,14 @@ def _clearance_position(law: ClearanceLaw, wrench: NDArray) -> NDArray:
 
 @dataclass(frozen=True, eq=False)
 class _Placed:
-    """Joint coordinates of a robot, as the simulation takes them."""
+    """Joint coordinates of a robot, in the form that the simulation needs."""
 
     robot: Robot
     coordinates: NDArray
 
 
 def _simulated(machines: Sequence[Machine]) -> Iterator[Rest]:
-    """Equilibria by the multibody simulation, one by one."""
+    """Yield equilibria by the multibody simulation, one by one."""
     for machine in machines:
         robot = machine.robot
         q = np.array([machine.coordinates.get(f.name, 0.0) for f in robot.frames])

@@ -1,24 +1,24 @@
-"""The same machine with springs at its beams' tips, all rows of a campaign at once.
+"""The same machine with springs at its beams' tips, for all rows together.
 
-A second, faster program.  Motions are finite and the equilibrium
-is found on the deformed machine, as in the multibody simulation; a beam is its
-compliance at its tip instead of elements, which differs under large deflections.
-Clearances in closed loops need the multibody simulation.
+This is a second, faster program.  Motions are finite and the equilibrium is that of the
+deformed machine, as in the multibody simulation.  A beam is its compliance at its tip
+instead of elements, which differs under large deflections.  Clearances in closed loops
+need the multibody simulation.
 
-Unknown are the passive joints' motions q and the wrench l of each closure.  Given them,
-the springs deform under their wrenches, and the frames follow; the residuals are
+The unknowns are the passive joints' motions q and the wrench l of each closure.  Given
+these, the springs deform under their wrenches, and the frames follow; the residuals are
 
     r = errors of the closures,        t = moments about passive joints' axes.
 
-Newton's step uses the nominal posture, as springs deform little: with a_j the axis of
+Newton's step uses the nominal posture, as springs deform little.  With a_j the axis of
 joint j and s_kj = +1, -1 on the closure's first and second chain,
 
     [ -S       -(s a) ] [ dl ]     [ r ]
     [ (s a)^T    0    ] [ dq ] = - [ t ]
 
-S the compliance between each pair of closures.  Steps are of least norm, in idle
-rotations and in the wrenches of overconstrained rigid loops.  Screws and wrenches
-are read at the base origin in base axes unless said otherwise.
+with S the compliance between each pair of closures.  Steps are of least norm, in idle
+rotations and in the wrenches of overconstrained rigid loops.  Screws and wrenches are
+read at the base origin in base axes unless stated otherwise.
 """
 
 from collections.abc import Sequence
@@ -36,9 +36,9 @@ from validation.multibody.simulation import SimulationFailed
 from validation.synthetic.effects import Machine, Rest
 
 _STEPS = 60
-_CONVERGED = 1e-12  # [rad, m] of the last step
-_DIVERGED = 1e3  # [rad, m] of a coordinate: the steps diverge
-_RANK = 1e-10  # singular values below it, relative, are of idle motions
+_CONVERGED = 1e-12  # [rad, m] size of the last step
+_DIVERGED = 1e3  # [rad, m] coordinate above which the steps diverge
+_RANK = 1e-10  # relative: smaller singular values belong to idle motions
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +46,10 @@ class _SpringModel:
     """Arrays of k machines of one structure, with n frames.
 
     Attributes:
-        robot: one of theirs.
+        robot: one of the robots.
         placed: (k, n, 4, 4) each frame with its error, seen from its parent.
         compliances: (2, k, n, 6, 6) of links and of joints, at the frame, in its axes.
-        nominal: (k, n, 4, 4) frames of the robot as drawn.
+        nominal: (k, n, 4, 4) nominal frames of the robot.
         passive: rows whose motion is free.
         pairs: (closures, 2) rows.
         signs: (closures, n) +1 on the first chain, -1 on the second.
@@ -67,10 +67,10 @@ class _SpringModel:
 
 
 def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
-    """Equilibria of machines whose links are springs.
+    """Return the equilibria of machines whose links are springs.
 
     Args:
-        machines: of one structure, without clearances.
+        machines: machines of one structure, without clearances.
 
     Returns:
         The equilibrium of each.
@@ -119,7 +119,7 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
 
 
 def _spring_model(machines: Sequence[Machine], q: NDArray) -> _SpringModel:
-    """Compliances, places and chains of machines."""
+    """Return the compliances, poses and chains of machines."""
     robot = machines[0].robot
     drawn = _placements(np.array([
         [[*f.rotation, *f.translation] for f in m.robot.frames] for m in machines
@@ -150,7 +150,7 @@ def _spring_model(machines: Sequence[Machine], q: NDArray) -> _SpringModel:
 
 
 def _compliances(frame: Frame) -> tuple[NDArray, NDArray]:
-    """(6, 6) of a frame's link and of its joint."""
+    """Return the (6, 6) compliances of a frame's link and of its joint."""
     joint = np.zeros((6, 6))
     K = frame.springs
     if K is not None:
@@ -161,7 +161,7 @@ def _compliances(frame: Frame) -> tuple[NDArray, NDArray]:
 
 
 def _placements(screws: NDArray) -> NDArray:
-    """(..., 4, 4) of rotation vectors and translations (..., 6)."""
+    """Return the (..., 4, 4) of rotation vectors and translations (..., 6)."""
     T = np.zeros((*screws.shape[:-1], 4, 4))
     turns = Rotation.from_rotvec(screws[..., :3].reshape(-1, 3)).as_matrix()
     T[..., :3, :3] = turns.reshape(*screws.shape[:-1], 3, 3)
@@ -171,7 +171,7 @@ def _placements(screws: NDArray) -> NDArray:
 
 
 def _deflections(screws: NDArray) -> NDArray:
-    """(..., 4, 4) of springs' screws (..., 6), translations in axes turned half-way."""
+    """Return (..., 4, 4) of springs' screws, translations in half-rotated axes."""
     half = screws.copy()
     half[..., :3] /= 2
     T = _placements(screws)
@@ -181,10 +181,10 @@ def _deflections(screws: NDArray) -> NDArray:
 
 
 def _chain(robot: Robot, steps: NDArray, ends: NDArray, q: NDArray) -> NDArray:
-    """(k, n, 4, 4) frames by products along the chains.
+    """Return the (k, n, 4, 4) frames by products along the chains.
 
     Args:
-        robot: whose tree it is.
+        robot: robot with the tree.
         steps: (k, n, 4, 4) from the parent's joint.
         ends: (k, n, 4, 4) after the step, before the joint's own motion.
         q: (k, n) [rad or m] the joints' own motions.
@@ -207,14 +207,14 @@ def _chain(robot: Robot, steps: NDArray, ends: NDArray, q: NDArray) -> NDArray:
 
 
 def _forward(parts: _SpringModel, q: NDArray, screws: NDArray) -> NDArray:
-    """(2, k, n, 4, 4) frames at the bodies' ends, and behind the joints' springs."""
+    """Return (2, k, n, 4, 4) frames at the bodies' ends, and after joint springs."""
     links, joints = _deflections(screws)
     before = _chain(parts.robot, parts.placed @ links, joints, q)
     return np.stack([before @ np.linalg.inv(joints), before])
 
 
 def _maps(T: NDArray) -> NDArray:
-    """(..., 6, 6) from screws in frames' axes to the base."""
+    """Return (..., 6, 6) maps from screws in frames' axes to the base."""
     R, p = T[..., :3, :3], T[..., :3, 3]
     A = np.zeros((*T.shape[:-2], 6, 6))
     A[..., :3, :3] = A[..., 3:, 3:] = R
@@ -223,7 +223,7 @@ def _maps(T: NDArray) -> NDArray:
 
 
 def _axes(parts: _SpringModel, T: NDArray) -> NDArray:
-    """(k, passive, 6) screws of unit motions."""
+    """Return the (k, passive, 6) screws of unit motions."""
     own = [parts.robot.frames[i].own_axis for i in parts.passive]
     maps = _maps(T[:, parts.passive])
     columns = [maps[:, k, :, axis] for k, axis in enumerate(own)]
@@ -231,8 +231,8 @@ def _axes(parts: _SpringModel, T: NDArray) -> NDArray:
 
 
 def _newton(parts: _SpringModel, q: NDArray) -> tuple[NDArray, float]:
-    """Inverses of Newton's matrix, and the compliance that scales wrenches."""
-    # rows of one configuration and the same springs have the same matrix
+    """Return inverses of Newton's matrix, and the compliance that scales wrenches."""
+    # rows of one configuration and equal springs have the same matrix
     distinct = np.hstack([
         q,
         parts.compliances.sum(axis=(0, 3, 4)).reshape(len(q), -1),
@@ -248,7 +248,7 @@ def _newton(parts: _SpringModel, q: NDArray) -> tuple[NDArray, float]:
     S = np.einsum("an,bn,knij->kaibj", s, s, at_base, optimize=True)
     S = S.reshape(machines, size, size)
     axes = _axes(parts, nominal)
-    # a closure's wrench passes a joint if the joint is on one of its chains only
+    # a closure's wrench acts on a joint if the joint is on one of its chains only
     A = np.einsum("an,kni->kain", s[:, parts.passive], axes)
     A = A.reshape(machines, size, passive)
     diagonal = np.diagonal(S, axis1=1, axis2=2)
@@ -263,7 +263,7 @@ def _newton(parts: _SpringModel, q: NDArray) -> tuple[NDArray, float]:
 def _carried(
     machines: Sequence[Machine], parts: _SpringModel, ends: NDArray, closing: NDArray
 ) -> NDArray:
-    """(2, k, n, 6) wrenches through each body's end and through its joint."""
+    """Return (2, k, n, 6) wrenches through each body's end and through its joint."""
     robot, (bodies, before) = parts.robot, ends
     carried = np.zeros((2, *before.shape[:2], 6))
     platform = robot.index(robot.platform)
@@ -285,7 +285,7 @@ def _carried(
 def _add_weights(
     machines: Sequence[Machine], gravity: NDArray, bodies: NDArray, carried: NDArray
 ) -> None:
-    """Weights of the first machine's bodies; a beam's at its ends, with end moments."""
+    """Add weights of the first machine's bodies; a beam's at its ends, with moments."""
     parents = machines[0].robot.parents
     for i, frame in enumerate(machines[0].robot.frames):
         R, tip = bodies[:, i, :3, :3], bodies[:, i, :3, 3]
@@ -308,23 +308,23 @@ def _add_weights(
 
 
 def _force(vectors: NDArray) -> NDArray:
-    """(k, 6) wrenches of forces (k, 3)."""
+    """Return the (k, 6) wrenches of forces (k, 3)."""
     return np.concatenate([np.zeros_like(vectors), vectors], axis=1)
 
 
 def _at_base(wrenches: NDArray, points: NDArray) -> NDArray:
-    """(k, 6) wrenches at points, read at the base origin."""
+    """Return the (k, 6) wrenches at points, read at the base origin."""
     moments = wrenches[:, :3] + np.cross(points, wrenches[:, 3:])
     return np.concatenate([moments, wrenches[:, 3:]], axis=1)
 
 
 def _at_frames(T: NDArray, wrenches: NDArray) -> NDArray:
-    """(..., 6) wrenches read at frames, in their axes."""
+    """Return the (..., 6) wrenches read at frames, in their axes."""
     return np.einsum("...ij,...i->...j", _maps(T), wrenches)
 
 
 def _closure_errors(parts: _SpringModel, before: NDArray) -> NDArray:
-    """(k, closures, 6) [rad, m] of second frames from their closed positions."""
+    """Return the (k, closures, 6) [rad, m] closure errors."""
     first, second = parts.pairs.T
     target, T = before[:, first] @ parts.closed, before[:, second]
     turn = (T[..., :3, :3] @ np.swapaxes(target[..., :3, :3], -1, -2)).reshape(-1, 3, 3)

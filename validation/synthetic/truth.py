@@ -4,6 +4,12 @@ from typing import Any
 
 import numpy as np
 
+from assembly.model.statuses import (
+    AMBIGUOUS,
+    EXPLAINED,
+    NONE_NEEDED,
+    OUTSIDE_LIBRARY,
+)
 from validation.synthetic.generator import Synthetic
 from validation.synthetic.machine import Hidden
 from validation.synthetic.outside import OUTSIDE
@@ -41,14 +47,14 @@ def truth_of(
     accept: list[list[str]] | None = None,
     note: str = "",
 ) -> dict[str, Any]:
-    """The truth of a campaign.
+    """Return the truth of a campaign.
 
     Args:
-        campaign: with what is hidden in it.
-        verdict: of a correct diagnosis; if absent, that of a design that distinguishes
-            the effects.
-        accept: sets of effects that explain the data as well.
-        note: why.
+        campaign: campaign with its hidden effects.
+        verdict: verdict of a correct diagnosis; if absent, that of a design that
+            distinguishes the effects.
+        accept: sets of effects that explain the data equally well.
+        note: explanation.
 
     Returns:
         Plain values, keys of the practice campaigns' truth.
@@ -56,8 +62,8 @@ def truth_of(
     names = [effect.name for effect in campaign.effects]
     outside = [OUTSIDE[name] for name in names if name in OUTSIDE]
     if verdict is None:
-        verdict = "outside_library" if outside else "explained"
-        verdict = verdict if names else "none_needed"
+        verdict = OUTSIDE_LIBRARY if outside else EXPLAINED
+        verdict = verdict if names else NONE_NEEDED
     accepted = [[]] if outside else [names, *(accept or [])]
     residual = (campaign.readings - campaign.exact) / campaign.sigma
     added = campaign.added / campaign.sigma
@@ -66,7 +72,7 @@ def truth_of(
         "rows": len(campaign.plan.rows),
         "configurations": int(campaign.plan.configuration.max()) + 1,
         "verdict": verdict,
-        "accept_verdicts": sorted({verdict, *(["ambiguous"] if accept else [])}),
+        "accept_verdicts": sorted({verdict, *([AMBIGUOUS] if accept else [])}),
         "effects": [_effect(campaign, effect) for effect in campaign.effects],
         "outside": "; ".join(outside) or None,
         "note": note,
@@ -87,7 +93,7 @@ def truth_of(
 
 
 def _effect(campaign: Synthetic, effect: Hidden) -> dict[str, Any]:
-    """Name, place and parameters of an effect."""
+    """Return name, place and parameters of an effect."""
     names = [frame.name for frame in campaign.robot.frames]
     where: list[str] = []
     parameters = []
@@ -103,7 +109,7 @@ def _effect(campaign: Synthetic, effect: Hidden) -> dict[str, Any]:
 
 
 def _unit(campaign: Synthetic, effect: str, key: str, frame: str) -> str:
-    """The unit of a parameter."""
+    """Return the unit of a parameter."""
     last = key.rpartition(".")[2]
     special = {
         "phase": "rad", "tilt": "rad", "exponent": "1", "factor": "1",
@@ -118,6 +124,6 @@ def _unit(campaign: Synthetic, effect: str, key: str, frame: str) -> str:
 
 
 def _rms(values: np.ndarray) -> float:
-    """Root mean square of what was measured; 1 where nothing is known."""
+    """Return the root mean square of the measured values; 1 without any."""
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if known.size else 1.0

@@ -1,11 +1,11 @@
-// Continuation to several targets, as Python calls it.
+// Python binding of the continuation to several targets.
 #include "../arrays.h"
 #include "../bindings.h"
 #include "../kernels.h"
 
 namespace {
 
-// A robot's joints and closures, kept as long as their addresses are.
+// A robot's joints and closures; the object keeps the arrays alive.
 struct KeptTree {
     nb::object arrays;
     Tree tree;

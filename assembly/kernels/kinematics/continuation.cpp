@@ -1,26 +1,24 @@
-// Continuation to several targets side by side.
-//
-// Each lane follows a target of its own, and takes the next one where its own ends.  A
-// round is one iteration of Newton's method in every lane; what comes of it each lane
-// decides for itself.
+// Continuation to several targets in parallel.  Each lane follows one target, and takes
+// the next target at the end.  A round is one iteration of Newton's method in every lane;
+// each lane decides on its result independently.
 #include "../kernels.h"
 #include "motion.h"
 
 using namespace LANE_SPACE;
 
 constexpr double SOLVED = 1e-10;  // scaled residual of a configuration that is solved
-constexpr double ROUNDED = 1e-5;  // accepted where it cannot be made smaller
-constexpr double NEAR = 1e-4;     // accepted on the way
-constexpr double JUMP = 0.4;  // [rad or lengths] most in a step: keeps the assembly mode
-constexpr double FAR = 1.0;   // the same where the tangent is a guide to the whole step
-constexpr double LONG = 0.7;  // of it: the step that is tried, by the tangent
-constexpr double SHORT = 0.03;  // of the way: where long steps lead nowhere
-// there, and where the target does not determine all joints
+constexpr double ROUNDED = 1e-5;  // accepted residual if it does not decrease further
+constexpr double NEAR = 1e-4;     // accepted residual before the last step
+constexpr double JUMP = 0.4;  // [rad or lengths] largest step: keeps the assembly mode
+constexpr double FAR = 1.0;   // largest step if the tangent predicts the whole step
+constexpr double LONG = 0.7;  // step tried by the tangent, as a share of the largest
+constexpr double SHORT = 0.03;  // share of the path: below it steps are short
+// first step on difficult paths, and if the target does not determine all joints
 constexpr double FIRST_STEP = 0.125;
-constexpr double CURVED = 0.25;  // of the tangent's step: largest correction of it
-// damping, of the normal matrix' trace, where all joints are determined; where some are
-// not, rounding moves those by its own size over the damping, and with less they would
-// stand elsewhere on every processor
+constexpr double CURVED = 0.25;  // largest correction, as a share of the tangent's step
+// damping, as a share of the normal matrix' trace: if all joints are determined, and if
+// some are not. Rounding errors move undetermined joints by their size over the damping;
+// with less damping their positions would depend on the processor
 constexpr double LEAST = 1e-13, SPREAD = 1e-9;
 constexpr double SMALLEST_STEP = 1e-5;
 constexpr int NEWTON = 12;  // iterations; quadratic convergence needs about 4
@@ -28,7 +26,7 @@ constexpr double ENDLESS = HUGE_VAL;
 
 namespace {
 
-// After an iteration Newton's method goes on, begins on another step, or the track ended.
+// After an iteration Newton's method continues, begins another step, or the track ends.
 enum Next { GOES_ON, BEGINS, ENDED };
 
 // Largest absolute number, NaN if one is NaN.
@@ -41,13 +39,13 @@ inline Real largest_of(const Real *v, int count) {
     return total == total ? largest : total;
 }
 
-// What one lane follows, and how far it has come.
+// Target and progress of one lane.
 struct Lane {
     int64_t target = -1;
     double done, step, goal, jump, ahead, before, first;
     bool careful;
     int iteration;
-    std::vector<double> q;  // where it stands
+    std::vector<double> q;  // coordinates reached
 };
 
 class Follower : Motion {
@@ -89,7 +87,7 @@ void Follower::start(int l, int64_t target) {
     begin(l);
 }
 
-// Newton's method, from where the lane stands to as far as its step goes.
+// Newton's method from the lane's coordinates to the end of its step.
 void Follower::begin(int l) {
     Lane &lane = lanes[l];
     lane.goal = std::fmin(1.0, lane.done + lane.step);
@@ -118,14 +116,14 @@ void Follower::begin(int l) {
     }
 }
 
-// After Newton's method: a step that is done, or a shorter one.
+// Result of Newton's method: a completed step, or a shorter one.
 Next Follower::next(int l, bool fine, bool determined) {
     Lane &lane = lanes[l];
     if (!lane.careful && (!determined || lane.step < SHORT)) {
-        // the way is hard: by short steps from here on
+        // the path is difficult: short steps from here on
         lane.careful = true, lane.jump = JUMP * longest;
         if (!determined) {
-            // and where it ends depends on all of the way
+            // and the result depends on the whole path
             lane.q.assign(targets.start, targets.start + n);
             lane.done = 0.0, lane.step = FIRST_STEP;
         }
@@ -148,7 +146,7 @@ Next Follower::next(int l, bool fine, bool determined) {
     return lane.done < 1.0 && lane.step > SMALLEST_STEP ? BEGINS : ENDED;
 }
 
-// What one lane does with its iteration; Newton's method goes on only if it says so.
+// Use of an iteration's result in one lane; GOES_ON continues Newton's method.
 Next Follower::iterate(int l, double worst, double largest, bool determined) {
     Lane &lane = lanes[l];
     if (lane.goal < 1.0 && !lane.careful && worst < NEAR) return next(l, true, true);
@@ -158,17 +156,18 @@ Next Follower::iterate(int l, double worst, double largest, bool determined) {
         if (lane.ahead > lane.jump || !determined) return next(l, false, determined);
     }
     if (lane.iteration == 1 && !lane.careful && largest > CURVED * lane.first)
-        return next(l, false, true);  // the tangent is no guide: a shorter step
+        return next(l, false, true);  // the tangent predicts badly: a shorter step
     lane.first = std::fmax(lane.first, largest);
     const double part = 0.5 / std::fmax(0.5, largest);
     const bool still = largest < 1e-9;
     for (size_t i = 0; i < joints.size(); ++i)
         q[joints[i]][l] -= x[i][l] * part * unit[i];
     if (worst < 1e-14 || still || !std::isfinite(worst))
-        // solved, or as well as a rounded overconstrained file can be
+        // solved, or as well as an overconstrained robot from a file with rounded numbers
+        // can be
         return next(l, worst < SOLVED || (still && worst < ROUNDED), true);
     if (worst > ROUNDED && worst > 0.7 * lane.before)
-        return next(l, false, true);  // it does not converge: try a smaller step
+        return next(l, false, true);  // no convergence: try a smaller step
     lane.before = worst;
     return ++lane.iteration < NEWTON ? GOES_ON : next(l, worst < SOLVED, true);
 }
@@ -178,7 +177,7 @@ void Follower::follow(Tracks &out) {
     int64_t waiting = std::min<int64_t>(LANES, targets.count);
     for (int l = 0; l < LANES; ++l) {
         start(l, std::min<int64_t>(l, waiting - 1));
-        if (l >= waiting) lanes[l].target = -1;  // rests
+        if (l >= waiting) lanes[l].target = -1;  // the lane is idle
     }
     bool running = true;
     while (running) {
@@ -209,7 +208,7 @@ void Follower::follow(Tracks &out) {
     }
 }
 
-// Where tracks end: rotations and origins of all frames, what stays open of closures.
+// Results at the ends of the tracks: rotations and origins of frames, open closures.
 void Follower::frames(Tracks &out) {
     in_blocks(all_of(targets.count), [&](const Block &block, Whole inside) {
         for (int j = 0; j < n; ++j) q[j] = block.read(out.ends, n, j);

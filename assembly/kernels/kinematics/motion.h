@@ -1,5 +1,5 @@
-// What a robot leaves open of its closures and of its platform's pose, in every lane, and
-// the step of Newton's method that closes it.
+// Residuals of a robot's closures and of its platform's pose in every lane, and the step
+// of Newton's method that reduces them.
 #pragma once
 
 #include "../records.h"
@@ -8,17 +8,17 @@
 
 namespace LANE_SPACE {
 
-// by what a pivot exceeds the damping where a step is determined
+// factor between a pivot and the damping from which a step is determined
 constexpr double CLEAR = 1e4;
 
 namespace {
 
-// A joint that is solved for and moves a closure: its row of J, and its column of N.
+// An unknown joint that moves a closure: its row of J and its column of N.
 struct Mover {
     int row, column;
 };
 
-// Where all frames are, what stays open, and a step that closes it.
+// Poses of all frames, residuals, and a step that reduces them.
 class Motion {
 public:
     Motion(const Tree &tree, const Targets &targets);
@@ -28,15 +28,15 @@ protected:
     const Targets &targets;
     const int n, closures;
     const bool posed;
-    std::vector<int> joints, columns;  // solved for; -1 for the others
+    std::vector<int> joints, columns;  // unknown joints; -1 for the others
     std::vector<double> unit;
-    std::vector<std::vector<int>> coupled;  // later columns that a row of N enters
+    std::vector<std::vector<int>> coupled;  // later columns coupled with a row of N
     std::vector<std::vector<Mover>> movers;  // of each closure, then of the platform
     std::vector<bool> straight;             // frames that are not turned in their parents
     bool asked[6], all_turns, turns;
     Row q, R, p, after_R, after_p, r, J, x;
     Table N;
-    Real pose[6] = {}, turn[9] = {};  // of the platform, asked for on the way
+    Real pose[6] = {}, turn[9] = {};  // required pose of the platform on the path
 
     void forward();
     void equations();
@@ -72,7 +72,7 @@ Motion::Motion(const Tree &tree, const Targets &targets)
     }
 }
 
-// Joints that move the same closure, and those that elimination couples.
+// Joints that move the same closure, and those coupled by elimination.
 void Motion::couple() {
     const int m = joints.size();
     std::vector<std::vector<char>> entered(m, std::vector<char>(m, 0));
@@ -130,7 +130,7 @@ void Motion::forward() {
     }
 }
 
-// Scaled residuals and, six numbers for each of the tree's moves, their derivatives.
+// Scaled residuals and their derivatives, six numbers for each move of the tree.
 void Motion::equations() {
     const double scale = 1.0 / tree.size;
     for (int g = 0; g < closures + posed; ++g) {
@@ -172,7 +172,8 @@ void Motion::equations() {
         }
 }
 
-// The turn that the platform lacks: regular near half a turn where all of it is given.
+// Rotation that the platform still needs; regular near half a turn if all three rotations
+// are required.
 void Motion::platform_turn(int first, int last, Real *out) {
     const Real *own = &R[9 * tree.platform];
     if (all_turns) {
@@ -197,7 +198,7 @@ void Motion::platform_turn(int first, int last, Real *out) {
     }
 }
 
-// Least-squares step x, of least norm by damping; where it is determined without.
+// Least-squares step x, of least norm by damping; mask of lanes where it is determined.
 Whole Motion::least_step(Real damped) {
     const int m = joints.size();
     for (int i = 0; i < m; ++i) {

@@ -22,7 +22,7 @@ void assemble_all(const Robot &robot, const Points &points, Solutions &out) {
     in_blocks(energies.waiting, solve);
 }
 
-// Of robots without springs.
+// For robots without springs.
 void all_margins(const Robot &robot, const Points &points, Margins &out) {
     ZoneMargins zone(robot, points);
     in_blocks(all_of(points.count), [&](const Block &block, Whole pending) {

@@ -1,11 +1,11 @@
-// Problems (22), (21) and (27), and the classical compliance, as Python calls them.
+// Python bindings of problems (22), (21) and (27), and of the classical compliance.
 #include "../arrays.h"
 #include "../bindings.h"
 #include "../kernels.h"
 
 namespace {
 
-// A robot's arrays, kept as long as their addresses are.
+// A robot's arrays; the object keeps them alive.
 struct KeptRobot {
     nb::object structure;
     Robot robot;
@@ -42,8 +42,8 @@ KeptRobot robot_of(nb::object s) {
     return {std::move(s), r};
 }
 
-// Frames, the closure error that they have already, and their errors: of each point, or
-// one row for all.
+// Frames, their nominal closure error and their geometric errors: of each point, or one
+// row for all.
 Points points_of(
     const Robot &r, nb::handle T, nb::handle errors, nb::handle mismatch, Size &k) {
     Size postures, sets;

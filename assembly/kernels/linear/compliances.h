@@ -1,4 +1,4 @@
-// The classical compliance at several postures side by side.  For a unit wrench e on the
+// The classical compliance at several postures in parallel.  For a unit wrench e on the
 // platform the closures carry lambda = lambda_e + Z^T mu: the first lets no free motion
 // work, the second makes the springs' energy
 //
@@ -14,9 +14,10 @@
 namespace LANE_SPACE {
 
 enum { COMPLIANT, LOOSE, UNCLEAR };
-constexpr double STILL = 1e-9;  // of a unit wrench's work on a free motion: none
+// share of a unit wrench's work on a free motion that counts as zero
+constexpr double STILL = 1e-9;
 
-// Blocks of points of one robot, one after the other.
+// Blocks of points of one robot, in sequence.
 class Compliance : public Reduction {
 public:
     using Reduction::Reduction;

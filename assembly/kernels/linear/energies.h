@@ -1,9 +1,9 @@
-// Problem (22) at several postures side by side, from the frames' poses to the certified
-// answer.
+// Problem (22) at several postures in parallel, from the frames' poses to the certified
+// solution.
 //
-// Points that this does not cover go to the reference, with a code for the reason.  A point
-// counts as solved only if its certificate, computed from the wrenches on the problem
-// before any elimination, proves the gap asked for.
+// Points that this code cannot solve are solved by the reference; a code gives the
+// reason.  A point counts as solved only if its certificate proves the required gap.  The
+// certificate is computed from the wrenches, on the problem before any elimination.
 #pragma once
 
 #include "loads.h"
@@ -18,15 +18,15 @@ constexpr double OPEN = 1e-11;
 enum Outcome { NEWTON, INTERIOR, RIGID, AMBIGUOUS, UNCERTIFIED, BOUNDED, DRIVEN };
 constexpr double STOP = 3e-3;  // the solvers stop at this fraction of the accepted gap
 
-// Solves blocks of points of one robot, one after the other.
+// Solver of blocks of points of one robot, in sequence.
 class Energies : public Loaded {
 public:
     Energies(const Robot &s, const Points &points)
         : Loaded(s, points), postpones(!points.own_posture), solver(cones, m), v(m),
           G(m, nu), unfelt(m, m) {}
 
-    // Where one posture serves all, points wait for others that need the interior point
-    // too, unless all of a block do: no lane is idle.
+    // If all points have one posture, points that need the interior-point method wait for
+    // others, unless all points of a block need it: no lane is idle.
     bool postpones;
     std::vector<int64_t> waiting;
 
@@ -35,11 +35,11 @@ public:
 private:
     Solver solver;
     Row v;  // G u + h
-    // kept while the posture stays
+    // kept while the posture does not change
     int64_t prepared = -1;  // at which change of it
-    Table G, unfelt;        // of Z's other rows, orthonormal: nothing feels them
+    Table G, unfelt;  // unfelt: other rows of Z, orthonormal, which no spring enters
     Real largest_column;    // |G's columns|^2
-    Whole stuck;            // clearances enter rows that no spring enters
+    Whole stuck;            // lanes where clearances enter rows that no spring enters
 
     void prepare(int r, int count);
     Whole stuck_clearances(int rank, int count);
@@ -78,7 +78,7 @@ inline Whole Energies::stuck_clearances(int rank, int count) {
     return worst > limit;
 }
 
-// Lanes where clearances or errors do.
+// Lanes where clearances or errors enter rows that no spring enters.
 inline Whole Energies::rigid_rows(int rank, int count, Real tolerance) {
     Whole rigid = stuck;
     const Real allowed = 1e-12 / CLEAR + tolerance * largest_error;
@@ -87,7 +87,7 @@ inline Whole Energies::rigid_rows(int rank, int count, Real tolerance) {
     return rigid;
 }
 
-// What depends on the posture alone, and G and h.
+// Quantities that depend only on the posture, and G and h.
 inline void Energies::prepare(int r, int count) {
     if (!posture.empty() && prepared == changes) return right_sides(r);
     prepared = changes;
@@ -112,9 +112,9 @@ inline void Energies::prepare(int r, int count) {
     }
 }
 
-// Least |G u + h|^2 / 2 - d.u: u, v = G u + h, and the multipliers y.  Newton alone where
-// all constraints are active, else after an interior point, unless these wait.
-// Returns the outcomes.
+// Minimum of |G u + h|^2 / 2 - d.u: u, v = G u + h, and the multipliers y.  Newton's
+// method alone if all constraints are active, else after the interior-point method,
+// unless these points wait. Returns the outcomes.
 inline Whole Energies::minimise(int r, Whole asked) {
     Programme &q = programme;
     const Real square = inner(q.h.data(), q.h.data(), r);
@@ -156,7 +156,7 @@ inline Whole Energies::minimise(int r, Whole asked) {
     return left ? whole(INTERIOR) : whole(NEWTON);
 }
 
-// Multipliers of the closures, the least ones where they are not unique.
+// Multipliers of the closures; those of least size if they are not unique.
 inline Row Energies::least_multipliers(int r, int count) {
     Row multipliers = loaded ? holding : Row(m);
     combine(Z.data(), r, programme.y.data(), m, multipliers.data());
@@ -168,7 +168,7 @@ inline Row Energies::least_multipliers(int r, int count) {
     return multipliers;
 }
 
-// Deformation of every spring, from that of the groups' six.
+// Deformation of every spring, from the six of its group.
 inline void Energies::own_springs(
     const Row &grouped, const Block &block, double *elastic, Whole where) {
     Triangle rows(6, widest);
@@ -217,9 +217,10 @@ inline Energies::Proof Energies::complementary(const Row &motions, const Row &mu
     return {gain, cost};
 }
 
-// How far energy minus work is above what the wrenches prove, on the problem before
-// elimination:  |y - s|^2 / 2  with s the springs' strains that balance the wrenches, and
-// what clearances could still gain.  Loads bend both y and s by t, which cancels.
+// Difference of energy minus work from the bound that the wrenches prove, on the problem
+// before elimination:  |y - s|^2 / 2  with s the springs' strains in balance with the
+// wrenches, plus the largest gain that clearances could still give.  Loads change both y
+// and s by t, which cancels.
 inline Real Energies::loaded_gap(
     int r, const Row &grouped, const Row &motions, const Row &multipliers) {
     Row closing(m);
@@ -252,8 +253,8 @@ inline Real Energies::loaded_gap(
     return gap;
 }
 
-// Solves the lanes asked for that have the ranks of the first of them, and writes their
-// rows; returns the others.
+// Solves the requested lanes that have the same ranks as the first of them, and writes
+// their rows; returns the other lanes.
 inline Whole Energies::solve(
     const Points &points, const Block &block, Whole asked, Solutions &out) {
     const auto settle = [&](Whole where, int64_t outcome) {
@@ -313,7 +314,8 @@ inline Whole Energies::solve(
     if (loaded) {
         energy += stored + inner(v.data(), left.data(), r);
         bound = energy - loaded_gap(r, grouped, motions, multipliers) - slip;
-        // t is orthogonal to what closures do to springs, and known what they have to close
+        // t is orthogonal to the closure columns of the springs; `known` is the error that
+        // they have to close
         work = 2.0 * stored + inner(programme.d.data(), programme.u.data(), nu) +
                inner(holding.data(), known.data(), m);
     } else {

@@ -1,12 +1,13 @@
-// Problems (22), (21) and (27), and the classical compliance, several
-// postures side by side.
+// Problems (22), (21) and (27), and the classical compliance, several postures in
+// parallel.
 #include "assembled.h"
 #include "compliances.h"
 #include "pose_errors.h"
 
 using namespace LANE_SPACE;
 
-constexpr size_t AT_ONCE = 1024;  // points whose reachable sets are kept together
+// points whose reachable sets are stored at the same time
+constexpr size_t AT_ONCE = 1024;
 
 void bound_all(
     const Robot &robot, const Points &points, const Centres &centres,

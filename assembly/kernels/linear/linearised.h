@@ -1,5 +1,5 @@
-// The linear model of a robot, (16)-(20), at several postures side by side: what moves the
-// platform and what the closures say of it.
+// The linear model of a robot, (16)-(20), at several postures in parallel: motions of the
+// platform and of the closures.
 //
 // ========  =============  ============================================================
 // symbol    shape          meaning
@@ -20,13 +20,13 @@ namespace LANE_SPACE {
 // assembly/kinematics/ranks.py
 constexpr double RANK = 1e-10, MISMATCH_FACTOR = 30.0, NOISE = 1e-12;
 
-// A closure that a frame enters, and the sign.
+// A closure of a frame, and the sign.
 struct Entry {
     int closure;
     double sign;
 };
 
-// Reads blocks of points of one robot, one after the other.
+// Reader of blocks of points of one robot, in sequence.
 class Linearised {
 public:
     Linearised(const Robot &s, const Points &points);
@@ -39,7 +39,7 @@ protected:
     Table P;                       // (n, 18) the three turns of each frame: `column`
     Table motion, play, elastic;   // (.., 6) columns of free motions, clearances, springs
     Row known;
-    Real screw[6];  // of the platform
+    Real screw[6];  // screw of the platform
     Real largest_error, largest_spring;
 
     bool stays(const Points &points, const Block &block);
@@ -51,8 +51,9 @@ protected:
     Real tolerance(const Points &points, const Block &block) const;
     Real largest_clearance() const;
 
-    std::vector<double> posture;  // of all lanes: frames and closure error, if it is one
-    int64_t changes = 0;          // of the posture
+    // posture of all lanes, if it is the same: frames and closure error
+    std::vector<double> posture;
+    int64_t changes = 0;          // number of changes of the posture
 
 private:
     void read_frame(const Points &points, const Block &block, int j, const Real *origin);
@@ -80,8 +81,8 @@ inline Linearised::Linearised(const Robot &s, const Points &points)
                 erring[j] = std::any_of(own, own + 6, [](double e) { return e != 0.0; });
 }
 
-// Whether all lanes stand where all lanes of the block before stood: what depends on the
-// frames alone is then known.
+// Whether all lanes have the same posture as in the block before: quantities that depend
+// only on the frames are then known.
 inline bool Linearised::stays(const Points &points, const Block &block) {
     if (!points.own_posture && !posture.empty()) return true;
     const size_t count = 16 * size_t(n);
@@ -107,8 +108,8 @@ inline bool Linearised::stays(const Points &points, const Block &block) {
     return false;
 }
 
-// The columns that the frames' poses give, unless they stay, and the closure error and the
-// platform's screw that their errors cause.
+// Columns from the frames' poses, unless the posture is the same, and the closure error
+// and the platform's screw due to the frames' errors.
 inline void Linearised::read(const Points &points, const Block &block, bool stay) {
     if (!stay) {
         Real origin[3];
@@ -125,7 +126,7 @@ inline void Linearised::read(const Points &points, const Block &block, bool stay
         if (erring[j]) read_errors(points, block, j);
 }
 
-// A frame's turns: unit screws about its axes.
+// Rotations of a frame: unit screws about its axes.
 inline void Linearised::read_frame(
     const Points &points, const Block &block, int j, const Real *origin) {
     const auto entry = [&](int a, int b) {
@@ -142,7 +143,7 @@ inline void Linearised::read_frame(
     }
 }
 
-// What a frame's errors move.
+// Adds the motions due to a frame's errors.
 inline void Linearised::read_errors(const Points &points, const Block &block, int j) {
     Real own[6] = {}, step[6];
     for (int axis = 0; axis < 6; ++axis) {
@@ -188,7 +189,7 @@ inline void Linearised::columns() {
     }
 }
 
-// Adds a step of a frame to the platform's screw and to what closures are open.
+// Adds a step of a frame to the platform's screw and to the closure error.
 inline void Linearised::move(int64_t pattern, double on_path, const Real *step, Row &open) {
     if (on_path)
         for (int a = 0; a < 6; ++a) screw[a] += on_path * step[a];
@@ -196,7 +197,7 @@ inline void Linearised::move(int64_t pattern, double on_path, const Real *step, 
         for (int a = 0; a < 6; ++a) open[6 * e.closure + a] += e.sign * step[a];
 }
 
-// What a screw of this pattern is in a row over the closures.
+// Value of a screw of this pattern in a row over the closures.
 inline void Linearised::part(const Real *row, int64_t pattern, Real *out) const {
     Real own[6] = {};
     for (const Entry &e : patterns[pattern])
@@ -204,14 +205,14 @@ inline void Linearised::part(const Real *row, int64_t pattern, Real *out) const 
     std::copy(own, own + 6, out);
 }
 
-// What clearance c is in a row, of which screws of its pattern are `part`.
+// Value of clearance c in a row, from the screws `part` of its pattern.
 inline Real Linearised::enters(int c, const Real *part) const {
     Real total = {};
     for (int a = s.cone_axis[c] < 3 ? 0 : 3; a < 6; ++a) total += play[c][a] * part[a];
     return total;
 }
 
-// Relative size of what may be rounding of rows that the frames leave open.
+// Relative rounding error of rows, including the nominal closure error of the frames.
 inline Real Linearised::tolerance(const Points &points, const Block &block) const {
     return RANK + MISMATCH_FACTOR * block.read(points.mismatch, points.own_posture, 0);
 }

@@ -1,21 +1,23 @@
-// What loads do to a robot without clearances and errors, at several postures side by
-// side.  Of problem (22) under loads,
+// Effects of loads on a robot without clearances and errors, at several postures in
+// parallel.  In problem (22) under loads,
 //
 //     minimise  |y|^2 / 2 - f.y - c.u - g.q   subject to  A_q q + A_u u + A_y y = -known,
 //
-// closures' wrenches w that hold the free motions, A_q^T w = -g, and bend springs least
-// make  t = f + A_y^T w  orthogonal to all that closures do to springs.  With y = t + ..,
+// the closures' wrenches w that balance the free motions, A_q^T w = -g, with the least
+// energy of the springs make  t = f + A_y^T w  orthogonal to all closure columns of
+// springs.  With y = t + ..,
 //
 //     |t|^2 / 2 is stored beside  |G u + h|^2 / 2 - d.u,   d = c + A_u^T w:
 //
-// G and h are those without loads, and clearances feel what they carry when tight.
+// G and h are those without loads; d contains the forces of the loads on clearances.
 #pragma once
 
 #include "reduction.h"
 
 namespace LANE_SPACE {
 
-constexpr double STILL_OF_DRIVE = 1e-9;  // of the largest force on a free motion
+// share of the largest force on a free motion that counts as zero
+constexpr double STILL_OF_DRIVE = 1e-9;
 
 class Loaded : public Reduction {
 public:
@@ -32,7 +34,7 @@ protected:
     Row holding;   // (m,) w
     Row drive;     // (nq,) g
     Row on_play;   // (nu,) c, in the robot's order
-    Row left;      // (r,) what rounding leaves of t in the springs of closures
+    Row left;      // (r,) rounding error of t in the springs of closures
     Real stored;   // |t|^2 / 2
 
     Whole balance(const Points &points, const Block &block, int rank, int r);
@@ -41,8 +43,8 @@ protected:
     Row on_patterns(const Row &closing) const;
 
 private:
-    std::vector<double> acting;  // on all lanes, if they are the same
-    int64_t balanced = -1;       // at which change of the posture
+    std::vector<double> acting;  // of all lanes, if they are equal
+    int64_t balanced = -1;       // number of the posture's change
     Row pull;                    // (nu,) d
     Whole driven;
 
@@ -63,7 +65,7 @@ inline Row Loaded::on_patterns(const Row &closing) const {
     return on;
 }
 
-// What t is of the groups' six springs.
+// t in the six springs of each group.
 inline Row Loaded::bent_groups() {
     Row bent(6 * ng);
     Triangle rows(6, widest);

@@ -1,4 +1,4 @@
-// Problem (21) at several postures side by side, from the frames' poses to the certified
+// Problem (21) at several postures in parallel, from the frames' poses to the certified
 // margin.
 #pragma once
 
@@ -12,7 +12,7 @@ constexpr double INFEASIBLE = 1e-13;
 // assembly/linear/lanes.py: COMPILED, REFERENCE
 enum { COMPILED, REFERENCE };
 
-// Solves blocks of points of one robot, one after the other.
+// Solver of blocks of points of one robot, in sequence.
 class ZoneMargins : public Rows {
 public:
     ZoneMargins(const Robot &s, const Points &points)
@@ -30,7 +30,7 @@ private:
     void reduce(Real tolerance, Whole asked);
 };
 
-// Everything of the lanes asked for but what their errors are.
+// All quantities of the requested lanes that do not depend on the errors.
 inline void ZoneMargins::reduce(Real tolerance, Whole asked) {
     kept = eliminate_free(tolerance, asked);
     if (!any(kept.same)) return;
@@ -45,8 +45,8 @@ inline void ZoneMargins::reduce(Real tolerance, Whole asked) {
         std::copy(programme.M[i], programme.M[i] + nu, B[i]);
 }
 
-// Margins of the lanes asked for that have the ranks of the first of them; returns the
-// others.  With every link and joint rigid, B u = w must hold (least_factor.h).
+// Margins of the requested lanes that have the same ranks as the first of them; returns
+// the other lanes.  With every link and joint rigid, B u = w must hold (least_factor.h).
 inline Whole ZoneMargins::margins(
     const Points &points, const Block &block, Whole asked, Margins &out) {
     const auto settle = [&](Whole where, Real margin, Real bound, Whole proved) {
@@ -83,7 +83,7 @@ inline Whole ZoneMargins::margins(
         for (int l = 0; l < std::min(i, left); ++l) total -= rows.F[i][l] * w[l];
         if (i < left)
             w[i] = total / rows.diagonal[i];
-        else  // what no clearance enters; written so that NaN is not possible
+        else  // rows that no clearance enters; written so that NaN is not possible
             possible &= magnitude(total) <= INFEASIBLE;
     }
     const Real size = root(inner(w.data(), w.data(), left));

@@ -1,7 +1,7 @@
-// Problem (27), readings frozen and free, at several postures side by side, from the
-// frames' poses to the certified bounds: deformations stay, unloaded clearances move,
-// passive joints follow.  Points with a numerically ambiguous rank, or where a passive
-// joint could pass the bound of its motion, go to the reference.
+// Problem (27), assumptions frozen and free, at several postures in parallel, from the
+// frames' poses to the certified bounds: deformations do not change, unloaded clearances
+// move, passive joints follow.  The reference solves points with a numerically ambiguous
+// rank, or where a passive joint could exceed the bound of its motion.
 #pragma once
 
 #include <map>
@@ -12,12 +12,12 @@
 namespace LANE_SPACE {
 
 constexpr double UNBOUNDED = 1e-8;  // assembly/kinematics/ranks.py
-constexpr double APART = 100.0;     // by which load and slack of a cone must differ
+constexpr double APART = 100.0;  // factor by which load and slack of a cone must differ
 
-// Columns are filled up to a multiple of this many cones, so that bodies share lanes.
+// Columns are padded to a multiple of this many cones, to solve bodies in parallel.
 constexpr int FILLED = 2;
 
-// Blocks of points of one robot without springs, one after the other.
+// Blocks of points of one robot without springs, in sequence.
 class ReachableSets : public Rows {
 public:
     ReachableSets(
@@ -50,8 +50,8 @@ private:
     Body body_of(int l, int64_t point, int p, const Real *centre) const;
 };
 
-// Lanes where it is unambiguous which clearances are loaded; those are held.  Load times
-// slack is about the solver's gap, so one of the two is nearly zero.
+// Lanes where the loaded clearances are unambiguous; these are held.  Load times slack is
+// about the solver's gap, so one of the two is nearly zero.
 inline Whole ReachableSets::held_cones(const Block &block) {
     const Robot &h = *loads.robot;
     const int closures = int(h.closures);
@@ -88,8 +88,8 @@ inline Whole ReachableSets::held_cones(const Block &block) {
     return decided;
 }
 
-// X: what clearances do to the platform, free motions too, at the point asked; the lanes
-// where no free motion moves it by itself.
+// X: motions of the platform by clearances and the free motions that follow, at the
+// requested point; returns the lanes where no free motion alone moves it.
 inline Whole ReachableSets::follow(int rank) {
     Whole still = whole(-1);
     Row closing(m), on(6 * np);
@@ -112,7 +112,7 @@ inline Whole ReachableSets::follow(int rank) {
     return still;
 }
 
-// Lanes where no passive joint passes its bound, whatever the clearances do.
+// Lanes where no passive joint exceeds its bound for any position of the clearances.
 inline Whole ReachableSets::within_bounds(int rank, const Block &block) {
     Row middle(nq), most(nq), squares(nq), moved(m);
     for (int q = 0; q < nq; ++q) middle[q] = block.read(centres.motions, nq, q);
@@ -139,7 +139,7 @@ inline Whole ReachableSets::within_bounds(int rank, const Block &block) {
     return within;
 }
 
-// A lane's body: the columns that are not held, filled up.
+// A lane's body: the columns that are not held, padded.
 inline Body ReachableSets::body_of(int l, int64_t point, int p, const Real *centre) const {
     const auto filled = [](int count) { return (count + FILLED - 1) / FILLED * FILLED; };
     std::vector<int> columns;
@@ -163,8 +163,8 @@ inline Body ReachableSets::body_of(int l, int64_t point, int p, const Real *cent
     return body;
 }
 
-// The sets of platform screws of the lanes asked for that have the ranks of the first of
-// them; returns the others.
+// Sets of platform screws of the requested lanes that have the same ranks as the first of
+// them; returns the other lanes.
 inline Whole ReachableSets::read_bodies(
     const Points &points, const Block &block, Whole asked, std::vector<Body> &bodies,
     int64_t *outcome) {
@@ -210,8 +210,8 @@ inline Whole ReachableSets::read_bodies(
     return others & ~asked;
 }
 
-// Searches of all bodies in both halves; together those of bodies that are filled up to
-// the same numbers of rows and columns.
+// Searches of all bodies in both halves; bodies padded to the same numbers of rows and
+// columns are searched together.
 typedef std::map<std::array<int, 3>, std::vector<Task>> Groups;
 
 inline Groups searches_of(const std::vector<Body> &bodies, const double *tolerance) {

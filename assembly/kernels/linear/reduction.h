@@ -1,5 +1,6 @@
-// Free motions and springs eliminated at several postures side by side, what is left for
-// the solvers, and the way back: assembly/linear/reference/reduction.py in another order.
+// Elimination of free motions and springs at several postures in parallel, the problem
+// that remains for the solvers, and the way back: assembly/linear/reference/reduction.py
+// in another order.
 //
 // Vectors are stored as rows, one Householder triangulation with pivoting serves the free
 // motions, the springs and the least motions, and springs that enter the same closures are
@@ -25,14 +26,14 @@
 
 namespace LANE_SPACE {
 
-// The rank in the first of these lanes.
+// Rank in the first of these lanes.
 inline int rank_of_first(Whole ranks, Whole lanes) {
     int l = 0;
     while (!lanes[l]) ++l;
     return int(ranks[l]);
 }
 
-// Places of the patterns with clearances; -1 for the others.
+// Positions of the patterns with clearances; -1 for the others.
 inline Array<int> loose_patterns(const Robot &s) {
     Array<int> slot(s.np, -1);
     int next = 0;
@@ -90,7 +91,7 @@ inline Reduction::Reduction(const Robot &s, const Points &points)
         widest = std::max(widest, int(s.groups[g + 1] - s.groups[g]));
 }
 
-// Free motions brought to a triangle; the rank of each lane, -1 where it is unclear.
+// Triangulates the free motions; returns the rank of each lane, -1 if it is ambiguous.
 inline Whole Reduction::triangulate_free(Real tolerance) {
     for (int c = 0; c < nq; ++c) {
         std::fill(free.F[c], free.F[c] + m, Real{});
@@ -101,7 +102,7 @@ inline Whole Reduction::triangulate_free(Real tolerance) {
     return triangulate(free, nq, m, tolerance, Real{}, 1e-11, m);
 }
 
-// (6, springs) columns of a group's springs; returns how many, at least six.
+// (6, springs) columns of a group's springs; returns their number, at least six.
 inline int Reduction::spring_group(int g, Triangle &rows) {
     const int count = int(s.groups[g + 1] - s.groups[g]);
     for (int i = 0; i < 6; ++i)
@@ -149,7 +150,7 @@ inline void Reduction::spring_rows(int count) {
         }
 }
 
-// Divides Z, ordered like Y's triangle, by it: rows that springs enter first.
+// Divides Z, ordered like Y's triangle, by it: rows that springs enter are first.
 inline void Reduction::eliminate_springs(int rank, int count) {
     Row weights(rank);
     for (int i = 0; i < count; ++i) {
@@ -158,15 +159,16 @@ inline void Reduction::eliminate_springs(int rank, int count) {
         const int before = std::min(i, rank);
         for (int l = 0; l < before; ++l) weights[l] = -Y[l];
         combine(Z.data(), before, weights.data(), m, Z[i]);
-        // rows that no spring enters have length 1: what is rounding there has their size
+        // rows that no spring enters have length 1: rounding errors there are of that
+        // size
         const Real size = i < rank ? springs.diagonal[i] : root(inner(Z[i], Z[i], m));
         const Real over = 1.0 / size;
         for (int a = 0; a < m; ++a) Z[i][a] *= over;
     }
 }
 
-// Free motions, then springs brought to triangles, in the lanes asked for that have the
-// ranks of the first of them.
+// Triangulates free motions, then springs, in the requested lanes that have the same
+// ranks as the first of them.
 inline Reduction::Ranks Reduction::eliminate(Real tolerance, Whole asked) {
     Ranks ranks = {};
     const Whole free_rank = triangulate_free(tolerance);
@@ -188,8 +190,8 @@ inline Reduction::Ranks Reduction::eliminate(Real tolerance, Whole asked) {
     return ranks;
 }
 
-// Everything of the lanes asked for but what their errors and loads are; it is kept while
-// their posture is.
+// All quantities of the requested lanes that do not depend on errors and loads; they are
+// kept while the posture does not change.
 inline Reduction::Ranks Reduction::read_and_eliminate(
     const Points &points, const Block &block, Whole asked) {
     const bool stay = stays(points, block);
@@ -203,7 +205,7 @@ inline Reduction::Ranks Reduction::read_and_eliminate(
     return kept;
 }
 
-// What a screw of each pattern is in Z's rows.
+// Value of a screw of each pattern in Z's rows.
 inline void Reduction::clearance_parts(int count) {
     for (int i = 0; i < count; ++i)
         for (int g = 0; g < np; ++g)
@@ -240,7 +242,7 @@ inline Row Reduction::spring_strains(int r, const Row &v) {
     return spring;
 }
 
-// Closure error of errors, clearances and grouped springs, which move the platform.
+// Closure error by errors, clearances and grouped springs, which move the platform.
 inline Row Reduction::moved_by(const Row &grouped) {
     Row total = known;
     Real step[6];
@@ -256,7 +258,7 @@ inline Row Reduction::moved_by(const Row &grouped) {
     return total;
 }
 
-// Free motions of least size that close the rest.
+// Free motions of least size that close the remaining error.
 inline Row Reduction::least_motions(int rank, const Row &moved) {
     Row right(std::max(m, nq)), least(nq), motions(nq);
     for (int a = 0; a < m; ++a) right[a] = -moved[a];
@@ -288,8 +290,8 @@ inline Row Reduction::least_motions(int rank, const Row &moved) {
     return motions;
 }
 
-// The closures' least wrenches with which forces `drive` on the free motions move none,
-// but for `still`; returns the lanes that have none.
+// The closures' least wrenches that balance forces `drive` on the free motions, except
+// for `still`; returns the lanes that have none.
 inline Whole Reduction::hold_free_motions(
     int rank, const Row &drive, Real still, Row &closing) {
     Whole loose = {};
@@ -317,8 +319,9 @@ inline Whole Reduction::hold_free_motions(
     return hold_free_motions(rank, drive, real(still), closing);
 }
 
-// Adds to the closures' wrenches those that bend springs least; `bent`, what the others
-// bend of the groups' springs, is overwritten with what these are of Z's first rows.
+// Adds to the closures' wrenches those that give the springs the least energy; `bent`,
+// the deformation of the groups' springs by the other wrenches, is overwritten with their
+// part in Z's first rows.
 inline void Reduction::bend_least(int r, Row &bent, Row &closing) {
     turn_back(springs, r, 6 * ng, bent.data());
     for (int i = 0; i < r; ++i) bent[i] = -bent[i];

@@ -1,5 +1,5 @@
-// Rows that clearances alone have to satisfy, at several postures side by side: those of
-// the closures that no free motion of a robot without springs enters.
+// Rows that only clearances can satisfy, at several postures in parallel: the closures'
+// rows that no free motion of a robot without springs enters.
 //
 // ========  =============  ============================================================
 // B, w      (p, nu), (p,)  B u = w must hold, B's rows orthonormal
@@ -19,7 +19,7 @@ public:
         : Reduction(s, points), rows(m, nu + 1) {}
 
 protected:
-    Triangle rows;  // with their right sides beside them
+    Triangle rows;  // with their right sides
 
     struct Ranks { int free; Whole same, unclear; };
     Ranks eliminate_free(Real tolerance, Whole asked);
@@ -27,8 +27,8 @@ protected:
     void orthonormal_rows(int count);
 };
 
-// Free motions eliminated in the lanes asked for that have the rank of the first of them:
-// G and h of the small problem are the rows.
+// Eliminates free motions in the requested lanes that have the same rank as the first of
+// them: G and h of the small problem are the rows.
 inline Rows::Ranks Rows::eliminate_free(Real tolerance, Whole asked) {
     const Whole found = triangulate_free(tolerance);
     Ranks ranks = {0, asked & (found >= 0), asked & (found < 0)};
@@ -41,8 +41,8 @@ inline Rows::Ranks Rows::eliminate_free(Real tolerance, Whole asked) {
     return ranks;
 }
 
-// The rows brought to a triangle, without the columns held; the rank of each lane, -1
-// where it is unclear.
+// Triangulates the rows without the held columns; returns the rank of each lane, -1 if it
+// is ambiguous.
 inline Whole Rows::triangulate_rows(int count, const Array<Whole> *held) {
     for (int i = 0; i < count; ++i) {
         std::copy(programme.M[i], programme.M[i] + nu, rows.F[i]);

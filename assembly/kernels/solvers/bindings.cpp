@@ -1,11 +1,11 @@
-// One cone programme, and one body's farthest screw, as Python calls them.
+// Python bindings of one cone programme and of one body's farthest screw.
 #include "../arrays.h"
 #include "../bindings.h"
 #include "../kernels.h"
 
 namespace {
 
-// The problem that u and y, the first guess, are of; cones of any size.
+// Problem of u and y, the first guess; cones of any size.
 ConeProblem problem_of(
     nb::handle G, nb::handle h, nb::handle d, nb::handle H, nb::handle k,
     nb::handle cones) {

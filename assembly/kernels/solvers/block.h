@@ -1,4 +1,4 @@
-// Blocks of problems that stand side by side.
+// Blocks of problems that are solved in parallel.
 #pragma once
 
 #include "real.h"
@@ -27,8 +27,9 @@ inline std::vector<int64_t> all_of(int64_t count) {
     return all;
 }
 
-// These points in blocks of lanes; solve returns the lanes that it left, to be asked
-// again.  Lanes that are too many repeat the last point, and are not asked for.
+// Solves these points in blocks of lanes.  `solve` returns the lanes that it has not
+// solved, which are tried again.  Unused lanes repeat the last point, and are not
+// requested.
 template <typename Solve>
 inline void in_blocks(const std::vector<int64_t> &points, Solve solve) {
     for (size_t first = 0; first < points.size(); first += LANES) {

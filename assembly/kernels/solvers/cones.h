@@ -1,4 +1,4 @@
-// Small cone programmes side by side:
+// Small cone programmes in parallel:
 //
 //     minimise  |G u + h|^2 / 2 - d.u   subject to  H u = e,  |u_k| <= 1, each cone k
 //
@@ -30,15 +30,17 @@
 
 namespace LANE_SPACE {
 
-constexpr int ITERATIONS = 60;      // most of the interior-point method
-constexpr double START = 0.03;      // heads of z begin this far inside
-constexpr double BACK_OFF = 0.99;   // of the step to the nearest boundary of a cone
-constexpr int HALVINGS = 12;        // of a step of Newton's
+// largest number of iterations of the interior-point method
+constexpr int ITERATIONS = 60;
+// relative distance of z's heads from the boundary at the start
+constexpr double START = 0.03;
+constexpr double BACK_OFF = 0.99;   // share of the step to the nearest boundary of a cone
+constexpr int HALVINGS = 12;        // largest number of halvings of a Newton step
 constexpr double SIGMA_GROWTH = 10.0, INNER_SHARE = 0.1;
-constexpr double ON_ROWS = 1e-13;   // accepted of H u = e
+constexpr double ON_ROWS = 1e-13;   // accepted residual of H u = e
 
-// gap from which Newton's method finishes, of the energy and of that without clearance;
-// its steps; its first sigma
+// gap at which Newton's method begins, relative to the energy and to that without
+// clearance; its number of steps; its first sigma
 constexpr double NEAR = 1e-8, NEAR_WITHOUT_CLEARANCE = 1e-9, FIRST_SIGMA = 1e6;
 constexpr int STEPS_ALONE = 6, STEPS = 20, STEPS_LAST = 150;
 
@@ -94,7 +96,8 @@ private:
     Slopes slopes(const Programme &q, Real sigma, const Real *y);
 };
 
-// Overwrites the scaling with that of (u, z); lanes whose cones all have points.
+// Overwrites the scaling with that of (u, z) in lanes where all points are inside the
+// cones.
 inline Whole Solver::scale() {
     Whole inside = whole(-1);
     k.each([&](auto size, int c, int at) {
@@ -265,9 +268,9 @@ inline void Solver::correct(Real target) {
     });
 }
 
-// Minimises in the lanes asked for, from u = 0; q.u and q.y of H are overwritten there
-// with the last iterate.  Returns the lanes where the gap came down to tolerance +
-// relative |G u + h|^2 / 2.
+// Minimises in the requested lanes, from u = 0; overwrites q.u and q.y of H there with
+// the last iterate.  Returns the lanes whose gap is at most tolerance + relative |G u +
+// h|^2 / 2.
 inline Whole Solver::interior_point(
     Programme &q, Real tolerance, double relative, Whole asked) {
     const int r = q.r, p = q.p, m = r + p;
@@ -315,7 +318,7 @@ inline Whole Solver::interior_point(
         direction(q);
         length = BACK_OFF / larger(fastest(), real(BACK_OFF));
         going &= length >= 1e-10;
-        // lanes that have ended stay where they are
+        // lanes that have ended do not change
         for (int j = 0; j < k.nu; ++j) u[j] = going ? u[j] + length * du[j] : u[j];
         for (int c = 0; c < k.count; ++c) z0[c] = going ? z0[c] + length * dz0[c] : z0[c];
         // the balance holds by construction; computed again it cannot drift

@@ -54,7 +54,7 @@ inline Solver::Slopes Solver::slopes(const Programme &q, Real sigma, const Real 
             const Whole inside = length <= 1.0;
             const Real shorter = 1.0 / (inside ? real(1.0) : length);
             own[0] *= shorter, own[1] *= shorter;
-            // on the disc's edge only turning is left
+            // on the disc's edge only rotation is free
             const Real across = sigma * shorter;
             D[0] = inside ? sigma : across * own[1] * own[1];
             D[1] = inside ? Real{} : -across * own[0] * own[1];
@@ -125,7 +125,7 @@ inline Whole Solver::dual_newton(
         going &= climbs | (halvings <= (first_sigma > 0.0 ? HALVINGS : 0));
         going &= ~climbs | (taken < steps);
         if (!any(going)) break;
-        // shorter where it did not climb, else on
+        // halve the step if the value did not increase, else continue
         const Whole shorter = going & ~climbs, on = going & climbs;
         for (int i = 0; i < m; ++i) {
             step[i] = shorter ? 0.3 * step[i] : step[i];
@@ -156,11 +156,13 @@ inline Whole Solver::dual_newton(
     return done;
 }
 
-// Minimises in the lanes asked for, to a gap of absolute + relative |G u + h|^2 / 2; the
-// interior point leaves the rest to Newton at a gap of `near` and NEAR of that energy.
+// Minimises in the requested lanes, to a gap of absolute + relative |G u + h|^2 / 2;
+// Newton's method follows the interior-point method at a gap of `near` and NEAR of that
+// energy.
 inline void Solver::interior_then_newton(
     Programme &q, double relative, Real absolute, Real near, Whole asked) {
-    // near a zone's edge the interior point stops early; Newton then takes longer
+    // near a zone's edge the interior-point method stops early; Newton's method then
+    // takes longer
     for (int attempt = 0; attempt < 2 && any(asked); ++attempt) {
         if (attempt == 0)
             interior_point(q, near, NEAR, asked);

@@ -1,15 +1,15 @@
 // The farthest points of convex bodies of platform screws, bracketed: problem (27) by
 // outer approximation (search.h).
 //
-// A body's support function along d is a small cone programme; the multipliers n of its
-// rows, whatever they are, prove an upper bound,
+// A body's support function along d is a small cone programme.  Any multipliers n of its
+// rows prove an upper bound,
 //
 //     d.(centre - X start) + n.H start + sum_k |(X^T d - H^T n)_k|,
 //
-// and its point is projected into the body: both hold whatever the solver returned.
+// and its point is projected into the body: both are valid for any result of the solver.
 //
-// Each lane searches one body in one half of the screw, and takes the next where its own
-// ends.
+// Each lane searches one body in one half of the screw, and takes the next one at the
+// end.
 #pragma once
 
 #include <functional>
@@ -19,15 +19,16 @@
 namespace LANE_SPACE {
 
 constexpr int MOST_SUPPORTS = 400;
-constexpr double SHARE = 0.1;  // of the tolerance that a support may leave open ..
-constexpr double POOR = 0.5;   // .. and with which the search still goes on
+// accepted gap of a support function, as a share of the tolerance ..
+constexpr double SHARE = 0.1;
+constexpr double POOR = 0.5;   // .. and the gap with which the search still continues
 constexpr double SYMMETRIC = 1e-14;  // H start counts as zero
-constexpr double ROUNDING = 1e-14;   // by which a cone may be exceeded
+constexpr double ROUNDING = 1e-14;   // accepted excess over a cone
 
-// Searches bodies with cones as the first one, of at most p rows.
+// Search of bodies with cones as those of the first one, of at most p rows.
 class Farthest {
 public:
-    // Where a support function is not found here: of a direction its certified height, the
+    // If a support function is not found here: of a direction its certified height, the
     // screw that attains it and the gradient X^T d - H^T n.
     typedef std::function<void(const Point &, double *, double *, double *)> Support;
 
@@ -36,7 +37,7 @@ public:
           solver(cones, p), majorant(cones.nu, p), other(std::move(other)),
           gradient(cones.nu), v(cones.nu) {}
 
-    // Does all tasks; settle(search, solved) is called at the end of each.
+    // Does all tasks; calls settle(search, solved) at the end of each.
     template <typename Settle> void search(const std::vector<Task> &tasks, Settle settle) {
         size_t next = 0;
         Whole busy = {};
@@ -107,7 +108,7 @@ private:
     Search searches[LANES];
     Whole symmetric = {};   // v -> -v leaves the rows satisfied
     Real centre[6], tolerances = {};
-    // what `support` and `opposite` leave
+    // results of `support` and `opposite`
     Real height, screw[6];
     Row gradient, v;
 
@@ -122,7 +123,7 @@ private:
         return height[l] - reached <= POOR * searches[l].tolerance;
     }
 
-    // A lane's support from somewhere else; whether there is one.
+    // A lane's support from the alternative; whether there is one.
     bool ask(int l) {
         if (!other) return false;
         double own_height, attains[6];
@@ -228,7 +229,7 @@ inline void Farthest::support(Whole asked) {
     screw_at(v);
 }
 
-// The same along the opposite directions, where the body is symmetric.
+// The same along the opposite directions, if the body is symmetric.
 inline void Farthest::opposite() {
     Row mirrored(cones.nu);
     for (int j = 0; j < cones.nu; ++j) mirrored[j] = -v[j];
@@ -251,7 +252,7 @@ inline void Farthest::within(Row &v) {
         const Real residual = inner(body.H[i], v.data(), nv);
         for (int j = 0; j < nv; ++j) v[j] -= residual * body.H[i][j];
     }
-    // the longest part of the step, from a start inside, that stays in all cones
+    // the largest part of the step, from a start inside, that remains in all cones
     Real share = real(1.0);
     cones.each([&](auto of, int, int at) {
         Real aa = {}, ab = {}, bb = real(-1.0 - ROUNDING);

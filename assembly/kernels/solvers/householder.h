@@ -9,9 +9,9 @@
 
 namespace LANE_SPACE {
 
-constexpr double CLEAR = 10.0;  // within this factor of the threshold a rank is in doubt
+constexpr double CLEAR = 10.0;  // a rank is ambiguous within this factor of the threshold
 
-// What triangulation leaves: reflectors above the diagonal, the triangle below it.
+// Result of a triangulation: reflectors above the diagonal, the triangle below it.
 struct Triangle {
     Table F;
     Row turns, diagonal;  // factors of the reflectors; of the triangle
@@ -20,8 +20,8 @@ struct Triangle {
         : F(rows, columns), turns(rows), diagonal(rows), order(rows) {}
 };
 
-// R rows reflected: row -= turn (own.row) own, over the columns from .. to; if they are
-// sized, what is left of their squares beyond the first column.
+// Reflects R rows: row -= turn (own.row) own, over the columns from .. to; with sizes,
+// also the remaining squares beyond the first column.
 template <int R, bool sized>
 inline void reflect(
     const Real *own, Real turn, Real *const *rows, int from, int to, Real *sizes) {
@@ -54,7 +54,7 @@ inline void reflect_all(
     if (i < count) reflect<1, sized>(own, turn, rows + i, from, to, sizes + i);
 }
 
-// Rows `step` and `at` change places, in each lane its own.
+// Exchanges rows `step` and `at`, different ones in each lane.
 inline void exchange(Real **rows, int step, Whole at, int width) {
     bool same = true;
     for (int l = 1; l < LANES; ++l) same = same && at[l] == at[0];
@@ -68,7 +68,7 @@ inline void exchange(Real **rows, int step, Whole at, int width) {
             }
 }
 
-// Turn p rows of m columns into a triangle, the largest remaining row first.
+// Triangulates p rows of m columns, the largest remaining row first.
 //
 // relative  a row this small relative to the first adds nothing new,
 // floor     nor does one this small;

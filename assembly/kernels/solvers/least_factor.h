@@ -28,8 +28,8 @@ inline void first_along(Programme &q, int count, Real *w, Real size) {
     for (int c = 0; c < nu; ++c) B[0][c] *= sign;
 }
 
-// u within the cones with the most B[0].u, its reach, and no B[1:] u; the most that it can
-// be, by the multipliers.  Returns g - B_rest^T n.
+// u within the cones with the largest B[0].u, its reach, and B[1:] u = 0; the upper bound
+// of the reach by the multipliers.  Returns g - B_rest^T n.
 inline Row reach_along_first(
     Solver &solver, Programme &q, int count, Whole asked, Real &reach, Real &most) {
     const int nu = q.cones.nu;
@@ -42,7 +42,7 @@ inline Row reach_along_first(
     Row gradient = q.d, against(q.p);
     for (int i = 0; i < q.p; ++i) against[i] = -q.y[i];
     combine(B, q.p, against.data(), nu, gradient.data());
-    // the residual of the rest by rounding is removed, then u scaled into the cones
+    // the rounding residual of the rest is removed, then u is scaled into the cones
     for (int i = 0; i < q.p; ++i) {
         const Real residual = inner(B[i], q.u.data(), nu);
         for (int c = 0; c < nu; ++c) q.u[c] -= residual * B[i][c];

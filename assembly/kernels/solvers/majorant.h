@@ -1,5 +1,5 @@
-// A second upper bound for (27), exact where outer approximation is slow: a round body
-// takes that about 1 / gap cuts, since all directions are nearly as good.  The support
+// A second upper bound for (27), exact where outer approximation is slow: for a round
+// body that needs about 1 / gap cuts, since all directions are nearly equal.  The support
 // function is the least, over n, of linear terms + sum_k |w_k|, w = X^T d - H^T n.  For
 // any sizes s_k > 0,
 //
@@ -90,7 +90,7 @@ struct Projection {
     Table X, H;           // (3, nv), (p, nv) orthonormal rows
     Real centre[3];
     Row start, right;     // (nv,) within the cones; (p,) H start
-    std::vector<Whole> present;  // cones that are a lane's own
+    std::vector<Whole> present;  // cones that a lane has
     Whole rows;           // of each lane
     Projection(const Cones &cones, int p)
         : cones(cones), p(p), X(3, cones.nu), H(p, cones.nu), start(cones.nu), right(p),

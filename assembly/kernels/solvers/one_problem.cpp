@@ -10,8 +10,8 @@ using namespace LANE_SPACE;
 
 namespace {
 
-// Overwrites a first guess u (nu,) and the multipliers y (r + p,), of H's rows last, with
-// what a method makes of the problem, which stands in every lane.
+// Overwrites a first guess u (nu,) and the multipliers y (r + p,), those of H's rows
+// last, with the result of a method.  All lanes contain the same problem.
 template <typename Method>
 void solve(const ConeProblem &given, double *u, double *y, Method method) {
     const Cones cones(given.starts, int(given.cones));

@@ -1,9 +1,9 @@
-// A convex polytope in three dimensions, cut plane by plane; its vertices are known.
+// A convex polytope in three dimensions, cut by planes; its vertices are known.
 //
-// A cut drops the corners above the plane and puts new ones where it meets an edge; an
-// edge is two corners with two planes in common.  Every corner has three planes: one that
-// a plane touches by accident counts as below it, so that where more than three meet,
-// corners lie together and nothing else changes.
+// A cut removes the corners above the plane and adds corners where the plane meets an
+// edge. An edge is two corners with two common planes.  Every corner has three planes.  A
+// corner on a cutting plane counts as below it, so where more than three planes meet,
+// several corners coincide.
 #pragma once
 
 #include <array>
@@ -37,7 +37,8 @@ public:
         planes = 6;
     }
 
-    // Keeps the points x with normal . x <= height; not where corners become too many.
+    // Keeps the points x with normal . x <= height; unchanged if there are too many
+    // corners.
     void cut(const Point &normal, double height) {
         const int plane = planes++, count = int(corners.size());
         double size = 0.0;

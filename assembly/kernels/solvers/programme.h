@@ -1,5 +1,5 @@
-// Cone programmes over plain tables, one in each lane, and the systems that their solvers
-// factor:
+// Cone programmes over plain tables, one in each lane, and the linear systems of their
+// solvers:
 //
 //     minimise  |G u + h|^2 / 2 - d.u   subject to  H u = e,  |u_k| <= 1, each cone k
 #pragma once
@@ -13,7 +13,7 @@ namespace LANE_SPACE {
 struct Cones {
     int discs = 0, intervals = 0, count = 0, nu = 0;
     Array<int> balls;       // columns of each
-    Array<int64_t> column;  // (nu,) as the robot counts them
+    Array<int64_t> column;  // (nu,) index in the robot's order
 
     Cones(const int64_t *starts, int cones) : count(cones), nu(int(starts[cones])) {
         const auto add = [&](int c) {
@@ -28,7 +28,7 @@ struct Cones {
                 balls.push_back(size), add(c);
     }
 
-    // So many discs, then intervals, then balls of so many columns each.
+    // Given numbers of discs, then intervals, then balls of given numbers of columns.
     Cones(int discs, int intervals, const Array<int> &balls)
         : discs(discs), intervals(intervals), count(discs + intervals + int(balls.size())),
           nu(std::accumulate(balls.begin(), balls.end(), 2 * discs + intervals)),
@@ -67,8 +67,9 @@ public:
     Table S;
     explicit System(int rows) : S(rows, rows), size(rows) {}
 
-    // Lanes where every pivot is a number; one lost to rounding is made huge, or, where
-    // that is not allowed, fails.  The diagonal is overwritten with D^-1.
+    // Lanes where every pivot is a number.  A pivot lost to rounding is replaced by a
+    // huge one, or, if that is not allowed, the lane fails.  The diagonal is overwritten
+    // with D^-1.
     Whole factor(int m, bool replace) {
         Whole good = whole(-1);
         for (int j = 0; j < m; ++j) size[j] = S[j][j];

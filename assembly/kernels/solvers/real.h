@@ -1,7 +1,7 @@
-// Numbers of several problems side by side, one in each lane of a vector register.
+// Numbers of several problems in parallel, one in each lane of a vector register.
 //
-// Every lane computes as if it were alone: nothing sums over lanes, and a lane that has
-// finished is frozen by masks.  So an answer does not depend on its neighbours.
+// Every lane computes independently: nothing sums over lanes, and masks keep the values
+// of a lane that has finished.  So a result does not depend on the other lanes.
 #pragma once
 
 #include <algorithm>
@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-// One module holds code for two lanes, where few problems come at once, and for as many
-// as registers have: each in a namespace of its own.
+// One module has code for two lanes, for few problems, and for as many as the registers
+// have: each in its own namespace.
 #if defined(FEW_LANES)
 #define LANE_COUNT 2
 #define LANE_SPACE lanes_2
@@ -43,8 +43,8 @@ inline Real root(Real x) {
     return x;
 }
 
-// A number that is used several times, read once: compilers would rather read it again
-// with every product, and reading is what these loops wait for.
+// A number that is used several times, read once: compilers would read it again for every
+// product, and these loops are limited by reading.
 inline Real once(Real x) {
 #if defined(__x86_64__)
     asm("" : "+x"(x));
@@ -52,7 +52,7 @@ inline Real once(Real x) {
     return x;
 }
 
-// Before the loops of a tile over its own sums: these stay in registers.
+// Before the loops of a tile over its own sums: these remain in registers.
 #define UNROLL _Pragma("GCC unroll 8")
 
 inline Real magnitude(Real x) { return x < 0.0 ? -x : x; }

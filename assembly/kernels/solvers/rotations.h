@@ -1,4 +1,4 @@
-// Rotations of several problems side by side.
+// Rotations of several problems in parallel.
 //
 // A rotation matrix is nine numbers, row after row.
 #pragma once

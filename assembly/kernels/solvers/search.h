@@ -1,4 +1,4 @@
-// The state of a search of (27): bounds of the farthest point of a convex body of platform
+// State of a search of (27): bounds of the farthest point of a convex body of platform
 // screws, from one support function to the next.
 //
 // A body is {centre + X (v - start) : |v_k| <= 1, H (v - start) = 0}.  The largest rotation,
@@ -20,13 +20,13 @@
 namespace LANE_SPACE {
 
 constexpr int CLIMBS = 8, MOST_KEPT = 32;
-constexpr double GAIN = 1e-3;  // [tolerances] a climb that gains less is over
+constexpr double GAIN = 1e-3;  // [tolerances] smaller gain that ends the climb
 
-// A body, its columns filled up with zeros to a number that others have too.
+// A body; its columns are padded with zeros to a number common to several bodies.
 struct Body {
     int64_t point;
     Cones cones;                   // of the columns
-    int own_discs, own_intervals;  // that are not filled up
+    int own_discs, own_intervals;  // numbers without padding
     int p;
     double centre[6];
     std::vector<double> X, H, start;  // (6, nv), (p, nv), (nv,)
@@ -39,7 +39,7 @@ struct Body {
     }
 };
 
-// A search: of a body, in the rotation (0) or the translation (3), to bounds so close.
+// A search: of a body, in the rotation (0) or the translation (3), to required bounds.
 struct Task {
     const Body *body;
     int half;
@@ -93,7 +93,7 @@ inline void Search::begin(const Task &task) {
         high = low;
 }
 
-// The direction of farthest reach if there were no closures.
+// Direction of the farthest point without the closures' rows.
 inline void Search::first_direction() {
     const Body &b = *body;
     const int nv = b.nv();
@@ -136,7 +136,7 @@ inline void Search::first_direction() {
     }
 }
 
-// Keeps a screw that is farther than the best.
+// Stores a screw that is farther than the best.
 inline void Search::improve(const double *screw) {
     const double *own = screw + half;
     const double size = std::sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2]);
@@ -146,7 +146,7 @@ inline void Search::improve(const double *screw) {
     std::copy(screw, screw + 6, best);
 }
 
-// A plane for the box, for those kept for it, or for the polytope.
+// Adds a plane to the box, to the stored planes, or to the polytope.
 inline void Search::add_plane(const Point &normal, double height) {
     if (stage == CUTTING)
         outer.cut(normal, height);

@@ -12,15 +12,16 @@
 
 #include "../kernels.h"
 
-// of numpy/random/distributions.h, which would bring Python with it
+// of numpy/random/distributions.h, which would include Python
 extern "C" void random_standard_normal_fill(bitgen_t *, intptr_t, double *);
 extern "C" double random_standard_exponential(bitgen_t *);
 
 namespace {
 
-constexpr double FRACTION = 0.9;  // of the way to the boundary, where chains start
-constexpr double FLIGHT = 2.0;  // mean time; Dikin's ellipsoid is crossed in about one
-constexpr int64_t REFLECTIONS = 20;  // of a trajectory at most, for each dimension
+// share of the distance to the boundary, at which chains start
+constexpr double FRACTION = 0.9;
+constexpr double FLIGHT = 2.0;  // mean time; crossing Dikin's ellipsoid takes about one
+constexpr int64_t REFLECTIONS = 20;  // largest number in a trajectory, for each dimension
 
 class Walk {
 public:
@@ -51,7 +52,8 @@ public:
             left -= nearest.reach;
             reflect(s.starts[nearest.wall], s.starts[nearest.wall + 1]);
         }
-        // too many reflections, as in a corner: u is kept, which preserves reversibility
+        // after too many reflections, as in a corner, u is kept, which preserves
+        // reversibility
     }
 
 private:
@@ -94,7 +96,7 @@ private:
                 vv += v[c] * v[c];
             }
             if (!(ww > 1e-300)) continue;
-            // a point on the boundary may lie outside by rounding
+            // a point on the boundary may be outside by rounding
             const double root = std::sqrt(vw * vw + ww * std::max(0.0, 1.0 - vv));
             if (root - vw < nearest.reach * ww) nearest = {(root - vw) / ww, k};
         }

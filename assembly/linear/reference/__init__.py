@@ -1,11 +1,11 @@
 """The reference, in numpy and Clarabel: problems (21), (22) and (27) at one posture.
 
-Slow, and for everything: loads, rigid closures, ranks in doubt, bounds of passive
-joints that are active.  The method ``"reference"`` is this, and so is the answer where
-the compiled method does not cover a problem or falls short of its proof.
+The reference is slow and covers all cases: loads, rigid closures, ranks in doubt,
+active bounds of passive joints.  It is the method ``"reference"``, and solves points
+that the compiled method does not cover or prove.
 
 =========  ==========================================  ===============================
-paper      what                                        where
+paper      quantity or problem                         function
 =========  ==========================================  ===============================
 (16)-(20)  A (dl + dc + de + db) = 0, dx_p from them   ``closure.linearise``
 (1)-(7)    dc = cones u + free q, de and db = springs  ``closure.virtual_joints``
@@ -19,7 +19,7 @@ paper      what                                        where
            farthest                                    ``ReachableSet.farthest``
 =========  ==========================================  ===============================
 
-``closure.py`` and ``assembled.py`` stand in the folder above: the compiled methods
-have them in common.  Cone programmes are :mod:`assembly.solvers.conic`'s.
-``as_printed.py`` has (21) and (22) again, as the paper prints them, in cvxpy.
+``closure.py`` and ``assembled.py`` are in the folder above, because the compiled
+methods use them too.  Cone programmes are solved by :mod:`assembly.solvers.conic`.
+``as_printed.py`` solves (21) and (22) again, as the paper prints them, in cvxpy.
 """

@@ -1,9 +1,9 @@
 """Problems (21) and (22) again, written in cvxpy as the paper prints them.
 
 Slow and simple on purpose: every screw of every frame is a variable, every constraint
-an equation of the paper.  :mod:`assembly.linear.energy` and
-:mod:`assembly.linear.zone` are tested against it; the two share the robot, the bounds
-c-bar, the compliances and eqs (13)-(15), and nothing of how the problems are solved.
+an equation of the paper.  Tests compare :mod:`assembly.linear.energy` and
+:mod:`assembly.linear.zone` with it.  Both use the same robot, bounds c-bar, compliances
+and eqs (13)-(15), but no common code solves the problems.
 
 Two departures from the printed problems: screws are in mrad and mm, to which the
 solver's absolute tolerances fit, and a rigid direction is a screw fixed at zero.
@@ -19,7 +19,6 @@ from scipy.linalg import block_diag
 from assembly.kinematics.posture import Posture
 from assembly.model.clearance import (
     CONES,
-    Compliant,
     clearance_bounds,
     scales_with_margin,
 )
@@ -32,10 +31,10 @@ _UNIT = 1e-3  # screws are in mrad and mm here
 def energy_as_printed(
     posture: Posture, load: ArrayLike | None = None
 ) -> tuple[float, NDArray]:
-    """Minimum assembly energy as printed, (22).
+    """Return the minimum assembly energy as printed, (22).
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         load: (6,) [N m, N] on the platform at its origin, base axes; energy minus its
             work is then minimised.
 
@@ -66,22 +65,23 @@ def energy_as_printed(
     return float(energy.value), np.asarray(x_p.value) * _UNIT
 
 
-def margin_as_printed(posture: Posture, compliant: Compliant = "rigid") -> float | None:
-    """Margin of problem (21): the least factor on the clearances that assembles.
+def margin_as_printed(posture: Posture, own_axes_free: bool = False) -> float | None:
+    """Return the margin of problem (21): the least factor on clearances that assembles.
 
     Args:
-        posture: where the robot stands.
-        compliant: ``"rigid"`` as printed, or ``"free"``.
+        posture: the robot's configuration.
+        own_axes_free: whether compliant joints are free about their own axis; as
+            printed they are rigid.
 
     Returns:
-        The factor; None if no factor helps.
+        The factor; None if the problem is infeasible for every factor.
     """
     import cvxpy as cp
 
     count = len(posture.robot.frames)
     c = cp.Variable((count, 6))
     x_p, t = cp.Variable(6), cp.Variable(nonneg=True)
-    bounds = clearance_bounds(posture.robot, compliant) / _UNIT
+    bounds = clearance_bounds(posture.robot, own_axes_free) / _UNIT
     factor = np.where(scales_with_margin(posture.robot), t, 1.0)
     constraints = _clearance_constraints(c, bounds, factor)
     errors = posture.robot.errors / _UNIT
@@ -92,7 +92,7 @@ def margin_as_printed(posture: Posture, compliant: Compliant = "rigid") -> float
 
 
 def _root_of_stiffness(C: NDArray) -> NDArray:
-    """(6, 6) R with R^T R the stiffness, zero in directions that do not yield."""
+    """Return (6, 6) R with R^T R the stiffness; zero in rigid directions."""
     soft = np.flatnonzero(np.diag(C) > 0)
     root = np.zeros_like(C)
     root[np.ix_(soft, soft)] = np.linalg.cholesky(
@@ -102,7 +102,7 @@ def _root_of_stiffness(C: NDArray) -> NDArray:
 
 
 def _clearance_constraints(c: Any, bounds: NDArray, factor: NDArray) -> list:
-    """Eqs (2)-(5); ``factor`` (n, 4) multiplies the bounds."""
+    """Return the constraints (2)-(5); ``factor`` (n, 4) multiplies the bounds."""
     import cvxpy as cp
 
     constraints = []
@@ -121,14 +121,14 @@ def _clearance_constraints(c: Any, bounds: NDArray, factor: NDArray) -> list:
 
 
 def _assembly_constraints(posture: Posture, x_p: Any, screws: Any) -> list:
-    """Eqs (16)-(20): every chain's end, and the platform's pose error x_p."""
+    """Return eqs (16)-(20): every chain's end, and the platform's pose error x_p."""
     import cvxpy as cp
 
     robot = posture.robot
     stacked = cp.vec(screws, "C")
 
     def pose_error(name: str) -> Any:
-        """Eq. (8): displacement of a frame by the screws along its path."""
+        """Return the displacement of a frame by the screws along its path, eq. (8)."""
         on_path = robot.on_path[robot.index(name)]
         return np.hstack(posture.paths * on_path[:, None, None]) @ stacked
 
@@ -142,7 +142,7 @@ def _solve(problem: Any, allowed: set[str]) -> None:
 
     tight = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
     try:
-        with warnings.catch_warnings():  # of inaccuracy: the status says it, too
+        with warnings.catch_warnings():  # the status reports inaccuracy too
             warnings.simplefilter("ignore")
             problem.solve(solver=cp.CLARABEL, **tight)
     except cp.error.SolverError as error:

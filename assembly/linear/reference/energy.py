@@ -1,4 +1,4 @@
-"""Problem (22) by the reference: the least energy less work, every |u_c| <= 1."""
+"""Problem (22) by the reference: minimise energy less work with every |u_c| <= 1."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ from assembly.linear.reference.reduction import (
     reduce_problem,
 )
 from assembly.linear.rounding import differs_from_zero, stiffness_spread
-from assembly.model.clearance import Compliant, has_bounded_motion
+from assembly.model.clearance import has_bounded_motion
 from assembly.solvers.conic import ConicSolution, minimise_energy
 
 _RIGID_BESIDE = 1e19  # springs so much stiffer than the softest count as rigid
@@ -29,23 +29,23 @@ _RIGID_BESIDE = 1e19  # springs so much stiffer than the softest count as rigid
 class CannotAssemble(Exception):
     """No clearance and no elasticity of the model lets the closures hold.
 
-    A result, not a mistake of the caller: some closure is rigid in every direction.
+    This is a result, not a mistake of the caller: some closure is rigid in a direction.
     """
 
 
 def least_energy(
     posture: Posture, load: NDArray, frame_loads: FrameLoads,
-    compliant: Compliant = "elastic",
+    own_axes_free: bool = False,
 ) -> Assembly:  # fmt: skip
     """Close a manipulator at least energy, as ``solve_assembly`` does.
 
     Bounds of passive joints' own motion count where they matter.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
         frame_loads: all loads, this one among them.
-        compliant: see :func:`assembly.linear.closure.virtual_joints`.
+        own_axes_free: see :func:`assembly.linear.closure.virtual_joints`.
 
     Returns:
         The assembled manipulator.
@@ -57,27 +57,27 @@ def least_energy(
     """
     lin, robot = linearise(posture), posture.robot
     try:
-        joints = virtual_joints(robot, compliant)
+        joints = virtual_joints(robot, True, own_axes_free)
         assembly = solve_with(lin, joints, load, frame_loads)
     except FreeMotion:
         if not has_bounded_motion(robot):
             raise
     else:
-        if assembly.clearance_excess(compliant) <= 1e-9:
+        if assembly.clearance_excess(own_axes_free) <= 1e-9:
             return assembly
     # the bound of a passive joint's own motion was left out, but it is active
-    joints = virtual_joints(robot, compliant, bounded_motion=True)
+    joints = virtual_joints(robot, True, own_axes_free, bounded_motion=True)
     return solve_with(lin, joints, load, frame_loads)
 
 
 def solve_with(
     lin: Linearisation, joints: VirtualJoints, load: NDArray, frame_loads: FrameLoads
 ) -> Assembly:
-    """Close a manipulator at least energy with a given choice of what may move.
+    """Return the assembly of least energy with given virtual joints.
 
     Args:
         lin: the assembly constraints.
-        joints: what may move.
+        joints: virtual joints that may move.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         frame_loads: all loads, this one among them.
 
@@ -116,7 +116,7 @@ def solve_with(
 
 
 def _minimise(reduced: Reduction) -> ConicSolution:
-    """Least energy of a reduced problem; infeasible ones are named."""
+    """Solve a reduced problem; name the open closure if it is infeasible."""
     joints = reduced.joints
     spread = stiffness_spread(joints, reduced.linearisation.size)
     beyond = ""

@@ -4,12 +4,12 @@ Clearances v move within their cones, free motions q follow the closures,
 
     A_q dq + A_v dv = 0,        platform screw = centre + P_v dv + P_q dq.
 
-A free motion that no closure holds either leaves the platform where it is or makes
-some of its components unbounded; those of the other half stay as they are.
+A free motion that no closure constrains either leaves the platform fixed or makes some
+components of its screw unbounded.
 
-Bounds of passive joints' own motion count.  Most are ranges that clearances do not come
-near, and a cone of 10 rad beside ones of 1e-5 costs digits; so each is left out until a
-bound of the motion, the sum over the cones of |A_q^+ A_v|, passes it.
+Bounds of passive joints' own motion count.  Most of them are never reached, and a cone
+of 10 rad next to cones of 1e-5 costs digits.  So each is left out until the largest
+possible motion, the sum over the cones of |A_q^+ A_v|, exceeds it.
 """
 
 from collections.abc import Callable
@@ -34,7 +34,6 @@ from assembly.linear.closure import VirtualJoints, virtual_joints
 from assembly.linear.reference.energy import least_energy
 from assembly.linear.reference.reduction import complement
 from assembly.model.clearance import (
-    Compliant,
     clearance_bounds,
     component_bounds,
     scales_with_margin,
@@ -43,23 +42,24 @@ from assembly.solvers import one_problem, outer_cuts
 from assembly.solvers.cones import cone_sizes, cone_starts, into_cones
 from assembly.solvers.conic import minimise_energy
 from assembly.solvers.method import Method
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 from stiffness.screws import skew
 
 ASSUMPTIONS = ("frozen", "free", "budget")
-# by which squares of cones may be exceeded: solutions are hardly better, and a cone
-# that stays on its bound would end the step of all others
+# accepted excess of squares of cones: solutions are hardly better, and a cone at its
+# bound would otherwise stop the step of all others
 _EXCESS = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
 class Support:
-    """How far a set of screws extends along a direction.
+    """Largest component of a set of screws along a direction.
 
     Attributes:
         height: certified upper bound of direction . screw over the set.
-        screw: (6,) [rad, m] of the set, (nearly) attains it.
-        gradient: (nv,) of the component by v, less what the closures' multipliers take.
+        screw: (6,) [rad, m] screw of the set that (nearly) attains it.
+        gradient: (nv,) of the component by v, less the part of the closures'
+            multipliers.
     """
 
     height: float
@@ -73,7 +73,7 @@ class MovingCones(NamedTuple):
     Attributes:
         closures: (6 closures, nv) columns in the scaled closures.
         platform: (6, nv) [rad, m] columns at the platform.
-        start: (nv,) where they start, within the cones.
+        start: (nv,) their start values, within the cones.
         group: (nv,) cone of each column.
     """
 
@@ -87,17 +87,17 @@ class MovingCones(NamedTuple):
 class ReachableSet:
     """Platform screws that remain possible: centre + map @ (v - start).
 
-    v runs over unit cones with rows @ (v - start) = 0: the homogeneous form, in which
-    an error of the solution of (22) adds no motion.
+    v runs over unit cones with rows @ (v - start) = 0.  In this homogeneous form an
+    error of the solution of (22) adds no motion.
 
     Attributes:
         centre: (6,) [rad, m] the screw at ``start``.
-        map: (6, nv) [rad, m] how the screw follows v.
+        map: (6, nv) [rad, m] derivative of the screw by v.
         rows: (p, nv) orthonormal rows of the closures.
         start: (nv,) v at the solution of (22), within its cones.
         group: (nv,) cone of each column.
-        free: (6, k) [rad, m] screws of the platform, for a unit of motions that nothing
-            resists and nothing bounds.
+        free: (6, k) [rad, m] screws of the platform per unit of motions without
+            resistance and without bound.
     """
 
     centre: NDArray
@@ -110,12 +110,12 @@ class ReachableSet:
     __repr__, _repr_html_ = short_repr, html_table
 
     def unbounded(self, part: int) -> bool:
-        """Whether the rotation (part 0), or the translation (3), has no bound."""
+        """Return whether the rotation (part 0) or the translation (3) has no bound."""
         free = self.free[part : part + 3]
         return bool(np.abs(free).max(initial=0.0) > UNBOUNDED)
 
     def at_point(self, offset: ArrayLike) -> "ReachableSet":
-        """The same set for another point of the platform.
+        """Return the same set for another point of the platform.
 
         Args:
             offset: (3,) [m] from the platform's origin to the point, base axes.
@@ -131,11 +131,11 @@ class ReachableSet:
         )  # fmt: skip
 
     def support(self, direction: ArrayLike, method: Method = "compiled") -> "Support":
-        """Largest component of the platform screw along a direction.
+        """Return the largest component of the platform screw along a direction.
 
         Args:
             direction: (6,) weights of the screw's components.
-            method: of :func:`assembly.solvers.conic.minimise_energy`.
+            method: method of :func:`assembly.solvers.conic.minimise_energy`.
 
         Returns:
             The height with the point that attains it; infinite where the platform
@@ -163,8 +163,8 @@ class ReachableSet:
         return Support(max(height, float(direction @ screw)), screw, reduced)
 
     def _screw_near(self, v: NDArray) -> NDArray:
-        """(6,) [rad, m] the screw of a nearby v that satisfies rows and cones."""
-        # rows to rounding, cones to 5e-9 of their clearance
+        """Return the (6,) [rad, m] screw of a nearby v within rows and cones."""
+        # rows to rounding, cones to 5e-9 of their size
         start, group = self.start, self.group
         step = v - start
         step = step - self.rows.T @ (self.rows @ step)
@@ -182,15 +182,16 @@ class ReachableSet:
     def farthest(
         self, part: int, tolerance: float, method: Method = "compiled"
     ) -> tuple[tuple[float, float], NDArray, int]:
-        """Bounds of the largest size of half a screw, and what attains it.
+        """Return the bounds of the largest size of half a screw, and a screw.
 
         Args:
             part: 0 for the rotation, 3 for the translation.
-            tolerance: [rad or m] asked of upper minus lower bound.
+            tolerance: [rad or m] required difference of upper and lower bound.
             method: ``"compiled"``; or ``"reference"``, numpy and Clarabel alone.
 
         Returns:
-            (lower, upper); (6,) [rad, m] the screw that attains the lower; how many.
+            (lower, upper); (6,) [rad, m] the screw that attains the lower; number of
+            supports.
 
         Raises:
             SolverFailed: the cone solver gave up.
@@ -220,30 +221,30 @@ class ReachableSet:
 def reachable_screws(
     assembly: Assembly, assumption: str, energy_budget: float = 0.05
 ) -> ReachableSet:
-    """The set of platform screws that an assumption of (27) leaves possible.
+    """Return the set of platform screws that an assumption of (27) leaves possible.
 
     Args:
-        assembly: of least energy.
+        assembly: assembly of least energy.
         assumption: ``"frozen"``, ``"free"`` or ``"budget"``.
         energy_budget: eta of assumption ``"budget"``, >= 0.
 
     Returns:
-        The set, within all bounds of passive joints' own motion too.
+        The set, within all bounds of passive joints' own motion.
 
     Raises:
-        ValueError: the assumption is unknown, or ``budget`` is asked under a load.
+        ValueError: the assumption is unknown, or ``budget`` is used under a load.
     """
     if assumption not in ASSUMPTIONS:
         raise ValueError(f"assumption is {assumption!r}, expected one of {ASSUMPTIONS}")
     if assumption == "budget" and (assembly.frame_loads or energy_budget < 0):
         raise ValueError("the budget assumption needs no load and a budget >= 0")
-    compliant: Compliant = "free" if assumption == "free" else "elastic"
+    free = assumption == "free"
     loaded = assembly
-    if assumption == "free":
-        # turning about the own axis costs nothing here: a clearance is held only if it
-        # stays loaded without those soft springs
+    if free:
+        # here the own axis turns without energy: a clearance is held only if it stays
+        # loaded without those soft springs
         loaded = least_energy(
-            assembly.posture, assembly.load, assembly.frame_loads, "hinged"
+            assembly.posture, assembly.load, assembly.frame_loads, own_axes_free=True
         )
 
     def moving(joints: VirtualJoints) -> MovingCones:
@@ -262,27 +263,30 @@ def reachable_screws(
         lin = assembly.linearisation
         return MovingCones(lin.rows @ columns, lin.platform @ columns, start, group)
 
-    return within_bounds(assembly, compliant, loaded.joints.bounded_motion, moving)
+    return within_bounds(assembly, loaded.joints.bounded_motion, moving, free)
 
 
 def within_bounds(
-    assembly: Assembly, compliant: Compliant, kept: frozenset[int],
-    moving: Callable[[VirtualJoints], MovingCones],
+    assembly: Assembly, kept: frozenset[int],
+    moving: Callable[[VirtualJoints], MovingCones], own_axes_free: bool = False,
 ) -> ReachableSet:  # fmt: skip
-    """Platform screws as cones move about an assembly and free motions follow.
+    """Return the platform screws while cones move and free motions follow.
 
     Args:
-        assembly: where they start.
-        compliant: see :func:`assembly.linear.closure.virtual_joints`.
-        kept: frames whose bound of the joint's own motion is certain to count.
-        moving: the cones that move, of given virtual joints.
+        assembly: the start.
+        kept: frames whose bound of the joint's own motion counts from the first.
+        moving: function of virtual joints that returns the cones that move.
+        own_axes_free: see :func:`assembly.linear.closure.virtual_joints`; then no
+            spring acts.
 
     Returns:
         The set, within all bounds.
     """
     kept = kept | assembly.joints.bounded_motion
     while True:
-        joints = virtual_joints(assembly.posture.robot, compliant, bounded_motion=kept)
+        joints = virtual_joints(
+            assembly.posture.robot, not own_axes_free, own_axes_free, kept
+        )
         cones = moving(joints)
         group = np.unique(cones.group, return_inverse=True)[1]
         motion = _Motion(assembly, joints, cones._replace(group=group))
@@ -301,7 +305,7 @@ class _Motion:
 
     @cached_property
     def _follow(self) -> tuple[NDArray, NDArray]:
-        """(nq, m) pseudoinverse of A_q; (6, nq) motions that nothing resists."""
+        """(nq, m) pseudoinverse of A_q; (6, nq) motions without resistance."""
         lin = self.assembly.linearisation
         A_q, P_q = lin.rows @ self.joints.free, lin.platform @ self.joints.free
         inverse = np.linalg.pinv(A_q, rcond=self._with_mismatch(RANK))
@@ -310,15 +314,15 @@ class _Motion:
         return inverse, np.where(large, free, 0.0)
 
     def _with_mismatch(self, threshold: float) -> float:
-        """[-] a threshold plus the rounding of the nominal closures."""
+        """Return [-] a threshold plus the rounding error of the nominal closures."""
         return rank_tolerance(self.assembly.posture.mismatch, threshold)
 
     @cached_property
     def passed(self) -> frozenset[int]:
-        """Frames whose own motion may pass a bound that is left out here."""
+        """Frames whose own motion may exceed a bound that is left out here."""
         inverse, free = self._follow
         row = self.joints.free.argmax(axis=0)
-        # a joint without a spring here has its bound by every assumption
+        # the bound of a joint without a spring counts under every assumption
         robot, group = self.joints.robot, self.cones.group
         limit = component_bounds(clearance_bounds(robot)).ravel()[row]
         clearance = component_bounds(scales_with_margin(robot)).ravel()[row]
@@ -330,7 +334,7 @@ class _Motion:
         most = np.abs(middle)
         for c in np.unique(group):
             most = most + np.linalg.norm(step[:, group == c], axis=1)
-        # a motion that nothing but its bound resists goes up to it
+        # a motion that only its bound resists reaches it
         passing = limited & ((most > limit) | free.any(axis=0))
         return frozenset((row[passing] // 6).tolist())
 
@@ -352,24 +356,24 @@ class _Motion:
 
 
 def clearances_in(assembly: Assembly, joints: VirtualJoints) -> NDArray:
-    """(nu,) an assembly's clearances in the unit cones of other virtual joints."""
+    """Return the (nu,) clearances of an assembly in the unit cones of other joints."""
     screws = assembly.clearance_screws.ravel()
     u = joints.cones.T @ screws / (joints.cones**2).sum(axis=0)
     return into_cones(u, joints.group)
 
 
 def _rows(A: NDArray, noise: float) -> NDArray:
-    """Orthonormal rows spanning those of A, but for rounding."""
+    """Return the orthonormal rows spanning those of A, up to rounding."""
     _, S, Vt = svd(A, full_matrices=False)
     return Vt[: rank_of(S, ROWS_RANK, noise)]
 
 
 def loaded_cones(assembly: Assembly, joints: VirtualJoints) -> NDArray:
-    """Clearances whose constraint is active, by strict complementarity.
+    """Return the clearances whose constraint is active, by strict complementarity.
 
     Args:
-        assembly: of least energy.
-        joints: whose columns are meant.
+        assembly: assembly of least energy.
+        joints: the virtual joints whose columns are judged.
 
     Returns:
         (nu,) bool, the same for all columns of a cone.
@@ -379,6 +383,6 @@ def loaded_cones(assembly: Assembly, joints: VirtualJoints) -> NDArray:
     screws = assembly.clearance_screws.ravel()
     u = joints.cones.T @ screws / (joints.cones**2).sum(axis=0)
     slack = np.maximum(0.0, 1.0 - cone_sizes(u, joints.group))
-    # load times slack is about the solver's gap: one of the two is nearly zero
+    # load times slack is about the solver's gap: one of them is nearly zero
     scale = max(assembly.energy, 1e-9 * assembly.energy_without_clearance, 1e-300)
     return ((load > scale * slack) & (load > 1e-9 * scale))[joints.group]

@@ -5,15 +5,15 @@ With the columns of :mod:`assembly.linear.closure` the assembly constraints read
     A_q q + A_u u + A_y y = -misfit,      |u_k| <= 1 for each cone k.
 
 Free motions q are projected out (rows orthogonal to A_q), then the springs y: the
-remaining rows split into those that springs enter and those that none does.  What
-remains is a problem in the clearances alone,
+remaining rows split into rows with springs and rows without.  The reduced problem has
+the clearances alone as unknowns,
 
     minimise  |G u + h|^2 / 2 - d.u      subject to  H u = k,  |u_k| <= 1,
 
-where G u + h is the scaled deformation of the springs (their strain) beyond that of the
-loads alone.  Springs enter by the square roots of their compliances, and ranks are
-decided on those: in a sum of compliances, such as 1 and 1e-8 rad/(N m), the stiff ones
-would be lost to rounding.
+where G u + h is the scaled deformation of the springs beyond that under the loads
+alone.  Springs enter by the square roots of their compliances, and ranks are decided on
+those: in a sum of compliances, such as 1 and 1e-8 rad/(N m), the stiff ones would be
+lost to rounding.
 
 Sources:
     Golub, Van Loan, Matrix Computations, 4th ed., sections 5.4-5.5 (rank-revealing
@@ -39,11 +39,11 @@ from assembly.linear.closure import (
     in_reference_lengths,
 )
 from assembly.linear.load import FrameLoads, loads_on_frames
-from forcefit.inputs.display import html_table, numbers, short_repr
+from forcefit.results.display import html_table, numbers, short_repr
 from stiffness.screws import SCREW
 
-_STILL = 1e-6  # of the largest motion: what less counts as rounding
-_NAMED = 4  # joints of a free motion that a message names
+_STILL = 1e-6  # relative to the largest motion: smaller ones count as rounding
+_NAMED = 4  # largest number of joints that a message names
 
 
 class FreeMotion(ValueError):
@@ -56,19 +56,21 @@ class Reduction:
 
     Attributes:
         linearisation: the assembly constraints.
-        joints: the columns eliminated and kept.
+        joints: the virtual joints: columns eliminated and kept.
         G: (r, nu) [sqrt(2 J)] sensitivity of the scaled strains to the clearances.
         h: (r,) [sqrt(2 J)] scaled strains with zero clearances and no loads.
         d: (nu,) [J] work of the load along the clearances.
-        H: (p, nu) rows that no spring enters.
-        k: (p,) their right sides.
-        inconsistent: [-] scaled closure error that nothing can close; 0 if none.
-        frame_loads: on every small screw.
-        load_multipliers: (6 closures,) that balance the loads on free motions.
+        H: (p, nu) rows without springs.
+        k: (p,) right sides of the rows H.
+        inconsistent: [-] scaled closure error that no motion can close; 0 if none.
+        frame_loads: loads on every small screw.
+        load_multipliers: (6 closures,) multipliers that balance the loads on free
+            motions.
         basis: (6 closures, m) orthonormal, orthogonal to all free motions.
         rigid: (m, p) rows of ``basis`` combined into those of H.
         elastic_inverse: (ny, m) pseudoinverse of the springs' columns.
-        spread: (ny, r) orthonormal, from the reduced problem's springs to all of them.
+        spread: (ny, r) orthonormal map from the reduced problem's springs to all
+            springs.
         ranks: numbers of rows: free, elastic, rigid, redundant.
     """
 
@@ -91,7 +93,7 @@ class Reduction:
     __repr__, _repr_html_ = short_repr, html_table
 
     def springs(self, u: NDArray) -> NDArray:
-        """(ny,) [sqrt(2 J)] all springs' scaled deformation at given clearances."""
+        """Return the (ny,) [sqrt(2 J)] scaled deformations of all springs at u."""
         return self.spread @ (self.G @ u + self.h) + self.load_springs
 
     @property
@@ -108,14 +110,14 @@ class Reduction:
         return float(h @ h + 2 * (self.spread @ h) @ bent + bent @ bent) / 2
 
     def motions(self, u: NDArray, y: NDArray) -> NDArray:
-        """(nq,) free motions of least size that go with clearances and springs."""
+        """Return the (nq,) least free motions that fit clearances and springs."""
         A = self.linearisation.rows
         moved = self.joints.cones @ u + self.joints.elastic @ y
         right = -self.linearisation.misfit - A @ moved
         return np.linalg.lstsq(A @ self.joints.free, right, rcond=RANK)[0]
 
     def multipliers(self, springs: NDArray, rigid_multipliers: NDArray) -> NDArray:
-        """(6 closures,) scaled closure wrenches, the least where not unique."""
+        """Return the (6 closures,) scaled closure wrenches, the least if not unique."""
         all_springs = self.spread @ springs
         inner = self.elastic_inverse.T @ all_springs + self.rigid @ rigid_multipliers
         return self.load_multipliers + self.basis @ inner
@@ -131,7 +133,7 @@ def reduce_problem(
     Args:
         linearisation: the assembly constraints.
         joints: what may move.
-        frame_loads: on every small screw; none if absent.
+        frame_loads: on every small screw; zero if absent.
 
     Returns:
         The problem in the clearances.
@@ -186,11 +188,11 @@ def reduce_problem(
 
 
 def complement(A: NDArray, tolerance: float) -> NDArray:
-    """Orthonormal basis of what is orthogonal to the columns of A.
+    """Return an orthonormal basis of the complement of the columns of A.
 
     Args:
         A: (m, n).
-        tolerance: relative size below which a column adds nothing new.
+        tolerance: relative size below which a column counts as dependent.
 
     Returns:
         (m, m - rank).
@@ -205,12 +207,12 @@ def spring_deformations(
     frame_loads: FrameLoads,
     multipliers: NDArray,
 ) -> NDArray:
-    """Deformations of the springs in balance with closures and loads.
+    """Return the deformations of the springs in balance with closures and loads.
 
     Args:
         lin: the assembly constraints.
-        joints: whose springs are asked about.
-        frame_loads: on every small screw.
+        joints: whose springs are computed.
+        frame_loads: loads on every small screw.
         multipliers: (6 closures,) of the scaled closures.
 
     Returns:
@@ -225,10 +227,10 @@ def spring_deformations(
 def _load_multipliers(
     lin: Linearisation, joints: VirtualJoints, frame_loads: FrameLoads
 ) -> NDArray:
-    """Multipliers that balance the loads along every free motion."""
+    """Return the multipliers that balance the loads along every free motion."""
     A_q, drive = lin.rows @ joints.free, joints.free.T @ frame_loads.joint
     multipliers = np.linalg.lstsq(A_q.T, -drive, rcond=RANK)[0]
-    # what is left is orthogonal to A_q's rows: a free motion, which the load drives
+    # the residual is orthogonal to A_q's rows: a free motion, which the load drives
     left = A_q.T @ multipliers + drive
     if np.abs(left).max(initial=0.0) > 1e-8 * np.abs(drive).max(initial=1e-300):
         raise FreeMotion(
@@ -239,7 +241,7 @@ def _load_multipliers(
 
 
 def _motion_text(lin: Linearisation, screws: NDArray) -> str:
-    """A free motion in words: the joints that make it and the platform's unit screw."""
+    """Return a free motion in words: its joints and the platform's unit screw."""
     robot = lin.posture.robot
     sizes = np.abs(screws.reshape(-1, 6) * in_reference_lengths(lin.size))
     moved = sizes.max(axis=1)
@@ -267,14 +269,15 @@ def _rigid_rows(
     tolerance: float,
     noise: float,
 ) -> tuple[NDArray, NDArray, NDArray, float]:
-    """Independent rows that only clearances can satisfy, and what nothing satisfies."""
+    """Return independent rows that only clearances satisfy, and the error left."""
     rows, wanted = rigid_rows.T @ A_u, rigid_rows.T @ right
     U, S, _ = svd(rows, full_matrices=True)
-    # clearances are small: their columns count against their own size
+    # rank relative to the clearances' size, which is small
     rank = rank_of(S, ROWS_RANK, noise)
     errors = np.abs(lin.rows * lin.posture.robot.errors.ravel()).max(initial=0.0)
     unclosed = np.abs(U[:, rank:].T @ wanted).max(initial=0.0)
-    # rows count as rigid by a tolerance: of what loads bend that much is left in them
+    # rows count as rigid by a tolerance, so a share of the load's deformation is in
+    # them
     bent = np.abs(right).max(initial=0.0)
     allowed = 1e-12 + 10 * tolerance * max(errors, bent)
     independent = U[:, :rank]

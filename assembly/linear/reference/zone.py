@@ -13,7 +13,6 @@ from assembly.linear.closure import (
 )
 from assembly.linear.reference.reduction import Reduction, reduce_problem
 from assembly.model.clearance import (
-    Compliant,
     clearance_bounds,
     clearance_excess,
     scales_with_margin,
@@ -22,26 +21,27 @@ from assembly.solvers.cones import cone_sizes, cone_starts
 from assembly.solvers.conic import least_factor
 
 
-def least_margin(posture: Posture, compliant: Compliant) -> tuple[float, float]:
-    """Factor on all clearances at which a rigid manipulator just assembles, (21).
+def least_margin(posture: Posture, own_axes_free: bool) -> tuple[float, float]:
+    """Return the factor on all clearances at which a rigid manipulator assembles, (21).
 
     Args:
-        posture: where the robot stands.
-        compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
+        posture: the robot's configuration.
+        own_axes_free: whether compliant joints are free about their own axis.
 
     Returns:
-        The margin and its certified lower bound; inf for both if no factor does.
+        The margin and its certified lower bound; inf for both if no factor suffices.
 
     Raises:
         SolverFailed: the cone solver gave up.
     """
-    lin = linearise(posture)
-    margin, bound, screws = margin_with(lin, virtual_joints(posture.robot, compliant))
-    bounds = clearance_bounds(posture.robot, compliant)
-    ranges = np.where(scales_with_margin(posture.robot), np.inf, bounds)
+    lin, robot = linearise(posture), posture.robot
+    joints = virtual_joints(robot, False, own_axes_free)
+    margin, bound, screws = margin_with(lin, joints)
+    bounds = clearance_bounds(robot, own_axes_free)
+    ranges = np.where(scales_with_margin(robot), np.inf, bounds)
     if clearance_excess(screws, ranges) > 1e-9:
         # the range of a passive joint's motion was left out, but it is active
-        joints = virtual_joints(posture.robot, compliant, bounded_motion=True)
+        joints = virtual_joints(robot, False, own_axes_free, bounded_motion=True)
         margin, bound, _ = margin_with(lin, joints)
     return margin, bound
 
@@ -49,14 +49,14 @@ def least_margin(posture: Posture, compliant: Compliant) -> tuple[float, float]:
 def margin_with(
     lin: Linearisation, joints: VirtualJoints
 ) -> tuple[float, float, NDArray]:
-    """Margin with a given choice of what may move.
+    """Return the margin with given virtual joints.
 
     Args:
         lin: the assembly constraints.
-        joints: what may move, without springs.
+        joints: virtual joints that may move, without springs.
 
     Returns:
-        The margin and its certified lower bound, inf if no factor does; the (n, 6)
+        The margin and its certified lower bound, inf if no factor suffices; the (n, 6)
         [rad, m] clearance screws that attain it.
 
     Raises:
@@ -72,14 +72,14 @@ def margin_with(
 
 
 def _margin_of(reduced: Reduction) -> tuple[float, float, NDArray]:
-    """Margin of a reduced problem, its bound, and the clearances that attain it."""
+    """Return the margin of a reduced problem, its bound, and its clearances."""
     joints = reduced.joints
     u = np.zeros(joints.cones.shape[1])
     if reduced.inconsistent:
         return np.inf, np.inf, u
     if not np.any(reduced.k):
         return 0.0, 0.0, u
-    # orthonormal rows, whatever the units of the closures
+    # orthonormal rows make the result independent of the closures' units
     U, S, B = svd(reduced.H, full_matrices=False)
     right = U.T @ reduced.k / S
     t, u, y = least_factor(B, right, joints.group, joints.scaled)
@@ -91,7 +91,7 @@ def _margin_of(reduced: Reduction) -> tuple[float, float, NDArray]:
 def _margin_bound(
     B: NDArray, right: NDArray, joints: VirtualJoints, y: NDArray
 ) -> float:
-    """Certified lower bound: t sum_k |B_k^T y| >= y.right for every y."""
+    """Return the certified lower bound: t sum_k |B_k^T y| >= y.right for every y."""
     sizes = cone_sizes(B.T @ y, joints.group)
     scaled = joints.scaled[cone_starts(joints.group)[:-1]]
     work = float(y @ right) - float(sizes[~scaled].sum())

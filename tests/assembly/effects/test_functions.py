@@ -1,4 +1,4 @@
-"""Functions against closed forms on an arm, and against springs that stand there."""
+"""Functions against closed forms on an arm, and against springs in their place."""
 
 from dataclasses import replace
 from math import cos, exp, sin
@@ -8,8 +8,7 @@ import pytest
 
 from assembly.effects import apply_effects, apply_known
 from assembly.effects.functions import apply_functions, basis
-from assembly.effects.units import units_of
-from assembly.kinematics.posture import place_many_joints, place_robot
+from assembly.kinematics.posture import place_many_joints, place_robot, together
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import assemble_row, predict
 from assembly.measurement.variables import with_history
@@ -43,16 +42,6 @@ def test_waves_of_a_joint_turn_the_arm(q):
     angle = 2e-5 * sin(q) - 1e-5 * cos(3 * q)
     found = seen(here(RIGID, q=q), waves)[0]
     assert found == pytest.approx(turned(angle, q), rel=1e-4, abs=1e-9)
-
-
-def test_a_wave_once_a_turn_is_an_eccentric_encoder():
-    """a sin(q + p) = a cos p sin q + a sin p cos q: the library's effect."""
-    there = here(RIGID, q=0.6)
-    values = {"drive.amplitude": 1e-4, "drive.phase": 0.5}
-    library = predict(apply_effects(there, {"encoder_eccentricity": values})).deviation
-    waves = {"1.sine": 1e-4 * cos(0.5), "1.cosine": 1e-4 * sin(0.5)}
-    found = predict(apply_functions(there, [at_drive(waves, "waves")])).deviation
-    assert found == pytest.approx(library, rel=1e-12, abs=1e-18)
 
 
 def test_a_formula_is_what_it_says():
@@ -154,11 +143,7 @@ def campaign_of(times, **columns):
     q = np.array(columns.pop("q", np.zeros(len(times))), dtype=float)
     coordinates = np.column_stack([q, np.zeros(len(q))])
     postures, _ = place_many_joints(RIGID, coordinates)
-    rows = replace(
-        postures[0],
-        coordinates=np.array([p.coordinates for p in postures]),
-        transforms=np.array([p.transforms for p in postures]),
-    )
+    rows = together(postures)
     session = columns.pop("session", None)
     known = {"time": times, **columns}
     return with_history(as_declared(rows, covariates=known | {"session": session}))
@@ -172,15 +157,6 @@ def test_a_lag_settles_exponentially():
     assert seen(rows, lag)[:, 2] == pytest.approx(
         1e-5 * (1 - np.exp(-t / 300)), rel=1e-9
     )
-
-
-def test_a_lag_behind_a_ramp_runs_one_time_constant_late():
-    """z = s (t - tau (1 - exp(-t / tau))), exact however far apart the rows are."""
-    t = np.array([0.0, 10.0, 400.0, 1000.0])
-    rows = campaign_of(t, temperature=0.02 * t)
-    lag = at_drive({"gain": 1.0, "time_constant": 300.0}, "lag", ("cov.temperature",))
-    expected = 0.02 * (t - 300 * (1 - np.exp(-t / 300)))
-    assert basis(rows, lag, ["gain"])[:, 0] == pytest.approx(expected, rel=1e-12)
 
 
 def test_rows_set_aside_are_remembered():
@@ -223,13 +199,6 @@ def test_backlash_may_vary_around_a_turn():
     assert seen(rows, scaled)[:, 2] == pytest.approx(expected, rel=1e-9)
 
 
-def test_rows_are_taken_in_the_order_of_time_session_by_session():
-    q, t = [0.3, 0.0, 0.9, 0.1], [5.0, 0.0, 9.0, 0.0]
-    rows = campaign_of(np.array(t), q=q, session=np.array(["a", "a", "a", "b"]))
-    back = at_drive({}, "reversal", ("q.drive",))
-    assert basis(rows, back, ["0"])[:, 0].tolist() == [1.0, 0.0, 1.0, 0.0]
-
-
 def test_a_session_has_its_own_effects():
     rows = campaign_of(np.zeros(3), session=np.array(["a", "b", "a"]))
     own = at_drive({"0": 1e-5}, session="a")
@@ -252,30 +221,3 @@ def test_what_settles_by_itself_and_what_jumps():
     )
     assert seen(rows, jump)[:, 2] == pytest.approx([0, 2e-5, 2e-5], abs=1e-15)
     assert seen(rows, slow)[:, 2] == pytest.approx([0, 3e-5, -3e-5], abs=1e-15)
-
-
-def test_units_follow_from_variables():
-    waves = at_drive({"1.sine": 1.0}, "waves")
-    assert units_of(RIGID, waves) == {"1.sine": "rad"}
-    bend = at_drive({"2": 1.0}, variables=("wrench.drive.mz",))
-    assert units_of(RIGID, bend) == {"2": "rad/(N^2 m^2)"}
-    soft = at_drive({"0": 1.0, "1": 1.0}, kind="compliance")
-    assert units_of(RIGID, soft) == {"0": "rad/(N m)", "1": "rad/(N m)"}
-    warm = Function("tip", ("tx",), ("cov.temperature",), "powers", {"2": 1.0})
-    assert units_of(RIGID, warm) == {"2": "m/K^2"}
-    # a gain is per unit of what is followed, but of time, which only passes
-    memory = {"gain": 1.0, "start": 1.0, "time_constant": 1.0}
-    lag = at_drive(memory, "lag", ("cov.temperature",))
-    assert units_of(RIGID, lag) == {
-        "gain": "rad/K",
-        "start": "rad",
-        "time_constant": "s",
-    }
-    creep = at_drive(memory, "creep", ("time",))
-    assert units_of(RIGID, creep) == {
-        "gain": "rad", "start": "rad", "time_constant": "s"
-    }  # fmt: skip
-    formula = at_drive(
-        {"a": 1.0, "k": 1.0}, "formula", ("time",), formula="a*exp(-k*time)"
-    )
-    assert units_of(RIGID, formula) == {"a": "1", "k": "1/s"}  # rad is a number

@@ -1,4 +1,4 @@
-"""Effects whose parameters are left out in part, and what fits give instead of them."""
+"""Effects with some parameters left out, and public parameters of fitted ones."""
 
 from dataclasses import replace
 from math import atan2, cos, hypot, sin
@@ -9,7 +9,6 @@ import pytest
 from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.base_compliance import FOUNDATION, on_foundation, with_foundation
 from assembly.effects.functions import covariates_of
-from assembly.effects.joint_clearance import moving_joints
 from assembly.effects.robot_effects import check_covariates
 from assembly.kinematics.posture import place_robot
 from assembly.measurement.conditions import as_declared
@@ -92,34 +91,6 @@ def test_a_foundation_has_a_name_of_its_own():
     assert [f.name for f in twice.frames[:2]] == [FOUNDATION + "_", FOUNDATION]
     assert np.diag(twice.frames[0].joint_stiffness)[5] == 1e6
     assert np.isinf(np.diag(twice.frames[0].joint_stiffness)[:5]).all()
-
-
-def test_a_foundations_own_rows_come_first_and_are_still():
-    """What is known of the other frames stays theirs."""
-    rng = np.random.default_rng(1)
-    given = here(arm(), q=0.3)
-    given = replace(
-        given, rest=rng.normal(size=(1, 2, 6)), errors=rng.normal(size=(1, 2, 6))
-    )
-    found = on_foundation(given)
-    for name in ("rest", "errors", "coordinates"):
-        rows, before = getattr(found, name), getattr(given, name)
-        assert rows.shape == (1, 3, *before.shape[2:])
-        assert np.array_equal(rows[:, 1:], before)
-        assert not rows[:, 0].any()
-    assert np.array_equal(found.transforms[0, 0], np.eye(4))
-    assert np.array_equal(found.transforms[:, 1:], given.transforms)
-
-
-@pytest.mark.parametrize(("clearance", "tight"), [
-    (None, True), (Clearance(), True), (Clearance(radial=1e-5), False),
-    (Clearance(axial=1e-5), False), (Clearance(tilt=1e-5), False),
-])  # fmt: skip
-def test_joints_that_may_have_clearance_are_those_declared_tight(clearance, tight):
-    robot = arm()
-    drive = replace(robot.frames[0], clearance=clearance)
-    robot = replace(robot, frames=(drive, robot.frames[1]))
-    assert moving_joints(robot) == (("drive",) if tight else ())
 
 
 def test_clearance_adds_to_what_is_declared():

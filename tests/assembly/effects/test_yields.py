@@ -1,4 +1,4 @@
-"""Places that give by a law of what goes through them, or of another place's wrench."""
+"""Places that deform by a law of their own wrench, or of another place's wrench."""
 
 from dataclasses import replace
 from math import cos
@@ -6,9 +6,9 @@ from math import cos
 import numpy as np
 import pytest
 
-from assembly.effects import LIBRARY, apply_effects
+from assembly.effects import apply_effects
 from assembly.model.function import Function
-from assembly.model.robot import Frame, MatrixLink, Robot
+from assembly.model.robot import MatrixLink
 from tests.assembly.effects.test_effects import L, here
 from tests.assembly.effects.test_functions import (
     RIGID,
@@ -90,18 +90,3 @@ def test_a_matrix_twice_as_stiff_bends_half():
     there = here(replace(RIGID, frames=(RIGID.frames[0], tip)), (0, 0, 0, 0, F, 0))
     link = apply_effects(there, {"modulus_scale": {"tip": 2.0}}).robot.frames[1].link
     assert np.array_equal(link.stiffness, 2.0 * tip.link.stiffness)
-
-
-def test_units_where_a_joint_slides():
-    slides = Robot("slides", "tip", (Frame("slide", joint="prismatic", actuated=True),
-                                     Frame("tip", "slide")))  # fmt: skip
-    for name, parameter, sliding, turning in (
-        ("friction_hysteresis", "", "N", "N m"),
-        ("contact_stiffening", ".coefficient", "N/m^n", "N m/rad^n"),
-        ("contact_stiffening", ".exponent", "1", "1"),
-        ("encoder_offset", "", "m", "rad"),
-        ("drive_compliance", "", "N/m", "N m/rad"),
-    ):
-        unit = LIBRARY[name].unit
-        assert unit(slides, "slide" + parameter) == sliding
-        assert unit(RIGID, "drive" + parameter) == turning

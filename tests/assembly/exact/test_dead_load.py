@@ -7,20 +7,19 @@ import pytest
 from scipy.optimize import brentq
 
 from assembly.exact.dead_load import (
-    curvature_of,
     dead_loads,
+    dead_loads_of_rows,
     work_gradient,
-    work_of,
+    wrenches_on_frames,
 )
 from assembly.exact.exact import solve_exact
-from assembly.exact.finite_robot import LINK, FiniteRobot
+from assembly.exact.finite_robot import FiniteRobot
 from assembly.exact.placement import place
-from assembly.kinematics.posture import home_posture, place_robot
+from assembly.kinematics.posture import home_posture, place_robot, together
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import solve_assembly
 from assembly.model.links import link_compliance
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
-from assembly.robots.irsbot2 import irsbot2
 from stiffness.screws import rotation_matrix, rotation_vector, screw_map
 from tests.assembly.exact.test_exact import only
 from tests.assembly.exact.test_placement import moved_unknowns
@@ -52,67 +51,6 @@ def on_a_hinge(stiffness, *frames):
     """Rigid bodies on an elastic hinge about z."""
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, stiffness))
     return home_posture(Robot("arm", frames[-1].name, (hinge, *frames)))
-
-
-def some_loads(posture, rng):
-    count = len(posture.robot.frames)
-    return rng.normal(size=6), rng.normal(size=(count, 6)), rng.normal(size=3) * G
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_at_rest_the_loads_pull_as_in_the_linear_model(seed):
-    rng = np.random.default_rng(seed)
-    robot = heavy(random_robot(rng, legs=3), rng)
-    posture = home_posture(robot.with_errors(0 * robot.errors))
-    load, bodies, gravity = some_loads(posture, rng)
-    linear = solve_assembly(posture, load, bodies, gravity)
-    model = moved_unknowns(posture, rng, 0.0)[0]
-    loads = dead_loads(posture, load, bodies, gravity)
-    here = place(model, np.zeros(len(model.frame)))
-    forces = np.where(model.motion == LINK, *(
-        np.einsum(
-            "ij,ij->i", model.columns, forces.reshape(-1, 6)[model.frame]
-        ) for forces in (linear.frame_loads.body, linear.frame_loads.joint)
-    ))  # fmt: skip
-    assert work_of(here, loads) == pytest.approx(0.0, abs=1e-13)
-    assert (
-        np.abs(work_gradient(here, loads) - forces).max() < 1e-12 * np.abs(forces).max()
-    )
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_both_derivatives_of_the_work(seed):
-    """Far from rest, central differences of 1e-5."""
-    rng = np.random.default_rng(seed)
-    posture = home_posture(heavy(random_robot(rng, legs=3), rng))
-    model, x, h = moved_unknowns(posture, rng, 0.1)
-    load, bodies, gravity = some_loads(posture, rng)
-    loads, step = dead_loads(posture, 0 * load, bodies, gravity), 1e-5
-    here, ahead, behind = (place(model, x + k * step * h) for k in (0, 1, -1))
-    slope = (work_of(ahead, loads) - work_of(behind, loads)) / (2 * step)
-    assert work_gradient(here, loads) @ h == pytest.approx(slope, rel=1e-7)
-    bend = (work_gradient(ahead, loads) - work_gradient(behind, loads)) / (2 * step)
-    found = curvature_of(here, np.zeros(len(here.residual)), loads)
-    assert np.abs(found @ h - bend).max() < 1e-7 * np.abs(bend).max()
-    assert np.abs(found - found.T).max() < 1e-12 * np.abs(found).max()
-
-
-@pytest.mark.parametrize("point", [(0.0, 0.0, 0.0), (0.1, -0.2, 0.05)])
-def test_loads_together_work_as_each_alone(point):
-    """Of the platform at a point, of bodies, of weights: energies add up."""
-    rng = np.random.default_rng(7)
-    posture = home_posture(heavy(random_robot(rng, legs=3), rng))
-    model, x, _ = moved_unknowns(posture, rng, 0.1)
-    there = place(model, x)
-    load, bodies, gravity = some_loads(posture, rng)
-    each = [
-        dead_loads(posture, load, point=point), dead_loads(posture, bodies=bodies),
-        dead_loads(posture, gravity=gravity),
-    ]  # fmt: skip
-    together = dead_loads(posture, load, bodies, gravity, point)
-    alone = [work_of(there, loads) for loads in each]
-    assert min(np.abs(alone)) > 1e-6
-    assert work_of(there, together) == pytest.approx(sum(alone), rel=1e-12)
 
 
 @pytest.mark.parametrize("stiffness", [3.0, 30.0])
@@ -217,8 +155,9 @@ def test_the_linear_model_is_the_limit_of_small_weights():
     assert off[0] / off[1] == pytest.approx(4.0, rel=0.05)
 
 
-def test_turning_robot_and_gravity_together_turns_the_answer():
-    rng = np.random.default_rng(5)
+@pytest.mark.parametrize("seed", [1, 2, 3, 5])
+def test_turning_robot_and_gravity_together_turns_the_answer(seed):
+    rng = np.random.default_rng(seed)
     robot = heavy(random_robot(rng, legs=2), rng)
     R = rotation_matrix(rng.normal(size=3))
     turned = []
@@ -236,19 +175,6 @@ def test_turning_robot_and_gravity_together_turns_the_answer():
     both = np.kron(np.eye(2), R)
     assert there.potential == pytest.approx(here.potential, rel=1e-9)
     assert there.platform_screw == pytest.approx(both @ here.platform_screw, abs=1e-9)
-
-
-def test_the_paper_robot_under_its_weight_at_full_errors():
-    robot = irsbot2_with(NUMBERS["cases"][1])
-    robot = heavy(robot, np.random.default_rng(2))
-    answer = solve_exact(
-        place_robot(robot, pose={"tx": 0.1, "tz": -0.5}), gravity=[0, 0, -G]
-    )
-    assert answer.closure_residual() < 1e-12
-    assert answer.stationarity < 1e-7
-    assert answer.least_curvature > 0
-    plain = solve_exact(place_robot(irsbot2(), pose={"tx": 0.1, "tz": -0.5}))
-    assert plain.loads.beyond_platform is False
 
 
 def test_a_start_under_other_loads_is_refused():
@@ -286,3 +212,54 @@ def test_the_simulation_agrees_about_weight_at_full_errors(gravity):
     assert difference[3:].max() < 1e-8
     weight = sum(f.mass for f in robot.frames) * np.linalg.norm(gravity)
     assert other.energy == pytest.approx(answer.energy, abs=1e-8 * weight)
+
+
+def test_what_a_frame_holds_is_all_that_hangs_on_it():
+    """Moments and forces at points, summed up the tree; joints hold no own body."""
+    rng = np.random.default_rng(4)
+    robot = with_bodies(random_robot(rng, legs=2), rng)
+    posture = home_posture(robot)
+    model, x, _ = moved_unknowns(posture, rng, 0.1)
+    there, load = place(model, x), np.r_[np.zeros(3), rng.normal(size=3)]
+    bodies, gravity = rng.normal(size=(len(robot.frames), 6)), np.array([1.0, -2, -9])
+    bodies[:, :3] = 0.0
+    body, joint = wrenches_on_frames(there, dead_loads(posture, load, bodies, gravity))
+    origin, own = posture.platform[:3, 3], []
+    for i, frame in enumerate(robot.frames):
+        T = there.body_ends[i]
+        weight, at = frame.mass * gravity, T[:3, :3] @ frame.centre_of_mass + T[:3, 3]
+        parts = [(at, weight), (T[:3, 3], bodies[i, 3:])]
+        if frame.name == robot.platform:
+            parts.append((there.platform[:3, 3], load[3:]))
+        own.append(sum(np.r_[np.cross(p - origin, f), f] for p, f in parts))
+    for i, frame in enumerate(robot.frames):
+        behind = [
+            own[k] for k in range(len(robot.frames)) if robot.on_path[k, i] and k != i
+        ]
+        held = np.sum(behind, axis=0) if behind else np.zeros(6)
+        scale = np.abs(own).sum()
+        assert joint[i] == pytest.approx(held, abs=1e-12 * scale), frame.name
+        assert body[i] == pytest.approx(held + own[i], abs=1e-12 * scale)
+
+
+@pytest.mark.parametrize("point", [(0.0, 0.0, 0.0), (0.1, -0.2, 0.05)])
+def test_loads_of_many_conditions_are_those_of_each(point):
+    """Weights with the errors of each row, loads and gravity of each."""
+    rng = np.random.default_rng(3)
+    robot = heavy(random_robot(rng, legs=2), rng)
+    rows = 3
+    errors = 1e-2 * rng.normal(size=(rows, len(robot.frames), 6))
+    load, gravity = rng.normal(size=(rows, 6)), 9.8 * rng.normal(size=(rows, 3))
+    postures = [home_posture(robot.with_errors(one)) for one in errors]
+    many = together(postures)
+    found = dead_loads_of_rows(many, errors, load, gravity, np.array(point))
+    for k, posture in enumerate(postures):
+        one = dead_loads(posture, load[k], gravity=gravity[k], point=point)
+        for name in ("load", "bodies", "carried"):
+            expected = getattr(one, name)
+            size = np.abs(expected).max()
+            assert getattr(found, name)[k] == pytest.approx(expected, abs=1e-12 * size)
+    assert np.abs(found.carried).max() > 0
+    still = dead_loads_of_rows(many, errors, load, 0 * gravity, np.zeros(3))
+    assert np.array_equal(still.load, load)
+    assert not still.beyond_platform

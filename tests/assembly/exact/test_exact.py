@@ -15,12 +15,7 @@ from assembly.model.links import link_compliance
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.solvers.conic import SolverFailed
 from stiffness.screws import rotation_matrix, rotation_vector
-from tests.robots_for_tests import (
-    NUMBERS,
-    coaxial_beams,
-    irsbot2_with,
-    small_clearance,
-)
+from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with, small_clearance
 from validation.multibody.simulation import SimulationModel, without_clearance
 
 CASES = {case["name"]: case for case in NUMBERS["cases"]}
@@ -150,13 +145,13 @@ def pin_gap(one, two, longer):
 
 
 @pytest.mark.parametrize("longer", [0.02, 0.06])
-def test_a_pin_with_play_presses_on_its_rim(longer):
-    """Least k turn^2 / 2 with the ends no farther apart than the play."""
-    play = 5e-3
+def test_a_pin_with_clearance_presses_on_its_rim(longer):
+    """Least k turn^2 / 2 with the ends no farther apart than the clearance."""
+    clearance = 5e-3
 
     def balance(z):
         one, two, force = z
-        gap = pin_gap(one, two, longer) / play
+        gap = pin_gap(one, two, longer) / clearance
         across = np.array([-np.sin(ALPHA + one), np.cos(ALPHA + one)])
         along = np.array([np.sin(BETA + two), -np.cos(BETA + two)])
         return [
@@ -167,26 +162,28 @@ def test_a_pin_with_play_presses_on_its_rim(longer):
 
     found = root(balance, [*triangle(B + longer), 0.1], tol=1e-14)
     one, two, force = found.x
-    answer = solve_exact(two_bars(longer, Clearance(radial=play)))
+    answer = solve_exact(two_bars(longer, Clearance(radial=clearance)))
     assert np.abs(found.fun).max() < 1e-12
     assert force > 0
     assert answer.joint_screws[0, 2] == pytest.approx(one, rel=1e-9)
     assert answer.joint_screws[3, 2] == pytest.approx(two, rel=1e-9)
     energy = (K_ONE * one**2 + K_TWO * two**2) / 2
     assert answer.energy == pytest.approx(energy, rel=1e-11)
-    assert np.hypot(*answer.clearance_screws[1, 3:5]) == pytest.approx(play, rel=1e-12)
+    assert np.hypot(*answer.clearance_screws[1, 3:5]) == pytest.approx(
+        clearance, rel=1e-12
+    )
 
 
-def test_within_the_play_nothing_is_forced():
+def test_within_the_clearance_nothing_is_forced():
     """4 mm too long, 5 mm of clearance: closed without energy."""
     answer = solve_exact(two_bars(4e-3, Clearance(radial=5e-3)))
-    assert energy_of(answer.placement) < 1e-12  # [J], of 0.04 J without play
+    assert energy_of(answer.placement) < 1e-12  # [J], of 0.04 J without clearance
     assert answer.energy == 0.0  # 1e-31 J is rounding
     assert answer.closure_residual() < 1e-12
     assert answer.clearance_excess() == 0.0
 
 
-def test_closures_that_only_play_can_shut():
+def test_closures_that_only_clearance_can_shut():
     """Axes 0.1 rad apart are met by 0.1 rad of tilt, however far the bars turn."""
     posture = two_bars(0.06, Clearance(tilt=0.2))
     errors = posture.robot.errors.copy()
@@ -197,7 +194,7 @@ def test_closures_that_only_play_can_shut():
     assert answer.closure_residual() < 1e-12
 
 
-def test_a_load_passes_through_play_alone():
+def test_a_load_passes_through_clearance_alone():
     """Rigid: far may move by 0.2 mm, near then by 0.5 + 0.2 mm, 5 N go through far."""
     frames = (
         Frame("near", clearance=Clearance(axial=1e-3)),

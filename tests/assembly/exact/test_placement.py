@@ -9,7 +9,6 @@ from assembly.exact.placement import place
 from assembly.kinematics.posture import home_posture
 from assembly.kinematics.se3 import (
     bracket,
-    bracket_form,
     exponential,
     inverse,
     left_jacobian,
@@ -18,9 +17,7 @@ from assembly.kinematics.se3 import (
 )
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import solve_assembly
-from tests.robots_for_tests import (
-    random_robot,
-)
+from tests.robots_for_tests import random_robot
 
 
 def moved_unknowns(posture, rng, size):
@@ -82,11 +79,6 @@ def test_second_derivative_of_the_exponential(rng, size):
     assert abs(h @ form @ h - expected) < (10 * rounding + 1e-7) * scale
 
 
-def test_the_bracket_form_is_the_work_on_a_bracket(rng):
-    a, b, w = rng.normal(size=(3, 6))
-    assert a @ bracket_form(w) @ b == pytest.approx(w @ (bracket(a) @ b), rel=1e-13)
-
-
 # Closures of a robot
 
 
@@ -115,30 +107,3 @@ def test_first_derivatives_of_closures_and_platform(seed):
     assert np.abs(here.rows @ h - difference).max() < 1e-7
     difference = (ahead.platform_screw - behind.platform_screw) / (2 * step)
     assert np.abs(here.platform_rows @ h - difference).max() < 1e-7
-
-
-@pytest.mark.parametrize("load", [[0] * 6, [0, 0, 0, 1, -2, 3], [2, 1, -3, 1, -2, 3]])
-@pytest.mark.parametrize("size", [0.02, 0.4])
-@pytest.mark.parametrize("seed", range(4))
-def test_second_derivatives_of_closures_and_platform(seed, size, load):
-    """Where the closures hold, against differences of the first derivatives.
-
-    At the larger size the platform turns by a radian, and moments work on it.
-    """
-    rng = np.random.default_rng(seed)
-    model, x, h = moved_unknowns(home_posture(random_robot(rng, legs=3)), rng, size)
-    T, (first, second) = place(model, x).transforms, model.closed_frames.T
-    vars(model)["nominal_closures"] = (
-        inverse(T[first]) @ T[second]
-    )  # close it where it stands
-    here, step, load = place(model, x), 1e-5, np.array(load, dtype=float)
-    multipliers = rng.normal(size=len(here.residual))
-
-    def slope(place):
-        return multipliers @ place.rows + load @ place.platform_rows
-
-    difference = slope(place(model, x + step * h)) - slope(place(model, x - step * h))
-    expected = difference / (2 * step)
-    found = here.curvature(multipliers, load) @ h
-    assert here.largest_gap < 1e-14
-    assert np.abs(found - expected).max() < 1e-7 * np.abs(expected).max()

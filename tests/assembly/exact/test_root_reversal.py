@@ -41,7 +41,7 @@ def random_legs(rng):
                 rng.uniform(-0.3, 0.3, 3), rotation_matrix(rng.normal(size=3))
             )
             here = here @ T
-            leg.append((T, rng.choice(["pin", "hinge", "play"])))
+            leg.append((T, rng.choice(["pin", "hinge", "clearance"])))
         leg.append((np.linalg.inv(here) @ platform, None))
         legs.append([body(rng, T, kind) for T, kind in leg])
     return legs, platform
@@ -50,13 +50,13 @@ def random_legs(rng):
 def body(rng, T, kind):
     A = rng.normal(size=(6, 6)) * np.repeat([1.0, 0.2], 3)
     K = 1e5 * (A.T @ A + 0.1 * np.diag(np.repeat([1.0, 0.04], 3)))
-    play = Clearance(radial=2e-5, axial=1e-5, tilt=1e-4, spin=5e-5)
+    clearance = Clearance(radial=2e-5, axial=1e-5, tilt=1e-4, spin=5e-5)
     joint = {
         None: {},
         "pin": {"joint": "revolute", "clearance": Clearance(radial=2e-5, tilt=1e-4)},
         "hinge": {"joint": "revolute", "joint_stiffness": np.diag(
             [1e4, 2e4, 3.0, 1e7, 1e7, 2e7])},
-        "play": {"clearance": play},
+        "clearance": {"clearance": clearance},
     }[kind]  # fmt: skip
     return Body(T, rng.normal(size=6) * np.repeat([1e-3, 2e-4], 3), K, joint)
 

@@ -13,32 +13,6 @@ from tests.examples_for_tests import example
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
 
-EVERYTHING = """<mujoco model="all">
-<compiler angle="degree" eulerseq="XYz"/>
-<default><joint axis="0 1 0"/><default class="slides"><joint type="slide"/></default>
-</default>
-<worldbody>
- <body name="a" pos="0.1 0.2 0.3" euler="10 20 30">
-  <inertial pos="0 0 0.1" mass="2" diaginertia="1 1 1"/>
-  <joint name="j1" pos="0.05 0 0.02" ref="15"/>
-  <joint name="j2" class="slides" axis="1 2 0" pos="0 0.1 0"/>
-  <body name="b" axisangle="1 1 0 40" pos="0 0.3 0">
-   <inertial pos="0 0 0.1" mass="1" diaginertia="1 1 1"/>
-   <joint name="j3" axis="1 0 1" pos="-0.1 0 0"/>
-   <frame pos="0 0 0.2" xyaxes="0 1 0 -1 0 0.2">
-    <body name="c" zaxis="1 0 1" pos="0.1 0 0" childclass="slides">
-     <inertial pos="0 0 0.1" mass="1" diaginertia="1 1 1"/><joint name="j4"/>
-     <body name="d" quat="1 2 0 1"><site name="s" pos="0 0 1"/></body>
-    </body>
-   </frame>
-  </body>
- </body>
-</worldbody>
-<equality><connect name="c" body1="b" anchor="0.1 0.2 0.3"/>
-<weld name="w" body1="d" body2="a"/></equality>
-<actuator><motor joint="j1"/></actuator>
-</mujoco>"""
-
 
 def largest_gap(model, mechanism, rng):
     """Largest difference of any entry of any body's pose in random postures."""
@@ -80,19 +54,3 @@ def test_urdfs_are_read_as_mujoco_reads_them(name, rng):
     text = re.sub(r"(<robot[^>]*>)", rf"\1{ours}", text, count=1)
     model = mujoco.MjModel.from_xml_string(text)
     assert largest_gap(model, read_urdf(path), rng) < 1e-13
-
-
-def test_every_way_to_write_an_mjcf_body(tmp_path, rng):
-    path = tmp_path / "all.xml"
-    path.write_text(EVERYTHING)
-    mechanism = read_mjcf(path)
-    model = mujoco.MjModel.from_xml_path(str(path))
-    assert largest_gap(model, mechanism, rng) < 1e-13
-    assert [joint.name for joint in mechanism.joints if joint.actuated] == ["j1"]
-    # in the initial configuration both constraints hold, there and here
-    poses = body_poses(mechanism, mechanism.home)
-    for loop in mechanism.loops:
-        first = poses[loop.first] @ loop.at_first
-        second = poses[loop.second] @ loop.at_second
-        gap = np.abs(first - second)[:3]
-        assert gap[:, 3 if loop.point else 0 :].max() < 1e-13

@@ -30,15 +30,6 @@ def test_example_robots_convert_and_close(name, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_loop_that_cannot_close_is_named_and_nothing_is_written(tmp_path):
-    """Kangaroo's file says 6d where a rod needs a ball: three turns cannot close it."""
-    target = tmp_path / "robot.toml"
-    with pytest.raises(BadInput, match=r"loop2 .* cannot close, not even alone"):
-        convert(example("kangaroo_like"), target, points=())
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.slow
 def test_types_as_a_generator_writes_them_may_be_points(tmp_path):
     """Kangaroo closes without a word more, and the answer says what was taken."""
     answer = convert(example("kangaroo_like"), tmp_path / "robot.toml")
@@ -225,7 +216,7 @@ def test_an_overlay_adds_what_a_urdf_cannot_hold(tmp_path):
         ('platform = "efector"\n', 'did you mean "effector"?'),
     ],
 )
-def test_what_no_overlay_may_say(run, text, message, tmp_path):
+def test_wrong_overlays_are_refused(run, text, message, tmp_path):
     overlay = tmp_path / "overlay.toml"
     overlay.write_text(text)
     status, out, err = run(
@@ -238,92 +229,13 @@ def test_what_no_overlay_may_say(run, text, message, tmp_path):
     assert not (tmp_path / "robot.toml").exists()
 
 
-URDF = """<robot name="r"><link name="a"/><link name="b"/>{links}
-<joint name="j" type="{kind}"><parent link="a"/><child link="{child}"/>{more}</joint>
-{joints}</robot>"""
-
-
-def urdf(kind="revolute", child="b", more="", links="", joints=""):
-    """A URDF of two links, or one with something wrong."""
-    return URDF.format(kind=kind, child=child, more=more, links=links, joints=joints)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (urdf(kind="revolut"), "joint \"j\".type: found 'revolut', expected rev"),
-        (urdf(child="c"), 'joint "j": found "c", expected the name of a link'),
-        (urdf(child="a"), "found a ring of parents"),
-        (urdf(links='<link name="c"/>'), 'found as root "a" and "c"'),
-        (urdf(more='<origin xyz="0 0"/>'), "xyz: found '0 0', expected 3 finite"),
-        (urdf(more='<origin xyz="0 0 nan"/>'), "expected 3 finite numbers [m]"),
-        (urdf(more='<axis xyz="0 0 0"/>'), "not a direction"),
-        (urdf(more='<mimic joint="k"/>'), 'mimic.joint: found "k"'),
-        (urdf(links='<link name="b"/>'), "found it twice"),
-        ("<robot><link/></robot>", "link.name: missing"),
-        ("<robot/>", "link: missing; expected at least one"),
-        ("<robott/>", 'found the root element "robott", expected robot'),
-        ("<robot>", "not valid XML"),
-        ("", "not valid XML"),
-        (
-            '<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot>&x;</robot>',
-            "found a document type or an entity",
-        ),
-        (f"<robot>{'<a>' * 300}{'</a>' * 300}</robot>", "stand more than 200 deep"),
-    ],
-)
-def test_a_wrong_urdf_is_one_line(run, text, message, tmp_path):
-    source = tmp_path / "robot.urdf"
-    source.write_text(text)
-    status, out, err = run("convert", source, "-o", tmp_path / "out.toml")
-    assert (status, out) == (2, "")
-    assert message in err.splitlines()[-1]
-    assert "robot.urdf" in err
-    assert not (tmp_path / "out.toml").exists()
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("closed_loop: [[b]]", "closed_loop[1]: found ['b'], expected two different"),
-        ("closed_loop: [[b, bb]]", 'found "bb", expected a joint or link'),
-        ("closed_loop: [[a, b]]\ntype: [5d]", 'expected "6d" or "3d"'),
-        ("closed_loop: [[a, b]]\ntype: []", "type: found 0, expected one for each"),
-        (
-            "closed_lop: []",
-            'missing; expected pairs of names; did you mean "closed_lop"',
-        ),
-        ("closed_loop: []\nname_mot: [k]", 'name_mot: found "k"'),
-        ("closed_loop: []\nhome: {k: 1}", 'home: found "k"'),
-        (
-            "closed_loop: []\nhome: {j: x}",
-            "home.j: found 'x', expected a finite number",
-        ),
-        ("closed_loop: []\nplatform: k", 'platform: found "k"'),
-        ("closed_loop: []\njoint_name: [j]", "joint_type: found 0, expected one for"),
-        ("closed_loop: []\njoint_name: [j]\njoint_type: [BALL]", "found 'BALL'"),
-        ("[1", "not valid YAML"),
-        ("- 1", "expected keys such as closed_loop"),
-        ("!!python/object/apply:os.getcwd []", "not valid YAML"),
-    ],
-)
-def test_a_wrong_loops_file_is_one_line(run, text, message, tmp_path):
-    source = tmp_path / "robot.urdf"
-    source.write_text(urdf())
-    (tmp_path / "robot.yaml").write_text(text)
-    status, out, err = run("convert", source, "-o", tmp_path / "out.toml")
-    assert (status, out) == (2, "")
-    assert message in err.splitlines()[-1]
-    assert not (tmp_path / "out.toml").exists()
-
-
 def test_another_program_s_file_is_not_overwritten(run, tmp_path):
     target = tmp_path / "robot.urdf"
-    target.write_text(urdf())
+    target.write_text("<robot/>")
     status, _, err = run("convert", "arm6", "-o", target)
     assert status == 2
     assert "it is not overwritten" in err
-    assert target.read_text() == urdf()
+    assert target.read_text() == "<robot/>"
     status, _, err = run("convert", "arm6", "-o", tmp_path / "robot.sdf")
     assert status == 2
     assert "expected .toml or .urdf or .xml" in err

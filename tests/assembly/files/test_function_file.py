@@ -49,61 +49,72 @@ def test_effects_of_sessions_come_back(tmp_path):
     assert read_robot(tmp_path / "again.toml").session_effects == robot.session_effects
 
 
+WAVES = '"waves"\nparameters = { "1.sine" = 1.2e-4, "1.cosine" = -3e-5 }'
+ANGLE = 'variables = ["q.drive"]\nform = "formula"\nformula = "a*sin(3*q) + b"'
+VARIABLES = (
+    "expected q.<frame>, wrench.<frame>.<mx..fz>, load.<mx..fz>, load.force, "
+    "position.<x..z>, time, approach, cov.<name>"
+)
 REFUSED = {
-    "an unknown place": (('where = "drive"', 'where = "driv"'),
-        'where: found "driv", expected a frame or a place; did you mean "drive"?'),
-    "an unknown variable": (('"q.drive"', '"q.drivee"'),
-        'variables: found "q.drivee", expected q.<frame>, wrench.<frame>.<mx..fz>'),
-    "a fixed joint's coordinate": (('"q.drive"', '"q.tool"'), 'found "q.tool"'),
-    "a word": (('"q.drive"', '"speed"'),
-        'variables: found "speed", expected q.<frame>'),
-    "an unknown form": (('"waves"', '"wave"'), "form: found 'wave', expected"),
-    "an unknown component": (('"rz"', '"mz"'), 'components: found "mz" there'),
-    "a number of another form": (('"1.sine"', '"sine"'),
-        'parameters: found "sine", which is no parameter of waves'),
-    "a shape that is missing": (('"waves"', '"lag"'), "no parameter of lag"),
-    "a compliance of a reading": (('where = "drive"', 'where = "reading"\n'
-        'kind = "compliance"'), 'kind: found "compliance" in the reading'),
-    "an unknown key": (('session =', 'sesion ='), 'unknown key "sesion"'),
-    "a knee at no load": (('"waves"\nparameters = { "1.sine" = 1.2e-4, "1.cosine" = '
-        '-3e-5 }', '"knee"\nparameters = { size = 1e-4, at = 0.0 }'),
-        'parameters: "at": found 0, expected > 0'),
-    "waves of a load": (('["q.drive"]\nform = "waves"',
-        '["approach", "load.fz"]\nform = "reversal_waves"'), '"period" is missing'),
-    "a spread of no number": (('session =', 'std = { "2.sine" = 1.0 }\nsession ='),
-        'std: found "2.sine", which is no parameter'),
-}  # fmt: skip
-FORMULAS = {
-    "no formula": ("a*sin(3*q) + b", "a*sin(3*q", "expected a formula such as"),
-    "a call": ("a*sin(3*q) + b", "__import__('os')", "which is no function"),
-    "an unknown name": ("a*sin(3*q) + b", "a*sin(3*p) + b",
-        'found "p", which is neither'),
-    "a number unused": ("a*sin(3*q) + b", "a*sin(3*q)", 'parameter "b" is not in it'),
-    "units": ('variables = ["q.drive"]\nform = "formula"\nformula = "a*sin(3*q) + b"',
+    "an unknown place": (PUBLIC, 'where = "drive"', 'where = "driv"',
+        '.where: found "driv", expected a frame or a place; did you mean "drive"?'),
+    "an unknown variable": (PUBLIC, '"q.drive"', '"q.drivee"',
+        f'.variables: found "q.drivee", {VARIABLES}; did you mean "q.drive"?'),
+    "a fixed joint's coordinate": (PUBLIC, '"q.drive"', '"q.tool"',
+        f'.variables: found "q.tool", {VARIABLES}'),
+    "a word": (PUBLIC, '"q.drive"', '"speed"',
+        f'.variables: found "speed", {VARIABLES}'),
+    "an unknown form": (PUBLIC, '"waves"', '"wave"',
+        ".form: found 'wave', expected \"powers\" | \"waves\" | "),
+    "an unknown component": (PUBLIC, '"rz"', '"mz"',
+        '.components: found "mz" there; valid: rx, ry, rz, tx, ty, tz'),
+    "a number of another form": (PUBLIC, '"1.sine"', '"sine"',
+        '.parameters: found "sine", which is no parameter of waves; expected names '
+        'such as "1.sine" or "period"'),
+    "a shape that is missing": (PUBLIC, '"waves"', '"lag"',
+        '.parameters: found "1.sine", which is no parameter of lag; expected names '
+        'such as "gain" or "time_constant"'),
+    "a compliance of a reading": (PUBLIC, 'where = "drive"',
+        'where = "reading"\nkind = "compliance"',
+        '.kind: found "compliance" in the reading, expected "screw"'),
+    "an unknown key": (PUBLIC, "session =", "sesion =",
+        ': unknown key "sesion"; did you mean "session"?'),
+    "a knee at no load": (PUBLIC, WAVES,
+        '"knee"\nparameters = { size = 1e-4, at = 0.0 }',
+        '.parameters: "at": found 0, expected > 0'),
+    "waves of a load": (PUBLIC, '["q.drive"]\nform = "waves"',
+        '["approach", "load.fz"]\nform = "reversal_waves"',
+        '.parameters: "period" is missing; waves of a variable that is no angle need '
+        "it"),
+    "a spread of no number": (PUBLIC, "session =",
+        'std = { "2.sine" = 1.0 }\nsession =',
+        '.std: found "2.sine", which is no parameter; did you mean "1.sine"?'),
+    "no formula": (FORMULA, "a*sin(3*q) + b", "a*sin(3*q",
+        ".formula: found 'a*sin(3*q', expected a formula such as \"a*sin(q)\""),
+    "a call": (FORMULA, "a*sin(3*q) + b", "__import__('os')",
+        '.formula: found "__import__", which is no function; valid: abs, atan, cos, '
+        "exp, log, sign, sin, sqrt, tan, tanh"),
+    "an unknown name": (FORMULA, "a*sin(3*q) + b", "a*sin(3*p) + b",
+        '.formula: found "p", which is neither a variable nor a parameter; valid: a, '
+        "b, drive, q, q_drive"),
+    "a number unused": (FORMULA, "a*sin(3*q) + b", "a*sin(3*q)",
+        '.formula: parameter "b" is not in it'),
+    "units": (FORMULA, ANGLE,
         'variables = ["time"]\nform = "formula"\nformula = "a*sin(3*time) + b"',
-        'formula: units clash in "3 * time": found s, expected 1'),
+        '.formula: units clash in "3 * time": found s, expected 1'),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_a_function_that_makes_no_sense_is_refused(case, tmp_path):
-    (old, new), message = REFUSED[case]
-    assert old in PUBLIC
-    path = arm_with(tmp_path, PUBLIC.replace(old, new))
+@pytest.mark.parametrize(("text", "old", "new", "message"), REFUSED.values(),
+                         ids=REFUSED)  # fmt: skip
+def test_a_function_that_makes_no_sense_is_refused(text, old, new, message, tmp_path):
+    assert old in text
+    path = arm_with(tmp_path, text.replace(old, new))
     with pytest.raises(BadInput) as error:
         read_robot(path)
-    assert message in str(error.value)
-    assert str(path) in str(error.value)
+    label = "gear of the drive" if text == PUBLIC else "function"
+    assert str(error.value).startswith(f'{path}: effect "{label}"{message}')
     assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize("case", FORMULAS)
-def test_a_formula_that_makes_no_sense_is_refused(case, tmp_path):
-    old, new, message = FORMULAS[case]
-    assert old in FORMULA
-    with pytest.raises(BadInput) as error:
-        read_robot(arm_with(tmp_path, FORMULA.replace(old, new)))
-    assert message in str(error.value)
 
 
 def answer(run, tmp_path, *words):
@@ -113,11 +124,13 @@ def answer(run, tmp_path, *words):
     return json.loads(file.read_text())
 
 
-@pytest.mark.parametrize("command", ["solve", "exact"])
-def test_functions_act_in_solve_and_exact(command, tmp_path, run):
+@pytest.mark.parametrize("state", ["contact", "exact"])
+def test_functions_act_in_every_state(state, tmp_path, run):
     path = str(arm_with(tmp_path, FORMULA))
     turn = 1e-4 * sin(0.9) + 2e-5
-    screw = answer(run, tmp_path, command, path, "--joint", "drive=0.3")
+    screw = answer(
+        run, tmp_path, "solve", path, "--state", state, "--joint", "drive=0.3"
+    )
     expected = [0, 0, turn, -turn * L * sin(0.3), turn * L * cos(0.3), 0]
     assert screw["platform_screw"] == pytest.approx(expected, rel=1e-3, abs=1e-8)
 

@@ -6,7 +6,6 @@ from assembly.exact.exact import solve_exact
 from assembly.files.robot_file import read_robot, write_robot
 from assembly.kinematics.posture import home_posture
 from assembly.sweeps.parameters import load_design
-from forcefit.inputs.table import BadInput
 
 BEAM = """
 name = "beam"
@@ -35,31 +34,3 @@ def test_pieces_are_read_written_and_a_design_number(file, tmp_path):
     assert other.frame("tip").link.pieces == 8
     posture = home_posture(robot)
     assert len(solve_exact(posture, [0, 0, 0, 0, 1.0, 0]).cut.robot.frames) == 4
-
-
-@pytest.mark.parametrize(
-    ("pieces", "message"),
-    [
-        ("0", 'frame "tip".link.pieces: found 0, expected a finite number >= 1'),
-        ("101", 'frame "tip".link.pieces: found 101, expected a finite number >= 1'),
-        ("2.5", 'frame "tip".link.pieces: found 2.5, expected a whole number'),
-        ('"a"', "frame \"tip\".link.pieces: found 'a', expected a finite number"),
-    ],
-)
-def test_what_is_no_number_of_pieces_is_refused(file, pieces, message):
-    file.write_text(BEAM.replace("pieces = 4", f"pieces = {pieces}"))
-    with pytest.raises(BadInput) as error:
-        read_robot(file)
-    assert message in str(error.value)
-
-
-def test_only_beams_are_cut(file):
-    stiffness = "stiffness = " + str([
-        [float(i == j) for i in range(6)] for j in range(6)
-    ])
-    text = BEAM.replace(
-        "beam = { radius = 0.005 }, young = 7e10, poisson = 0.3", stiffness
-    )
-    file.write_text(text)
-    with pytest.raises(BadInput, match="pieces"):
-        read_robot(file)

@@ -98,9 +98,6 @@ REFUSED = {
         'frame[5].name: found "base", already the name of the root; expected another'),
     "an empty name": (
         'name = "wrist"', 'name = " "', "frame[5].name: found ' ', expected a string"),
-    "a name of two lines": (
-        'name = "wrist"', 'name = "a\\nb"',
-        "frame[5].name: found 'a\\nb', expected no control characters"),
     "a joint of another kind": (
         'joint = "revolute"\nactuated', 'joint = "revolut"\nactuated',
         'frame "crank".joint: found \'revolut\', expected "fixed" | "revolute" | '
@@ -116,45 +113,17 @@ REFUSED = {
         'joint = "revolute"\nactuated = true\nposition = 1.0', "actuated = true",
         'frame "crank".actuated: found one on a fixed joint; expected joint = '
         '"revolute" | "prismatic", or no such key'),
-    "a position that is no number": (
-        "position = -1.0\nclearance", 'position = "1"\nclearance',
-        'frame "elbow".position: found \'1\', expected a finite number [rad or m]'),
-    "true for a number": (
-        "mass = 1.2", "mass = true",
-        'frame "coupler".mass: found true, expected a finite number >= 0 [kg]'),
     "a negative mass": (
         "mass = 1.2", "mass = -1.2",
         'frame "coupler".mass: found -1.2, expected a finite number >= 0 [kg]'),
-    "nan": (
-        "mass = 1.2", "mass = nan",
-        'frame "coupler".mass: found nan, expected a finite number >= 0 [kg]'),
     "an infinite length": (
         "translation = [0.3, 0.0, 0.0]", "translation = [0.3, -inf, 0.0]",
         'frame "wrist".translation: found -inf as number 2, expected 3 finite numbers '
-        "[m]"),
-    "true in a vector": (
-        "translation = [0.3, 0.0, 0.0]", "translation = [0.3, false, 0.0]",
-        'frame "wrist".translation: found false as number 2, expected 3 finite '
-        "numbers [m]"),
-    "a vector too short": (
-        "translation = [0.3, 0.0, 0.0]", "translation = [0.3, 0.0]",
-        'frame "wrist".translation: found [0.3, 0.0] of length 2, expected 3 finite '
-        "numbers [m]"),
-    "a vector of vectors": (
-        "translation = [0.3, 0.0, 0.0]", "translation = [[0.3], [0.0], [0.0]]",
-        'frame "wrist".translation: found [0.3] as number 1, expected 3 finite numbers '
         "[m]"),
     "a length beyond any machine": (
         "translation = [0.3, 0.0, 0.0]", "translation = [3e6, 0.0, 0.0]",
         'frame "wrist".translation: found [3000000.0, 0.0, 0.0], expected numbers of '
         "size at most 1e+06 [m]"),
-    "an integer that no float holds": (
-        "mass = 1.2", f"mass = 1{'0' * 400}",
-        'frame "coupler".mass: found an integer of 1329 bits, expected a finite number '
-        ">= 0 [kg]"),
-    "an integer that Python does not read": (
-        "mass = 1.2", f"mass = 1{'0' * 5000}",
-        "not valid TOML: found a whole number of thousands of digits"),
     "dh beside a translation": (
         "translation = [0.3, 0.0, 0.0]", "translation = [0.3, 0.0, 0.0]\ndh = {a = 1}",
         'frame "wrist".translation: found it beside "dh", which places the frame; '
@@ -170,10 +139,9 @@ REFUSED = {
         "radial = 29e-6", "radial = -29e-6",
         'frame "elbow".clearance.radial: found -2.9e-05, expected a finite number >= 0 '
         "[m]"),
-    "an infinite clearance": (
-        "spin = 3.0", "spin = inf",
-        'frame "elbow".clearance.spin: found inf, expected a finite number >= 0 '
-        "[rad]"),
+    "a clearance whose square is no number": (
+        "radial = 29e-6", "radial = 1e-200",
+        'frame "elbow".clearance.radial: found 1e-200, expected 0 or'),
     "a number for a clearance": (
         PLAY, "clearance = 1e-5",
         'frame "elbow".clearance: found 1e-05, expected a table'),
@@ -204,11 +172,6 @@ REFUSED = {
         'frame "rocker".joint_stiffness: found nan as number 3 in row 2, expected 6 '
         "diagonal terms > 0 or inf (number 3 may be 0: free), or 6 rows of 6 "
         "[N m/rad .. N/m]"),
-    "an integer no float holds in a joint's stiffness": (
-        SPRING, f"joint_stiffness = [1, 2, 1{'0' * 400}, 4, 5, 6]",
-        'frame "rocker".joint_stiffness: found an integer of 1329 bits as number 3, '
-        "expected 6 diagonal terms > 0 or inf (number 3 may be 0: free), or 6 rows of "
-        "6 [N m/rad .. N/m]"),
     "inf off the diagonal": (
         SPRING, f"joint_stiffness = {rows({(1, 2): math.inf, (2, 1): math.inf})}",
         'frame "rocker".joint_stiffness: found inf at [1, 2]; expected inf only on the '
@@ -267,10 +230,6 @@ REFUSED = {
     "a description that is none": (
         'description = "a parallelogram"', "description = 3",
         "description: found 3, expected a string"),
-    "a date for a number": (
-        "mass = 1.2", "mass = 2024-01-31",
-        'frame "coupler".mass: found datetime.date(2024, 1, 31), expected a finite '
-        "number >= 0 [kg]"),
 }  # fmt: skip
 
 
@@ -283,15 +242,7 @@ CONTENTS = {
     "nothing": (b"", "platform: missing; expected the name of a frame"),
     "no frame": (b'platform = "a"', "frame: missing; expected 1 to 2000 [[frame]]"),
     "bytes": (bytes(range(256)) * 9, "byte 128 is not UTF-8"),
-    "a picture": (b"\x89PNG\r\n\x1a\n\0\0", "byte 0 is not UTF-8"),
     "UTF-16": (FOUR_BAR.encode("utf-16"), "byte 0 is not UTF-8"),
-    "prose": (b"Dear all, the robot is", "not valid TOML: Expected '=' after a key in"),
-    "lists in lists": (b"a = " + b"[" * 9999, "not valid TOML: nested too deeply"),
-    "tables in tables": (b"a." * 50_000 + b"a = 1", "not valid TOML: nested too"),
-    "two values": (
-        b"a = 1\na = 2",
-        "not valid TOML: Cannot overwrite a value",
-    ),
     "a gigantic key": (
         b'"' + b"key" * 10**6 + b'" = 1\nplatform = "a"',
         "unknown key ",
@@ -316,9 +267,3 @@ def test_a_file_that_is_not_there_or_a_folder_is_named(tmp_path):
         read_robot(tmp_path)
     with pytest.raises(BadInput, match="cannot be read: "):
         read_robot("a\0b.toml")
-
-
-def test_a_gigantic_name_is_cut_in_the_message(write_file):
-    path = write_file(FOUR_BAR.replace('"wrist"', f'"{"w" * 10**6}"'))
-    with pytest.raises(BadInput, match="of 1000000 characters, expected at most 200"):
-        read_robot(path)

@@ -11,8 +11,7 @@ import pytest
 
 from assembly.files import solved_links, stored_solutions
 from assembly.files.solved_links import solved_link
-from assembly.model.link_stress import peak_stresses
-from assembly.model.robot import Frame, MeshLink, Robot
+from assembly.model.robot import Frame, MeshLink
 from forcefit.inputs.table import BadInput
 from stiffness.surface.beam_surfaces import shape_surface
 
@@ -126,24 +125,7 @@ def test_stored_solution_equals_the_solved_one_to_the_last_bit(
     assert_same(again.solution, solved_once[1])
 
 
-def test_stresses_by_a_stored_solution_equal_those_by_the_solved_one(
-    surface, solved_once, cache, runs
-):
-    wrenches = np.array([[1.0, 2.0, 3.0, 40.0, 50.0, 60.0]])
-    links = (
-        replace(frame(surface).link, solution=solved_once[1]),
-        solved_link(frame(surface)),
-    )
-    first, second = (
-        peak_stresses(Robot("one", "tool", (frame(surface),)).with_links(
-            {"tool": link}), wrenches)
-        for link in links
-    )  # fmt: skip
-    assert repr(first) == repr(second)
-    assert not runs
-
-
-def test_where_a_surface_lies_and_how_its_mesh_is_turned_run_nothing_again(
+def test_moved_files_and_turned_meshes_are_not_solved_again(
     surface, cache, tmp_path, runs
 ):
     """The solution is in the mesh's axes."""
@@ -265,7 +247,7 @@ def test_solutions_that_were_not_used_for_months_are_removed(surface, cache, run
     assert mesh.exists()
 
 
-def test_what_is_refused_stays_refused_and_leaves_nothing_behind(surface, cache):
+def test_refused_links_stay_refused_and_leave_no_file(surface, cache):
     before = {file.name for file in cache.iterdir()}
     for _ in range(2):
         with pytest.raises(BadInput, match="no face"):

@@ -34,16 +34,6 @@ def given():
     }  # fmt: skip
 
 
-def test_what_is_right_is_taken():
-    right = given()
-    kernels.assemble_all(**right)
-    assert (right["energy"] >= right["bound"]).all()
-    loads = np.full((K, 2, N, 6), 2.0)
-    loaded = given() | {"loads": loads}
-    kernels.assemble_all(**loaded)
-    assert (loaded["energy"] != right["energy"]).all()
-
-
 @pytest.mark.parametrize("rows", [("errors",), ("T", "mismatch"), ("loads",)])
 def test_one_row_of_22_serves_all_points(rows):
     loads = np.full((K, 2, N, 6), 2.0)
@@ -101,14 +91,6 @@ def test_what_is_filled_must_be_writable(name):
     wrong = given()
     with pytest.raises(ValueError, match=rf"^{name}: .*read-only, expected writable"):
         kernels.assemble_all(**wrong | {name: read_only(wrong[name])})
-
-
-def test_what_is_only_read_may_be_read_only():
-    right, same = given(), given()
-    kernels.assemble_all(**right)
-    same |= {name: read_only(same[name]) for name in ("T", "errors", "mismatch")}
-    kernels.assemble_all(**same)
-    assert np.array_equal(right["energy"], same["energy"])
 
 
 INDEXED = ("pattern_of", "spring_frame", "spring_order", "of_joint", "group_pattern",

@@ -83,7 +83,15 @@ def test_the_highest_level_is_taken_if_none_is_named(monkeypatch):
 @x86_64
 @pytest.mark.parametrize("level", ["x86-64-v9", "native", "haswell"])
 def test_what_is_no_level_is_refused_in_one_line(level):
-    words = ["-m", "forcefit", "assembly", "zone", "five_bar"]
+    words = [
+        "-m",
+        "forcefit",
+        "assembly",
+        "solve",
+        "five_bar",
+        "--quantities",
+        "margin",
+    ]
     status, out, err = run(level, *words)
     assert (status, out) == (2, "")
     assert err == (

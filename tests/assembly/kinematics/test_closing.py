@@ -1,5 +1,6 @@
-"""Closures that do not hold: a frame's error, or preloaded drives."""
+"""Closures that do not hold: rounding, a frame's error, or preloaded drives."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -88,7 +89,7 @@ def test_redundant_drives_are_preloaded_by_what_does_not_fit(apart):
     assert robot.remarks[-1].startswith("1 of 2 drives redundant")
 
 
-def test_redundant_drives_that_do_not_fit_are_told_the_way_out():
+def test_redundant_drives_that_do_not_fit_are_refused_with_the_option():
     with pytest.raises(BadInput, match="1 of 2 drives redundant: with --mismatch spr"):
         place_robot(two_slides(), joints={"one": 0.3, "two": 0.32})
 
@@ -113,3 +114,41 @@ def test_closure_of_a_small_robot_holds_to_a_share_of_its_size(scale):
         home_posture(Robot("gap", "tip", frames, (("tip", "post"),)))
     frames = (frames[0], replace(frames[1], translation=[scale, 1e-7 * scale, 0]))
     assert home_posture(Robot("gap", "tip", frames, (("tip", "post"),))).mismatch > 0
+
+
+def frame(name, parent="base", at=(0, 0, 0), **more):
+    return Frame(name, parent, np.array(at, float), np.zeros(3), **more)
+
+
+def parallelograms(digits, error=0.0):
+    """Three equal cranks on one coupler: overconstrained, numbers rounded."""
+    q = 0.7
+    height = round(math.sqrt(0.05), digits) + error
+    shifts = [(0.0, 0.0), (0.5, 0.0), (round(1 / 3, digits), height)]
+    frames, closures = [], []
+    for i, (x, y) in enumerate(shifts):
+        frames += [
+            frame(f"crank{i}", at=(x, y, 0), joint="revolute", position=q,
+                  actuated=i == 0),
+            frame(f"pin{i}", f"crank{i}", (0.3, 0, 0), joint="revolute", position=-q),
+            frame(f"tip{i}", f"pin{i}", (-(1 / 3 if i == 2 else x),
+                  -(math.sqrt(0.05) if i == 2 else y), 0)),
+        ]  # fmt: skip
+        if i:
+            closures.append((f"tip{i}", "tip0"))
+    return Robot("cranks", "tip0", tuple(frames), tuple(closures))
+
+
+def test_what_six_digits_leave_open_is_accepted_and_reported():
+    """Rounding leaves up to 5e-7 m per number; below 1e-6 it is dropped."""
+    posture = home_posture(parallelograms(digits=6))
+    assert 1e-9 < posture.mismatch < 1e-6
+    assert home_posture(parallelograms(digits=15)).mismatch < 1e-12
+    moved = place_robot(parallelograms(digits=6), joints={"crank0": 0.9})
+    assert moved.mismatch < 1e-6
+
+
+def test_what_is_open_by_more_than_a_micrometre_is_refused_by_name():
+    with pytest.raises(BadInput, match=r'closure\[2\] \("tip2", "tip0"\)') as caught:
+        home_posture(parallelograms(digits=15, error=1e-4))
+    assert "expected < 1e-06" in str(caught.value)

@@ -56,14 +56,3 @@ def test_the_least_singular_value_of_parallel_joints(joint, count):
 def test_without_closures_no_singular_value_is_above_zero():
     arm = Robot("arm", "tip", (Frame("a", **TURNING), Frame("tip", "a", [1, 0, 0])))
     assert mobility(home_posture(arm)).smallest_singular_value == 0.0
-
-
-def test_what_counts_as_zero_is_relative_to_the_largest():
-    """Of joints whose rows have singular values sqrt(n) and one."""
-    at = home_posture(side_by_side("revolute", "revolute", "revolute"))
-    assert mobility(at, 0.99 / np.sqrt(3)).freedoms == 1
-    few = mobility(at, 1.01 / np.sqrt(3))
-    assert (few.freedoms, few.overconstraint) == (2, 11)
-    assert few.smallest_singular_value == pytest.approx(
-        np.sqrt(3) * mobility(at).smallest_singular_value
-    )

@@ -5,29 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.nominal import Target, follow, motion_screws, size_of
+from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import (
-    Posture,
     home_posture,
     joint_target,
-    place_many_joints,
     place_robot,
-    pose_target,
+    together,
 )
 from assembly.model.robot import Frame, Robot
 from assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
-from stiffness.screws import rotation_matrix, transform
-from tests.linkages_for_tests import CRANK, GROUND, four_bar, four_bar_angles
-
-
-def many_of(*postures):
-    """Several postures of one robot in one."""
-    return replace(
-        postures[0],
-        coordinates=np.stack([p.coordinates for p in postures]),
-        transforms=np.stack([p.transforms for p in postures]),
-    )
+from tests.linkages_for_tests import GROUND, four_bar, four_bar_angles
 
 
 def turned(*angles):
@@ -38,7 +26,7 @@ def test_one_posture_shows_its_pose_and_many_their_number():
     one, other = turned(0.4, 0.9)
     assert "drives" in repr(one)
     assert "crank 0.4 [rad, m]" in repr(one)
-    many = many_of(one, other, one)
+    many = together([one, other, one])
     assert repr(many) == "Posture of bars\n  postures  (3,)"
     grid = replace(
         many, coordinates=many.coordinates[None], transforms=many.transforms[None]
@@ -55,7 +43,7 @@ def test_a_robot_without_drives_says_so():
 def test_paths_move_screws_from_each_frame_to_the_platform():
     """[R 0; [p_j - p]x R, R], of one posture and of each of many."""
     postures = turned(0.4, 0.9)
-    many = many_of(*postures)
+    many = together(postures)
     last = postures[0].robot.index(postures[0].robot.platform)
     for row, one in enumerate(postures):
         for j, T in enumerate(one.transforms):
@@ -66,17 +54,6 @@ def test_paths_move_screws_from_each_frame_to_the_platform():
             assert many.paths[row, j] == pytest.approx(expected, abs=1e-15)
     with pytest.raises(ValueError, match="read-only"):
         many.paths[0, 0, 0, 0] = 1.0
-
-
-def test_postures_that_repeat_are_told_apart_once():
-    """Distinct ones, taken again in their order, are those given."""
-    first, second = turned(0.4, 0.9)
-    many = many_of(second, first, second, second, first)
-    distinct, which = many.distinct
-    assert len(distinct.coordinates) == len(distinct.transforms) == 2
-    assert which.shape == (5,)
-    assert np.array_equal(distinct.coordinates[which], many.coordinates)
-    assert np.array_equal(distinct.transforms[which], many.transforms)
 
 
 def test_joints_that_are_not_named_keep_their_home(rng):
@@ -101,13 +78,6 @@ def test_coordinates_beyond_any_machine_are_refused():
         BadInput, match=r"joint crank: found -2e\+06, .* at most 1e\+06"
     ):
         place_robot(four_bar(), joints={"crank": -2e6})
-
-
-def test_no_target_is_none():
-    assert len(Target()) == 0
-    assert len(pose_target({"tx": 0.1})) == 1
-    assert len(Target(pose=np.zeros((3, 6)))) == 3
-    assert len(Target(coordinates=np.zeros((2, 4)))) == 2
 
 
 def test_the_reference_length_is_that_of_the_longest_body():
@@ -142,56 +112,6 @@ def test_joints_at_and_beyond_a_closure_stay_where_they_are():
     there = place_robot(robot, pose={"tx": posture.platform[0, 3]})
     for name in closed:
         assert there.coordinates[robot.index(name)] == 0.3
-
-
-def test_unit_joint_motions_move_as_differences_of_postures_say():
-    """[z, p x z] of a hinge, [0, z] of a slide, nothing of what is fixed."""
-    robot = Robot("arm", "tip", (
-        Frame("a", "base", [0.1, -0.2, 0.3], [0.4, 0.2, -0.5], joint="revolute",
-              actuated=True),
-        Frame("b", "a", [0.3, 0.1, 0.2], [1.0, -0.3, 0.4], joint="prismatic",
-              actuated=True),
-        Frame("tip", "b", [0.2, 0, 0]),
-    ))  # fmt: skip
-    here = home_posture(robot)
-    screws = motion_screws(robot, here.transforms)
-    h = 1e-6
-    for k, name in enumerate("ab"):
-        ends = [place_robot(robot, joints={name: s * h}).platform for s in (1, -1)]
-        slope = (ends[0] - ends[1]) @ np.linalg.inv(here.platform) / (2 * h)
-        turn = slope[[2, 0, 1], [1, 2, 0]]
-        assert screws[k] == pytest.approx([*turn, *slope[:3, 3]], abs=1e-9)
-    assert not screws[2].any()
-
-
-def test_many_are_placed_from_coordinates_as_each_alone():
-    robot = four_bar()
-    goals = np.full((2, len(robot.frames)), np.nan)
-    goals[:, robot.index("crank")] = [0.8, 1.3]
-    postures, reasons = place_many_joints(robot, goals)
-    assert reasons == ["", ""]
-    for posture, one in zip(postures, turned(0.8, 1.3), strict=True):
-        assert isinstance(posture, Posture)
-        assert posture.transforms == pytest.approx(one.transforms, abs=1e-9)
-        with pytest.raises(ValueError, match="read-only"):
-            posture.transforms[0, 0, 0] = 1.0
-        with pytest.raises(ValueError, match="read-only"):
-            posture.coordinates[0] = 1.0
-
-
-def test_what_is_not_actuated_may_be_held_too():
-    """Of a serial chain, any joints: the frames are the product of the motions."""
-    robot = Robot("chain", "end", (
-        Frame("a", joint="revolute", actuated=True),
-        Frame("b", "a", [CRANK, 0, 0], joint="prismatic"), Frame("end", "b"),
-    ))  # fmt: skip
-    held = np.array([[0.5, 0.2, 7.0]])  # the last is fixed: it has no coordinate
-    track = follow(robot, np.zeros(3), Target(coordinates=held))
-    R = rotation_matrix([0, 0, 0.5])
-    expected = transform([*(R @ [CRANK, 0, 0])[:2], 0.2], R)
-    assert track.reached[0]
-    assert track.transforms[0, 2] == pytest.approx(expected, abs=1e-14)
-    assert track.coordinates[0].tolist() == [0.5, 0.2, 0.0]
 
 
 @pytest.mark.parametrize(

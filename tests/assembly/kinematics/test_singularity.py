@@ -231,7 +231,7 @@ def way_to(robot, name):
 
 
 @pytest.mark.parametrize("name", ["five_bar", "3rrr", "orthoglide", "arm6", "delta"])
-def test_motions_told_are_of_drives_and_platform_together(name):
+def test_singular_motions_keep_closures_closed(name):
     """Of size one in all: the least share of the platform, or of the drives; joints
     move with them, and closures stay closed."""
     robot = load_robot(name)

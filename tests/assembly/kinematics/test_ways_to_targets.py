@@ -15,13 +15,8 @@ from assembly.kinematics.posture import (
     pose_components,
 )
 from assembly.model.robot import Frame, Robot
-from assembly.robots import load_robot
-from stiffness.screws import rotation_matrix, transform
-from tests.linkages_for_tests import (
-    CRANK,
-    GROUND,
-    five_bar,
-)
+from assembly.robots import BUILT_IN, load_robot
+from tests.linkages_for_tests import five_bar
 
 EXACT = 1e-9  # closures are solved to 1e-10 of the longest body, all near 1 m here
 
@@ -112,96 +107,6 @@ def test_what_a_pose_leaves_open_does_not_hang_on_rounding(name):
     assert all(np.abs(first - other).max() < 1e-6 for other in others)
 
 
-def frames_of(robot, q):
-    """Products of transforms, one after the other."""
-    T, after = [], []
-    for i, frame in enumerate(robot.frames):
-        parent = robot.parents[i]
-        before = np.eye(4) if parent < 0 else after[parent]
-        T.append(before @ robot.fixed_transforms[i])
-        motion = {
-            "fixed": np.eye(4),
-            "revolute": transform(np.zeros(3), rotation_matrix([0, 0, q[i]])),
-            "prismatic": transform([0, 0, q[i]], np.eye(3)),
-        }[frame.joint]
-        after.append(T[i] @ motion)
-    return np.array(T)
-
-
-def held_at(robot, **coordinates):
-    """One row of coordinates that are held, and those that are free."""
-    held = np.full((1, len(robot.frames)), np.nan)
-    for name, value in coordinates.items():
-        held[0, robot.index(name)] = value
-    return Target(coordinates=held)
-
-
-def test_frames_and_what_is_open_are_those_of_the_end():
-    """Per closure the largest of three turns and three gaps, by scipy."""
-    turns = [[1e-3, -4e-3, 2e-3], [0.0, 0.0, -3e-7], [0.0, 0.0, 0.0]]
-    gaps = [[1e-3, 0.0, -2e-3], [0.0, 2e-7, 1e-7], [3e-3, -7e-3, 5e-3]]
-    seats = [
-        Frame(f"b{k}", "a", gap, turn)
-        for k, (gap, turn) in enumerate(zip(gaps, turns, strict=True))
-    ]
-    robot = Robot("open", "a", (
-        Frame("arm", joint="prismatic", actuated=True), Frame("a", "arm", [1.0, 0, 0]),
-        *seats,
-    ), tuple(("a", seat.name) for seat in seats))  # fmt: skip
-    held = np.full((2, 5), np.nan)
-    held[:, 0] = 0.3, -0.4
-    track = follow(robot, np.zeros(5), Target(coordinates=held), guess=True)
-    for row in range(2):
-        q = [held[row, 0], 0, 0, 0, 0]
-        assert track.coordinates[row] == pytest.approx(q, abs=1e-15)
-        assert track.transforms[row] == pytest.approx(frames_of(robot, q), abs=1e-14)
-        assert track.closure_mismatch[row] == pytest.approx([4e-3, 3e-7, 7e-3])
-
-
-def test_what_cannot_be_reached_stops_on_the_straight_line_to_it():
-    """Of three hinges in a plane, place and turn: in parts as progress says.
-
-    The last step is 1e-5 of the way, 1 m and 1 rad.
-    """
-    robot = Robot("arm", "hand", (
-        Frame("a", joint="revolute", actuated=True, position=0.4),
-        Frame("b", "a", [0.5, 0, 0], joint="revolute", actuated=True, position=0.9),
-        Frame("c", "b", [0.4, 0, 0], joint="revolute", actuated=True, position=-0.6),
-        Frame("hand", "c", [0.1, 0, 0]),
-    ))  # fmt: skip
-    home = frames_of(robot, robot.positions)[3]
-    begin = np.array([home[0, 3], home[1, 3], 0.7])
-    goal = begin + [0.8, -0.3, 0.5]
-    pose = np.full((2, 6), np.nan)
-    pose[:, [0, 1, 5]] = goal, begin + 0.1 * (goal - begin)
-    track = follow(robot, robot.positions, Target(pose=pose))
-    assert track.reached.tolist() == [False, True]
-    assert 0.1 < track.progress[0] < 1
-    wanted = begin + np.outer([track.progress[0], 0.1], goal - begin)
-    T = track.transforms[:, 3]
-    found = np.c_[T[:, 0, 3], T[:, 1, 3], np.arctan2(T[:, 1, 0], T[:, 0, 0])]
-    assert found[1] == pytest.approx(wanted[1], abs=1e-9)
-    assert found[0] == pytest.approx(wanted[0], abs=2e-4)
-    # there the arm without its hand is straight
-    wrist = T[0, :2, 3] - 0.1 * T[0, :2, 0]
-    assert np.hypot(*wrist) == pytest.approx(0.9, abs=1e-4)
-
-
-def test_both_poses_and_coordinates_are_followed_together():
-    """A drive held and one component asked: the other drive closes."""
-    robot = five_bar()
-    home = follow(robot, robot.positions, Target(coordinates=np.full((1, 8), np.nan)))
-    pose, held = np.full((1, 6), np.nan), np.full((1, 8), np.nan)
-    pose[0, 0] = home.transforms[0, robot.index("right.tip"), 0, 3] + 0.02
-    held[0, 0] = robot.positions[0] + 0.03
-    track = follow(robot, robot.positions, Target(pose, held))
-    assert track.reached[0]
-    assert track.coordinates[0, 0] == held[0, 0]
-    tip = track.transforms[0, robot.index("right.tip")]
-    assert tip[0, 3] == pytest.approx(pose[0, 0], abs=1e-9)
-    assert track.mismatch[0] < 1e-9
-
-
 BALL = Robot("ball", "body", (
     *(
         Frame(f"slide{k}", f"slide{k - 1}" if k else "base", rotation=turn,
@@ -241,43 +146,88 @@ def test_a_free_body_is_turned_and_put_where_it_is_told(given, rng):
         np.testing.assert_allclose(T[:, :3, :3], R, rtol=0, atol=1e-8)
 
 
-def test_one_component_of_a_turn_is_that_of_scipys_vector(rng):
-    """The others are left open; beside a place."""
-    robot = BALL
-    wanted = np.full((12, 6), np.nan)
-    wanted[:, :3] = 0.2 * rng.normal(size=(12, 3))
-    wanted[np.arange(12), 3 + np.arange(12) % 3] = rng.uniform(-0.8, 0.8, 12)
-    track = follow(robot, np.zeros(7), Target(pose=wanted))
-    assert track.reached.sum() > 6
-    T = track.transforms[track.reached, robot.index("body")]
-    wanted = wanted[track.reached]
-    vectors = Rotation.from_matrix(T[:, :3, :3]).as_rotvec()
-    found = np.c_[T[:, :3, 3], vectors]
-    asked = np.isfinite(wanted)
-    np.testing.assert_allclose(found[asked], wanted[asked], rtol=0, atol=1e-8)
+def targets_of(home, rng, count=40):
+    """Drives, the poses to which they lead, parts of these, and poses of any kind."""
+    robot, n = home.robot, len(home.robot.frames)
+    moving = [j for j, frame in enumerate(robot.frames) if frame.joint != "fixed"]
+    driven = [j for j in moving if robot.frames[j].actuated] or moving[:2]
+    drives = np.full((count, n), np.nan)
+    drives[:, driven] = home.coordinates[driven] + 0.3 * rng.normal(
+        size=(count, len(driven))
+    )
+    track = follow(robot, home.coordinates, Target(coordinates=drives))
+    poses = pose_components(track.transforms[:, robot.index(robot.platform)])
+    some = poses.copy()
+    some[:, rng.permutation(6)[:3]] = np.nan
+    mixed = np.where(rng.random(poses.shape) < 0.3, np.nan, poses)
+    anywhere = poses + rng.normal(size=(count, 6)) * [*[0.1] * 3, *[0.3] * 3]
+    return [Target(pose=p) for p in (poses, some, mixed, anywhere)] + [
+        Target(coordinates=drives), Target(pose=some, coordinates=drives)
+    ]  # fmt: skip
 
 
-def test_nothing_is_reached_where_nothing_can_close():
-    """The two bars are 0.1 m too short for the crank's place."""
-    robot = Robot("short", "end", (
-        Frame("crank", joint="revolute", actuated=True),
-        Frame("elbow", "crank", [CRANK, 0, 0], joint="revolute"),
-        Frame("end", "elbow", [0.2, 0, 0]),
-        Frame("rocker", translation=[GROUND, 0, 0], joint="revolute",
-              position=np.pi),
-        Frame("wrist", "rocker", [0.2, 0, 0], joint="revolute", position=np.pi),
-        Frame("seat", "wrist"),
-    ), (("end", "seat"),))  # fmt: skip
-    start = np.array(robot.positions) + [0, 0.1, 0, -0.1, 0, 0]
-    for guess in (True, False):
-        assert not follow(robot, start, held_at(robot, crank=0.0), guess).reached[0]
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_every_target_that_is_reached_is_where_it_was_sent(name, rng):
+    """With closures that hold; reached again from there in one step."""
+    home = home_posture(BUILT_IN[name]())
+    reached = 0
+    for target in targets_of(home, rng):
+        track = follow(home.robot, home.coordinates, target)
+        assert_sent_there(home.robot, target, track)
+        assert track.mismatch[track.reached].max(initial=0.0) < 1e-9
+        reached += np.count_nonzero(track.reached)
+        for i in np.flatnonzero(track.reached)[::9].tolist():
+            own = target.rows(np.array([i]))
+            again = follow(home.robot, track.coordinates[i], own, guess=True)
+            assert again.reached[0]
+            gap = np.abs(again.coordinates[0] - track.coordinates[i])
+            assert gap.max() < 1e-6
+    assert reached
 
 
-def test_what_a_target_leaves_open_is_still_followed():
-    """Two drives of a five-bar and one coordinate asked: any elbow would do."""
-    robot, pose = five_bar(), np.full((1, 6), np.nan)
-    pose[0, 0] = 0.01
-    track = follow(robot, robot.positions, Target(pose=pose))
-    assert track.reached[0]
-    assert track.transforms[0, robot.index("right.tip"), 0, 3] == pytest.approx(0.01)
-    assert track.mismatch[0] < 1e-9
+def assert_sent_there(robot, target, track):
+    """Coordinates and places of the platform that are held are attained."""
+    platform = track.transforms[:, robot.index(robot.platform), :3, 3]
+    held = [] if target.pose is None else [target.pose[:, :3] - platform]
+    if target.coordinates is not None:
+        held.append(target.coordinates - track.coordinates)
+    for off in held:
+        assert np.nanmax(np.abs(off[track.reached]), initial=0.0) < 1e-6
+
+
+def test_a_target_does_not_depend_on_its_neighbours(rng):
+    """To the last bit: alone, in another order, among others that ask for more."""
+    home = home_posture(BUILT_IN["irsbot2"]())
+    poses = targets_of(home, rng)[
+        2
+    ].pose  # which parts are free differs from row to row
+    together = follow(home.robot, home.coordinates, Target(pose=poses))
+    order = rng.permutation(len(poses))
+    shuffled = follow(home.robot, home.coordinates, Target(pose=poses[order]))
+    assert np.array_equal(shuffled.coordinates, together.coordinates[order])
+    assert np.array_equal(shuffled.transforms, together.transforms[order])
+    for i in range(0, len(poses), 7):
+        alone = follow(home.robot, home.coordinates, Target(pose=poses[i : i + 1]))
+        assert np.array_equal(alone.coordinates[0], together.coordinates[i])
+        assert alone.progress[0] == together.progress[i]
+
+
+def test_joints_turn_as_far_as_they_are_told(rng):
+    """Scipy's rotation about z, from no turn to more than the polynomials carry."""
+    robot = Robot("wheel", "rim", (Frame("rim", joint="revolute"), Frame("end", "rim")))
+    angles = np.r_[
+        rng.uniform(-10, 10, 200), rng.uniform(-9e4, 9e4, 200), 0.0, 1e-300,
+        np.pi * np.arange(-8, 9) / 4, 3e5, -1e9,
+    ]  # fmt: skip
+    held = np.full((len(angles), 2), np.nan)
+    held[:, 0] = angles
+    track = follow(robot, np.zeros(2), Target(coordinates=held), guess=True)
+    expected = Rotation.from_rotvec(angles[:, None] * [0.0, 0.0, 1.0]).as_matrix()
+    np.testing.assert_allclose(track.transforms[:, 1, :3, :3], expected, atol=4e-16)
+
+
+def test_no_targets_are_no_tracks():
+    home = home_posture(BUILT_IN["five_bar"]())
+    track = follow(home.robot, home.coordinates, Target(pose=np.zeros((0, 6))))
+    assert track.coordinates.shape == (0, len(home.robot.frames))
+    assert track.reached.shape == (0,)

@@ -1,6 +1,6 @@
 """Certificates of an assembly that is not the best, against their definitions."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,14 +9,12 @@ from assembly.kinematics.posture import home_posture, together
 from assembly.linear.energy import solve_assembly, together_at
 from assembly.model.clearance import CONES, clearance_bounds
 from assembly.model.links import joint_compliances, link_compliances
-from assembly.model.robot import Frame, Robot
-from tests.robots_for_tests import coaxial_beams, planar_four_bar, random_robot
-
-EPS = 2.0**-52
+from assembly.model.robot import Frame
+from tests.robots_for_tests import coaxial_beams, random_robot
 
 
 def disturbed(rng, seed):
-    """A random robot's assembly, and the same with anything else for its solution."""
+    """A random robot's assembly, and the same with a disturbed solution."""
     robot = random_robot(np.random.default_rng(seed), 2, link_share=0.8)
     load = rng.normal(size=6) * [1, 1, 1, 10, 10, 10]
     best = solve_assembly(home_posture(robot), load)
@@ -50,7 +48,7 @@ SEEDS = (1, 3, 4, 6, 9, 12)
 
 
 def solvable(rng):
-    """Random assemblies, where there are any."""
+    """Assemblies of the random robots that have one."""
     for seed in SEEDS:
         try:
             yield disturbed(rng, seed)
@@ -59,7 +57,7 @@ def solvable(rng):
 
 
 def test_any_wrenches_bound_the_energy(rng):
-    """Weak duality, and the bound as its docstring has it."""
+    """Weak duality; the bound is the sum that its docstring defines."""
     some = list(solvable(rng))
     assert len(some) >= 3
     assert any(len(other.motions) for _, other in some)
@@ -85,51 +83,14 @@ def test_the_uncertainty_is_the_gap_without_cancellation(rng):
         assert other.uncertainty == pytest.approx(worst, rel=1e-8)
 
 
-def test_a_large_work_is_uncertain_by_its_rounding():
-    """Nothing else is: an arm that hangs from a spring, without closures."""
-    K = 1e4 * np.eye(6)
-    robot = Robot("arm", "tip", (
-        Frame("hinge", joint="revolute", joint_stiffness=K), Frame("tip", "hinge"),
-    ))  # fmt: skip
-    assembly = solve_assembly(home_posture(robot), [0, 0, 0, 100.0, 0, 0])
-    assert assembly.work == pytest.approx(1.0)
-    assert assembly.uncertainty == pytest.approx(8 * EPS, rel=0.5, abs=0.0)
-
-
-def test_a_gap_is_relative_to_an_energy_of_any_size():
-    """1e-4 of the energy without clearance is the least it is compared with."""
-    assembly = solve_assembly(home_posture(coaxial_beams([0, 0, 0, 1e-6, 0, 0])))
-    other = replace(assembly, elastic=1.1 * assembly.elastic)
-    assert other.stored < 1e-5
-    # y + (y - s)^2 / 2 beyond s, and the work on the open closure
-    assert other.relative_gap() == pytest.approx(other.duality_gap() / other.stored)
-    none = np.zeros_like(assembly.multipliers)
-    little = replace(assembly, elastic=1e-4 * assembly.elastic, multipliers=none)
-    least = 1e-4 * assembly.energy_without_clearance
-    # without wrenches the bound is zero, and the gap is the energy
-    assert little.relative_gap() == pytest.approx(little.stored / least, rel=1e-6)
-
-
 def test_the_largest_force_is_named_by_the_first_body_that_carries_it():
-    """Bodies in a row carry the same, whatever rounding says; the idle one none."""
+    """Bodies in series carry equal forces but for rounding; the idle one none."""
     robot = coaxial_beams([0, 0, 0, 1e-4, 2e-5, 3e-5])
     idle = replace(
         robot, frames=(Frame("idle", translation=[0.1, 0, 0]), *robot.frames)
     )
     figures = solve_assembly(home_posture(idle))._figures()
     assert figures["largest force"].endswith(" N, in one")
-
-
-def test_one_assembly_is_one_row():
-    """In every array that has a row for each point."""
-    one = solve_assembly(home_posture(planar_four_bar())).as_many
-    for each in fields(one):
-        if each.name == "load":  # one load serves all
-            continue
-        values = getattr(one, each.name)
-        if isinstance(values, np.ndarray):
-            assert len(values) == 1, each.name
-    assert len(one) == 1
 
 
 def test_points_solved_one_by_one_keep_their_own_certificate():

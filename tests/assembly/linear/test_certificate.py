@@ -1,110 +1,44 @@
-"""What the certificate of a least energy proves, and what rounding spoils."""
+"""Certificates of a least energy and of its screw, and their loss by rounding."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_many, place_robot
-from assembly.linear import energy
-from assembly.linear.certificate import (
-    bound_screw,
-    unproved,
-    unproved_screw,
-)
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.linear.certificate import bound_screw, unproved, unproved_screw
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.reference.as_printed import energy_as_printed
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
-from assembly.robots import load_robot
 from assembly.statistics.linear_response import linear_response
 from tests.robots_for_tests import (
     NUMBERS,
     assemble_at,
     coaxial_beams,
+    irsbot2_over,
     irsbot2_with,
     random_robot,
 )
 
 
-@pytest.mark.parametrize("kappa", [0.05, 0.1])
-def test_the_energy_is_proved_near_the_edge_of_the_zone(kappa):
-    """Where hardly any energy is left; a part of the 25 mm grid."""
-    for posture in half_workspace(every=37):
-        assert_proved(solve_assembly(with_errors_times(kappa, posture)))
-
-
-@pytest.mark.slow
-def test_the_energy_is_proved_at_every_point_of_the_half_workspace():
-    postures = half_workspace(every=1)
-    assert len(postures) == 1113
-    for kappa in (0.0, 0.05, 0.1, 0.2, 0.5, 1.0):
-        for posture in postures:
-            assert_proved(solve_assembly(with_errors_times(kappa, posture)))
-
-
-def half_workspace(every):
-    """Every so many postures of the 25 mm grid below the base."""
-    x, z = np.meshgrid(np.arange(-0.65, 0.651, 0.025), np.arange(-0.75, 0.001, 0.025))
-    poses = np.full((x.size, 6), np.nan)
-    poses[:, 0], poses[:, 2] = x.ravel(), z.ravel()
-    robot = irsbot2_with(NUMBERS["cases"][0])
-    placed = place_many(robot, poses[::every])[0]
-    return [posture for posture in placed if posture is not None]
-
-
-def with_errors_times(factor, posture):
-    """The posture of the robot with other errors."""
-    robot = posture.robot
-    return replace(posture, robot=robot.with_errors(factor * robot.errors))
+@pytest.mark.parametrize("kappa", [0.0, 0.05, 0.1, 1.0])
+def test_energy_is_proved_over_half_of_the_workspace(kappa):
+    """Errors of 0.05 and 0.1 are near the edge of the zone: little energy is left."""
+    robot, postures = irsbot2_over(
+        np.arange(-0.65, 0.651, 0.15), np.arange(-0.75, 0.001, 0.15)
+    )
+    reached = [posture for posture in postures if posture is not None]
+    assert len(reached) > 20
+    for posture in reached:
+        erring = replace(posture, robot=robot.with_errors(kappa * robot.errors))
+        assert_proved(solve_assembly(erring))
 
 
 def assert_proved(answer):
-    """The promise of the batch, 1e-8 E + 1e-12 E(tight), not asking the answer."""
+    """The gap is at most 1e-8 of the energy and 1e-12 of that without clearance."""
     assert unproved(answer) == ""
     gap = answer.potential - answer.bound
     assert gap <= 1e-8 * answer.energy + 1e-12 * answer.energy_without_clearance
-
-
-def spoilt(solve):
-    """A solver whose clearances are 1e-4 off."""
-
-    def solver(G, h, d, H, k, group):
-        u, rigid, status = solve(G, h, d, H, k, group)
-        return None if u is None else 0.9999 * u, rigid, status
-
-    return solver
-
-
-@pytest.mark.slow
-def test_what_no_solver_proves_is_not_certified(monkeypatch):
-    """The edge of the zone with Newton's method taken away and the others spoilt."""
-    from assembly.report.results import solution_of, solution_text
-    from assembly.solvers import conic
-
-    robot = irsbot2_with(NUMBERS["cases"][0])
-    posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.5})
-    good = solve_assembly(posture)
-    assert_proved(good)
-    worse = tuple(map(spoilt, conic._SOLVERS["reference"]))
-    monkeypatch.setitem(conic._SOLVERS, "reference", worse)
-    monkeypatch.setattr(conic, "refine", lambda *_: iter(()))
-    monkeypatch.setattr(
-        energy, "assemble_side_by_side", lambda *given: given[5]["outcome"].fill(4)
-    )
-    answer = solve_assembly(posture)
-    # 1e-4 of some clearances more energy than the least: far above 1e-8
-    assert answer.energy > good.energy * (1 + 1e-8)
-    assert "the energy is proved least to" in unproved(answer)
-    found = solution_of(posture)
-    assert found["status"] == "not proved"
-    assert found["reason"] == unproved(answer)
-    assert found["energy"] == answer.energy
-    assert f"not proved: {unproved(answer)}" in solution_text(found)
-    assert "certificate" in solution_text(found)
-    energies = assemble_at(robot, posture.transforms[None])
-    assert (energies.status[0], energies.reason[0]) == (
-        "solver failed", unproved(answer)
-    )  # fmt: skip
 
 
 def test_values_that_are_no_numbers_prove_nothing():
@@ -115,6 +49,8 @@ def test_values_that_are_no_numbers_prove_nothing():
         replace(answer, clearances=answer.clearances * np.nan),
     ):
         assert unproved(spoilt_answer)
+    weaker = replace(answer, multipliers=0.9 * answer.multipliers)
+    assert "the energy is proved least to" in unproved(weaker)
     assert "stays open" in unproved(replace(answer, elastic=1.1 * answer.elastic))
     assert "exceeded by" in unproved(replace(answer, clearances=2 * answer.clearances))
 
@@ -155,40 +91,9 @@ def test_a_hinges_turn_is_within_its_bound_or_refused_by_name(young):
     assert bound.rotation_error < 1e-8
 
 
-@pytest.mark.parametrize("young", [7e10, 1e18, 1e24, 1e30])
-@pytest.mark.parametrize("name", ["five_bar", "3rrr", "orthoglide"])
-def test_a_screw_that_rounding_spoils_is_never_certified(name, young):
-    """Against Young = 1e16: from there on the screws no longer change, to 1e-5 of them.
-
-    Beams of all links equally stiff, so that the answer is a limit of its own.
-    """
-
-    def stiff(young):
-        rng = np.random.default_rng(1)
-        robot = load_robot(name)
-        errors = 1e-3 * rng.uniform(-1, 1, (len(robot.frames), 6))
-        frames = (
-            replace(f, link=replace(f.link, young=young) if f.link else None)
-            for f in robot.with_errors(errors).frames
-        )
-        return solve_assembly(home_posture(replace(robot, frames=tuple(frames))))
-
-    answer, limit = stiff(young), stiff(1e16)
-    bound, off = bound_screw(answer), answer.platform_screw - limit.platform_screw
-    other = bound_screw(limit)
-    if young >= 1e16:
-        assert np.linalg.norm(off[:3]) <= bound.rotation + other.rotation
-        assert np.linalg.norm(off[3:]) <= bound.translation + other.translation
-    if young != 1e18:  # in between its bound is what is told
-        assert bool(unproved(answer)) == (young >= 1e24)
-        posture = answer.posture
-        batch = assemble_at(posture.robot, posture.transforms[None])
-        assert (batch.status[0] == "ok") == (unproved(answer) == "")
-
-
 def test_screws_of_least_energy_from_another_solver_are_within_the_bound():
-    """cvxpy's answers, of 1e-8 J at best, are themselves off by the root of that: told
-    apart by what their own energies are above the bound.
+    """cvxpy's energies are above the least by 1e-8 J, its screws off by the root of it:
+    that excess is added to the uncertainty.
     """
     compared = 0
     for seed in range(16):
@@ -244,7 +149,7 @@ def test_rounding_of_zero_is_zero():
 
 
 def test_the_certificate_trusts_nothing_but_the_wrenches():
-    """Answers spoilt on purpose: a gap opens that the wrong part accounts for."""
+    """Wrong multipliers and springs open a gap of the size worked out by hand."""
     robot = coaxial_beams(np.array([0, 0, 0, 2e-4, 0, 0]), (1e6, 3e6))
     answer = solve_assembly(home_posture(robot))
     assert answer.duality_gap() < 1e-12 * answer.energy
@@ -256,43 +161,6 @@ def test_the_certificate_trusts_nothing_but_the_wrenches():
     stiffer = replace(answer, elastic=answer.elastic * 1.01)
     assert stiffer.duality_gap() == pytest.approx(0.0201 * answer.energy, rel=1e-6)
     assert stiffer.closure_residual() > 1e-7
-
-
-def spoilt_springs(answer, size, rng):
-    """The same closures and clearances, springs moved by what closures leave open."""
-    rows = answer.linearisation.rows @ answer.joints.elastic
-    _, S, Vt = np.linalg.svd(rows)
-    free = Vt[np.sum(S > 1e-12 * S[0]) :]
-    move = free.T @ rng.normal(size=len(free))
-    scale = size * np.linalg.norm(answer.elastic) / np.linalg.norm(move)
-    return replace(answer, elastic=answer.elastic + scale * move)
-
-
-@pytest.mark.parametrize("size", [1e-3, 0.1, 2.0])
-def test_what_springs_do_not_balance_is_the_gap(size, rng):
-    """A spoilt energy is larger by |dy|^2 / 2, y.dy being zero; so is the gap."""
-    posture = place_robot(load_robot("irsbot2"), {"tx": 0.1, "tz": -0.5})
-    errors = np.zeros((len(posture.robot.frames), 6))
-    errors[posture.robot.index("leg1.link_a"), 3] = 3e-3
-    answer = solve_assembly(replace(posture, robot=posture.robot.with_errors(errors)))
-    spoilt = spoilt_springs(answer, size, rng)
-    larger = size**2 * answer.stored
-    assert spoilt.stored - answer.stored == pytest.approx(larger, rel=1e-3)
-    assert spoilt.duality_gap() == pytest.approx(larger, rel=1e-3)
-    assert spoilt.uncertainty == pytest.approx(larger, rel=1e-3)
-    share = size**2 / (1 + size**2)
-    assert spoilt.relative_gap() == pytest.approx(share, rel=1e-3)
-    assert (unproved(spoilt) == "") == (share < 1e-8)
-
-
-def test_within_the_zone_a_gap_counts_beside_the_energy_without_clearance():
-    posture = place_robot(load_robot("3rrr"))
-    errors = np.zeros((len(posture.robot.frames), 6))
-    errors[0, 3] = 1e-6
-    answer = solve_assembly(replace(posture, robot=posture.robot.with_errors(errors)))
-    assert answer.stored < 1e-6 * answer.energy_without_clearance
-    scale = 1e-4 * answer.energy_without_clearance
-    assert answer.relative_gap() * scale == pytest.approx(answer.duality_gap())
 
 
 def test_each_half_of_the_screw_is_proved_to_its_own_size():

@@ -8,16 +8,14 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import Posture, home_posture, place_robot
+from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.certificate import unproved
 from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.load import loads_with_weight
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reference.as_printed import energy_as_printed
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.zone import zone_margin
 from assembly.measurement.settled_clearance import without_joint_clearances
-from assembly.measurement.without_clearance import flexibility
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.solvers.conic import minimise_energy
@@ -53,12 +51,15 @@ def test_two_springs_in_series_take_the_gap(axis):
     assert answer.platform_screw[axis] == pytest.approx(1.5e-4, rel=1e-12)
 
 
-@pytest.mark.parametrize(("gap", "left"), [(5e-5, 0.0), (1.5e-4, 5e-5)])
-def test_play_is_used_up_before_anything_bends(gap, left):
-    """Radial play of 1e-4 m: the springs only see what it leaves of the gap."""
-    play = Clearance(radial=1e-4)
+@pytest.mark.parametrize(
+    ("gap", "left"),
+    [(5e-5, 0.0), (1e-4, 0.0), (1e-4 * (1 + 1e-16), 0.0), (1.5e-4, 5e-5)],
+)
+def test_clearance_is_used_up_before_anything_bends(gap, left):
+    """Radial clearance of 1e-4 m: the springs close only the rest of the gap."""
+    clearance = Clearance(radial=1e-4)
     direction = np.array([0, 0, 0, 0.6, 0.8, 0.0])
-    robot = coaxial_beams(gap * direction, (1e6, 1e6), clearance=play)
+    robot = coaxial_beams(gap * direction, (1e6, 1e6), clearance=clearance)
     answer = solve_assembly(home_posture(robot))
     assert answer.energy == pytest.approx(0.5e6 * left**2 / 2, rel=1e-9, abs=1e-15)
     assert answer.clearance_excess() < 1e-12
@@ -107,43 +108,6 @@ def test_a_robot_without_clearances_stores_what_it_would_without_them(name, rng)
         assert answer.joints.cones.shape[1] == 0
         assert answer.energy > 0.0
         assert answer.energy_without_clearance == pytest.approx(answer.energy, rel=1e-9)
-
-
-@pytest.mark.parametrize("scale", [0.1, 3.0])
-def test_errors_and_clearances_times_s_give_energy_times_s_squared(scale):
-    case = NUMBERS["cases"][0]
-    robot = irsbot2_with(case)
-    scaled = replace(
-        robot.with_errors(robot.errors * scale),
-        frames=tuple(
-            replace(
-                f,
-                geometric_error=f.geometric_error * scale,
-                clearance=f.clearance
-                and Clearance(*(scale * v for v in vars(f.clearance).values())),
-            )
-            for f in robot.frames
-        ),
-    )
-    pose = {"tx": 0.1, "tz": -0.4}
-    one = solve_assembly(place_robot(robot, pose=pose))
-    other = solve_assembly(place_robot(scaled, pose=pose))
-    assert other.energy == pytest.approx(scale**2 * one.energy, rel=1e-8)
-    assert np.allclose(
-        other.platform_screw, scale * one.platform_screw, rtol=1e-5, atol=1e-9 * scale
-    )
-
-
-def test_swapping_the_chains_of_a_closure_changes_only_its_wrenchs_sign():
-    robot = irsbot2_with(NUMBERS["cases"][1])
-    swapped = replace(robot, closures=tuple((b, a) for a, b in robot.closures))
-    pose = {"tx": -0.2, "tz": -0.45}
-    one = solve_assembly(place_robot(robot, pose=pose))
-    other = solve_assembly(place_robot(swapped, pose=pose))
-    assert other.energy == pytest.approx(one.energy, rel=1e-10)
-    scale = np.abs(one.closure_wrenches[-1]).reshape(2, 3).max(axis=1).repeat(3)
-    left = (other.closure_wrenches[-1] + one.closure_wrenches[-1]) / scale
-    assert np.abs(left).max() < 1e-6
 
 
 def test_moving_the_platform_frame_moves_the_screw_and_not_the_energy():
@@ -209,7 +173,8 @@ def test_a_load_along_a_free_motion_has_no_equilibrium():
     assert across.energy == 0.0
 
 
-def test_play_bound_of_a_passive_joint_holds_where_it_matters():
+@pytest.mark.parametrize("method", METHODS)
+def test_bound_of_a_passive_joints_motion_holds(method):
     """A passive slider bounded to +-1e-4 m: the spring takes the rest of the gap."""
     frames = (
         Frame("link", translation=[0, 0, 0.5], link=MatrixLink(1e6 * np.eye(6))),
@@ -219,12 +184,18 @@ def test_play_bound_of_a_passive_joint_holds_where_it_matters():
               geometric_error=[0, 0, 0, 0, 0, 3e-4]),
     )  # fmt: skip
     robot = Robot("slider", "end", frames, (("end", "wall"),))
-    answer = solve_assembly(home_posture(robot))
+    answer = solve_assembly(home_posture(robot), method=method)
+    assert answer.method == method
     assert answer.energy == pytest.approx(1e6 * (2e-4) ** 2 / 2, rel=1e-9)
     assert answer.clearance_screws[1, 5] == pytest.approx(1e-4, rel=1e-9)
+    within = home_posture(robot.with_errors(robot.errors / 4))
+    answer = solve_assembly(within, method=method)
+    assert answer.energy == pytest.approx(0, abs=1e-20)
+    assert np.abs(answer.clearance_screws[1, 5]) == pytest.approx(3e-4 / 4, rel=1e-9)
     unbounded = replace(robot, frames=(frames[0], replace(frames[1], clearance=None),
                                        *frames[2:]))  # fmt: skip
-    assert solve_assembly(home_posture(unbounded)).energy == pytest.approx(0, abs=1e-20)
+    answer = solve_assembly(home_posture(unbounded), method=method)
+    assert answer.energy == pytest.approx(0, abs=1e-20)
 
 
 def as_bearings(robot):
@@ -254,7 +225,7 @@ def as_bearings(robot):
 
 
 def test_a_bearing_is_its_springs_and_then_a_free_joint():
-    """In every solver; energies to 1e-8 of those without play, 1e-12 where linear."""
+    """In every solver; energies to 1e-8 of those without clearance."""
     compared = 0
     for seed in range(40):
         rng = np.random.default_rng(seed)
@@ -287,46 +258,8 @@ def test_a_bearing_is_its_springs_and_then_a_free_joint():
             )
             exact = [solve_exact(p).energy for p in (first, second)]
             assert exact[0] == pytest.approx(exact[1], rel=1e-6, abs=scale)
-        tight = without_joint_clearances(one), without_joint_clearances(two)
-        rows = [Posture(r, p.coordinates[None], p.transforms[None], p.mismatch)
-                for r, p in zip(tight, (first, second), strict=True)]  # fmt: skip
-        found = [
-            flexibility(p).solve(
-                np.zeros(1, int), p.robot.errors.reshape(1, -1), loads_with_weight(
-                    p, np.zeros((1, 6)), np.zeros((1, 3))
-                ),
-            )
-            for p in rows
-        ]  # fmt: skip
-        if all(f.solved[0] for f in found):
-            np.testing.assert_allclose(
-                found[0].platform_screw, found[1].platform_screw, rtol=1e-7, atol=1e-12
-            )
         compared += 1
     assert compared > 10
-
-
-def test_play_that_just_suffices_stores_nothing():
-    """A gap of the size of the play, to the last digit: inside, at, and beyond it."""
-    direction = np.array([0, 0, 0, 0.6, 0.8, 0.0])
-    for gap, energy in ((1e-4, 0.0), (1e-4 * (1 + 1e-16), 0.0),
-                        (1.0001e-4, 0.5e6 * 1e-8**2 / 2)):  # fmt: skip
-        robot = coaxial_beams(gap * direction, clearance=Clearance(radial=1e-4))
-        posture = home_posture(robot)
-        batch = assemble_at(robot, posture.transforms[None])
-        for found in (solve_assembly(posture).energy, batch.energy[0]):
-            assert found == (pytest.approx(energy, rel=1e-3) if energy else 0.0)
-
-
-def test_frames_in_another_order_give_the_same_answer():
-    robot = irsbot2_with(NUMBERS["cases"][0])
-    turned = Robot(robot.name, robot.platform, robot.frames[::-1], robot.closures)
-    one = solve_assembly(home_posture(robot))
-    other = solve_assembly(home_posture(turned))
-    assert other.energy == pytest.approx(one.energy, rel=1e-10)
-    name = "leg2.link_b"
-    a, b = one.wrenches[robot.index(name)], other.wrenches[turned.index(name)]
-    assert np.allclose(a, b, rtol=1e-6, atol=1e-6 * np.abs(a).max())
 
 
 @settings(deadline=None, max_examples=25)
@@ -337,7 +270,7 @@ def test_frames_in_another_order_give_the_same_answer():
 @example(seed=17, legs=3, joints=1)
 @example(seed=58, legs=2, joints=2)
 def test_random_robots_equal_the_printed_problem_in_cvxpy(seed, legs, joints):
-    """Tolerance 1e-6 of the energy without play: what cvxpy's solver reaches."""
+    """Tolerance 1e-6 of the energy without clearance: what cvxpy's solver reaches."""
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, legs, joints)
     load = rng.normal(size=6) * [1, 1, 1, 10, 10, 10] if rng.random() < 0.5 else None
@@ -358,7 +291,7 @@ def test_random_robots_equal_the_printed_problem_in_cvxpy(seed, legs, joints):
 
 
 @pytest.mark.parametrize("turned", [1, -1])
-def test_a_closure_out_of_reach_is_told_from_one_within_it(turned):
+def test_a_closure_out_of_reach_is_infeasible(turned):
     """H u reaches 5 over the disc and 2 over the interval: 7, and not 7 + 1e-6."""
     H = np.array([[3.0, 4.0, 2.0]])
     problem = np.zeros((1, 3)), np.ones(1), np.zeros(3), H

@@ -69,12 +69,6 @@ def test_moving_the_whole_robot_moves_the_answer_with_it(seed):
         a, b = getattr(one_error, name), getattr(other_error, name)
         assert a[0] <= b[1] + 1e-9
         assert b[0] <= a[1] + 1e-9
-    if one.energy > 1e-6 * one.energy_without_clearance:
-        R = rotation_matrix(turn)
-        back = np.concatenate([R.T @ other.platform_screw[:3],
-                               R.T @ other.platform_screw[3:]])  # fmt: skip
-        # the pose is unique only up to unloaded play: compare within its bounds
-        assert np.linalg.norm(back[:3]) <= one_error.rotation_error[1] + 1e-7
 
 
 def cut_at_the_crank(robot):
@@ -112,7 +106,7 @@ def test_where_a_loop_is_cut_changes_nothing():
 
 
 def test_reciprocity_two_loads_do_each_others_work(rng):
-    """Maxwell-Betti on the paper's closed loops without play: w1 . x2 = w2 . x1."""
+    """Maxwell-Betti on closed loops without clearance: w1 . x2 = w2 . x1."""
     robot = irsbot2()
     tight = replace(robot, frames=tuple(
         replace(f, clearance=None) for f in robot.frames

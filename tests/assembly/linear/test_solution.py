@@ -33,18 +33,6 @@ def rigid_pins(gaps):
     return home_posture(robot), errors
 
 
-def test_many_loads_at_one_posture_are_a_row_each():
-    """Two springs side by side: F^2 / 4 K and F / 2 K, and no load no energy."""
-    forces = np.array([0.0, 10.0, -30.0])
-    loads = np.zeros((3, 6))
-    loads[:, 5] = forces
-    found = solve_assembly(home_posture(coaxial_beams(np.zeros(6), (K, K))), loads)
-    assert found.energy == pytest.approx(forces**2 / (4 * K), rel=1e-12)
-    assert found.platform_screw[:, 5] == pytest.approx(forces / (2 * K), rel=1e-12)
-    assert found.loaded.tolist() == [False, True, True]
-    assert found[2].load.tolist() == loads[2].tolist()
-
-
 def test_a_load_and_gravity_of_each_posture_add_up(rng):
     """Linear in the loads where nothing has clearance: superposition, row by row."""
     home = home_posture(coaxial_beams(np.zeros(6), (K, 3 * K)))
@@ -69,6 +57,9 @@ def test_some_of_many_are_taken_by_mask_slice_and_numbers_more_than_once():
         assert some.energy.tolist() == many.energy[rows].tolist()
         assert np.array_equal(some.wrenches, many.wrenches[rows])
         assert np.array_equal(some[0].wrenches, some.wrenches[0])
+    assert many[-1].energy == many.energy[3]
+    with pytest.raises(IndexError):
+        many[4]
 
 
 def test_a_point_without_solution_is_so_wherever_it_is_taken():
@@ -87,3 +78,18 @@ def test_one_point_has_no_length():
     home, _ = pins([0.0])
     with pytest.raises(TypeError, match="Assembly of one point has no length"):
         len(solve_assembly(home))
+
+
+@pytest.mark.parametrize("loaded", [(1, 0), (0, 1), (1, 1), (0, 0)])
+def test_points_with_and_without_loads_have_their_own_errors(loaded):
+    """Stored: K g^2 / 4 of the gap and F^2 / 4 K of the load, which do not mix."""
+    sets = np.zeros((2, 6, 6))
+    sets[:, 2, 3] = 1e-4, 3e-4
+    at = home_posture(coaxial_beams(np.zeros(6), (K, K)))
+    forces = np.array(loaded)[:, None] * np.array([0.0, 0, 0, 100.0, 0, 0])
+    found = solve_assembly([at] * 2, forces, errors=sets)
+    expected = K * sets[:, 2, 3] ** 2 / 4 + forces[:, 3] ** 2 / (4 * K)
+    assert found.energy == pytest.approx(expected, rel=1e-9)
+    assert found.loaded.tolist() == [bool(one) for one in loaded]
+    for one, errors in zip(found, sets, strict=True):
+        assert (one.posture.robot.errors == errors).all()

@@ -1,17 +1,11 @@
 """Springs of a law in series: Newton's method against bisection, in any unit."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from assembly.kinematics.posture import home_posture
-from assembly.linear.energy import solve_assembly
 from assembly.measurement.conditions import ContactLaw
-from assembly.measurement.contacts import contact_deflections, secants
-from assembly.measurement.row_state import Rows
-from assembly.model.robot import Frame, Robot
+from assembly.measurement.contacts import contact_deflections
 
 LAWS = (ContactLaw("a", 3e5, 1.5), ContactLaw("b", 2e3, 1.1))
 
@@ -55,51 +49,3 @@ def test_contacts_that_load_each_other_balance(rng, force):
     loads = np.stack([law(one, d[:, i]) for i, one in enumerate(in_unit(force))], 1)
     left = loads - w - np.einsum("rij,rj->ri", A, d)
     assert np.abs(left).max() < 1e-9 * np.abs(w).max()
-
-
-def test_a_secant_is_deflection_over_load_and_none_without_load():
-    """(F / c)^(1 / n) / F along the slider's own z."""
-    K = np.diag([np.inf] * 5 + [1e4])
-    robot = Robot("slide", "b", (
-        Frame("a", joint="prismatic", joint_stiffness=K), Frame("b", "a"),
-    ))  # fmt: skip
-    one = ContactLaw("a", 3e5, 1.5)
-    for F in (20.0, -1e-3):
-        assembly = solve_assembly(home_posture(robot), [0, 0, 0, 0, 0, F])
-        expected = (abs(F) / 3e5) ** (1 / 1.5) / abs(F)
-        assert secants(assembly, (one,)) == pytest.approx([expected], rel=1e-9)
-    assert secants(solve_assembly(home_posture(robot)), (one,)).tolist() == [0.0]
-
-
-def rows_with(d):
-    """Rows that know nothing but their contacts' deflections in the linear model."""
-    return Rows(SimpleNamespace(laws=LAWS), None, None, np.asarray(d, dtype=float))
-
-
-def test_the_tangent_of_a_contact_is_its_laws():
-    """By differences; and it touches the law."""
-    d = np.array([[1e-4, -2e-3], [-3e-5, 1e-2]])
-    rows = rows_with(d)
-    w = np.stack([law(one, d[:, i]) for i, one in enumerate(LAWS)], axis=1)
-    assert rows.deflection(w) == pytest.approx(d, rel=1e-12)
-    assert rows.tangent_deflection(w) == pytest.approx(d, rel=1e-12)
-    h = 1e-5 * np.abs(w)
-    slope = (rows.deflection(w + h) - rows.deflection(w - h)) / (2 * h)
-    assert rows.contact_compliance == pytest.approx(slope, rel=1e-8)
-    change = rows.tangent_deflection(w + h) - d
-    assert change == pytest.approx(slope * h, rel=1e-6)
-
-
-def test_a_contact_of_a_nanometre_is_a_linear_spring():
-    """With the secant at 1e-9: the same load per deflection, and no load, none."""
-    small = rows_with([[1e-10, -5e-11], [0.0, 1e-12]])
-    least = np.array([one.coefficient * 1e-9**one.exponent for one in LAWS])
-    secant = np.array([1e-9, 1e-9]) / least
-    assert small.contact_compliance == pytest.approx(np.array([secant] * 2), rel=1e-12)
-    for share in (0.0, 0.3, -0.7):
-        w = np.array([share * least] * 2)
-        expected = np.array([[share * 1e-9] * 2] * 2)
-        assert small.deflection(w) == pytest.approx(expected, rel=1e-12, abs=1e-24)
-        assert small.tangent_deflection(w) == pytest.approx(
-            expected, rel=1e-9, abs=1e-24
-        )

@@ -1,4 +1,4 @@
-"""Many exact equilibria at once are those found one by one."""
+"""Many exact equilibria together are those found one by one."""
 
 from dataclasses import replace
 
@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from assembly.effects.places import drives
-from assembly.kinematics.posture import Posture, home_posture, place_many_joints
+from assembly.kinematics.posture import home_posture, place_many_joints, together
 from assembly.measurement.conditions import ContactLaw, as_declared
-from assembly.measurement.contacts import contact_deflections
 from assembly.measurement.exact_rows import solve_rows
-from assembly.measurement.predict import assemble_row, predict, read
+from assembly.measurement.predict import assemble_row, predict
 from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.model.robot import Frame, Robot
 from assembly.robots import load_robot
@@ -32,10 +30,7 @@ def loaded_rows(name, rng, laws=()):
     postures = [p for p in postures if p is not None] * 2
     count = len(postures)
     here = as_declared(
-        Posture(
-            robot, np.array([p.coordinates for p in postures]),
-            np.array([p.transforms for p in postures]), 1e-9,
-        ),
+        together(postures),
         rng.uniform(-1, 1, (count, 6)) * np.repeat([5.0, 100.0], 3),
         mismatch=[p.mismatch for p in postures],
         point=[0.02, -0.01, 0.03],
@@ -69,22 +64,6 @@ def test_beams_in_pieces_together_as_one_by_one(rng):
         np.testing.assert_allclose(screws[row], alone, rtol=0, atol=2e-11)
     whole, _ = solve_rows(here, np.zeros((len(here), 0)))
     assert np.abs(screws - whole).max() > 1e-8  # it matters here
-
-
-def test_a_contact_at_one_drive_settles_as_one_by_one(rng):
-    """One by one the secant settles to 1e-5 of the finite part, some 1e-10 here."""
-    first = drives(load_robot("arm6"))[0]
-    here = loaded_rows("arm6", rng, (ContactLaw(first, 2e6, 1.5),))
-    together = predict(here).deviation
-    for row in range(len(here)):
-        alone = assemble_row(here, row).platform_screw
-        turned = read_alone(here, row, alone)
-        np.testing.assert_allclose(together[row], turned, rtol=0, atol=1e-8)
-
-
-def read_alone(here, row, screw):
-    """What the device makes of one platform screw."""
-    return read(here.take([row]), screw[None])[0]
 
 
 BAR = Robot(
@@ -132,21 +111,6 @@ def test_rows_that_do_not_converge_claim_nothing():
     assert angle == pytest.approx(brentq(lambda x: x - 3 * np.cos(x), 0, 2), rel=1e-9)
 
 
-def test_contacts_that_load_each_other_balance_their_laws(rng):
-    """c |d|^n sign d = w + A d with A < 0, of all signs and sizes."""
-    laws = tuple(
-        ContactLaw(f"j{k}", c, n) for k, (c, n) in enumerate([(2e6, 1.5), (3e7, 2.0)])
-    )
-    d = rng.uniform(-1, 1, (40, 2)) * 10.0 ** rng.uniform(-6, -3, (40, 1))
-    B = rng.normal(size=(40, 2, 2))
-    A = -3e4 * np.einsum("rij,rkj->rik", B, B) - 1e3 * np.eye(2)
-    c, n = np.array([2e6, 3e7]), np.array([1.5, 2.0])
-    w = c * np.abs(d) ** n * np.sign(d) - np.einsum("rij,rj->ri", A, d)
-    found, converged = contact_deflections(laws, w, A)
-    assert converged.all()
-    np.testing.assert_allclose(found, d, rtol=1e-6, atol=1e-10)
-
-
 @pytest.mark.parametrize("seed", [0, 3, 5, 7])
 def test_rows_in_another_unit_of_length_turn_alike(seed, rng):
     """And shift by as many millimetres; neither is refused."""
@@ -156,10 +120,7 @@ def test_rows_in_another_unit_of_length_turn_alike(seed, rng):
     load = rng.uniform(-1, 1, (1, 6)) * 0.1
     found = []
     for s in (1.0, 1e3, 1e-3):
-        at = home_posture(in_millimetres(robot, s))
-        postures = replace(
-            at, coordinates=at.coordinates[None], transforms=at.transforms[None]
-        )
+        postures = together([home_posture(in_millimetres(robot, s))])
         here = as_declared(postures, load * np.repeat([s, 1.0], 3))
         screws, converged = solve_rows(replace(here, exact=True), np.zeros((1, 0)))
         assert converged.all()

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from assembly.effects import apply_effects
-from assembly.kinematics.posture import home_posture, place_many_joints
+from assembly.kinematics.posture import home_posture, place_many_joints, together
 from assembly.measurement.conditions import ContactLaw, Yield, as_declared
 from assembly.measurement.exact_rows import solve_rows
 from assembly.measurement.predict import (
@@ -36,13 +36,9 @@ def arm(stiffness=STIFFNESS):
 def rows(robot, force=FORCE, error=0.0):
     """At four commands under a force along y, the drive off by an angle."""
     placed, _ = place_many_joints(robot, np.column_stack([Q, 0 * Q]))
-    several = replace(
-        placed[0], coordinates=np.array([p.coordinates for p in placed]),
-        transforms=np.array([p.transforms for p in placed]),
-    )  # fmt: skip
     errors = np.zeros((2, 6))
     errors[0, 2] = error
-    several = replace(several, robot=robot.with_errors(errors))
+    several = replace(together(placed), robot=robot.with_errors(errors))
     return as_declared(several, np.tile([0, 0, 0, 0, force, 0], (4, 1)))
 
 
@@ -128,7 +124,7 @@ def test_a_law_of_its_own_gives_under_the_moment_of_finite_motions():
         assert seen.deviation[:, 2] == pytest.approx(turn, rel=1e-6)
 
 
-def test_a_row_that_cannot_close_has_no_answer_and_its_play_is_centred():
+def test_a_row_that_cannot_close_has_no_answer_and_its_clearance_is_centred():
     """A four-bar with a loose pin, of which one row's coupler is out of the plane."""
     robot = four_bar()
     frames = tuple(
@@ -136,11 +132,7 @@ def test_a_row_that_cannot_close_has_no_answer_and_its_play_is_centred():
         for f in robot.frames
     )
     robot = replace(robot, frames=frames)
-    at = home_posture(robot)
-    three = replace(
-        at, coordinates=np.stack([at.coordinates] * 3),
-        transforms=np.stack([at.transforms] * 3),
-    )  # fmt: skip
+    three = together([home_posture(robot)] * 3)
     here = as_declared(three, [0, 0, 0, 10.0, -20.0, 0])
     errors = here.errors.copy()
     errors[1, robot.index("elbow"), 5] = 1e-2
@@ -159,7 +151,7 @@ def test_a_row_that_cannot_close_has_no_answer_and_its_play_is_centred():
     assert held.deviation[0] == pytest.approx(seen.deviation[0], abs=1e-9)
 
 
-def test_play_of_an_open_chain_is_taken_up_by_finite_motions_too():
+def test_clearance_of_an_open_chain_is_taken_up_by_finite_motions_too():
     """A radius along the force; a joint without load in that way is undetermined."""
     c = 1e-4
     rigid = Frame("drive", joint="revolute", actuated=True)
@@ -184,11 +176,7 @@ def test_a_contact_beside_a_spring_takes_its_share_by_finite_motions_too(exact):
         Frame("a", **slides), Frame("end_a", "a", [0.1, 0, 0]),
         Frame("b", **slides), Frame("end_b", "b", [0.1, 0, 0]),
     ), (("end_a", "end_b"),))  # fmt: skip
-    at = home_posture(robot)
-    three = replace(
-        at, coordinates=np.stack([at.coordinates] * 3),
-        transforms=np.stack([at.transforms] * 3),
-    )  # fmt: skip
+    three = together([home_posture(robot)] * 3)
     load = np.zeros((3, 6))
     load[:, 5] = forces
     here = replace(as_declared(three, load), laws=(ContactLaw("a", c, 1.5),))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assembly.kinematics.posture import Posture, place_robot
+from assembly.kinematics.posture import place_robot, together
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import predict, read
 from assembly.model.robot import Frame, Robot
@@ -28,10 +28,7 @@ def rows():
         place_robot(robot, joints={"one": 0.3 * k, "two": 1 - 0.5 * k})
         for k in range(ROWS)
     ]
-    return Posture(
-        robot, np.array([p.coordinates for p in placed]),
-        np.array([p.transforms for p in placed]), 0.0,
-    )  # fmt: skip
+    return together(placed)
 
 
 @pytest.mark.parametrize("own_targets", [False, True])
@@ -57,17 +54,6 @@ def test_a_reading_is_that_of_rigid_bodies(rows, own_targets, by_row, rng):
             (device * turn).as_rotvec(), device.apply(moved) + own[3:] - nominal
         ])  # fmt: skip
         assert seen[k] - here.reading[k] == pytest.approx(expected, abs=1e-12)
-
-
-def test_a_reading_of_any_of_three_kinds_is_not_the_pose_error(rows):
-    """Whatever of a device's frame, its tool and its own reading there is."""
-    here = as_declared(rows)
-    assert not here.reads_otherwise
-    for part in ("base", "tool", "reading"):
-        shape = {"base": 6, "tool": 3, "reading": (ROWS, 6)}[part]
-        some = np.zeros(shape)
-        some.flat[-1] = 1e-6
-        assert replace(here, **{part: some}).reads_otherwise, part
 
 
 def test_what_finite_motions_add_is_added_to_the_linear_model_alone(rows, rng):

@@ -4,11 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
-from assembly.kinematics.posture import home_posture
-from assembly.measurement.conditions import ContactLaw, as_declared
-from assembly.measurement.predict import _linear
+from assembly.kinematics.posture import home_posture, together
+from assembly.measurement.conditions import as_declared
 from assembly.measurement.settled_clearance import (
     fractions,
     with_clearances_at_rest,
@@ -21,35 +19,32 @@ RADIAL, AXIAL = 1e-5, 3e-5
 
 def at_home(robot, load, **given):
     """One row."""
-    at = home_posture(robot)
-    postures = replace(
-        at, coordinates=at.coordinates[None], transforms=at.transforms[None]
-    )
+    postures = together([home_posture(robot)])
     return as_declared(postures, np.array([load], dtype=float), **given)
 
 
-def pin(**play):
+def pin(**clearance):
     """A passive pin about z, turned about x, whose arm points along its x."""
     return Robot("pin", "tip", (
         Frame("pin", joint="revolute", rotation=[0.7, 0, 0],
-              clearance=Clearance(**play)),
+              clearance=Clearance(**clearance)),
         Frame("tip", "pin", [1.0, 0, 0]),
     ))  # fmt: skip
 
 
 @pytest.mark.parametrize("unit", [1e-12, 1.0, 1e6])
-def test_play_goes_the_way_of_the_load_of_any_size(unit):
+def test_clearance_goes_the_way_of_the_load_of_any_size(unit):
     """Through a pin: radially along x by its radius, axially by nothing."""
     conditions = at_home(pin(radial=RADIAL), unit * np.array([0, 0, 0, 2.0, 0, 0]))
     settled, undetermined = with_clearances_taken_up(conditions)
     expected = np.zeros((1, 2, 6))
     expected[0, 0, 3] = RADIAL
     assert settled.errors == pytest.approx(expected, abs=1e-18)
-    # its own motion is no play that could be undetermined
+    # its own motion is no clearance that could be undetermined
     assert undetermined.tolist() == [False]
 
 
-def test_play_that_no_load_takes_up_is_undetermined_and_centred():
+def test_clearance_that_no_load_takes_up_is_undetermined_and_centred():
     conditions = at_home(pin(radial=RADIAL, axial=AXIAL), [0, 0, 0, 2.0, 0, 0])
     settled, undetermined = with_clearances_taken_up(conditions)
     assert undetermined.tolist() == [True]
@@ -67,32 +62,8 @@ def test_a_point_is_measured_where_it_is():
     assert conditions.measured_arms[0] == pytest.approx(np.array(expected) - [1, 0, 0])
 
 
-@pytest.mark.parametrize("force", [500.0, -2.0])
-def test_a_contact_in_one_of_two_springs_side_by_side_shifts_the_load(force):
-    """x = F_a / K + (F_a / c)^(2/3) = (F - F_a) / K along two sliders, by bisection."""
-    K, c = 1e6, 3e8
-    spring = np.diag([np.inf] * 5 + [K])
-    robot = Robot("pair", "end_a", (
-        Frame("a", joint="prismatic", actuated=True, joint_stiffness=spring),
-        Frame("end_a", "a", [0.1, 0, 0]),
-        Frame("b", joint="prismatic", actuated=True, joint_stiffness=spring),
-        Frame("end_b", "b", [0.1, 0, 0]),
-    ), (("end_a", "end_b"),))  # fmt: skip
-    conditions = at_home(robot, [0, 0, 0, 0, 0, force])
-    conditions = replace(conditions, laws=(ContactLaw("a", c, 1.5),))
-    screws, wrenches, solved = _linear(conditions)
-    F = abs(force)
-    own = brentq(lambda f: f / K + (f / c) ** (2 / 3) - (F - f) / K, 0.0, F, xtol=1e-13)
-    assert solved.all()
-    sign = np.sign(force)
-    assert screws[0, 5] == pytest.approx(sign * (F - own) / K, rel=1e-6)
-    through = wrenches[0].reshape(-1, 6)[:, 5]
-    assert through[[0, 2]] == pytest.approx([sign * own, sign * (F - own)], rel=1e-6)
-    assert own < 0.45 * F
-
-
-def test_play_at_rest_is_a_share_of_its_bounds_and_no_play_is_none():
-    """Tilt, spin, radial and axial bounds; a pin's own spin is motion, no play."""
+def test_clearance_at_rest_is_a_share_of_its_bounds_and_no_clearance_is_none():
+    """Tilt, spin, radial and axial bounds; a pin's own spin is motion, no clearance."""
     robot = Robot("two", "tip", (
         Frame("fixed", clearance=Clearance(1e-5, 2e-5, 3e-4, 4e-4)),
         Frame("pin", "fixed", joint="revolute",

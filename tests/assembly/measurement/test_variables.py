@@ -1,11 +1,11 @@
-"""What effects may depend on, by public name, and what came before a row."""
+"""Variables of effects by public name, and the rows before a row."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import Posture, place_robot
+from assembly.kinematics.posture import place_robot, together
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.variables import past, variable, with_history
 from assembly.model.robot import Frame, Robot
@@ -23,10 +23,7 @@ def rows(rng):
     ))  # fmt: skip
     commands = rng.uniform(-1, 1, (ROWS, 2))
     placed = [place_robot(robot, joints={"turn": a, "slide": z}) for a, z in commands]
-    postures = Posture(
-        robot, np.array([p.coordinates for p in placed]),
-        np.array([p.transforms for p in placed]), 0.0,
-    )  # fmt: skip
+    postures = together(placed)
     known = {
         "temperature": rng.normal(size=ROWS), "time": [30.0, 10.0, 20.0, 5.0],
         "dust": rng.normal(size=ROWS), "session": ["b", "a", "b", "a"],

@@ -17,10 +17,10 @@ from assembly.robots import load_robot
 from assembly.robots.hexapod import HexapodParameters, hexapod, points
 from benchmarks.evidence.stiffness_random_robots import by_differences
 from stiffness.screws import screw_map
+from tests.assembly.exact.test_exact import only
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
 
 UNIT = np.eye(6)
-RIGID = np.diag([np.inf] * 6)
 
 
 def assert_same_matrix(M, expected, tolerance):
@@ -38,13 +38,6 @@ def serial(*frames):
         chain.append(replace(frame, parent=above))
         above = frame.name
     return home_posture(Robot("chain", above, tuple(chain)))
-
-
-def only(row, stiffness):
-    """K_B rigid but for one direction."""
-    K = RIGID.copy()
-    K[row, row] = stiffness
-    return K
 
 
 def test_a_cantilever_has_the_textbook_compliance():
@@ -334,7 +327,7 @@ def test_within_its_clearance_nothing_holds_the_platform(state):
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
 def test_both_sides_of_a_change_of_contact(state):
-    """An error just takes up the play: against the stop rigid, away from it a spring.
+    """An error just takes up the clearance: rigid against the stop, else a spring.
 
     The stop is met without a force, so both are true, each for one sense of the load.
     """
@@ -350,11 +343,3 @@ def test_both_sides_of_a_change_of_contact(state):
     away = platform_stiffness(posture, state, side="letting go")
     assert stop.along(UNIT[5])[0] == np.inf
     assert away.along(UNIT[5])[0] == pytest.approx(1e5)
-
-
-def test_an_unknown_state_and_a_direction_that_is_none_are_refused():
-    posture = home_posture(load_robot("four_bar"))
-    with pytest.raises(ValueError, match="no state"):
-        platform_stiffness(posture, "loose")
-    with pytest.raises(ValueError, match="not all 0"):
-        platform_stiffness(posture).shares(np.zeros(6))

@@ -14,15 +14,10 @@ from assembly.platform_stiffness.vibration import natural_modes
 from assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
 from stiffness.screws import rotation_matrix
+from tests.assembly.exact.test_exact import only
 
 MESHES = Path(__file__).parents[3] / "meshes"
 LENGTH, SIDE, E, RHO = 1.0, 0.02, 70e9, 2700.0
-
-
-def only(row, stiffness):
-    K = np.diag([np.inf] * 6)
-    K[row, row] = stiffness
-    return K
 
 
 def cantilever(pieces, axis=(1.0, 0.0, 0.0)):

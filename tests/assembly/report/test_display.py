@@ -16,7 +16,7 @@ from assembly.linear.reference.pose_error import reachable_screws
 from assembly.linear.zone import zone_margin
 from assembly.model.robot import Clearance
 from assembly.report.results import solution_of, solution_text
-from forcefit.inputs.display import brief, html_table, short_repr
+from forcefit.results.display import brief, html_table, short_repr
 from stiffness.beam.beam import beam_compliance
 from stiffness.beam.sections import round_section
 from stiffness.link import LinkStiffness
@@ -72,9 +72,10 @@ def test_a_notebook_gets_the_same_figures(shown):
 
 def test_an_assembly_shows_what_the_command_prints(answer):
     printed = solution_text(solution_of(answer.posture))
-    for name in ("energy", "platform error"):
-        (said,) = re.findall(rf"^{name}: (.*)$", printed, flags=re.M)
-        assert f"{name:14}  {said}\n" in answer.summary()
+    shown = answer.summary()
+    for name in ("pose", "assembly energy", "platform error"):
+        (said,) = re.findall(rf"^  {name}  +(.*)$", printed, flags=re.M)
+        assert re.findall(rf"^  {name}  +(.*)$", shown, flags=re.M) == [said]
     assert answer.summary() == repr(answer)
 
 

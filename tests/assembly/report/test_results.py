@@ -12,7 +12,7 @@ from assembly.model.robot import Clearance, Frame, MeshLink, Robot
 from assembly.report.pose_errors import pose_error_of
 from assembly.report.results import solution_of, solution_text
 from assembly.robots import load_robot
-from forcefit.inputs.display import largest_row
+from forcefit.results.display import largest_row
 
 
 def test_largest_error_that_solve_names_is_the_one_that_error_certifies():
@@ -26,7 +26,7 @@ def test_largest_error_that_solve_names_is_the_one_that_error_certifies():
     assert results["worst_error"]["translation"] == pytest.approx(5e-5, abs=1e-6)
     certified = pose_error_of(posture, ["frozen"])["error"]["frozen"]["translation"]
     assert results["worst_error"]["translation"] == certified["upper"]
-    assert "assumption frozen of assembly error" in solution_text(results)
+    assert "assumption frozen of (27)" in solution_text(results)
 
 
 def test_wrenches_leave_out_what_is_rounding_of_the_largest():

@@ -67,7 +67,7 @@ def test_units_and_dimensions_are_those_of_sweeps(answer, batches):
         for name, variable in one.to_xarray().data_vars.items():
             if name in asked:
                 seen.add(name)
-                assert variable.attrs["units"] == asked[name].unit, name
+                assert variable.attrs["units"] == asked[name].quantity.unit, name
                 assert variable.dims == ("point", *asked[name].dims), name
     assert seen >= {"energy", "margin", "platform_screw", "rotation_error"}
 

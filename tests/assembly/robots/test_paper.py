@@ -10,6 +10,7 @@ import pytest
 from assembly.kinematics.posture import place_many
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
+from assembly.robots.irsbot2 import irsbot2
 from assembly.sweeps.sweep import assemblable, sweep_poses
 from assembly.sweeps.targets import parse_grid
 from tests.robots_for_tests import NUMBERS, irsbot2_with
@@ -88,8 +89,6 @@ def test_pose_errors_have_the_references_least_median_and_largest_values(case):
 @pytest.mark.slow
 def test_clearances_alone_give_the_references_pose_errors():
     """A 100 mm grid, in x > 0 by symmetry: within the table's least and largest."""
-    from assembly.robots.irsbot2 import irsbot2
-
     x, z = np.meshgrid(np.arange(0, 0.61, 0.1), np.arange(-0.7, -0.05, 0.1))
     poses = np.full((x.size, 6), np.nan)
     poses[:, 0], poses[:, 2] = x.ravel(), z.ravel()

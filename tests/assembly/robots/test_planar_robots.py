@@ -109,7 +109,7 @@ def test_3rrr_drives_follow_gosselin_and_angeles(rng):
 
 
 def only_radial(robot):
-    """The robot's play, its radial part alone: everything stays in the plane."""
+    """The robot's clearance, its radial part alone: everything stays in the plane."""
     bare = (
         replace(f, clearance=f.clearance and Clearance(radial=f.clearance.radial))
         for f in robot.frames
@@ -148,7 +148,7 @@ def arm_lines(posture):
     return np.array(lines)
 
 
-def test_3rrr_reaches_as_far_as_its_pins_play(rng):
+def test_3rrr_reaches_as_far_as_its_pins_clearance(rng):
     """The support of the reachable errors, w.x <= sum of |f| 2c over the legs.
 
     A leg's second arm passes a force f along itself; its two pins give by c each.

@@ -82,8 +82,8 @@ def test_arm_under_load_gives_by_its_drives(rng):
     assert np.abs((found - expected) / np.outer(size, size)).max() < 1e-12
 
 
-def test_arm_reaches_as_far_as_its_joints_play(rng):
-    """A load pushes every joint to the bound of its play, each by itself."""
+def test_arm_reaches_as_far_as_its_joints_clearance(rng):
+    """A load pushes every joint to the bound of its clearance, each by itself."""
     posture = place_robot(only_play(BUILT_IN["arm6"]()), pose=random_pose("arm6", rng))
     play = Clearance(radial=5e-6, axial=5e-6, tilt=5e-5, spin=1e-4)
     answer = solve_assembly(posture, LOAD)

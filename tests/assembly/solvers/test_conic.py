@@ -3,16 +3,8 @@
 import numpy as np
 import pytest
 
-from assembly.solvers import conic
-from assembly.solvers.cones import cone_sizes, cone_starts
-from assembly.solvers.conic import (
-    ConeProgramme,
-    _certified,
-    _certify,
-    _compiled,
-    least_factor,
-    minimise_energy,
-)
+from assembly.solvers.cones import cone_sizes
+from assembly.solvers.conic import least_factor, minimise_energy
 
 GROUP = np.array([0, 0, 1, 2, 2])
 
@@ -21,15 +13,6 @@ GROUP = np.array([0, 0, 1, 2, 2])
 def rng():
     """Of problems whose rows the interior-point method closes to 1e-11."""
     return np.random.default_rng(3)
-
-
-def programme(rng, push=1.0, rows=1):
-    """Of size 1, with a point within the cones that closes the rows."""
-    H = np.linalg.qr(rng.normal(size=(5, rows)))[0].T.copy()
-    return ConeProgramme(
-        rng.normal(size=(4, 5)) / 3, push * rng.normal(size=4) / 2,
-        0.1 * rng.normal(size=5), H, H @ np.array([0.3, -0.2, 0.4, 0.1, 0.2]), GROUP,
-    )  # fmt: skip
 
 
 def test_nothing_to_close_costs_nothing_and_no_clearance_costs_all(rng):
@@ -64,60 +47,6 @@ def test_within_all_cones_the_solution_is_that_of_linear_equations(rng, unit, sc
     assert 0 <= least.gap + 1e-15 * unit <= 1e-8 * unit
 
 
-def test_every_solver_of_the_chain_proves_the_same(rng):
-    p = programme(rng)
-    least = minimise_energy(*p)
-    for solve in conic._SOLVERS["compiled"]:
-        u, rigid, status = solve(*p)
-        assert status in {"Solved", "AlmostSolved"}
-        np.testing.assert_allclose(p.H @ u, p.k, atol=1e-11)
-        own = _certify(p, conic.into_cones(u, GROUP), p.G @ u + p.h, rigid)
-        assert own.value == pytest.approx(least.value, abs=1e-10)
-        assert own.gap <= 1e-10
-
-
-@pytest.mark.parametrize(
-    ("push", "rows"), [(0.2, 0), (1.0, 0), (5.0, 0), (1.0, 1), (5.0, 1)]
-)
-def test_newton_proves_what_a_poor_guess_does_not(rng, push, rows):
-    p = programme(rng, push, rows)
-    u, n, _ = _compiled(*p)
-    value = _certify(p, u, p.G @ u + p.h, n).value
-    poor, refined = _certified(p, 0.9 * u, 0.9 * n, "compiled")
-    assert poor.gap > 1e-4
-    assert refined.gap <= 1e-9 * (abs(refined.value) + 0.01 * p.h @ p.h)
-    assert refined.value == pytest.approx(value, abs=1e-9)
-    np.testing.assert_allclose(p.H @ refined.clearances, p.k, atol=1e-11)
-    # the multipliers are those of the optimum, with their signs
-    slope = p.G.T @ refined.springs - p.d - p.H.T @ refined.rigid_multipliers
-    force = -np.bincount(GROUP, slope * refined.clearances)
-    np.testing.assert_allclose(slope, -force[GROUP] * refined.clearances, atol=1e-4)
-
-
-def test_without_loads_any_multiple_of_multipliers_proves_as_much(rng):
-    """f gain - f^2 cost / 2 is best at gain / cost, at 0 if nothing is gained."""
-    p = programme(rng)._replace(d=np.zeros(5))
-    u, n, _ = _compiled(*p)
-    springs = p.G @ u + p.h
-    for size in (1e-3, 0.3, 1.0, 20.0):
-        y, m = size * springs, size * n
-        gain = y @ p.h + m @ p.k - cone_sizes(p.G.T @ y - p.H.T @ m, GROUP).sum()
-        assert gain > 0.0
-        own = _certify(p, u, y, m)
-        assert own.bound == pytest.approx(gain**2 / (2 * y @ y), rel=1e-9)
-        # the multipliers kept are those of the proof
-        z = p.G.T @ own.springs - p.H.T @ own.rigid_multipliers
-        proof = own.springs @ p.h + own.rigid_multipliers @ p.k
-        proof -= own.springs @ own.springs / 2 + cone_sizes(z, GROUP).sum()
-        assert own.bound == pytest.approx(proof, rel=1e-12)
-        assert _certify(p, u, -y, -m).bound == pytest.approx(0.0, abs=1e-15)
-    assert _certify(p, u, 0 * springs, 5.0 * np.sign(p.k) * -1.0).bound == 0.0
-
-
-def test_columns_of_cones_begin_where_their_number_does():
-    assert cone_starts(GROUP).tolist() == [0, 2, 3, 5]
-
-
 @pytest.mark.parametrize("row", [1e-5, 1.0, 1e4])
 @pytest.mark.parametrize("fixed", [False, True])
 def test_the_least_factor_is_proved_by_its_multipliers(rng, row, fixed):
@@ -135,22 +64,6 @@ def test_the_least_factor_is_proved_by_its_multipliers(rng, row, fixed):
     own = scaled[[0, 2, 3]]
     assert reach[own].sum() == pytest.approx(1.0, abs=1e-7)
     assert n @ right - reach[~own].sum() == pytest.approx(t, rel=1e-7)
-
-
-def test_a_factor_of_1_is_found_at_the_first_attempt(monkeypatch):
-    """u = 5 along a disc of (3, 4)."""
-    solve, calls = conic._clarabel, []
-
-    def counted(*given):
-        calls.append(given[-1])
-        return solve(*given)
-
-    monkeypatch.setattr(conic, "_clarabel", counted)
-    B, all_scaled = np.array([[0.6, 0.8]]), np.array([True, True])
-    t, u, _ = least_factor(B, np.array([5.0]), np.zeros(2, np.int64), all_scaled)
-    assert t == pytest.approx(5.0, rel=1e-10)
-    np.testing.assert_allclose(u, [3.0, 4.0], rtol=1e-6)
-    assert calls == [0.0]
 
 
 @pytest.mark.parametrize("reach", [1.2, 1.9, 30.0])

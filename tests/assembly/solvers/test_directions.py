@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog, minimize_scalar
+from scipy.optimize import linprog
 
 from assembly.solvers.cones import cone_sizes, cone_starts
 from assembly.solvers.one_problem import farthest_points
@@ -53,20 +53,6 @@ def test_multipliers_prove_that_no_point_is_farther(rng, rows):
         most = multipliers[i] @ H @ start[i] + cone_sizes(gradient, GROUP).sum()
         assert -1e-12 <= most - d[i] @ points[i] <= 1.1e-9
         assert d[i] @ points[i] >= d[i] @ start[i] - 1e-9
-
-
-def test_one_row_has_the_multiplier_that_bounds_best(rng):
-    """The bound is convex in n: its least by a search along a line."""
-    H, d = rows_of(rng, 1), directions_of(rng, 1)
-    start = rng.uniform(-0.4, 0.4, size=6)
-    points, multipliers, _ = found(H, GROUP, d, (start @ H.T)[None])
-
-    def bound(n):
-        return n * (H[0] @ start) + cone_sizes(d[0] - n * H[0], GROUP).sum()
-
-    least = minimize_scalar(bound, (-1, 1), tol=1e-12)
-    assert d[0] @ points[0] == pytest.approx(least.fun, abs=1e-8)
-    assert multipliers[0, 0] == pytest.approx(least.x, abs=1e-3)
 
 
 def test_intervals_alone_are_a_linear_programme(rng):

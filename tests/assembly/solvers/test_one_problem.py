@@ -1,7 +1,5 @@
 """One cone programme, and one farthest screw: closed forms, Clarabel, proofs."""
 
-from itertools import product
-
 import cvxpy as cp
 import numpy as np
 import pytest
@@ -64,11 +62,6 @@ def interior_point(p, tolerance):
     return one_problem.interior_point(p[:5], cone_starts(p.group), tolerance)
 
 
-def newton(p, u, y, relative=1e-11, absolute=1e-12, first_sigma=1e4, steps=60):
-    limits = one_problem.SolverLimits(relative, absolute, first_sigma, steps)
-    one_problem.newton(p[:5], cone_starts(p.group), limits, u, y)
-
-
 @pytest.mark.parametrize("rows", [0, 1, 2])
 @pytest.mark.parametrize("widest", [2, 7])
 @pytest.mark.parametrize("seed", range(3))
@@ -82,84 +75,6 @@ def test_the_interior_point_is_clarabels_least_value_and_proves_it(seed, widest,
     # rounding of the rows may end it just before
     most = 1e-8 if rows else 1.1e-9
     assert value(p, u) - proved(p, p.G @ u + p.h, n) <= most
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_however_large_a_gap_may_be_it_is_kept_and_rows_are_closed(seed):
-    p = programme(seed, 2)
-    for tolerance in (100.0, 1e-2):
-        u, _ = interior_point(p, tolerance)
-        assert value(p, u) - least(p) <= 1.01 * tolerance
-        assert np.abs(p.H @ u - p.k).max() < 1e-12
-
-
-def test_the_farthest_point_of_a_disc_is_its_rim():
-    none = np.zeros((0, 2))
-    disc = none, np.zeros(0), np.array([3.0, 4.0]), none, np.zeros(0)
-    u, _ = one_problem.interior_point(disc, np.array([0, 2]), 1e-12)
-    np.testing.assert_allclose(u, [0.6, 0.8], atol=1e-6)
-    assert 5.0 - disc[2] @ u <= 1e-12
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_newton_after_a_rough_start_proves_its_gap(seed):
-    p = programme(seed, 0)
-    u, _ = interior_point(p, 1e-4)
-    y = p.G @ u + p.h
-    newton(p, u, y)
-    assert (cone_sizes(u, GROUP) <= 1 + 1e-14).all()
-    gap = value(p, u) - proved(p, y, np.zeros(0))
-    energy = float(np.sum((p.G @ u + p.h) ** 2) / 2)
-    assert -1e-13 <= gap <= 1e-11 * energy + 1e-12 + 1e-13
-    assert value(p, u) == pytest.approx(least(p), abs=1e-8)
-
-
-def test_without_smoothing_newton_is_done_where_all_cones_are_active():
-    """|G_k^T h| large: the solution is on every rim, the dual smooth about it."""
-    rng = np.random.default_rng(2)
-    G, u, y = rng.normal(size=(6, 6)), *np.zeros((2, 6))
-    h, none = 30 * G @ rng.normal(size=6), (np.zeros((0, 6)), np.zeros(0))
-    p = ConeProgramme(G, h, np.zeros(6), *none, GROUP)
-    newton(p, u, y, 1e-12, 0.0, first_sigma=0.0, steps=20)
-    np.testing.assert_allclose(cone_sizes(u, GROUP), 1.0, rtol=1e-12)
-    # a clearance lies against its force
-    z = G.T @ y
-    np.testing.assert_allclose(u, -z / cone_sizes(z, GROUP)[GROUP], atol=1e-6)
-
-
-def solved(seed, rows):
-    """A problem made from its solution: every cone presses, with a force z of 1 to 2.
-
-    u = -z / |z| there, and z = G^T y + H^T n - d, h = y - G u, k = H u.
-    """
-    rng = np.random.default_rng(seed)
-    G, y = rng.normal(size=(SPRINGS, 6)) / 3, rng.normal(size=SPRINGS)
-    H = np.linalg.qr(rng.normal(size=(6, rows)))[0].T.copy()
-    n = rng.normal(size=rows)
-    z = rng.normal(size=6)
-    sizes = cone_sizes(z, GROUP)[GROUP]
-    u = -z / sizes
-    z *= rng.uniform(1, 2, GROUP[-1] + 1)[GROUP] / sizes
-    d = G.T @ y + H.T @ n - z
-    return ConeProgramme(G, y - G @ u, d, H, H @ u, GROUP), u, np.r_[y, n]
-
-
-@pytest.mark.parametrize("rows", [0, 1, 2])
-@pytest.mark.parametrize("seed", range(8))
-def test_newton_converges_from_near_where_every_cone_presses(seed, rows):
-    """There the dual is smooth; rows are closed to the 1e-13 that it accepts."""
-    p, expected, multipliers = solved(seed, rows)
-    away = np.random.default_rng(seed).uniform(-1e-3, 1e-3, (2, 6))
-    u, y = (1 - 1e-3) * expected + away[0] / 10, multipliers.copy()
-    y[SPRINGS:] += away[1, :rows]
-    newton(p, u, y, 1e-10, 1e-13)
-    assert np.abs(p.H @ u - p.k).max(initial=0.0) < 3e-13
-    energy = float(np.sum((p.G @ u + p.h) ** 2) / 2)
-    gap = value(p, u) - proved(p, y[:SPRINGS], y[SPRINGS:])
-    assert gap <= 1.01e-10 * energy + 1e-12
-    # the dual curves by 1 along the springs: |y - y*|^2 / 2 is no more than the gap
-    assert y[:SPRINGS] == pytest.approx(multipliers[:SPRINGS], abs=1e-4)
-    assert value(p, u) == pytest.approx(value(p, expected), abs=1e-9)
 
 
 @pytest.mark.parametrize("widest", [1, 2, 3, 20])
@@ -237,44 +152,6 @@ def test_of_an_ellipse_two_supports_tell_all():
     assert low == pytest.approx(np.sqrt(6.5), abs=1e-6)
     assert high - low <= 1e-6
     assert supports <= 2
-
-
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("part", [0, 3])
-def test_of_intervals_the_farthest_is_one_of_all_corners(seed, part):
-    body = body_of(np.random.default_rng(seed), np.arange(6))
-    corners = np.array(list(product([-1.0, 1.0], repeat=6)))
-    points = body.centre + (corners - body.start) @ body.map.T
-    farthest = np.linalg.norm(points[:, part : part + 3], axis=1).max()
-    (low, high), screw, supports = body.farthest(part, 0.01 * farthest)
-    assert low == pytest.approx(farthest, rel=1e-12)  # it is a corner
-    assert farthest * (1 - 1e-13) <= high <= low + 0.01 * farthest
-    assert np.linalg.norm(screw[part : part + 3]) == pytest.approx(low, rel=1e-13)
-    assert supports < 40
-
-
-@pytest.mark.parametrize("rows", [0, 1, 3])
-@pytest.mark.parametrize("seed", range(3))
-def test_of_a_zonotope_with_rows_the_farthest_is_one_of_its_corners(seed, rows):
-    """Of intervals with equations every corner has all but so many at their ends."""
-    rng = np.random.default_rng(seed)
-    body = body_of(rng, np.arange(6), rows)
-    right, farthest = body.rows @ body.start, 0.0
-    for free in product([False, True], repeat=6):
-        own = np.array(free)
-        if own.sum() != rows:
-            continue
-        for ends in product([-1.0, 1.0], repeat=6 - rows):
-            v = np.zeros(6)
-            v[~own] = ends
-            v[own] = np.linalg.solve(body.rows[:, own], right - body.rows @ v)
-            if np.abs(v).max() <= 1 + 1e-12:
-                point = body.centre + body.map @ (v - body.start)
-                farthest = max(farthest, float(np.linalg.norm(point[3:])))
-    (low, high), _, _ = body.farthest(3, 1e-3 * farthest)
-    assert low <= farthest * (1 + 1e-12)
-    assert high >= farthest * (1 - 1e-12)
-    assert high - low <= 1e-3 * farthest
 
 
 @pytest.mark.parametrize("widest", [2, 12])

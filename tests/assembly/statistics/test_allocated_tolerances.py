@@ -91,7 +91,7 @@ def test_draws_that_are_undecided_are_told_with_the_looks():
     assert text.endswith("95% for all, 3 draws undecided)")
 
 
-def test_the_play_is_told_where_a_pose_error_is_limited():
+def test_the_clearance_is_told_where_a_pose_error_is_limited():
     for limits, play in (({"rotation": 1e-3}, "worst"), ({"energy": 1.0}, None)):
         plain = allocation_of(allocation(limits=limits))
         assert plain["clearance"] == play

@@ -26,28 +26,6 @@ def walked(starts, M, u, every=1, kept=1, seed=1, to_screw=None):
     return u, trace, draw_generator(seed, 0, 9)
 
 
-@pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("size", [0.1, 1.0, 5.0])
-def test_in_a_box_every_side_is_a_folded_straight_line(seed, size):
-    """A random direction, normal, for a random time, exponential; each side folds."""
-    M, start = size * np.diag([1.0, 0.5, 2.0]), np.array([0.9, -0.3, 0.0])
-    u, _, rng = walked([0, 1, 2, 3], M, start, seed=seed)
-    way = M @ rng.standard_normal(3) * FLIGHT * rng.standard_exponential()
-    folded = np.abs((start + way - 1) % 4 - 2) - 1
-    np.testing.assert_allclose(u, folded, atol=1e-9)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_on_a_segment_a_line_folds_unless_it_is_reflected_too_often(seed):
-    """Beyond forty times the point stays where it was."""
-    u, _, rng = walked([0, 1], [[3.0]], [0.25], seed=seed)
-    way = 3.0 * rng.standard_normal() * FLIGHT * rng.standard_exponential()
-    assert u[0] == pytest.approx(np.abs((0.25 + way - 1) % 4 - 2) - 1, abs=1e-9)
-    assert u[0] != 0.25
-    still, _, _ = walked([0, 1], [[3e4]], [0.25], seed=seed)
-    assert still[0] == 0.25
-
-
 def reflected(starts, M, u, speed, left):
     """The same in coordinates y of u = M y, where reflections are those of mirrors."""
     for _ in range(1000):

@@ -11,32 +11,25 @@ from assembly.statistics.clearance_positions import position_clearances
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.linear_response import linear_response
 from tests.robots_for_tests import random_robot, with_bounded_motion
+from tests.tolerances_for_tests import ARM, arm
 
-SPIN, RADIAL, ARM = 1e-4, 1e-6, 1.0
-
-
-def hinge(joint="revolute", **clearance):
-    """A passive joint with bounded motion, and an arm of 1 m across its axis."""
-    frames = (
-        Frame("hinge", joint=joint, clearance=Clearance(**clearance)),
-        Frame("tip", "hinge", [ARM, 0, 0]),
-    )
-    return Robot("hinge", "tip", frames)
+SPIN, RADIAL = 1e-4, 1e-6
 
 
-def positions(robot, clearance_model, errors, count=200, **options):
+def positions(robot, clearance, errors, count=200, **options):
     """Platform screws of draws that all have the same errors."""
     prepared = linear_response(home_posture(robot), **options)
     draws = prepared.solve(np.repeat(np.asarray(errors, dtype=float)[None], count, 0))
     rngs = [draw_generator(3, i, 9) for i in range(count)]
-    screws, mixed = position_clearances(prepared, draws, clearance_model, rngs)
+    screws, mixed = position_clearances(prepared, draws, clearance, rngs)
     assert mixed.all()
     return screws
 
 
 def test_a_hinge_at_contact_turns_to_the_end_of_its_motion():
     """The tip moves by arm times angle along y, and by the radius along the force."""
-    screws = positions(hinge(radial=RADIAL, spin=SPIN), "contact", np.zeros((2, 6)))
+    hinge = arm(passive=True, radial=RADIAL, spin=SPIN)
+    screws = positions(hinge, "contact", np.zeros((2, 6)))
     np.testing.assert_allclose(np.abs(screws[:, 2]), SPIN, rtol=1e-6)
     radial = screws[:, 3:5] - np.stack([0 * screws[:, 2], ARM * screws[:, 2]], axis=1)
     np.testing.assert_allclose(np.linalg.norm(radial, axis=1), RADIAL, rtol=1e-3)
@@ -47,7 +40,7 @@ def test_a_hinge_at_contact_turns_to_the_end_of_its_motion():
     ("joint", "key", "component"), [("revolute", "spin", 2), ("prismatic", "axial", 5)]
 )
 def test_a_bounded_joint_is_uniform_over_its_motion(joint, key, component):
-    robot = hinge(joint, **{key: SPIN})
+    robot = arm(passive=True, joint=joint, **{key: SPIN})
     screws = positions(robot, "uniform", np.zeros((2, 6)))
     part = (screws[:, component] / SPIN + 1) / 2
     assert stats.kstest(part, "uniform").pvalue > 1e-3
@@ -78,12 +71,12 @@ def test_two_hinges_on_one_axis_turn_as_far_as_both_let_them(error, steel):
     assert 0.3 < (ends > (low + high) / 2).mean() < 0.7
 
 
-@pytest.mark.parametrize("clearance_model", ["uniform", "contact", "least"])
-def test_a_moment_turns_a_hinge_to_the_end_of_its_motion(clearance_model):
+@pytest.mark.parametrize("clearance", ["uniform", "contact", "least"])
+def test_a_moment_turns_a_hinge_to_the_end_of_its_motion(clearance):
     """Under 5 N m about its axis it stops at +spin, whatever is assumed."""
-    robot = hinge(spin=SPIN)
+    robot = arm(passive=True, spin=SPIN)
     load = [0, 0, 5.0, 0, 0, 0]
-    screws = positions(robot, clearance_model, np.zeros((2, 6)), 5, load=load)
+    screws = positions(robot, clearance, np.zeros((2, 6)), 5, load=load)
     np.testing.assert_allclose(screws[:, 2], SPIN, rtol=1e-6)
 
 
@@ -95,7 +88,7 @@ def test_no_clearance_model_exceeds_the_certified_worst_in_any_draw(seed):
     sources = tolerance_sources(robot, [1e-5] * 6, [f.name for f in robot.frames])
     rows = {
         model: Experiment(
-            home_posture(robot), sources, margins=False, clearance_model=model
+            home_posture(robot), sources, margins=False, clearance=model
         ).solve(0, 12)
         for model in ("worst", "uniform", "contact", "least")
     }

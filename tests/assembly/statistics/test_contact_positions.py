@@ -5,10 +5,10 @@ import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.model.error_distributions import draw_generator
-from assembly.model.robot import Clearance, Frame, Robot
 from assembly.statistics.clearance_positions import position_clearances
 from assembly.statistics.contact_positions import move_to_contact
 from assembly.statistics.linear_response import linear_response
+from tests.tolerances_for_tests import ARM, arm
 
 
 def moved(directions, starts, rows=(), free=None, positions=None):
@@ -41,7 +41,7 @@ def test_equations_are_kept_with_what_they_were():
     np.testing.assert_allclose(found, [[1, 0.5, 1], [-0.5, -1, -1]], atol=1e-5)
 
 
-def test_what_is_loaded_stays_where_it_is():
+def test_loaded_clearances_stay_in_place():
     """Its direction does not count, nor does it enter the equations."""
     start = np.array([[0.6, 0.8, 0.1, -0.2]])
     row = np.array([[0.0, 0.0, 1.0, 1.0]]) / np.sqrt(2)
@@ -68,15 +68,11 @@ def test_the_contact_length_weighs_moments_against_forces(length):
     s = sqrt(1 + (L / length)^2).  Their direction is that of the tilt, so the platform
     moves along z by L t |cos|, whose median is L t s / sqrt(1 + s^2).
     """
-    arm, tilt = 0.4, 2e-3
-    frames = (
-        Frame("pin", joint="revolute", actuated=True, clearance=Clearance(tilt=tilt)),
-        Frame("tip", "pin", [arm, 0, 0]),
-    )
-    prepared = linear_response(home_posture(Robot("arm", "tip", frames)))
+    tilt = 2e-3
+    prepared = linear_response(home_posture(arm(tilt=tilt)))
     draws = prepared.solve(np.zeros((4000, 2, 6)))
     rngs = [draw_generator(3, i, 9) for i in range(4000)]
     screws, _ = position_clearances(prepared, draws, "contact", rngs, length)
-    s = np.hypot(1.0, arm / length)
-    expected = arm * tilt * s / np.hypot(1.0, s)
+    s = np.hypot(1.0, ARM / length)
+    expected = ARM * tilt * s / np.hypot(1.0, s)
     assert np.median(np.abs(screws[:, 5])) == pytest.approx(expected, rel=0.03)

@@ -1,4 +1,4 @@
-"""Records of draws: two springs in a row, and an arm with play at its pin."""
+"""Records of draws: two springs in a row, and an arm with clearance at its pin."""
 
 from dataclasses import replace
 
@@ -9,38 +9,35 @@ from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.model.error_distributions import tolerance_sources
 from assembly.model.link_stress import peak_stresses
-from assembly.model.robot import Clearance, Frame, Robot
+from assembly.model.robot import Clearance
 from assembly.robots import load_robot
 from assembly.statistics.experiment import Experiment, precision_for
 from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.summary import summarise, summary_text
 from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import coaxial_beams
+from tests.tolerances_for_tests import PLAY, arm, rigid_pair
 
-STIFFNESS, PLAY = 1e6, 1e-4  # [N/m], [m]
+STIFFNESS = 1e6  # [N/m]
 
 
-def springs(clearance=PLAY, **options):
-    """Two bars of 0.5 m that meet on the x axis, with play between them."""
-    play = Clearance(radial=clearance)
+def springs(radial=PLAY, **options):
+    """Two bars of 0.5 m that meet on the x axis, with clearance between them."""
+    play = Clearance(radial=radial)
     robot = coaxial_beams(np.zeros(6), (STIFFNESS, STIFFNESS), clearance=play)
     sources = tolerance_sources(robot, [0, 0, 0, 4e-4, 4e-4, 0], ("one", "two"))
     return Experiment(home_posture(robot), sources, **options)
 
 
-def arm(**options):
-    """An arm of 0.4 m whose pin has play; its tip has errors."""
-    frames = (
-        Frame("pin", joint="revolute", actuated=True, clearance=Clearance(radial=PLAY)),
-        Frame("tip", "pin", [0.4, 0, 0]),
-    )
-    robot = Robot("arm", "tip", frames)
+def tip(**options):
+    """An arm with clearance of its pin and errors of its tip."""
+    robot = arm(radial=PLAY)
     sources = tolerance_sources(robot, [1e-3, 0, 0, 3e-4, 3e-4, 3e-4], ("tip",))
     return Experiment(home_posture(robot), sources, **options)
 
 
 def test_pressed_springs_carry_one_force_and_its_moment_at_the_mount():
-    """Beyond the play p of a gap d: k (d - p)^2 / 4, k (d - p) / 2, half a metre of it.
+    """Beyond the clearance p of a gap d: k (d - p)^2 / 4, k (d - p) / 2, half of that.
 
     Margins are d/p in both readings, as no joint is compliant; nothing is short of
     the least energy by more than rounding.
@@ -68,7 +65,7 @@ def test_pressed_springs_carry_one_force_and_its_moment_at_the_mount():
 @pytest.mark.parametrize("axis", range(3))
 def test_bars_that_are_turned_against_each_other_carry_a_moment_alone(axis):
     """Springs k of both ends, turned by d about an axis on their line: k d / 2."""
-    experiment = springs(margins=False, clearance_model="least")
+    experiment = springs(margins=False, clearance="least")
     widths = np.zeros(6)
     widths[axis] = 1e-3
     robot = experiment.posture.robot
@@ -82,10 +79,9 @@ def test_bars_that_are_turned_against_each_other_carry_a_moment_alone(axis):
     np.testing.assert_allclose(rows["force"], 0.0, atol=1e-3)
 
 
-def test_what_does_not_close_has_a_status_and_no_numbers():
-    """Rigid parts without play fit where both errors are equal."""
-    frames = (Frame("one", translation=[0.5, 0, 0]), Frame("two", "base", [0.5, 0, 0]))
-    robot = Robot("rigid", "one", frames, (("one", "two"),))
+def test_draws_that_do_not_close_have_a_status_and_no_numbers():
+    """Rigid parts without clearance fit where both errors are equal."""
+    robot = rigid_pair()
     sources = tolerance_sources(robot, [0, 0, 0, 3e-4, 0, 0], ("one", "two"))
     rows = Experiment(home_posture(robot), sources, margins=False).evaluate(
         np.array([[1e-4, 1e-4], [1e-4, 2e-4]]), range(2)
@@ -97,7 +93,7 @@ def test_what_does_not_close_has_a_status_and_no_numbers():
 
 
 def test_later_draws_are_those_of_a_longer_run():
-    experiment = springs(clearance_model="contact", seed=4)
+    experiment = springs(clearance="contact", seed=4)
     whole, later = experiment.solve(0, 9), experiment.solve(5, 4)
     assert len(later) == 4
     for name in ("energy", "force", "translation", "platform_screw"):
@@ -107,7 +103,7 @@ def test_later_draws_are_those_of_a_longer_run():
 
 @pytest.mark.parametrize("model", ["least", "uniform", "contact"])
 def test_a_pose_error_is_the_size_of_its_part_of_the_screw(model):
-    rows = arm(clearance_model=model).solve(0, 6)
+    rows = tip(clearance=model).solve(0, 6)
     screws = rows["platform_screw"]
     for part, name in ((slice(0, 3), "rotation"), (slice(3, 6), "translation")):
         size = np.sqrt((screws[:, part] ** 2).sum(axis=1))
@@ -120,8 +116,8 @@ def test_a_pose_error_is_the_size_of_its_part_of_the_screw(model):
 
 
 def test_the_worst_pose_errors_have_bounds_of_the_precision_asked_for():
-    """An error e about x and play: rotation |e|, and hypot(e_xy + p, e_z)."""
-    experiment = arm(precision=(1e-8, 1e-7))
+    """An error e about x and clearance: rotation |e|, and hypot(e_xy + p, e_z)."""
+    experiment = tip(precision=(1e-8, 1e-7))
     values = experiment.sources.draw(0, 30, seed=2)
     rows = experiment.evaluate(values, range(30))
     truth = {
@@ -133,7 +129,7 @@ def test_the_worst_pose_errors_have_bounds_of_the_precision_asked_for():
         assert (lower <= size * (1 + 1e-12)).all()
         assert (size <= upper * (1 + 1e-12)).all()
         assert (upper - lower).max() <= 1.001 * width
-    # beside them the screw is that of the solution, which leaves the play alone
+    # beside them the screw is that of the solution, which leaves the clearance alone
     np.testing.assert_allclose(rows["platform_screw"][:, 3:], values[:, 1:], atol=1e-12)
 
 
@@ -141,7 +137,7 @@ def test_stress_is_that_of_the_links_alone_and_of_none_where_it_is_left_out(rng)
     posture = place_robot(load_robot("irsbot2"), {"tx": 0.1, "tz": -0.5})
     robot = posture.robot
     sources = tolerance_sources(robot, [0, 0, 0, 2e-3, 0, 0])
-    experiment = Experiment(posture, sources, margins=False, clearance_model="least")
+    experiment = Experiment(posture, sources, margins=False, clearance="least")
     values = rng.uniform(-2e-3, 2e-3, size=(2, len(sources)))
     rows = experiment.evaluate(values, range(2))
     assert experiment.links == tuple(
@@ -173,41 +169,18 @@ def test_limits_on_what_is_not_computed_are_refused():
         assert str(error.value) == message
 
 
-def test_a_load_that_nothing_resists_is_refused_by_the_robot_s_name():
-    frames = (Frame("slide", joint="prismatic"), Frame("tip", "slide", [0.1, 0, 0]))
-    robot = Robot("sledge", "tip", frames)
-    sources = tolerance_sources(robot, [0, 0, 0, 1e-4, 0, 0], ("tip",))
-    experiment = Experiment(
-        home_posture(robot), sources, load=(0.0, 0.0, 0.0, 0.0, 0.0, 5.0)
-    )
-    with pytest.raises(BadInput, match="^sledge: "):
-        experiment.solve(0, 1)
-
-
-@pytest.mark.parametrize(
-    ("limits", "precision"),
-    [
-        ({}, (1e-6, 1e-6)),
-        ({"translation": 1e-4}, (1e-6, 1e-7)),
-        ({"rotation": 2e-5, "energy": 1e-9}, (2e-8, 1e-6)),
-        ({"rotation": 5.0, "translation": 5.0}, (1e-6, 1e-6)),
-    ],
-)
-def test_a_tight_limit_asks_for_a_thousandth_of_it(limits, precision):
-    assert precision_for(limits) == pytest.approx(precision)
-    if "translation" in limits:
-        half = precision_for(limits, 5e-4)
-        assert half[1] == pytest.approx(min(1e-6, limits["translation"] * 5e-4))
+def test_a_tight_limit_is_bracketed_to_a_thousandth_of_itself():
+    found = precision_for({"rotation": 2e-5, "translation": 1e-4})
+    assert found == pytest.approx((2e-8, 1e-7))
 
 
 @pytest.mark.parametrize("contact_length", [None, 0.25])
 def test_the_contact_length_is_named_with_the_pose_errors(contact_length):
     """In the text, the plain values and the data set: given, or the longest body."""
-    frames = (Frame("pin"), Frame("tip", "pin", [0.4, 0, 0]))
-    robot = Robot("arm", "tip", frames)
+    robot = arm()
     sources = tolerance_sources(robot, [0, 0, 0, 1e-4, 0, 0], ("tip",))
     data = run_draws(
-        Experiment(home_posture(robot), sources, clearance_model="contact",
+        Experiment(home_posture(robot), sources, clearance="contact",
                    contact_length=contact_length), 20,
     )  # fmt: skip
     summary, length = summarise(data), contact_length or 0.4

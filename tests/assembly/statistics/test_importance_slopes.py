@@ -5,12 +5,12 @@ import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import tolerance_sources
-from assembly.model.robot import Frame, Robot
 from assembly.robots import load_robot
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance_slopes import platform_gains, platform_slopes
 from assembly.statistics.importance_table import ImportanceOptions, importance_design
 from assembly.statistics.linear_response import linear_response
+from tests.tolerances_for_tests import arm
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -19,7 +19,7 @@ def test_a_lever_gains_by_its_length_whatever_is_drawn(seed):
 
     Along x the tip stays, so the gain of RX is 0 in translation and 1 in rotation.
     """
-    robot = Robot("arm", "tip", (Frame("pin"), Frame("tip", "pin", [0.4, 0, 0])))
+    robot = arm()
     sources = tolerance_sources(robot, [1e-3, 2e-3, 3e-3, 0, 0, 0], ("pin",))
     experiment = Experiment(home_posture(robot), sources, seed, "least", margins=False)
     design = importance_design(experiment, ImportanceOptions(16, "source"))
@@ -30,7 +30,7 @@ def test_a_lever_gains_by_its_length_whatever_is_drawn(seed):
 
 def test_the_gain_of_a_group_is_its_root_mean_square_by_variance():
     """RY at the pin (lever 0.4) and at the tip (none), deviations 1 and 2."""
-    robot = Robot("arm", "tip", (Frame("pin"), Frame("tip", "pin", [0.4, 0, 0])))
+    robot = arm()
     pin = tolerance_sources(robot, [0, 1e-3, 0, 0, 0, 0], ("pin", "tip"))
     pin.scale[1] *= 2.0
     experiment = Experiment(home_posture(robot), pin, 1, "least", margins=False)

@@ -7,37 +7,31 @@ import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.model.error_distributions import tolerance_sources
-from assembly.model.robot import Clearance, Frame, Robot
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance_table import (
     ImportanceOptions,
-    importance_clearance_model,
     importance_dataset,
     importance_design,
     importance_report,
     importance_rows,
     importance_text,
 )
+from tests import tolerances_for_tests
 
-PLAY, WIDTHS = 1e-4, np.array([2e-3, 0, 0, 3e-4, 4e-4, 0.0])
+WIDTHS = np.array([2e-3, 0, 0, 3e-4, 4e-4, 0.0])
 NAMES = ["tip.RX", "tip.TX", "tip.TY"]
 
 
-def arm(play=None, **options):
+def arm(**options):
     """A driven arm; its tip follows its errors, of an angle and of two lengths."""
-    clearance = None if play is None else Clearance(radial=play)
-    frames = (
-        Frame("pin", joint="revolute", actuated=True, clearance=clearance),
-        Frame("tip", "pin", [0.4, 0, 0]),
-    )
-    robot = Robot("arm", "tip", frames)
+    robot = tolerances_for_tests.arm()
     sources = tolerance_sources(robot, WIDTHS, ("tip",))
     return Experiment(home_posture(robot), sources, margins=False, **options)
 
 
 def solved(by="source", draws=400, **options):
-    """The data set of an arm without play, and its plain values."""
-    experiment = arm(clearance_model="least", **options)
+    """The data set of an arm without clearance, and its plain values."""
+    experiment = arm(clearance="least", **options)
     design = importance_design(experiment, ImportanceOptions(draws, by))
     rows = importance_rows(experiment, design, 0, len(design))
     data = importance_dataset(experiment, design, rows)
@@ -82,45 +76,9 @@ def test_angles_and_lengths_together_have_parts_and_no_gain():
     assert data["part"].sel(component="rotation").item() == one["rotation_part"]
 
 
-def test_a_group_of_like_errors_gains_by_their_common_spread():
-    """x moves the platform by 3e-4, y by 4e-4: one group of 5e-4 / sqrt(3) by both.
-
-    Each moves it by as much as it is itself: the gain of both is 1.
-    """
-    experiment = arm(clearance_model="least")
-    design = importance_design(experiment, ImportanceOptions(400, "source"))
-    design = replace(design, groups=[("turn", np.array([0])), ("xy", np.array([1, 2]))])
-    rows = importance_rows(experiment, design, 0, len(design))
-    data = importance_dataset(experiment, design, rows)
-    assert list(data["error_unit"].values) == ["rad", "m"]
-    part, gain = (data[k].sel(component="translation").values for k in ("part", "gain"))
-    assert part[1] == pytest.approx(5e-4 / np.sqrt(3), rel=0.1)
-    assert gain[1] == pytest.approx(1.0, rel=1e-12)
-
-
-def test_rows_of_a_design_are_those_of_its_errors_without_random_play():
-    """Where play is random its least position counts, or else all of it."""
-    for model, taken in (
-        ("uniform", "least"),
-        ("contact", "least"),
-        ("worst", "worst"),
-    ):
-        experiment = arm(PLAY, clearance_model=model)
-        design = importance_design(experiment, ImportanceOptions(4, "source"))
-        rows = importance_rows(experiment, design, 3, 9)
-        assert importance_clearance_model(experiment) == taken
-        assert rows.dtype == experiment.record_type
-        alone = replace(experiment, clearance_model=taken)
-        expected = alone.evaluate(design.rows(3, 9), range(9))
-        for name in ("translation", "rotation", "platform_screw"):
-            np.testing.assert_allclose(
-                rows[name], expected[name], rtol=1e-9, atol=1e-12
-            )
-
-
 def test_draws_without_an_answer_are_told_with_their_reason():
     """Less than a twentieth may be left out: beyond, the others are not independent."""
-    experiment = arm(clearance_model="least")
+    experiment = arm(clearance="least")
     design = importance_design(experiment, ImportanceOptions(100, "source"))
     rows = importance_rows(experiment, design, 0, len(design))
     for lost, reason in ((4, None), (6, "6.0%")):
@@ -151,7 +109,7 @@ def test_draws_without_an_answer_are_told_with_their_reason():
 
 
 def test_margins_count_where_they_are_computed_and_stress_where_links_have_a_shape():
-    with_margins = replace(arm(clearance_model="least"), margins=True)
+    with_margins = replace(arm(clearance="least"), margins=True)
     design = importance_design(with_margins, ImportanceOptions(8, "source"))
     rows = importance_rows(with_margins, design, 0, len(design))
     data = importance_dataset(with_margins, design, rows, 0.5)

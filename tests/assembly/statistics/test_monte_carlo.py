@@ -3,30 +3,19 @@
 import json
 import subprocess
 import sys
-from dataclasses import replace
 
-import numpy as np
 import pytest
 import xarray
 
 from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import solve_assembly
 from assembly.model.error_distributions import tolerance_sources
-from assembly.model.link_stress import peak_stresses
 from assembly.robots import load_robot
 from assembly.statistics import monte_carlo
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance_table import ImportanceOptions
 from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.plot import (
-    allocation_figure,
-    histogram_figure,
-    tornado_figure,
-)
-from assembly.statistics.quantities import parse_limit
-from assembly.statistics.summary import summarise
+from assembly.statistics.plot import allocation_figure, histogram_figure, tornado_figure
 from assembly.sweeps.sweep import journal_path
-from forcefit.inputs.table import BadInput
 
 ERRORS = """
 [[errors]]
@@ -55,114 +44,47 @@ def experiment():
     return Experiment(posture, sources, seed=5)
 
 
-@pytest.fixture
-def small_blocks(monkeypatch):
+@pytest.mark.parametrize("at", [60, 200])
+def test_a_run_that_was_killed_goes_on_and_ends_in_the_same_bytes(
+    experiment, monkeypatch, tmp_path, at
+):
+    """Killed among its 100 draws, and while importance is computed."""
     monkeypatch.setattr(monte_carlo, "BLOCK", 64)
-
-
-def test_a_draw_is_what_one_solve_says(experiment):
-    data = run_draws(experiment, 5)
-    robot, sources = experiment.posture.robot, experiment.sources
-    values = sources.draw(0, 5, experiment.seed)
-    for i, errors in enumerate(sources.errors(values)):
-        posture = replace(experiment.posture, robot=robot.with_errors(errors))
-        answer = solve_assembly(posture)
-        one = data.isel(draw=i)
-        allowed = 2e-8 * answer.energy + 2e-12 * answer.energy_without_clearance
-        assert float(one["energy"]) == pytest.approx(answer.energy, abs=allowed)
-        if answer.energy > 1e-6 * answer.energy_without_clearance:
-            sizes = np.linalg.norm(answer.wrenches[:, 3:], axis=1)
-            assert float(one["force"]) == pytest.approx(sizes.max(), rel=1e-3)
-            stress = peak_stresses(robot, answer.wrenches)
-            np.testing.assert_allclose(one["stress"], stress, rtol=1e-2)
-
-
-@pytest.mark.parametrize("model", ["least", "contact"])
-def test_pose_errors_of_a_draw_are_the_sizes_of_its_screw(experiment, model):
-    data = run_draws(replace(experiment, clearance_model=model), 4)
-    screw = data["platform_screw"].values
-    for k, name in enumerate(("rotation", "translation")):
-        sizes = np.sqrt((screw[:, 3 * k : 3 * k + 3] ** 2).sum(axis=1))
-        assert sizes.max() > 0
-        np.testing.assert_allclose(data[name].values, sizes, rtol=1e-12)
-
-
-def test_a_run_that_was_killed_goes_on_and_ends_the_same(
-    experiment, small_blocks, tmp_path
-):
-    whole = run_draws(experiment, 300)
-    path = tmp_path / "draws.nc"
-
-    class Killed(Exception):
-        pass
-
-    def kill(done, total):
-        if done > 130:
-            raise Killed
-
-    with pytest.raises(Killed):
-        run_draws(experiment, 300, path, progress=kill)
-    assert not path.exists()
-    kept = journal_path(path).stat().st_size
-    seen = []
-    run_draws(experiment, 300, path, workers=2, progress=lambda d, n: seen.append(d))
-    assert seen[0] >= 130
-    assert kept > 0
-    assert not journal_path(path).exists()
-    with xarray.open_dataset(path, engine="h5netcdf") as found:
-        for name in whole:
-            np.testing.assert_array_equal(found[name], whole[name])
-
-
-def test_a_kill_while_importance_is_found_loses_no_draw(
-    experiment, small_blocks, tmp_path
-):
-    """The whole file, importance too, ends in the same bytes."""
     groups = ImportanceOptions(16, "kind")
     path, whole = tmp_path / "draws.nc", tmp_path / "whole.nc"
     run_draws(experiment, 100, whole, importance=groups)
-    total = []
 
-    def kill(done, all_):
-        total.append(all_)
-        if done > 200:
+    def kill(done, total):
+        if done > at:
             raise RuntimeError
 
     with pytest.raises(RuntimeError):
         run_draws(experiment, 100, path, progress=kill, importance=groups)
-    assert total[0] > 200
     assert not path.exists()
     seen = []
-    run_draws(experiment, 100, path, progress=lambda d, n: seen.append(d),
-              importance=groups)  # fmt: skip
-    assert seen[0] > 200
+    run_draws(experiment, 100, path, workers=2, importance=groups,
+              progress=lambda done, total: seen.append(done))  # fmt: skip
+    assert seen[0] > at
     assert path.read_bytes() == whole.read_bytes()
+    assert not journal_path(path).exists()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", ["statistics", "tolerances"])
-def test_commands_killed_again_and_again_end_in_the_same_bytes(command, tmp_path):
+def test_a_command_killed_again_and_again_ends_in_the_same_bytes(tmp_path):
     """SIGKILL at growing times; what was computed is never computed again."""
-    (tmp_path / "errors.toml").write_text(ERRORS)
-    (tmp_path / "plan.toml").write_text(
-        'yield = 0.9\ndraws = 200\n' + PLAN.replace(
-            "margin_free = 1.0", "margin_free = 2.0\ntranslation = 8e-4"
-        )
-    )  # fmt: skip
-    arguments = {
-        "statistics": ["--errors", "errors.toml", "--draws", "6000", "--importance",
-                       "64"],
-        "tolerances": ["--grid", "tx=0:0.1:0.1,tz=-0.5", "--plan", "plan.toml",
-                       "--fresh", "100"],
-    }[command]  # fmt: skip
-    base = ["assembly", command, "irsbot2", *arguments]
-    subprocess.run([sys.executable, "-m", "forcefit", *base, "-o", "whole.nc"],
-                   cwd=tmp_path, capture_output=True, check=True)  # fmt: skip
+    limits = "margin_free = 2.0\ntranslation = 8e-4"
+    plan = "yield = 0.9\ndraws = 200\n" + PLAN.replace("margin_free = 1.0", limits)
+    (tmp_path / "plan.toml").write_text(plan)
+    base = [sys.executable, "-m", "forcefit", "assembly", "tolerances", "irsbot2",
+            "--grid", "tx=0:0.1:0.1,tz=-0.5", "--plan", "plan.toml", "--fresh",
+            "100"]  # fmt: skip
+    subprocess.run([*base, "-o", "whole.nc"], cwd=tmp_path, capture_output=True,
+                   check=True)  # fmt: skip
     path, whole = tmp_path / "killed.nc", (tmp_path / "whole.nc").read_bytes()
     for wait in range(4, 90, 6):
         process = subprocess.Popen(
-            [sys.executable, "-m", "forcefit", *base, "-o", "killed.nc"],
-            cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            [*base, "-o", "killed.nc"], cwd=tmp_path,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         try:
             assert process.wait(wait) == 0
@@ -173,44 +95,6 @@ def test_commands_killed_again_and_again_end_in_the_same_bytes(command, tmp_path
         if path.exists():  # killed once it was written, perhaps
             break
     assert path.read_bytes() == whole
-
-
-def test_another_seed_does_not_go_on_from_this_ones_journal(
-    experiment, small_blocks, tmp_path
-):
-    path = tmp_path / "draws.nc"
-
-    def kill(done, total):
-        if done:
-            raise RuntimeError
-
-    with pytest.raises(RuntimeError):
-        run_draws(experiment, 300, path, progress=kill)
-    other = Experiment(experiment.posture, experiment.sources, seed=6)
-    with pytest.raises(BadInput, match="seed"):
-        run_draws(other, 300, path)
-
-
-def test_yields_and_limits_add_up(experiment):
-    data = run_draws(experiment, 400)
-    said = summarise(data, {"energy": 0.05, "rotation": 3e-3}, strength=1e6)
-    met = (
-        (data["energy"] <= 0.05) & (data["rotation"] <= 3e-3)
-        & (data["stress"].max("link") <= 1e6)
-    )  # fmt: skip
-    assert said["within_limits"]["probability"] == float(met.mean())
-    free = said["assembles"]["rigid_compliant_free"]["probability"]
-    # where it goes together by clearance alone it does so without energy
-    assert float((data["energy"] <= 1e-12).mean()) <= free
-    assert said["assembles"]["forced"]["probability"] == 1.0
-    with pytest.raises(BadInput, match="limit torque"):
-        summarise(data, {"torque": 1.0})
-
-
-@pytest.mark.parametrize("text", ["energy", "energy=-1", "enrgy=2", "energy=nan"])
-def test_limits_that_are_none_are_refused(text):
-    with pytest.raises(BadInput, match="--limit"):
-        parse_limit(text)
 
 
 @pytest.mark.slow

@@ -8,58 +8,36 @@ import pytest
 
 from assembly.kinematics.posture import place_robot
 from assembly.model.error_distributions import tolerance_sources
-from assembly.model.robot import Frame, Robot
 from assembly.statistics import monte_carlo
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance_table import ImportanceOptions
 from assembly.statistics.monte_carlo import provenance, run_draws
 from assembly.sweeps.sweep import journal_path
 from forcefit.inputs.table import BadInput
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_blocks_of_a_run_are_solved_once_and_counted(arm, monkeypatch, workers):
-    """Of 21 draws in blocks of 4, and 15 rows of a design: six blocks and four."""
-    monkeypatch.setattr(monte_carlo, "BLOCK", 4)
-    whole = run_draws(arm, 21)
-    monkeypatch.setattr(Experiment, "solve", counted(Experiment.solve, spans := []))
-    seen = []
-    data = run_draws(
-        arm, 21, workers=workers, importance=ImportanceOptions(3, "kind"),
-        progress=lambda done, total: seen.append((done, total)),
-    )  # fmt: skip
-    assert sorted(spans) == [(0, 4), (4, 4), (8, 4), (12, 4), (16, 4), (20, 1)]
-    assert seen[0] == (0, 36)
-    assert seen[-1] == (36, 36)
-    steps = np.diff([done for done, _ in seen])
-    assert sorted(steps) == [1, 3] + [4] * 8
-    for name in ("translation", "platform_screw", "energy"):
-        np.testing.assert_array_equal(data[name], whole[name])
-    np.testing.assert_array_equal(data["draw"], np.arange(21))
-
-
-def counted(method, spans):
-    """The method, with first row and number of rows noted down."""
-
-    def noting(self, first, count):
-        spans.append((first, count))
-        return method(self, first, count)
-
-    return noting
+from tests import tolerances_for_tests
 
 
 @pytest.fixture(scope="module")
 def arm():
     """A driven arm whose tip has errors in three directions."""
-    frames = (
-        Frame("pin", joint="revolute", actuated=True),
-        Frame("tip", "pin", [0.4, 0, 0]),
-    )
-    robot = Robot("arm", "tip", frames)
+    robot = tolerances_for_tests.arm()
     sources = tolerance_sources(robot, [0, 0, 1e-3, 1e-4, 1e-4, 0], ("tip",))
-    return Experiment(
-        place_robot(robot), sources, clearance_model="least", margins=False
-    )
+    return Experiment(place_robot(robot), sources, clearance="least", margins=False)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_blocks_of_a_run_change_no_number(arm, monkeypatch, workers):
+    """21 draws and the 20 rows of a design, whole and in blocks of 4."""
+    asked = ImportanceOptions(4, "source", 0.5)
+    whole = run_draws(arm, 21, importance=asked)
+    monkeypatch.setattr(monte_carlo, "BLOCK", 4)
+    data = run_draws(arm, 21, workers=workers, importance=asked)
+    for name in ("translation", "platform_screw", "energy"):
+        np.testing.assert_array_equal(data[name], whole[name])
+    for name in ("total_index", "part", "gain"):
+        np.testing.assert_allclose(data[name], whole[name], rtol=1e-9, atol=1e-9)
+    np.testing.assert_array_equal(data["draw"], np.arange(21))
+    assert data.attrs["importance_draws"] == 4
 
 
 @pytest.mark.parametrize("held", [None, ExitStack()])
@@ -93,20 +71,10 @@ def test_a_killed_run_goes_on_at_another_confidence_of_its_importance(arm, tmp_p
     assert seen == [(3, 23), (23, 23)]
 
 
-def test_importance_of_a_run_is_that_of_a_run_cut_at_other_places(arm, monkeypatch):
-    asked, found = ImportanceOptions(6, "source", 0.5), []
-    for block in (1024, 5):
-        monkeypatch.setattr(monte_carlo, "BLOCK", block)
-        found.append(run_draws(arm, 7, importance=asked))
-    for name in ("total_index", "part", "gain"):
-        np.testing.assert_allclose(found[1][name], found[0][name], rtol=1e-9, atol=1e-9)
-    assert found[0].attrs["importance_draws"] == 6
-
-
 def test_a_data_set_of_draws_says_what_was_solved(arm):
     """Units, meanings by clearance model, and everything that its numbers depend on."""
     asked = replace(
-        arm, clearance_model="worst", margins=True, seed=9, precision=(1e-6, np.inf)
+        arm, clearance="worst", margins=True, seed=9, precision=(1e-6, np.inf)
     )
     data = run_draws(asked, 3)
     units = {name: data[name].attrs["units"] for name in data.data_vars}
@@ -137,7 +105,7 @@ def test_a_data_set_of_draws_says_what_was_solved(arm):
     "change",
     [
         {"seed": 2}, {"margins": True}, {"stress": False}, {"load": (0.0,) * 6},
-        {"gravity": (0.0, 0.0, -9.81)}, {"clearance_model": "worst"},
+        {"gravity": (0.0, 0.0, -9.81)}, {"clearance": "worst"},
         {"precision": (1e-6, 1e-5)}, {"stiffness": "contact"},
     ],
 )  # fmt: skip
@@ -146,10 +114,9 @@ def test_runs_that_give_other_numbers_share_no_journal(arm, change):
     before, after = provenance(arm), provenance(replace(arm, **change))
     assert before == provenance(replace(arm))
     (name,) = change
-    named = "clearance" if name == "clearance_model" else name
     assert {
         k for k in before.keys() | after.keys() if before.get(k) != after.get(k)
-    } == {named}
+    } == {name}
 
 
 def test_runs_of_other_distributions_or_postures_share_no_journal(arm):

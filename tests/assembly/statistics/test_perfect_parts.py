@@ -8,29 +8,19 @@ import pytest
 from assembly.files.robot_file import write_robot
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import tolerance_sources
-from assembly.model.robot import Clearance, Frame, Robot
 from assembly.robots import load_robot
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.perfect_parts import limits_broken, perfect_parts
 from tests.pages_for_tests import tiles
+from tests.tolerances_for_tests import ARM, arm
 
-ARM, RADIAL, TILT = 0.4, 1e-4, 2e-3
+RADIAL, TILT = 1e-4, 2e-3
 ERRORS = """
 [[errors]]
 frames = ["tip"]
 distribution = "uniform"
 most = [0, 0, 0, 1e-6, 1e-6, 1e-6]
 """
-
-
-def arm(tilt=TILT):
-    """A driven pin with radial clearance and tilt, and a tip 0.4 m across its axis."""
-    clearance = Clearance(radial=RADIAL, tilt=tilt)
-    frames = (
-        Frame("pin", joint="revolute", actuated=True, clearance=clearance),
-        Frame("tip", "pin", [ARM, 0, 0]),
-    )
-    return Robot("arm", "tip", frames)
 
 
 def experiment(robot, **options):
@@ -40,7 +30,7 @@ def experiment(robot, **options):
 
 def test_the_parts_of_two_clearances_add_up_to_the_largest_error():
     """The disc r is across the shift L t: hypot(r, L t), of parts r^2 and (L t)^2."""
-    parts = perfect_parts(experiment(arm()))
+    parts = perfect_parts(experiment(arm(radial=RADIAL, tilt=TILT)))
     largest = np.hypot(RADIAL, ARM * TILT)
     translation = parts["translation"]
     assert translation["reached"] == pytest.approx(largest, abs=2e-6)
@@ -65,7 +55,7 @@ def test_the_parts_of_all_clearances_are_the_largest_error_of_a_loop_too(name):
 
 
 def test_limits_that_perfect_parts_meet_are_not_broken():
-    parts = perfect_parts(experiment(arm()))
+    parts = perfect_parts(experiment(arm(radial=RADIAL, tilt=TILT)))
     largest = np.hypot(RADIAL, ARM * TILT)
     assert not limits_broken(parts, {"translation": 1.01 * largest, "energy": 1.0})
     broken = limits_broken(parts, {"translation": 0.9 * largest, "rotation": 1.0})
@@ -75,7 +65,7 @@ def test_limits_that_perfect_parts_meet_are_not_broken():
 
 def test_a_load_is_part_of_what_perfect_parts_reach():
     """5 N along y press the pin to its rim: its radius, by the force of 5 N."""
-    parts = perfect_parts(experiment(arm(0.0), load=(0, 0, 0, 0, 5.0, 0)))
+    parts = perfect_parts(experiment(arm(radial=RADIAL), load=(0, 0, 0, 0, 5.0, 0)))
     assert parts["translation"]["reached"] == pytest.approx(RADIAL, rel=1e-6)
     assert parts["force"]["reached"] == pytest.approx(5.0)
     assert "clearances" not in parts["translation"]
@@ -86,7 +76,7 @@ def test_the_advice_is_the_clearances_where_these_alone_break_the_limit(
     tmp_path, run, limit
 ):
     """Clearances alone move the tip by 0.806 mm; the errors are of 1 um."""
-    write_robot(arm(), tmp_path / "arm.toml")
+    write_robot(arm(radial=RADIAL, tilt=TILT), tmp_path / "arm.toml")
     (tmp_path / "errors.toml").write_text(ERRORS)
     page = tmp_path / "page.html"
     status, text, err = run(
@@ -125,12 +115,7 @@ def test_equal_legs_are_named_together_on_the_page(tmp_path, run):
 
 def test_a_platform_that_moves_freely_has_no_bound(tmp_path, run):
     """A passive hinge without a bound of its motion, and an arm across its axis."""
-    clearance = Clearance(radial=RADIAL)
-    frames = (
-        Frame("pin", joint="revolute", clearance=clearance),
-        Frame("tip", "pin", [ARM, 0, 0]),
-    )
-    write_robot(Robot("arm", "tip", frames), tmp_path / "arm.toml")
+    write_robot(arm(passive=True, radial=RADIAL), tmp_path / "arm.toml")
     (tmp_path / "errors.toml").write_text(ERRORS)
     status, text, err = run(
         "assembly", "statistics", tmp_path / "arm.toml", "--errors",
@@ -143,12 +128,7 @@ def test_a_platform_that_moves_freely_has_no_bound(tmp_path, run):
 
 def test_the_bounded_motion_of_a_joint_has_its_part_too():
     """A hinge within 1e-3 rad on the arm: 0.4 mm of it, and 0.1 mm of the radius."""
-    clearance = Clearance(radial=RADIAL, spin=1e-3)
-    frames = (
-        Frame("pin", joint="revolute", clearance=clearance),
-        Frame("tip", "pin", [ARM, 0, 0]),
-    )
-    parts = perfect_parts(experiment(Robot("arm", "tip", frames)))
+    parts = perfect_parts(experiment(arm(passive=True, radial=RADIAL, spin=1e-3)))
     by_kind = parts["translation"]["clearances"]
     assert by_kind == pytest.approx(
         {"own motion of passive joints": ARM * 1e-3, "pin.radial": RADIAL}, rel=1e-2

@@ -7,17 +7,12 @@ import pytest
 
 from assembly.kinematics.posture import place_robot
 from assembly.linear.zone import zone_margin
-from assembly.model.error_distributions import tolerance_sources
 from assembly.robots import load_robot
 from assembly.statistics.posture_margins import prepare_margins
 from tests.robots_for_tests import random_robot
+from tests.tolerances_for_tests import drawn_errors
 
 ROBOTS = ["irsbot2", "five_bar", "3rrr", "orthoglide", "hexapod"]
-
-
-def some_errors(robot, scale=1.0, count=6):
-    sources = tolerance_sources(robot, scale * np.array([1e-3] * 3 + [1e-4] * 3))
-    return sources.errors(sources.draw(0, count, seed=4))
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -25,7 +20,7 @@ def some_errors(robot, scale=1.0, count=6):
 def test_margins_agree_with_one_solve_at_a_time(name, compliant):
     robot = load_robot(name)
     posture = place_robot(robot)
-    errors = some_errors(robot)
+    errors = drawn_errors(robot)
     found = prepare_margins(posture, compliant).solve(errors)
     for i, own in enumerate(errors):
         zone = zone_margin(replace(posture, robot=robot.with_errors(own)), compliant)
@@ -36,7 +31,7 @@ def test_margins_agree_with_one_solve_at_a_time(name, compliant):
 def test_margins_are_proportional_to_the_errors_and_convex():
     """Euler: slope . errors is the margin; a mean of draws has no larger margin."""
     robot = load_robot("irsbot2")
-    errors = some_errors(robot, count=40)
+    errors = drawn_errors(robot, count=40)
     ready = prepare_margins(place_robot(robot), "free")
     found = ready.solve(errors)
     work = (ready.slopes(found) * errors).sum(axis=(1, 2))

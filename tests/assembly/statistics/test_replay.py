@@ -27,9 +27,7 @@ def run(path, values, computed, stop=None, whose="mine"):
 
 
 @pytest.mark.parametrize("changed", [None, 1])
-def test_what_was_computed_before_a_kill_is_read_where_its_arguments_are_the_same(
-    changed, tmp_path
-):
+def test_results_before_a_kill_are_read_for_equal_arguments(changed, tmp_path):
     path, values = tmp_path / "out.nc", [3.0, 4.0, 5.0]
     first, second = [], []
     with pytest.raises(Killed):

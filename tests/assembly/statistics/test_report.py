@@ -55,7 +55,7 @@ def test_the_page_of_draws_is_their_summary(tmp_path, run):
         limits[k] for k in ("probability", "lower", "upper")
     ]
     translation = summary["quantities"]["translation"]
-    cells = rows["platform position error (clearance least)"]
+    cells = rows["platform translation (clearance least)"]
     expected = [translation["mean"]["value"], translation["most_probable"]["value"]]
     expected += [translation["quantiles"][q]["value"] for q in ("0.5", "0.95", "0.99")]
     assert [c.value for c in cells] == expected
@@ -120,7 +120,7 @@ def test_the_robot_of_the_page_is_a_draw_solved_alone():
     """Its platform is where its own assembly, outside the experiment, puts it."""
     posture = place_robot(load_robot("hexapod"))
     experiment = Experiment(
-        posture, read_sources(ERRORS, posture.robot), seed=3, clearance_model="least"
+        posture, read_sources(ERRORS, posture.robot), seed=3, clearance="least"
     )
     data = run_draws(experiment, 40)
     (scene,) = parse(drawn_robot(experiment, data)).figures

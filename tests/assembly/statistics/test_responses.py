@@ -1,4 +1,4 @@
-"""Quantities and their slopes: Euler's theorem, and an arm with play at its pin."""
+"""Quantities and their slopes: Euler's theorem, and an arm with clearance."""
 
 from dataclasses import replace
 
@@ -7,15 +7,14 @@ import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import tolerance_sources
-from assembly.model.link_stress import stressed_links
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from assembly.model.robot import Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.linear_response import linear_response
-from assembly.statistics.posture_margins import prepare_margins
-from assembly.statistics.responses import _stress_slopes, respond
+from assembly.statistics.responses import respond
+from tests.tolerances_for_tests import PLAY, arm, rigid_pair
 
-PLAY, STIFFNESS = 1e-4, 1e6  # [m], [N/m]
+STIFFNESS = 1e6  # [N/m]
 QUANTITIES = ["energy", "force", "moment", "stress", "rotation", "translation"]
 
 
@@ -45,47 +44,16 @@ def test_without_clearances_errors_times_slopes_are_the_quantity(stiff, key, pla
     np.testing.assert_allclose(same, -degree * slopes, atol=1e-5 * scale)
 
 
-@pytest.mark.parametrize("key", QUANTITIES)
-def test_slopes_without_clearances_are_quotients_of_differences(stiff, key):
-    """Along a random direction, a thousandth of the errors."""
-    prepared, sources, values = stiff
-    step = 1e-3 * sources.draw(9, 1, seed=3)
-    slopes = respond(prepared, sources, values, key)[1]
-    above, below = (
-        respond(prepared, sources, values + s, key)[0] for s in (step, -step)
-    )
-    along = (slopes * step).sum(axis=1)
-    scale = np.linalg.norm(slopes * step, axis=1)
-    np.testing.assert_allclose((above - below) / 2, along, atol=1e-3 * scale.max())
-
-
-def test_a_peak_stress_is_its_slopes_times_the_wrench(rng):
-    """Euler again, for each wrench by itself; its size is no matter to the slopes."""
-    links = stressed_links(load_robot("irsbot2"))
-    wrenches = rng.normal(size=(8, 6)) * [1, 2, 3, 40, 50, 60]
-    for link in (links[0], links[-1]):
-        slopes, peak = _stress_slopes(link, wrenches), link.peak(wrenches)
-        np.testing.assert_allclose((slopes * wrenches).sum(axis=1), peak, rtol=1e-6)
-        scale = np.abs(slopes).max()
-        for size in (2.0, 1e-6):
-            same = _stress_slopes(link, size * wrenches)
-            np.testing.assert_allclose(same, slopes, atol=1e-5 * scale)
-
-
-def arm(play=PLAY):
-    """An arm of 0.4 m whose pin has play, and errors of its tip."""
-    frames = (
-        Frame("pin", joint="revolute", actuated=True, clearance=Clearance(radial=play)),
-        Frame("tip", "pin", [0.4, 0, 0]),
-    )
-    robot = Robot("arm", "tip", frames)
-    return home_posture(robot), tolerance_sources(robot, [1e-3] * 3 + [3e-4] * 3,
-                                                  ("tip",))  # fmt: skip
+def tip():
+    """An arm with clearance of its pin, and errors of its tip."""
+    robot = arm(radial=PLAY)
+    sources = tolerance_sources(robot, [1e-3] * 3 + [3e-4] * 3, ("tip",))
+    return home_posture(robot), sources
 
 
 def test_the_largest_error_of_an_arm_has_the_slopes_of_its_closed_form():
     """R = hypot(e_xy + p, e_z): dR/dx = (e_xy + p) x / (e_xy R), dR/dz = z / R."""
-    posture, sources = arm()
+    posture, sources = tip()
     values = sources.draw(0, 20, seed=1)
     size, slopes = respond(
         linear_response(posture), sources, values, "translation", "worst"
@@ -110,13 +78,13 @@ def test_the_largest_error_of_an_arm_has_the_slopes_of_its_closed_form():
 
 @pytest.mark.parametrize("play", ["least", "contact", "uniform"])
 @pytest.mark.parametrize("key", ["rotation", "translation"])
-def test_random_play_of_a_response_is_that_of_the_first_experiment(play, key):
+def test_random_clearance_of_a_response_is_that_of_the_first_experiment(play, key):
     """Draw by draw; the slopes are the direction of the platform's error."""
-    posture, sources = arm()
+    posture, sources = tip()
     values = sources.draw(0, 12, seed=1)
-    rows = Experiment(
-        posture, sources, seed=1, clearance_model=play, margins=False
-    ).evaluate(values, range(12))
+    rows = Experiment(posture, sources, seed=1, clearance=play, margins=False).evaluate(
+        values, range(12)
+    )
     size, slopes = respond(linear_response(posture), sources, values, key, play)
     np.testing.assert_allclose(size, rows[key], rtol=1e-9)
     expected = rows["platform_screw"] / size[:, None]
@@ -151,13 +119,8 @@ def test_draws_without_an_answer_have_neither_a_quantity_nor_slopes():
 
 @pytest.mark.parametrize("component", [3, 4])
 def test_a_platform_beyond_a_pin_follows_the_part_that_it_is_closed_with(component):
-    """Rigid parts: the pin's play takes up what the errors of its own side do."""
-    frames = (
-        Frame("one", translation=[0.5, 0, 0]),
-        Frame("two", "base", [0.5, 0, 0]),
-        Frame("end", "one", clearance=Clearance(radial=PLAY)),
-    )
-    robot = Robot("pin", "end", frames, (("end", "two"),))
+    """Rigid parts: the pin's clearance takes up what the errors of its own side do."""
+    robot = rigid_pair(radial=PLAY)
     widths = np.zeros(6)
     widths[component] = PLAY
     sources = tolerance_sources(robot, widths, ("one", "two"))
@@ -166,13 +129,3 @@ def test_a_platform_beyond_a_pin_follows_the_part_that_it_is_closed_with(compone
     size, slopes = respond(prepared, sources, values, "translation", "least")
     np.testing.assert_allclose(size, np.abs(values[:, 1]), rtol=1e-6)
     np.testing.assert_allclose(slopes, [[0, 1], [0, -1]], atol=1e-6)
-
-
-def test_a_margin_is_homogeneous_of_degree_one():
-    robot = load_robot("irsbot2")
-    sources = tolerance_sources(robot, [1e-3] * 3 + [1e-4] * 3)
-    zone = prepare_margins(place_robot(robot, {"tx": 0.1, "tz": -0.5}), "free")
-    values = sources.draw(0, 4, seed=3)
-    margin, slopes = respond(zone, sources, values)
-    assert (margin > 0).all()
-    np.testing.assert_allclose((values * slopes).sum(axis=1), margin, rtol=1e-6)

@@ -34,9 +34,9 @@ def spring(row, stiffness):
 
 
 def test_a_bush_is_stiff_where_a_gap_presses_it_and_free_where_none_does():
-    """Two springs k that a gap e forces together through a play c: 2 k if e > c, or k.
+    """Two springs k that a gap forces together: 2 k if it exceeds the clearance, or k.
 
-    With e < c the platform hangs on its own spring alone: the other is within its play.
+    With less the platform hangs on its own spring alone.
     """
     k, c = 1e5, 1e-4
     frames = (
@@ -110,7 +110,7 @@ def test_the_command_gives_the_spread_and_writes_it(run, tmp_path):
     assert '--state: found "linear"' in err
 
 
-def test_what_resists_a_little_is_not_free():
+def test_small_stiffnesses_are_not_free_motions():
     """0.01 N m/rad is a spring; zero is none, and NaN no answer."""
     stiffnesses = np.full((6, 6), 2.0)
     stiffnesses[:, 2] = 0.01, 0.02, 0.03, 0.0, 0.0, np.nan

@@ -11,119 +11,59 @@ from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.zone import zone_margin
 from assembly.model.link_stress import peak_stresses
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.statistics.allocation import allocate
 from assembly.statistics.linear_response import linear_response
 from assembly.statistics.posture_margins import prepare_margins
-from assembly.statistics.replay import journalled
-from assembly.statistics.requirement import Plan, Requirement
+from assembly.statistics.requirement import Plan
 from assembly.statistics.responses import respond
-from assembly.statistics.tolerances import (
-    identity_of,
-)
 from assembly.statistics.worst_case import (
     bound_energy,
     bound_margin,
     random_corners,
     worst_corner,
 )
-from assembly.sweeps.sweep import journal_path
 from forcefit.inputs.table import BadInput
-from tests.tolerances_for_tests import PLAY, plan_for
+from tests.robots_for_tests import coaxial_beams
+from tests.tolerances_for_tests import PLAY, pairs_of_bars, plan_for, rigid_pair
+
+ENDS = [("one", 3), ("two", 3)]
 
 
-def two_bars(stiffness=None):
-    """Bars from two walls that meet; play in the x-y plane, or springs instead."""
-    link = None if stiffness is None else MatrixLink(np.eye(6) * stiffness)
-    play = Clearance(radial=PLAY) if stiffness is None else None
-    frames = (
-        Frame("one", translation=[0.5, 0, 0], link=link),
-        Frame("mount", translation=[1.0, 0, 0]),
-        Frame("two", "mount", [-0.5, 0, 0], link=link),
-        Frame("joint", "one", clearance=play),
-        Frame("end_one", "joint"),
-        Frame("end_two", "two"),
-    )
-    return Robot("bars", "end_one", frames, (("end_one", "end_two"),))
+@pytest.mark.parametrize(
+    ("places", "costs", "cost", "expected"),
+    [
+        (ENDS, [1, 4], "reciprocal", np.array([1, 2]) / 3),
+        (ENDS, [1, 4], "logarithm", np.array([1, 4]) / 5),
+        ([("one", 3), ("two", 4)], [1, 1], "reciprocal", np.full(2, np.sqrt(0.5))),
+    ],
+    ids=["roots of costs", "costs", "right angles"],
+)
+def test_two_lengths_share_the_clearance_by_their_costs(places, costs, cost, expected):
+    """Minimise c1/t1 + c2/t2, or -c1 log t1 - c2 log t2, with t1 + t2 = clearance.
 
-
-def test_two_lengths_in_a_row_share_the_play_by_the_roots_of_their_costs():
-    """Minimise c1/t1 + c2/t2 with t1 + t2 = play: t_i = play sqrt(c_i) / sum sqrt."""
-    robot = two_bars()
-    plan = plan_for(robot, [("one", 3), ("two", 3)], [1, 4], {"margin": 1.0})
+    At right angles with equal costs t1^2 + t2^2 = clearance^2.
+    """
+    robot = rigid_pair(radial=PLAY)
+    plan = plan_for(robot, places, costs, {"margin": 1.0}, cost=cost)
     found = allocate([place_robot(robot)], plan, fresh=200)
-    np.testing.assert_allclose(found.tolerances, [PLAY / 3, 2 * PLAY / 3], rtol=2e-3)
-    assert found.price_bound <= found.price <= 1.002 * found.price_bound
+    np.testing.assert_allclose(found.tolerances, PLAY * expected, rtol=2e-3)
+    assert found.price_bound <= found.price
+    assert found.price - found.price_bound <= 2e-3 * abs(found.price_bound)
     assert found.worst["margin"][0] == pytest.approx(1.0, rel=1e-3)
-    assert found.worst["margin"][1] == pytest.approx(1.0, rel=1e-3)
-    assert found.proven_scale == pytest.approx(1.0, rel=1e-3)
     assert found.verification["verdict"] == "no draw failed"
-
-
-@pytest.mark.slow
-def test_an_allocation_that_was_killed_asks_again_and_ends_the_same(tmp_path):
-    """Killed at its 5th and 9th result; each is computed once, all in all."""
-    robot = two_bars()
-    plan = plan_for(robot, [("one", 3), ("two", 3)], [1, 4], {"margin": 1.0},
-                    asked_yield=0.9, draws=500)  # fmt: skip
-    postures, path = [place_robot(robot)], tmp_path / "t.nc"
-    whose, counted = identity_of(postures, plan, 50), []
-
-    class Killed(Exception):
-        pass
-
-    def counting(self, *given):
-        counted.append(len(given))
-        if len(counted) in {5, 9}:
-            raise Killed
-        return original(self, *given)
-
-    original = Requirement._quantities
-    plain = allocate(postures, plan, fresh=50)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Requirement, "_quantities", counting)
-        for _ in range(2):
-            with pytest.raises(Killed), journalled(path, whose) as replay:
-                allocate(postures, plan, fresh=50, replay=replay)
-            assert journal_path(path).exists()
-        with journalled(path, whose) as replay:
-            found = allocate(postures, plan, fresh=50, replay=replay)
-    with pytest.MonkeyPatch.context() as patch:
-        once = []
-        patch.setattr(
-            Requirement, "_quantities",
-            lambda self, *given: once.append(1) or original(self, *given),
-        )  # fmt: skip
-        allocate(postures, plan, fresh=50)
-    assert len(counted) == len(once) + 2
-    assert not journal_path(path).exists()
-    np.testing.assert_array_equal(found.tolerances, plain.tolerances)
-    assert found.verification == plain.verification
-
-
-def test_logarithmic_costs_share_the_play_by_the_costs_themselves():
-    robot = two_bars()
-    plan = plan_for(robot, [("one", 3), ("two", 3)], [1, 4], {"margin": 1.0},
-                    cost="logarithm")  # fmt: skip
-    found = allocate([place_robot(robot)], plan, fresh=0)
-    np.testing.assert_allclose(found.tolerances, [PLAY / 5, 4 * PLAY / 5], rtol=2e-3)
-
-
-def test_errors_at_right_angles_share_a_disc():
-    """t1^2 + t2^2 = play^2 with equal costs: play / sqrt(2) each."""
-    robot = two_bars()
-    plan = plan_for(robot, [("one", 3), ("two", 4)], [1, 1], {"margin": 1.0})
-    found = allocate([place_robot(robot)], plan, fresh=0)
-    np.testing.assert_allclose(found.tolerances, PLAY / np.sqrt(2), rtol=2e-3)
-    # play in proportion adds sizes of vectors, not components: t1 + t2 = sqrt(2) play
-    assert found.proven_scale >= 1 / np.sqrt(2) - 1e-6
+    if places == ENDS:
+        assert found.worst["margin"][1] == pytest.approx(1.0, rel=1e-3)
+        assert found.proven_scale == pytest.approx(1.0, rel=1e-3)
+    else:
+        # the bound adds sizes of vectors, not components: t1 + t2 = sqrt(2) clearance
+        assert found.proven_scale >= 1 / np.sqrt(2) - 1e-6
 
 
 def test_springs_in_a_row_share_the_energy():
     """1/2 (k/2) (t1 + t2)^2 = E, equal costs: sqrt(E / k) each."""
-    robot = two_bars(stiffness=1e6)
-    plan = plan_for(robot, [("one", 3), ("two", 3)], [1, 1], {"energy": 1e-3})
+    robot = coaxial_beams(np.zeros(6))
+    plan = plan_for(robot, ENDS, [1, 1], {"energy": 1e-3})
     found = allocate([place_robot(robot)], plan, fresh=0)
     np.testing.assert_allclose(found.tolerances, np.sqrt(1e-3 / 1e6), rtol=2e-3)
     lower, upper = found.worst["energy"]
@@ -132,12 +72,12 @@ def test_springs_in_a_row_share_the_energy():
 
 
 @pytest.mark.slow
-def test_with_a_yield_a_single_error_may_leave_the_play_that_often():
-    """Uniform within t: the share within play is play / t, so t = play / yield.
+def test_with_a_yield_a_single_error_may_leave_the_clearance_that_often():
+    """Uniform within t: the share within the clearance is its part of t: the yield.
 
     Of 20000 training draws so many may fail that a yield of 0.8 is held with 95 %.
     """
-    robot = two_bars()
+    robot = rigid_pair(radial=PLAY)
     plan = plan_for(robot, [("one", 3)], [1], {"margin": 1.0}, asked_yield=0.8,
                     draws=20_000)  # fmt: skip
     found = allocate([place_robot(robot)], plan, fresh=5000)
@@ -175,45 +115,31 @@ def test_the_worst_corner_is_found_and_bounded(paper, kind):
     assert respond(ready, sources, inside * t)[0].max() <= truth
 
 
-def springs_apart(stiffnesses, plays=None):
-    """Pairs of bars as in ``two_bars``, one pair beside the other, on one platform."""
-    plays = plays or [None] * len(stiffnesses)
-    frames, closures = [], []
-    for i, (k, play) in enumerate(zip(stiffnesses, plays, strict=True)):
-        link = MatrixLink(np.eye(6) * k)
-        clearance = None if play is None else Clearance(radial=play)
-        frames += [
-            Frame(f"one{i}", translation=[0.5, 0, 0], link=link),
-            Frame(f"mount{i}", translation=[1.0, 0, 0]),
-            Frame(f"two{i}", f"mount{i}", [-0.5, 0, 0], link=link),
-            Frame(f"joint{i}", f"one{i}", clearance=clearance),
-            Frame(f"end_one{i}", f"joint{i}"),
-            Frame(f"end_two{i}", f"two{i}"),
-        ]
-        closures.append((f"end_one{i}", f"end_two{i}"))
-    return Robot("apart", "end_one0", tuple(frames), tuple(closures))
+@pytest.mark.parametrize(
+    ("clearance", "cost"),
+    [(None, "reciprocal"), (1e-4, "reciprocal"), (None, "logarithm")],
+)
+def test_a_force_is_shared_by_lagranges_multipliers(clearance, cost):
+    """Two springs k in a row carry (k/2) (t1 + t2 - clearance): at most F in each pair.
 
-
-@pytest.mark.parametrize("play", [None, 1e-4])
-def test_a_force_is_shared_by_lagranges_multipliers(play):
-    """Two springs k in a row carry (k/2) (t1 + t2 - play): at most F in each pair.
-
-    Minimise sum c/t with t1 + t2 = 2F/k + play in each pair by itself:
-    t_i = (2F/k + play) sqrt(c_i) / sum sqrt(c).  The energy's proportions are others:
-    pairs of springs of 1e6 and 1e5 N/m then do not both reach the limit.
+    Minimise sum c/t, or -sum c log t, with t1 + t2 = 2F/k + clearance in each pair by
+    itself: tolerances share it by the roots of the costs, or by the costs.  The
+    energy's proportions are others: pairs of springs of 1e6 and 1e5 N/m then do not
+    both reach the limit.
     """
     k, F, c = np.array([1e6, 1e5]), 50.0, np.array([1.0, 4.0, 1.0, 1.0])
-    robot = springs_apart(k, None if play is None else [play, play])
+    robot = pairs_of_bars(k, clearance)
     places = [("one0", 3), ("two0", 3), ("one1", 3), ("two1", 3)]
-    plan = plan_for(robot, places, c, {"force": F}, draws=100)
+    plan = plan_for(robot, places, c, {"force": F}, draws=100, cost=cost)
     found = allocate([place_robot(robot)], plan, fresh=500)
-    total = np.repeat(2 * F / k + (play or 0.0), 2)
-    roots = np.sqrt(c)
-    share = roots / np.repeat(roots.reshape(2, 2).sum(axis=1), 2)
-    np.testing.assert_allclose(found.tolerances, total * share, rtol=5e-3)
-    best = float((c / (total * share)).sum())
-    assert best * (1 - 1e-9) <= found.price <= 1.002 * best
-    assert found.price < 0.95 * found.price_uniformly_scaled
+    weights = np.sqrt(c) if cost == "reciprocal" else c
+    share = weights / np.repeat(weights.reshape(2, 2).sum(axis=1), 2)
+    best = np.repeat(2 * F / k + (clearance or 0.0), 2) * share
+    np.testing.assert_allclose(found.tolerances, best, rtol=1e-2)
+    least = plan.price(best)
+    assert least - 1e-9 * abs(least) <= found.price <= least + 2e-3 * abs(least)
+    # energy's proportions leave the softer pair's sum at a part of what it may have
+    assert found.price_uniformly_scaled - found.price > 0.04 * abs(least)
     assert found.worst["force"][0] == pytest.approx(F, rel=1e-3)
     assert np.isnan(found.worst["force"][1])
     assert found.verification["verdict"] == "no draw failed"
@@ -231,7 +157,7 @@ def several(paper):
               "margin_free": 4.0}  # fmt: skip
     plan = Plan(sources, np.tile([0, 1], 4), ("RX", "TX"), np.array([1.0, 0.01]),
                 np.zeros(2), np.array([0.05, 0.005]), limits, asked_yield=0.9,
-                draws=100, clearance_model="least")  # fmt: skip
+                draws=100, clearance="least")  # fmt: skip
     return postures, plan, allocate(postures, plan, fresh=300)
 
 
@@ -240,14 +166,6 @@ def test_several_limits_of_every_kind_cost_no_more_than_scaling(several):
     assert np.isnan(found.price_bound)
     assert found.price <= found.price_uniformly_scaled
     assert found.verification["verdict"] != "contradicted"
-
-
-def test_an_allocation_is_a_data_set_and_a_few_lines(several):
-    _, plan, found = several
-    data = found.to_xarray()
-    np.testing.assert_array_equal(data["tolerance"], found.tolerances)
-    assert list(data["class"].values) == list(plan.names)
-    assert all(len(repr(thing)) < 1000 for thing in (found, plan, plan.sources))
 
 
 @pytest.mark.slow
@@ -280,7 +198,7 @@ def largest_share(posture, limits):
     return max(values[key] / limit for key, limit in limits.items())
 
 
-def test_a_limit_below_the_play_of_perfect_parts_is_refused(paper):
+def test_a_limit_below_the_clearance_of_perfect_parts_is_refused(paper):
     """The paper's clearances alone move the platform by 0.39 mm: 0.2 cannot be had."""
     posture, sources, _ = paper
     plan = Plan(sources, np.tile([0, 1], 4), ("RX", "TX"), np.ones(2), np.zeros(2),
@@ -288,12 +206,12 @@ def test_a_limit_below_the_play_of_perfect_parts_is_refused(paper):
                 draws=200)  # fmt: skip
     with pytest.raises(BadInput, match="even perfect parts reach 0.0003877 m by clear"):
         allocate([posture], plan, fresh=0)
-    at_rest = allocate([posture], replace(plan, clearance_model="least"), fresh=0)
+    at_rest = allocate([posture], replace(plan, clearance="least"), fresh=0)
     assert at_rest.tolerances.min() > 0
 
 
 @pytest.mark.slow
-def test_with_the_worst_play_fresh_draws_stay_within_the_limit(paper):
+def test_with_the_worst_clearance_fresh_draws_stay_within_the_limit(paper):
     """Solved and bracketed one by one, slowly; a yield of 0.9."""
     posture, sources, _ = paper
     limit = 6e-4

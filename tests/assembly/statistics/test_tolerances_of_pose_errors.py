@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import place_robot
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from assembly.model.robot import Frame, MatrixLink, Robot
 from assembly.statistics.allocated_tolerances import allocation_of, allocation_text
 from assembly.statistics.allocation import allocate
-from tests.tolerances_for_tests import PLAY, plan_for
+from tests.tolerances_for_tests import PLAY, arm, plan_for
 
 
 def parallel(k1, k2):
@@ -66,18 +66,12 @@ def test_with_a_yield_pose_errors_add_up_as_squares():
     assert found.verification["verdict"] != "contradicted"
 
 
-def test_the_worst_play_takes_its_share_of_a_limit_on_the_pose():
+def test_the_worst_clearance_takes_its_share_of_a_limit_on_the_pose():
     """A serial arm: errors e and a clearance disc r reach e + r, so e <= limit - r."""
-    frames = (
-        Frame("pin", joint="revolute", actuated=True, clearance=Clearance(radial=PLAY)),
-        Frame("tip", "pin", [0.4, 0, 0]),
-    )
-    robot = Robot("arm", "tip", frames)
+    robot = arm(radial=PLAY)
     plan = plan_for(robot, [("tip", 3)], [1], {"translation": 3e-4}, draws=50)
     for play, tolerance in (("worst", 3e-4 - PLAY), ("least", 3e-4)):
-        found = allocate(
-            [place_robot(robot)], replace(plan, clearance_model=play), fresh=100
-        )
+        found = allocate([place_robot(robot)], replace(plan, clearance=play), fresh=100)
         assert found.tolerances[0] == pytest.approx(tolerance, rel=1e-3)
         said = allocation_text(allocation_of(found))
         assert f"pose errors: clearance {play}" in said

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from assembly.files.robot_file import write_robot
-from assembly.model.robot import Clearance, Frame, Robot
 from assembly.statistics.allocated_tolerances import Allocation, allocation_of
 from assembly.statistics.tolerances_report import tolerances_page
 from forcefit.page.page import Provenance
 from tests.pages_for_tests import parse, tiles
 from tests.robots_for_tests import coaxial_beams
-from tests.tolerances_for_tests import plan_for
+from tests.tolerances_for_tests import arm, plan_for
 
 NAN = float("nan")
 RADIAL, LIMIT = 1e-4, 3e-4
@@ -50,7 +49,7 @@ def shown(tolerances, costs, most=(0.1, 0.1), cost="reciprocal"):
 
 
 @pytest.mark.parametrize("loosest", [1e-2, 0.1, 10.0])
-def test_what_to_tighten_does_not_depend_on_a_bound_that_is_not_active(loosest):
+def test_advice_on_tightening_does_not_depend_on_inactive_bounds(loosest):
     """Prices are 1 / 1e-3 and 1 / 1e-4: the length has 10 of 11 parts of the price."""
     page = shown([1e-3, 1e-4], [1.0, 1.0], (loosest, 0.1))
     answer, note = tiles(page)["What to tighten"]
@@ -99,12 +98,7 @@ def test_the_page_says_what_was_asked_and_what_clearances_take(tmp_path, run):
 
     Without the clearance t would be the limit: 1.5 times looser, at 1 / limit.
     """
-    frames = (
-        Frame("pin", joint="revolute", actuated=True,
-              clearance=Clearance(radial=RADIAL)),
-        Frame("tip", "pin", [0.4, 0, 0]),
-    )  # fmt: skip
-    write_robot(Robot("arm", "tip", frames), tmp_path / "arm.toml")
+    write_robot(arm(radial=RADIAL), tmp_path / "arm.toml")
     (tmp_path / "plan.toml").write_text(PLAN)
     page, written = tmp_path / "t.html", tmp_path / "t.json"
     status, text, err = run(
@@ -117,11 +111,11 @@ def test_the_page_says_what_was_asked_and_what_clearances_take(tmp_path, run):
     assert taken["reached"] == pytest.approx(RADIAL, rel=1e-3)
     assert taken["looser_without"] == pytest.approx(1.5, rel=1e-3)
     assert taken["price_without"] == pytest.approx(1.0 / LIMIT, rel=2e-3)
-    assert "clearances alone take 0.1 of the 0.3 mm of translation" in text
+    assert "clearances alone take 0.1 mm of the 0.3 mm of translation" in text
     content = page.read_text("utf-8")
     assert tiles(content)["Clearances take"][0] == "33\u00a0%"
     asked = {row[0].text: row[1] for row in parse(content).table("asked")[1:]}
-    assert asked["platform position error, at most"].value == LIMIT
+    assert asked["platform translation, at most"].value == LIMIT
     assert asked["errors"].text == "uniform within plus or minus their tolerance"
     assert asked["price"].text == "sum of cost / tolerance [rad or m]"
     assert asked["postures"].text == "1: tx=0.4"

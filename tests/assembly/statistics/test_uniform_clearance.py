@@ -48,16 +48,13 @@ def test_the_diagnosis_is_that_of_the_textbook(length, correlation, rng):
 
 
 def test_chains_are_mixed_where_every_component_that_varies_is(rng):
-    """Criteria: an R-hat of 1.05 at most, 100 independent points at least."""
-    apart = 0.05 * np.array([-1.5, -0.5, 0.5, 1.5])[:, None]
+    """Neither chains of correlated points, nor chains about different means."""
+    apart = np.array([-1.5, -0.5, 0.5, 1.5])[:, None]
     slow = rng.normal(size=(4, 64))
     for t in range(1, 64):
         slow[:, t] += 0.6 * slow[:, t - 1]
     good = rng.normal(size=(4, 64))
-    assert diagnose(slow)[0] < 1.05 < diagnose(good + 20 * apart)[0]
-    assert diagnose(slow)[1] < 100 < diagnose(good)[1]
-    assert diagnose(good + 20 * apart)[1] < 256
-    for one, mixed in ((good, True), (slow, False), (good + 20 * apart, False)):
+    for one, mixed in ((good, True), (slow, False), (good + apart, False)):
         for size in (1.0, 1e-9):
             trace = np.zeros((4, 64, 6))
             trace[:, :, 0] = size * good
@@ -80,74 +77,10 @@ def test_chains_that_are_each_stuck_elsewhere_are_not_mixed():
 @pytest.mark.parametrize("start", [0.0, 0.6, 0.95, 1.0])
 def test_the_ellipsoid_of_a_box_is_a_ball_about_its_middle(dimensions, start):
     """-sum log(1 - u_i^2) has the Hessian 2 I at 0: axes of 1 / sqrt 2."""
-    u, M = _ellipsoid(
-        np.eye(dimensions), np.arange(dimensions + 1), np.full(dimensions, start)
-    )
+    heads = np.arange(dimensions + 1)
+    u, M = _ellipsoid(np.eye(dimensions), heads, np.full(dimensions, start))
     np.testing.assert_allclose(u, 0.0, atol=2e-3)
     np.testing.assert_allclose(M @ M.T, np.eye(dimensions) / 2, atol=1e-4)
-
-
-@pytest.mark.parametrize("cut", [0.0, 1.0, 1.9])
-def test_the_ellipsoid_of_a_segment_has_its_middle_and_its_curvature(cut):
-    """u0 + u1 = cut from corner to corner of a square: u0 = u1 = c = cut / 2.
-
-    Along s: -2 log(1 - (c + s / sqrt 2)^2) and its mirror have together the second
-    derivative (2 / q + 4 c^2 / q^2) with q = 1 - c^2, both halved, twice.
-    """
-    along = np.array([[1.0], [-1.0]]) / np.sqrt(2)
-    c = cut / 2
-    start = np.array([1.0, cut - 1.0]) if cut else np.array([0.3, -0.3])
-    u, M = _ellipsoid(along, np.arange(3), 0.98 * (start - c) + c)
-    np.testing.assert_allclose(u, c, atol=2e-3)
-    q = 1 - c**2
-    curvature = 2 / q + 4 * c**2 / q**2
-    np.testing.assert_allclose((M.T @ M).item(), 1 / curvature, rtol=2e-2)
-    np.testing.assert_allclose(M[0], -M[1], rtol=1e-9)
-
-
-def barrier(starts, u):
-    """-sum log(1 - |u_k|^2) over the cones."""
-    squares = [u[a:b] @ u[a:b] for a, b in zip(starts[:-1], starts[1:], strict=True)]
-    return -np.log1p(-np.array(squares)).sum()
-
-
-@pytest.mark.parametrize("thin", [1e-1, 1e-3, 1e-5])
-@pytest.mark.parametrize("part", [-0.5, -1.0, 0.9, 1.0])
-def test_at_the_centre_the_barrier_is_flat_and_bends_as_the_ellipsoid(thin, part, rng):
-    """Wherever it begins, on the edge too: of the cap u0 = 1 + thin u2 of a disc.
-
-    Along axes of the ellipsoid the barrier rises by half the square of the way.
-    """
-    starts = np.array([0, 2, 3, 4, 5])
-    rows = np.array([[1.0, 0.0, -thin, 0.0, 0.0]])
-    Z = np.ascontiguousarray(np.linalg.svd(rows)[2][1:].T)
-    # within the disc u2 is negative, and u1 at most sqrt(1 - u0^2)
-    u2 = -abs(part)
-    u0 = 1 + thin * u2
-    u1 = 0.5 * part * np.sqrt(1 - u0**2)
-    start = np.array([u0, u1, u2, part, -part])
-    u, M = _ellipsoid(Z, starts, start)
-    assert abs((rows @ u).item() - 1.0) < 1e-12
-    there = barrier(starts, u)
-    for _ in range(10):
-        way = rng.normal(size=4)
-        way *= 0.02 / np.linalg.norm(way)
-        ahead, back = (barrier(starts, u + s * M @ way) for s in (1, -1))
-        # flat to a decrement of 1e-3
-        assert abs(ahead - back) / 2 < 2e-3 * 0.02
-        assert (ahead + back) / 2 - there == pytest.approx(0.02**2 / 2, rel=0.02)
-
-
-@pytest.mark.parametrize("gap", [0.0, 1e-5, 1e-3, 1.0])
-@pytest.mark.parametrize("end", [0.0, 1.0])
-def test_a_segment_in_a_corner_has_an_inside_unless_it_is_a_point(gap, end):
-    """u0 + u1 = 2 - gap within a square, from its middle and from an end."""
-    along = np.array([[1.0], [-1.0]]) / np.sqrt(2)
-    start = 1.0 - gap / 2 * np.array([1 - end, 1 + end])
-    found = _ellipsoid(along, np.arange(3), start)
-    assert (found is None) == (gap == 0.0)
-    if found is not None:
-        np.testing.assert_allclose(found[0], 1 - gap / 2, atol=2e-3 * gap)
 
 
 def test_a_point_that_may_not_move_is_mixed_and_stays():

@@ -1,7 +1,5 @@
 """Worst cases of errors within tolerances against sums and squares known by hand."""
 
-from itertools import product
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,6 @@ from assembly.kinematics.posture import home_posture
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.statistics.linear_response import linear_response
 from assembly.statistics.posture_margins import prepare_margins
-from assembly.statistics.responses import respond
 from assembly.statistics.worst_case import (
     bound_energy,
     bound_margin,
@@ -17,54 +14,38 @@ from assembly.statistics.worst_case import (
     worst_corner,
 )
 from tests.robots_for_tests import coaxial_beams
-from tests.tolerances_for_tests import plan_for
+from tests.tolerances_for_tests import PLAY, arm, pairs_of_bars, plan_for, rigid_pair
 
-K, PLAY = 1e6, 1e-4  # [N/m], [m]
+K = 1e6  # [N/m]
 PLACES = [("one", 3), ("two", 3), ("one", 4), ("two", 4)]
 
 
 def bars(clearance=None):
-    """Bars in a row, springs alike in every direction, with or without play."""
+    """Bars in a row, springs alike in every direction, with or without clearance."""
     robot = coaxial_beams(np.zeros(6), (K, K), clearance=clearance)
     return home_posture(robot), plan_for(robot, PLACES, [1] * 4, {}).sources
 
 
-def test_springs_without_play_are_worst_where_all_errors_add_up(rng):
-    """k ((t1 + t2)^2 + (t3 + t4)^2) / 4, and the bound is no more than that at least.
-
-    The bound adds up sizes: k (t1 + t2 + t3 + t4)^2 / 4.
-    """
-    posture, sources = bars()
-    prepared, t = linear_response(posture), rng.uniform(1e-4, 3e-4, 4)
-    truth = K * ((t[0] + t[1]) ** 2 + (t[2] + t[3]) ** 2) / 4
-    corner = worst_corner(prepared, sources, t, np.ones((1, 4)))
-    assert corner.value == pytest.approx(truth, rel=1e-6)
-    assert corner.signs[0] == -corner.signs[1]
-    assert corner.signs[2] == -corner.signs[3]
-    # half the slope, times the errors, is the energy of a linear spring
-    assert (corner.slopes * corner.signs * t).sum() / 2 == pytest.approx(truth)
-    assert bound_energy(prepared, sources, t) == pytest.approx(K * t.sum() ** 2 / 4)
-
-
 @pytest.mark.parametrize("directions", [1, 2])
-def test_play_along_all_errors_is_taken_from_their_sum(directions):
-    """In one direction k (t1 + t2 - p)^2 / 4; play as affine functions do no better."""
-    posture, sources = bars(Clearance(radial=PLAY))
+@pytest.mark.parametrize("radial", [0.0, PLAY])
+def test_clearance_along_all_errors_is_taken_from_their_sum(directions, radial):
+    """k (hypot(t1 + t2, t3 + t4) - p)^2 / 4; the bound adds all t, less p, squared."""
+    posture, sources = bars(Clearance(radial=radial) if radial else None)
     prepared = linear_response(posture)
     t = np.array([3.0, 2.0, 0.0, 0.0]) * PLAY
     if directions == 2:
         t[2:] = [1.0, 4.0] * np.array(PLAY)
-    x, y = t[0] + t[1], t[2] + t[3]
-    truth = K * (np.hypot(x, y) - PLAY) ** 2 / 4
+    truth = K * (np.hypot(t[0] + t[1], t[2] + t[3]) - radial) ** 2 / 4
     corner = worst_corner(prepared, sources, t, random_corners(4, 4))
     assert corner.value == pytest.approx(truth, rel=1e-6)
+    assert corner.signs[0] == -corner.signs[1]
     bound = bound_energy(prepared, sources, t)
-    assert bound == pytest.approx(K * (t.sum() - PLAY) ** 2 / 4, rel=1e-5)
+    assert bound == pytest.approx(K * (t.sum() - radial) ** 2 / 4, rel=1e-5)
     assert bound >= corner.value * (1 - 1e-9)
 
 
 def test_a_margin_is_worst_and_bounded_by_sums_along_each_axis():
-    """hypot(t1 + t2, t3 + t4) / p; affine play reaches (t1 + t2 + t3 + t4) / p."""
+    """hypot(t1 + t2, t3 + t4) / p; affine clearance reaches (t1 + t2 + t3 + t4) / p."""
     posture, sources = bars(Clearance(radial=PLAY))
     zone, t = prepare_margins(posture, "rigid"), np.array([3.0, 2, 1, 4]) * PLAY
     corner = worst_corner(zone, sources, t, random_corners(4, 4))
@@ -73,8 +54,8 @@ def test_a_margin_is_worst_and_bounded_by_sums_along_each_axis():
     assert bound_margin(zone, sources, t * [1, 1, 0, 0]) == pytest.approx(5.0, rel=1e-6)
 
 
-def test_the_bound_of_a_margin_shares_errors_among_several_plays():
-    """Two pins in a row, of 1 and 3 plays: an error x takes x / 4 of either.
+def test_the_bound_of_a_margin_shares_errors_among_several_clearances():
+    """Two pins in a row, of 1 and 3 clearances: an error x takes x / 4 of either.
 
     Across their axis and along it, which are cones of their own.
     """
@@ -99,12 +80,7 @@ def test_the_bound_of_a_margin_shares_errors_among_several_plays():
 
 def test_an_error_that_nothing_takes_up_has_no_bound():
     """Along z of a pin; a tolerance of zero of it is none, one of 1e-13 m rounding."""
-    frames = (
-        Frame("one", translation=[0.5, 0, 0]),
-        Frame("two", "base", [0.5, 0, 0]),
-        Frame("end", "one", clearance=Clearance(radial=PLAY)),
-    )
-    robot = Robot("pin", "end", frames, (("end", "two"),))
+    robot = rigid_pair(radial=PLAY)
     posture = home_posture(robot)
     sources = plan_for(robot, [("one", 3), ("one", 5)], [1, 1], {}).sources
     zone = prepare_margins(posture, "rigid")
@@ -136,21 +112,12 @@ def test_a_spring_along_one_axis_bounds_the_energy_of_errors_along_it():
             assert found == pytest.approx(bound, rel=1e-6)
 
 
-def test_play_of_one_pair_is_not_spent_on_another():
-    """Two pairs of bars side by side: gaps of 1.5 and 10 plays leave 0.5 and 9.
+def test_clearance_of_one_pair_is_not_spent_on_another():
+    """Two pairs of bars side by side: gaps of 1.5 and 10 clearances leave 0.5 and 9.
 
-    Each takes its own play; the bound adds up what is left: k (0.5 + 9)^2 p^2 / 4.
+    Each takes its own clearance; the bound adds up what is left: k (0.5 + 9)^2 p^2 / 4.
     """
-    frames, closures = [], []
-    for i in (0, 1):
-        link = MatrixLink(np.eye(6) * K)
-        frames += [
-            Frame(f"one{i}", translation=[0.5, 0, 0], link=link),
-            Frame(f"two{i}", translation=[0.5, 0, 0], link=link),
-            Frame(f"joint{i}", f"one{i}", clearance=Clearance(radial=PLAY)),
-        ]
-        closures.append((f"joint{i}", f"two{i}"))
-    robot = Robot("pairs", "joint0", tuple(frames), tuple(closures))
+    robot = pairs_of_bars([K, K], PLAY)
     prepared = linear_response(home_posture(robot))
     sources = plan_for(robot, [("one0", 3), ("one1", 3)], [1, 1], {}).sources
     found = bound_energy(prepared, sources, np.array([1.5, 10.0]) * PLAY)
@@ -158,35 +125,8 @@ def test_play_of_one_pair_is_not_spent_on_another():
 
 
 def test_a_chain_that_always_closes_has_no_margin_to_bound():
-    frames = (
-        Frame("pin", joint="revolute", actuated=True, clearance=Clearance(radial=PLAY)),
-        Frame("tip", "pin", [0.4, 0, 0], link=MatrixLink(np.eye(6) * K)),
-    )
-    robot = Robot("arm", "tip", frames)
+    robot = arm(link=MatrixLink(np.eye(6) * K), radial=PLAY)
     posture = home_posture(robot)
     sources = plan_for(robot, [("tip", 3)], [1], {}).sources
     assert bound_margin(prepare_margins(posture, "rigid"), sources, np.ones(1)) == 0.0
     assert bound_energy(linear_response(posture), sources, np.ones(1)) == 0.0
-
-
-@pytest.mark.parametrize("key", ["force", "moment", "energy"])
-def test_one_start_finds_the_worst_of_all_corners(key):
-    """Of 16 corners each solved by itself; the same corner from any start."""
-    posture, sources = bars(Clearance(radial=PLAY))
-    prepared, t = linear_response(posture), np.array([3.0, 2, 1, 4]) * PLAY
-    every = np.array(list(product([-1.0, 1.0], repeat=4)))
-    values, slopes = respond(prepared, sources, every * t, key)
-    for start in (every[:1], every[5:7]):
-        corner = worst_corner(prepared, sources, t, start, key)
-        assert corner.value == pytest.approx(values.max(), rel=1e-6)
-        (row,) = np.flatnonzero((every == corner.signs).all(axis=1))
-        assert values[row] == pytest.approx(corner.value, rel=1e-6)
-        np.testing.assert_allclose(corner.slopes, slopes[row], rtol=1e-4, atol=1e-3)
-
-
-def test_corners_are_signs_of_either_kind():
-    corners = random_corners(500, 3, 2)
-    assert set(np.unique(corners)) == {-1.0, 1.0}
-    assert np.abs(corners.mean(axis=0)).max() < 0.2
-    np.testing.assert_array_equal(corners, random_corners(500, 3, 2))
-    assert not np.array_equal(corners, random_corners(500, 3, 3))

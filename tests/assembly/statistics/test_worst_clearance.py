@@ -7,7 +7,7 @@ import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import tolerance_sources
-from assembly.model.robot import Clearance, Frame, Robot
+from assembly.model.robot import Clearance
 from assembly.robots import load_robot
 from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from assembly.statistics.experiment import Experiment, precision_for
@@ -16,19 +16,10 @@ from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.responses import respond
 from assembly.statistics.summary import summarise, summary_text
 from assembly.statistics.worst_clearance import bound_worst_errors
+from tests.tolerances_for_tests import ARM, arm
 
-ARM, RADIAL, TILT = 0.4, 1e-4, 2e-3
+RADIAL, TILT = 1e-4, 2e-3
 POSE = {"tx": 0.1, "tz": -0.5}
-
-
-def chain(radial=RADIAL, tilt=0.0):
-    """One driven joint with clearance, and an arm of 0.4 m across its axis."""
-    play = Clearance(radial=radial, tilt=tilt)
-    frames = (
-        Frame("pin", joint="revolute", actuated=True, clearance=play),
-        Frame("tip", "pin", [ARM, 0, 0]),
-    )
-    return Robot("arm", "tip", frames)
 
 
 def tip_errors(robot, size):
@@ -42,35 +33,12 @@ def papers(share, **options):
     return Experiment(place_robot(robot, pose=POSE), sources, margins=False, **options)
 
 
-def test_one_disc_of_play_adds_its_radius_along_the_error():
-    """The tip is off by e and a disc about it: hypot(|e_xy| + radius, e_z) at most."""
-    robot = chain()
-    experiment = Experiment(home_posture(robot), tip_errors(robot, 3e-4),
-                            precision=(1e-9, 1e-9))  # fmt: skip
-    values = experiment.sources.draw(0, 50, seed=1)
-    rows = experiment.evaluate(values, range(50))
-    worst = np.hypot(np.hypot(values[:, 0], values[:, 1]) + RADIAL, values[:, 2])
-    assert (rows["translation_lower"] <= worst * (1 + 1e-12)).all()
-    assert (rows["translation"] >= worst * (1 - 1e-12)).all()
-    np.testing.assert_allclose(rows["translation"], worst, atol=1.1e-9)
-    assert not rows["rotation"].any()
-
-
-def test_tilt_swings_the_tip_on_its_arm():
-    """Tilt b about y moves a tip at distance L along x by L b; no radial play."""
-    robot = chain(0.0, TILT)
-    experiment = Experiment(home_posture(robot), tip_errors(robot, 0.0))
-    rows = experiment.evaluate(np.zeros((1, 0)), range(1))
-    assert rows["rotation"][0] == pytest.approx(TILT, abs=1e-6)
-    assert rows["translation"][0] == pytest.approx(ARM * TILT, abs=1e-6)
-
-
 def test_the_screws_of_the_bounds_attain_them_part_by_part(rng):
-    """A disc p of play and a tilt b on an arm L: rotation b, and hypot(e + p, L b).
+    """A disc of radius p and a tilt b on an arm L: rotation b, and hypot(e + p, L b).
 
     Beside errors e along x; a draw without an answer has no bounds.
     """
-    posture = home_posture(chain(RADIAL, TILT))
+    posture = home_posture(arm(radial=RADIAL, tilt=TILT))
     prepared = linear_response(posture)
     errors = np.zeros((3, 2, 6))
     errors[:, 1, 3] = 0.0, 2e-4, 0.0
@@ -90,7 +58,7 @@ def test_the_screws_of_the_bounds_attain_them_part_by_part(rng):
 @pytest.mark.parametrize("part", [0, 1])
 def test_a_part_that_is_not_asked_for_is_not_less_than_the_solution_s(part):
     """Its bounds enclose the truth, however far apart they are."""
-    posture = home_posture(chain(RADIAL, TILT))
+    posture = home_posture(arm(radial=RADIAL, tilt=TILT))
     prepared, errors = linear_response(posture), np.zeros((4, 2, 6))
     errors[:, 1] = np.linspace(1e-4, 4e-4, 4)[:, None] * [1, 0, 0, 1, 0, 0]
     draws = prepared.solve(errors)
@@ -110,9 +78,9 @@ def test_a_part_that_is_not_asked_for_is_not_less_than_the_solution_s(part):
     "share", [0.02, pytest.param(0.3, marks=pytest.mark.slow), 1.0]
 )
 @pytest.mark.parametrize("play", ["least", "uniform", "contact"])
-def test_no_other_play_is_worse_in_any_draw(share, play):
+def test_no_other_clearance_is_worse_in_any_draw(share, play):
     """Inside the zone, at its edge and outside; 1e-9: two solutions of (22)."""
-    worst, other = papers(share), papers(share, clearance_model=play)
+    worst, other = papers(share), papers(share, clearance=play)
     values = worst.sources.draw(0, 60, seed=1)
     bound, found = (e.evaluate(values, range(60)) for e in (worst, other))
     for name in ("rotation", "translation"):
@@ -122,41 +90,12 @@ def test_no_other_play_is_worse_in_any_draw(share, play):
         assert np.median(bound["translation"] / found["translation"]) > 2
 
 
-def test_more_play_is_never_better_where_play_alone_suffices():
-    """Clearances that close without energy are nested sets; brackets are 1e-6 wide."""
-    robot, before = load_robot("irsbot2"), None
-    sources = tolerance_sources(robot, [1e-4] * 3 + [5e-6] * 3)
-    values = sources.draw(0, 40, seed=3)
-    for factor in (1.0, 1.1, 1.5):
-        looser = replace(robot, frames=tuple(
-            replace(f, clearance=None if f.clearance is None else Clearance(**{
-                k: factor * getattr(f.clearance, k) for k in ("radial", "axial", "tilt")
-            }, spin=f.clearance.spin))
-            for f in robot.frames
-        ))  # fmt: skip
-        posture, own = place_robot(looser, pose=POSE), replace_robot(sources, looser)
-        experiment = Experiment(posture, own, margins=False)
-        rows = experiment.evaluate(values, range(40))
-        assert rows["energy"].max() < 1e-20
-        if before is not None:
-            for name in ("rotation", "translation"):
-                assert (rows[name] >= before[f"{name}_lower"]).all()
-                assert np.median(rows[name] / before[name]) > 1.05
-        before = rows
-
-
-def replace_robot(sources, robot):
-    arrays = ("frame", "component", "kind", "centre", "scale", "least", "limit",
-              "signed")  # fmt: skip
-    return type(sources)(robot, *(getattr(sources, a) for a in arrays))
-
-
-def test_a_yield_of_all_draws_becomes_none_when_the_worst_play_counts():
+def test_a_yield_of_all_draws_becomes_none_when_the_worst_clearance_counts():
     """Parts so good that clearance alone suffices: 0.1 mm is met at rest only."""
     limits, share = {"translation": 1e-4}, {}
     for play in CLEARANCE_MODELS:
         data = run_draws(
-            papers(0.025, clearance_model=play, precision=precision_for(limits)), 120
+            papers(0.025, clearance=play, precision=precision_for(limits)), 120
         )
         said = summarise(data, limits)
         share[play] = said["within_limits"]["probability"]
@@ -171,41 +110,9 @@ def test_a_yield_of_all_draws_becomes_none_when_the_worst_play_counts():
     assert share["worst"] < share["contact"] < share["uniform"] < share["least"]
 
 
-def test_of_draws_none_of_which_assemble_nothing_is_said():
-    """Rigid, without play: no error but zero can be closed."""
-    frames = (Frame("one", translation=[0.5, 0, 0]), Frame("two", "base", [0.5, 0, 0]))
-    robot = Robot("rigid", "one", frames, (("one", "two"),))
-    sources = tolerance_sources(robot, [0, 0, 0, 3e-4, 0, 0], ("one", "two"))
-    said = summarise(run_draws(Experiment(home_posture(robot), sources), 20))
-    lines = summary_text(said).splitlines()
-    (last,) = [line for line in lines if "draws that assemble" in line]
-    assert last == "of the 0 of 20 draws that assemble: nothing to say"
-    assert sum("nothing to say" in line for line in lines) == 1
-    assert said["assembles"]["forced"]["probability"] == 0.0
-
-
-def test_draws_between_the_bounds_are_counted_as_undecided():
-    """Rough bounds: each draw is surely within, surely not, or said to be open."""
-    robot = chain()
-    experiment = Experiment(home_posture(robot), tip_errors(robot, 3e-4),
-                            margins=False, precision=(1e-6, 3e-5))  # fmt: skip
-    data, limit = run_draws(experiment, 400), 3e-4
-    said = summarise(data, {"translation": limit})
-    found, over = said["within_limits"], said["exceeds"]["translation"]
-    values = experiment.sources.draw(0, 400, 1)
-    worst = np.hypot(np.hypot(values[:, 0], values[:, 1]) + RADIAL, values[:, 2])
-    truth = float((worst <= limit).mean())
-    assert 0 < found["undecided"] < 200
-    assert found["probability"] <= truth <= 1 - over["probability"]
-    both = found["probability"] + over["probability"] + found["undecided"] / 400
-    assert both == pytest.approx(1.0)
-    assert found["lower"] < truth < found["upper"]
-    assert f"{found['undecided']} draws undecided" in summary_text(said)
-
-
-def test_a_load_that_takes_up_all_play_leaves_nothing_to_the_worst():
+def test_a_load_that_takes_up_all_clearance_leaves_nothing_to_the_worst():
     """A weight pushes the pin to one side of its disc: sideways it may not move."""
-    robot = chain()
+    robot = arm(radial=RADIAL)
     sources, load = tip_errors(robot, 1e-4), (0, 0, 0, 10.0, 0, 0)
     values = sources.draw(0, 10, seed=1)
     rows = Experiment(home_posture(robot), sources, load=load, margins=False).evaluate(
@@ -241,6 +148,35 @@ def test_the_largest_pose_error_has_slopes(key, share, rng):
     assert max(off) < 0.1
 
 
-def test_an_unknown_play_is_refused():
+def test_more_clearance_is_never_better_where_clearance_alone_suffices():
+    """Clearances that close without energy are nested sets; brackets are 1e-6 wide."""
+    robot, before = load_robot("irsbot2"), None
+    sources = tolerance_sources(robot, [1e-4] * 3 + [5e-6] * 3)
+    values = sources.draw(0, 40, seed=3)
+    for factor in (1.0, 1.1, 1.5):
+        looser = replace(robot, frames=tuple(
+            replace(f, clearance=None if f.clearance is None else Clearance(**{
+                k: factor * getattr(f.clearance, k) for k in ("radial", "axial", "tilt")
+            }, spin=f.clearance.spin))
+            for f in robot.frames
+        ))  # fmt: skip
+        posture, own = place_robot(looser, pose=POSE), replace_robot(sources, looser)
+        experiment = Experiment(posture, own, margins=False)
+        rows = experiment.evaluate(values, range(40))
+        assert rows["energy"].max() < 1e-20
+        if before is not None:
+            for name in ("rotation", "translation"):
+                assert (rows[name] >= before[f"{name}_lower"]).all()
+                assert np.median(rows[name] / before[name]) > 1.05
+        before = rows
+
+
+def replace_robot(sources, robot):
+    arrays = ("frame", "component", "kind", "centre", "scale", "least", "limit",
+              "signed")  # fmt: skip
+    return type(sources)(robot, *(getattr(sources, a) for a in arrays))
+
+
+def test_an_unknown_clearance_is_refused():
     with pytest.raises(ValueError, match="clearance is 'most', expected one of"):
-        papers(0.1, clearance_model="most")
+        papers(0.1, clearance="most")

@@ -1,6 +1,7 @@
 """A sweep on many processes gives the numbers of one, also when a worker dies."""
 
 import os
+import pickle
 import re
 import signal
 import subprocess
@@ -12,8 +13,7 @@ import pytest
 
 from assembly.model.error_distributions import tolerance_sources
 from assembly.robots import load_robot
-from assembly.sweeps.cluster import cluster_solver, solve_task
-from assembly.sweeps.identity import question_hash
+from assembly.sweeps.cluster import _check_workers, cluster_solver, solve_task
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.sweep import run_sweep
@@ -32,30 +32,14 @@ def drawn_sweep(grid):
     return Sweep(question, targets, (), 3, block_size=32)
 
 
-def test_a_task_is_its_blocks():
-    """What a worker does, without one."""
-    import pickle
-
-    sweep = drawn_sweep("tx=0:0.02:0.01,ty=0.12:0.14:0.01")
-    question = pickle.dumps(sweep.question), question_hash(sweep.question)
-    seconds, found = solve_task(*question, [(0, sweep.points(0))])
-    assert seconds > 0
-    assert found[0][0] == 0
-    assert np.isfinite(found[0][1].records["energy"]).all()
-
-
 def test_a_worker_with_another_question_refuses_it():
     """As when a mesh differs there: its content is in the hash."""
-    import pickle
-
     question = drawn_sweep("tx=0,ty=0.13").question
     with pytest.raises(BadInput, match="a worker reads another robot"):
         solve_task(pickle.dumps(question), "0" * 64, [])
 
 
 def test_workers_with_other_sources_are_refused():
-    from assembly.sweeps import cluster
-
     class Client:
         def __init__(self, **theirs):
             self.theirs = theirs
@@ -67,21 +51,9 @@ def test_workers_with_other_sources_are_refused():
             return {"tcp://h:1": program() | self.theirs}
 
     with pytest.raises(BadInput, match=r"worker tcp://h:1 has forcefit .*, expected "):
-        cluster._check_workers(Client(program_sha256=64 * "0"))
+        _check_workers(Client(program_sha256=64 * "0"))
     # another commit of the same sources
-    cluster._check_workers(Client(program="forcefit 0.2.0.dev7+g1234567"))
-
-
-def test_draws_do_not_depend_on_who_makes_them():
-    """Draw 2 of posture 5 is draw 2 of posture 0, in whatever block it falls."""
-    from assembly.sweeps.points import solve_points
-
-    sweep = drawn_sweep("tx=0,ty=0.13")
-    many = drawn_sweep("tx=-0.02:0.02:0.01,ty=0.13")
-    one = solve_points(sweep.question, sweep.points(0)).records
-    all_ = solve_points(many.question, many.points(0)).records
-    assert (all_["energy"][6:9] == one["energy"]).all()  # tx = 0 is the third posture
-    assert len(set(one["energy"].tolist())) == 3
+    _check_workers(Client(program="forcefit 0.2.0.dev7+g1234567"))
 
 
 @pytest.mark.slow

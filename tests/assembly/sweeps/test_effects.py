@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from assembly.effects.robot_effects import apply_robot_effects
+from assembly.files.robot_file import read_robot
 from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.model.function import Function
@@ -13,6 +14,7 @@ from assembly.robots import load_robot
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.request import SweepOptions, ask_sweep
+from assembly.sweeps.robot_sweep import sweep
 from assembly.sweeps.sweep import sweep_in_memory
 from assembly.sweeps.targets import grid_targets, parse_grid
 from forcefit.inputs.table import BadInput
@@ -38,24 +40,16 @@ def swept(robot, grid, **given):
 def test_an_arm_on_a_spring_sags_by_hand(tmp_path):
     """M / k with M = F L cos q of a load, and m g L cos q / 2 of the beam's weight."""
     path = arm_with(tmp_path)
-    grid = "q.drive=0:1.2:0.4"
-    asked = ask_sweep(
-        str(path),
-        SweepOptions(
-            grid=grid,
-            assumption="none",
-            load=[0, 0, 0, 0, 10, 0],
-            gravity=[0, -G, 0],
-            wrench_of=["drive"],
-        ),
-    )
-    data = sweep_in_memory(asked)
+    data = sweep(
+        path, grid="q.drive=0:1.2:0.4", assumption="none", load=[0, 0, 0, 0, 10, 0],
+        gravity=[0, -G, 0], wrench_of=["drive"],
+    )  # fmt: skip
     q = data["q.drive"].values
     assert q.shape == (4,)
     weight = 2700 * np.pi * 0.015**2 * L * G
     M = (10 - weight / 2) * L * np.cos(q)
     joint = solve_assembly(
-        place_robot(asked.question.robot, joints={"drive": 0.4}),
+        place_robot(read_robot(path), joints={"drive": 0.4}),
         [0, 0, 0, 0, 10, 0], gravity=[0, -G, 0],
     )  # fmt: skip
     # the bar bends too: what is above the drive's own turn is the bar's
@@ -118,7 +112,7 @@ def test_functions_act_at_every_point(load):
         assert np.abs(change).max() > 0.02 * np.abs(other[3:]).max()
 
 
-def test_what_a_device_reads_stands_beside_the_pose():
+def test_readings_of_a_device_are_stored_with_the_pose():
     """A device shifted by b reads b less nothing: R = 1, so b more."""
     shift = {"base.tx": 3e-5, "base.tz": -1e-5}
     robot = irsbot2_with(NUMBERS["cases"][0])

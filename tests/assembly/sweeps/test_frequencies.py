@@ -1,32 +1,27 @@
 """Natural frequencies as quantities of sweeps."""
 
+import numpy as np
 import pytest
 
 from assembly.kinematics.posture import place_robot
 from assembly.platform_stiffness.vibration import natural_modes
-from assembly.robots import load_robot
 from assembly.sweeps.maps import figure_of
-from assembly.sweeps.request import SweepOptions, ask_sweep
-from assembly.sweeps.sweep import sweep_in_memory
+from assembly.sweeps.parameters import load_design
+from assembly.sweeps.robot_sweep import sweep
 from forcefit.inputs.table import BadInput
 
 
-def test_each_point_has_the_frequencies_of_its_posture():
-    """A lighter, as stiff design is faster: omega falls as 1 / sqrt(density)."""
-    rods = "density=2000,8000"
-    options = SweepOptions(
-        grid="tx=0:0.1:0.1,tz=-0.9",
-        vary=[f"leg1.elbow.link.{rods}"],
-        assumption="none",
-        frequencies=3,
-    )
-    data = sweep_in_memory(ask_sweep("delta", options))
-    assert data.frequency.dims[-1] == "mode"
-    one = natural_modes(place_robot(load_robot("delta"), {"tx": 0.1, "tz": -0.9}), 3)
-    assert one.frequencies.shape == (3,)
-    light, heavy = data.frequency.isel({data.frequency.dims[0]: [0, 1]}).values
-    assert (light >= heavy).all()
-    assert (light[..., 0] > 0).all()
+def test_each_point_has_the_frequencies_of_its_posture_and_design():
+    path, pose = "leg1.elbow.link.density", {"tx": 0.1, "tz": -0.9}
+    data = sweep(
+        "delta", grid="tx=0:0.1:0.1,tz=-0.9", assumption="none", frequencies=3,
+        vary=[f"{path}=2000,8000"],
+    )  # fmt: skip
+    for density in (2000.0, 8000.0):
+        robot = load_design("delta").robot({path: density})
+        expected = natural_modes(place_robot(robot, pose), 3).frequencies
+        found = data.frequency.sel(pose | {path: density}, method="nearest")
+        np.testing.assert_allclose(found, expected, rtol=1e-9)
     titles = [axes.get_title() for axes in figure_of(data, {}).axes]
     assert "lowest natural frequency [Hz]" in titles
 
@@ -38,9 +33,6 @@ def test_each_point_has_the_frequencies_of_its_posture():
         ("irsbot2", 2, "found no mass that moves"),
     ],
 )
-def test_what_has_no_frequencies_is_refused(robot, count, message):
+def test_robots_without_frequencies_are_refused(robot, count, message):
     with pytest.raises(BadInput, match=message):
-        ask_sweep(
-            robot,
-            SweepOptions(grid="tx=0,tz=-0.5", assumption="none", frequencies=count),
-        )
+        sweep(robot, grid="tx=0,tz=-0.5", assumption="none", frequencies=count)

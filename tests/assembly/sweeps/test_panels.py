@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray
 
 import forcefit as ff
 from assembly.statistics.plot import figure_of_draws
@@ -98,8 +99,6 @@ def test_histograms_of_signed_components_have_their_mode_below_zero(arm_draws):
 @pytest.fixture
 def arm_draws(rng):
     """Draws whose platform is 1 mm off against x, normally with 0.05 mm."""
-    import xarray
-
     screw = np.zeros((4000, 6))
     screw[:, 3] = rng.normal(-1e-3, 5e-5, 4000)
     return xarray.Dataset(

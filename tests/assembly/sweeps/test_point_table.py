@@ -99,13 +99,13 @@ def test_other_rows_are_named_and_unknown_ones_refused(data):
 def test_a_file_becomes_a_table_by_the_command(run, data, tmp_path):
     save_dataset(data, tmp_path / "s.nc")
     file, out = tmp_path / "s.nc", tmp_path / "t.csv"
-    assert run("assembly", "table", file, "-o", out) == (0, "", "")
+    assert run("assembly", "plot", file, "--csv", out) == (0, "", "")
     assert len(read(out)) == 12
-    status, _, err = run("assembly", "table", file, "-o", out, "--rows", "txx")
+    status, _, err = run("assembly", "plot", file, "--csv", out, "--rows", "txx")
     assert (status, err.count("\n")) == (2, 1)
     assert f'{file}: no axis "txx"' in err
     out.write_text("mine,1\n")
-    assert run("assembly", "table", file, "-o", out)[0] == 2
+    assert run("assembly", "plot", file, "--csv", out)[0] == 2
     assert out.read_text() == "mine,1\n"
 
 

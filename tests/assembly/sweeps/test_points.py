@@ -13,11 +13,13 @@ from assembly.linear.pose_error import bound_pose_error
 from assembly.model.error_distributions import read_sources
 from assembly.model.robot import BeamLink
 from assembly.robots import load_robot
+from assembly.sweeps import points
 from assembly.sweeps.maps import figure_of
 from assembly.sweeps.parameters import load_design
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.request import SweepOptions, ask_sweep, summary_of
+from assembly.sweeps.robot_sweep import sweep
 from assembly.sweeps.selection import BY_CLEARANCE
 from assembly.sweeps.sweep import sweep_in_memory, sweep_poses
 from assembly.sweeps.targets import grid_targets, parse_grid
@@ -85,11 +87,7 @@ def test_clearance_alone_is_symmetric_where_the_robot_is(data):
 
 def test_a_design_that_varies_is_that_robot_bit_for_bit():
     path = "link_a.link.beam.radius"
-    asked = ask_sweep(
-        "irsbot2",
-        SweepOptions(grid=GRID, vary=[f"{path}=0.03,0.05"], assumption="none"),
-    )
-    data = sweep_in_memory(asked)
+    data = sweep("irsbot2", grid=GRID, vary=[f"{path}=0.03,0.05"], assumption="none")
     assert data.energy.dims == (path, "tx", "tz")
     assert data[path].attrs["units"] == "m"
     one = sweep_poses(load_design("irsbot2").robot({path: 0.05}), parse_grid(GRID))
@@ -101,11 +99,9 @@ def test_a_design_that_varies_is_that_robot_bit_for_bit():
 def test_draws_are_robots_with_those_errors_bit_for_bit(tmp_path):
     path = tmp_path / "errors.toml"
     path.write_text(ERRORS)
-    asked = ask_sweep(
-        "five_bar",
-        SweepOptions(grid="tx=0:0.02:0.02,ty=0.14", errors=path, draws=3, seed=11),
+    data = sweep(
+        "five_bar", grid="tx=0:0.02:0.02,ty=0.14", errors=path, draws=3, seed=11
     )
-    data = sweep_in_memory(asked)
     assert data.energy.dims == ("tx", "ty", "draw")
     robot = load_robot("five_bar")
     sources = read_sources(path, robot)
@@ -129,11 +125,9 @@ def test_a_list_and_a_grid_of_one_robot_agree(robot, tmp_path):
         for a, b in zip(x.ravel().tolist(), z.ravel().tolist(), strict=True)
     ]
     (tmp_path / "path.csv").write_text("\n".join(["pose.tx,pose.tz", *rows]) + "\n")
-    asked = ask_sweep(
-        str(tmp_path / "robot.toml"),
-        SweepOptions(poses=tmp_path / "path.csv", assumption="none"),
+    found = sweep(
+        str(tmp_path / "robot.toml"), poses=tmp_path / "path.csv", assumption="none"
     )
-    found = sweep_in_memory(asked)
     assert found.energy.dims == ("posture",)
     assert found.tz.dims == ("posture",)
     assert np.array_equal(found.energy.values, grid.energy.values.ravel())
@@ -161,13 +155,12 @@ def test_joint_coordinates_lead_to_the_pose_they_command():
 def test_a_design_that_cannot_close_is_a_status_and_stops_nothing():
     path = "leg1.elbow_a.translation.y"
     y = float(load_robot("irsbot2").frame("leg1.elbow_a").translation[1])
-    asked = ask_sweep(
+    data = sweep(
         "irsbot2",
-        SweepOptions(
-            grid="tx=0,tz=-0.5:-0.4:0.1", vary=[f"{path}={y!r},0.4"], assumption="none"
-        ),
-    )
-    data = sweep_in_memory(asked).squeeze()
+        grid="tx=0,tz=-0.5:-0.4:0.1",
+        vary=[f"{path}={y!r},0.4"],
+        assumption="none",
+    ).squeeze()
     assert data.status.values.tolist() == [["ok", "ok"], ["invalid robot"] * 2]
     assert "does not hold in the home pose" in data.reason.values[1, 0]
     assert np.isnan(data.energy.values[1]).all()
@@ -176,8 +169,6 @@ def test_a_design_that_cannot_close_is_a_status_and_stops_nothing():
 
 def test_a_point_that_breaks_the_algebra_is_a_status_of_its_own(robot, monkeypatch):
     """The third of five postures raises in the middle of its block."""
-    from assembly.sweeps import points
-
     solve, axes = points.solve_assembly, parse_grid("tx=-0.2:0.2:0.1,tz=-0.5")
     expected = sweep_poses(robot, axes)
     bad = place_robot(robot, pose={"tx": 0.0, "tz": -0.5}).platform[:3, 3]
@@ -230,17 +221,14 @@ def test_figures_need_only_the_data_set(tmp_path):
     path = tmp_path / "errors.toml"
     path.write_text(ERRORS)
     grid = "tx=-0.02:0.02:0.02,ty=0.12:0.14:0.02"
-    asked = ask_sweep(
+    data = sweep(
         "five_bar",
-        SweepOptions(
-            grid=grid,
-            errors=path,
-            draws=3,
-            near=0.6,
-            quantities=["default", *BY_CLEARANCE],
-        ),
+        grid=grid,
+        errors=path,
+        draws=3,
+        near=0.6,
+        quantities=["default", *BY_CLEARANCE],
     )
-    data = sweep_in_memory(asked)
     figure = figure_of(data)
     titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
     assert len(titles) == 6

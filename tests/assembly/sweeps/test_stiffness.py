@@ -9,20 +9,17 @@ from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
 from assembly.sweeps.maps import figure_of
 from assembly.sweeps.request import SweepOptions, ask_sweep
+from assembly.sweeps.robot_sweep import sweep
 from assembly.sweeps.sweep import sweep_in_memory
 from forcefit.inputs.table import BadInput
 
 
 def test_each_point_has_the_stiffness_of_its_posture():
-    data = sweep_in_memory(
-        ask_sweep(
-            "irsbot2",
-            SweepOptions(
-                grid="tx=-0.1:0.1:0.1,tz=-0.5:-0.4:0.1",
-                assumption="none",
-                state="nominal",
-            ),
-        )
+    data = sweep(
+        "irsbot2",
+        grid="tx=-0.1:0.1:0.1,tz=-0.5:-0.4:0.1",
+        assumption="none",
+        state="nominal",
     )
     robot = load_robot("irsbot2")
     one = without_clearance(place_robot(robot, {"tx": 0.1, "tz": -0.4}))
@@ -46,16 +43,12 @@ def test_each_point_has_the_stiffness_of_its_posture():
 
 def test_a_thicker_link_is_stiffer_in_a_sweep_of_designs():
     """Bending stiffness of a round bar grows with the radius to the fourth."""
-    data = sweep_in_memory(
-        ask_sweep(
-            "irsbot2",
-            SweepOptions(
-                grid="tx=0,tz=-0.5",
-                vary=["link_a.link.beam.radius=0.03,0.04,0.05"],
-                assumption="none",
-                state="nominal",
-            ),
-        )
+    data = sweep(
+        "irsbot2",
+        grid="tx=0,tz=-0.5",
+        vary=["link_a.link.beam.radius=0.03,0.04,0.05"],
+        assumption="none",
+        state="nominal",
     )
     stiffness = data.stiffness.sel(wrench_component="FY").values.ravel()
     assert (np.diff(stiffness) > 0).all()
@@ -88,10 +81,8 @@ def test_a_tangent_is_that_of_the_point_s_errors_load_and_clearances(state):
 
 
 def test_a_tangent_names_the_motions_that_nothing_resists():
-    data = sweep_in_memory(
-        ask_sweep("irsbot2", SweepOptions(grid="tx=0,tz=-0.5", assumption="none",
-                                          state="contact", load=LOAD))
-    )  # fmt: skip
+    data = sweep("irsbot2", grid="tx=0,tz=-0.5", assumption="none", state="contact",
+                 load=LOAD)  # fmt: skip
     assert "nothing resists the platform's motion" in str(data.reason.values.ravel()[0])
     assert float(data.stiffness.sel(wrench_component="FY").squeeze()) == 0.0
 

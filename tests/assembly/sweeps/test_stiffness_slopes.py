@@ -10,7 +10,6 @@ from assembly.platform_stiffness.linear_tangent import without_clearance
 from assembly.robots import load_robot
 from assembly.sweeps.parameters import load_design
 from assembly.sweeps.stiffness_slopes import CannotChange, stiffness_slopes
-from forcefit.inputs.table import BadInput
 
 POSE = {"tx": 0.1, "tz": -0.5}
 
@@ -52,16 +51,6 @@ link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }
     assert slope[2, 4] == pytest.approx(0.5 / (7e10 * inertia), rel=1e-6)
 
 
-def test_the_command_gives_them(run):
-    status, out, _ = run(
-        "assembly", "stiffness", "irsbot2", "--by", "link_a.link.beam.radius",
-        "--json", "-",
-    )  # fmt: skip
-    assert status == 0
-    slope = np.array(json.loads(out)["slopes"]["link_a.link.beam.radius"])
-    assert (np.diag(slope) < 0).all()
-
-
 def test_the_command_gives_them_at_the_exact_equilibrium(run):
     """The load's own stiffness is in them: they are not those without it."""
     slopes = {}
@@ -76,11 +65,6 @@ def test_the_command_gives_them_at_the_exact_equilibrium(run):
     assert slopes[4][3, 3] < 0.0
     # entries beside it are zero or its rounding
     assert abs(slopes[4][3, 3] / slopes[0][3, 3] - 1) > 1e-4
-
-
-def test_an_unknown_number_is_named():
-    with pytest.raises(BadInput, match="no number"):
-        stiffness_slopes(load_design("irsbot2"), ["link_a.link.beam.raduis"])
 
 
 def test_effects_of_the_file_are_in_them(tmp_path):

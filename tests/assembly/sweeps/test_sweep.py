@@ -1,4 +1,4 @@
-"""Grids, and data sets over them."""
+"""Data sets over grids."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,10 @@ import xarray
 
 from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import solve_assembly
+from assembly.sweeps import points
 from assembly.sweeps.dataset import save_dataset
 from assembly.sweeps.maps import map_figure
-from assembly.sweeps.sweep import assemblable, sweep_poses
+from assembly.sweeps.sweep import sweep_poses
 from assembly.sweeps.targets import parse_grid
 from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
@@ -19,41 +20,6 @@ GRID = "tx=-0.4:0.4:0.2,tz=-0.65:-0.45:0.1"
 @pytest.fixture(scope="module")
 def data():
     return sweep_poses(irsbot2_with(NUMBERS["cases"][0]), parse_grid(GRID))
-
-
-@pytest.mark.parametrize(
-    ("text", "values"),
-    [
-        ("tx=0:1:0.25", [0, 0.25, 0.5, 0.75, 1.0]),
-        ("tx=0:1:0.3", [0, 0.3, 0.6, 0.9]),  # not whole: the end is left out
-        ("tx=-0.2:0.2:0.1", [-0.2, -0.1, 0, 0.1, 0.2]),  # whole within rounding
-        ("tx=0.3:0.1:-0.1", [0.3, 0.2, 0.1]),
-        ("tx=0.5", [0.5]),
-    ],
-)
-def test_both_ends_count_when_the_step_fits(text, values):
-    assert parse_grid(text)["tx"] == pytest.approx(values, abs=1e-15)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("tx=0:1", 'grid tx: found "0:1", expected START:STOP:STEP or one number'),
-        ("tx=a:b:c", 'grid tx: found "a:b:c", expected START:STOP:STEP'),
-        ("tx=0:nan:1", 'grid tx: found "0:nan:1", expected'),
-        ("tx=0:1:-0.1", "grid tx: step -0.1 never leads from 0 to 1"),
-        ("tx=0:1:0", "grid tx: step 0 never leads from 0 to 1"),
-        ("x=0:1:0.1", 'grid: unknown pose component "x"'),
-        ("tx=0,tx=1", 'grid: "tx" is given twice'),
-        ("tx=0:1:1e-9", "grid tx: 1e+09 points; is the step too small?"),
-        ("tx=0:1:1e-4,ty=0:1:1e-4", "grid: more than 10000000 points"),
-        ("", 'grid: unknown pose component ""'),
-    ],
-)
-def test_a_bad_grid_is_one_message(text, message):
-    with pytest.raises(BadInput) as error:
-        parse_grid(text)
-    assert str(error.value).startswith(message)
 
 
 def test_every_point_of_a_sweep_is_the_single_solution(data):
@@ -105,13 +71,6 @@ def test_a_folder_that_is_not_there_is_refused(data, tmp_path):
         save_dataset(data, tmp_path / "nowhere" / "map.nc")
 
 
-def test_assemblable_is_margin_up_to_one(data):
-    inside = assemblable(data)
-    at = data.indexes["tx"].get_indexer([0.4], method="nearest")[0]
-    assert inside[at, -1]  # 0.327 at (0.4, -0.45)
-    assert inside.sum() < inside.size
-
-
 def test_maps_show_each_quantity_of_the_grid(data):
     figure = map_figure(data)
     titles = [axes.get_title() for axes in figure.axes]
@@ -135,11 +94,6 @@ def test_pose_errors_are_bounded_where_a_reading_is_asked_for():
     assert low <= point["full_rigid_R"][1] + 1e-7
     assert high >= point["full_rigid_R"][0] - 1e-7
     assert np.isnan(data.rotation_error.sel(tz=-0.9, method="nearest")).all()
-    figure = map_figure(data)
-    panel = next(a for a in figure.axes if "orientation" in a.get_title())
-    shown = np.ma.filled(panel.collections[0].get_array(), np.nan)
-    highest = float(data.rotation_error.sel(bound="upper").max())
-    assert np.nanmax(shown) == pytest.approx(1e3 * highest)
 
 
 def test_maps_need_two_axes(data):
@@ -147,18 +101,8 @@ def test_maps_need_two_axes(data):
         map_figure(data.isel(tx=[0]))
 
 
-def test_progress_counts_points_block_by_block():
-    seen = []
-    robot = coaxial_beams(np.zeros(6))
-    axes = {"tx": np.linspace(0.4, 0.6, 130)}  # a block is 128
-    sweep_poses(robot, axes, lambda d, n: seen.append((d, n)))
-    assert seen == [(128, 130), (130, 130)]
-
-
 def test_a_margin_that_fails_is_a_status_of_its_point(monkeypatch):
     """The solver gives up on one reading of one point: its neighbour is not touched."""
-    from assembly.sweeps import points
-
     solve = points.zone_margin
 
     def spoilt(postures, reading, errors):

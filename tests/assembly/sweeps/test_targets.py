@@ -73,14 +73,39 @@ def test_a_table_with_a_mistake_is_one_message(robot, tmp_path, text, message):
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "values"),
     [
-        ("tx=0,q.leg1.drive=0", 'grid: found "tx" and "q.leg1.drive"; expected a pose'),
-        ("q.leg1.drove=0", 'unknown pose component "q.leg1.drove"; did you mean'),
-        ("q.leg1.elbow=0", 'unknown pose component "q.leg1.elbow"'),
+        ("tx=0:1:0.25", [0, 0.25, 0.5, 0.75, 1.0]),
+        ("tx=0:1:0.3", [0, 0.3, 0.6, 0.9]),  # not whole: the end is left out
+        ("tx=-0.2:0.2:0.1", [-0.2, -0.1, 0, 0.1, 0.2]),  # whole within rounding
+        ("tx=0.3:0.1:-0.1", [0.3, 0.2, 0.1]),
+        ("tx=0.5", [0.5]),
     ],
 )
-def test_a_grid_of_joints_names_actuated_ones_only(robot, text, message):
+def test_both_ends_count_when_the_step_fits(text, values):
+    assert parse_grid(text)["tx"] == pytest.approx(values, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("tx=0:1", 'grid tx: found "0:1", expected START:STOP:STEP or one number'),
+        ("tx=a:b:c", 'grid tx: found "a:b:c", expected START:STOP:STEP'),
+        ("tx=0:nan:1", 'grid tx: found "0:nan:1", expected'),
+        ("tx=0:1:-0.1", "grid tx: step -0.1 never leads from 0 to 1"),
+        ("tx=0:1:0", "grid tx: step 0 never leads from 0 to 1"),
+        ("x=0:1:0.1", 'grid: unknown pose component "x"'),
+        ("tx=0,tx=1", 'grid: "tx" is given twice'),
+        ("tx=0:1:1e-9", "grid tx: 1e+09 points; is the step too small?"),
+        ("tx=0:1:1e-4,ty=0:1:1e-4", "grid: more than 10000000 points"),
+        ("", 'grid: unknown pose component ""'),
+        ("tx=0,q.leg1.drive=0",
+         'grid: found "tx" and "q.leg1.drive"; expected a pose'),
+        ("q.leg1.drove=0", 'grid: unknown pose component "q.leg1.drove"; did you mean'),
+        ("q.leg1.elbow=0", 'grid: unknown pose component "q.leg1.elbow"'),
+    ],
+)  # fmt: skip
+def test_a_bad_grid_is_one_message(robot, text, message):
     with pytest.raises(BadInput) as error:
         parse_grid(text, robot)
-    assert message in str(error.value)
+    assert str(error.value).startswith(message)

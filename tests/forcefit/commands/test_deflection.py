@@ -27,7 +27,7 @@ def test_a_curve_goes_through_play_to_a_spring(run, tmp_path):
 def test_back_is_the_same_way_where_nothing_is_lost(run):
     status, out, _ = run(
         "assembly", "deflection", "four_bar", "--along", "fx=100:300:100", "--back",
-        "--exact", "--json", "-",
+        "--state", "exact", "--json", "-",
     )  # fmt: skip
     answer = json.loads(out)
     assert status == 0

@@ -4,7 +4,7 @@ import pytest
 import typer
 
 from forcefit.commands.app import app
-from forcefit.commands.old_names import OPTIONS, STAY, with_new_names
+from forcefit.commands.old_names import COMMANDS, OPTIONS, STAY, with_new_names
 
 RENAMED = [
     (command, old, new)
@@ -22,13 +22,37 @@ def options_of(command):
     return {name: not one.is_flag for one in options for name in one.opts}
 
 
+@pytest.mark.parametrize(("old", "new"), COMMANDS.items())
+def test_an_old_command_becomes_one_that_there_is(old, new, capsys):
+    found = with_new_names([*old.split(), "file", "--json", "-"])
+    assert found == [*new, "file", "--json", "-"]
+    assert capsys.readouterr().err == f"forcefit: {old} is now {' '.join(new)}\n"
+    with pytest.raises(KeyError):
+        options_of(old)
+    command = " ".join(new).partition(" --")[0]
+    assert {one for one in new if one.startswith("--")} <= set(options_of(command))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (["zone", "five_bar"], ["solve", "five_bar", "--quantities", "margin"]),
+        (["exact", "five_bar"], ["solve", "five_bar", "--state", "exact"]),
+    ],
+)
+def test_an_old_command_gives_the_answer_of_the_new_one(run, old, new):
+    status, out, _ = run("assembly", *old, "--json", "-")
+    assert (status, out) == run("assembly", *new, "--json", "-")[:2]
+    assert '"margin"' in out or '"linearisation_error"' in out
+
+
 @pytest.mark.parametrize(("command", "old", "new"), RENAMED)
 def test_an_old_option_becomes_one_that_the_command_has(command, old, new, capsys):
-    words = command.split()
+    words, present = command.split(), list(COMMANDS.get(command, command.split()))
     joined = f"{old}=value" if old.startswith("--") else f"{old}value"
     found = with_new_names([*words, old, "value", joined, "--json", "-"])
     assert found == [
-        *words,
+        *present,
         *new,
         "value",
         *new[:-1],
@@ -37,18 +61,27 @@ def test_an_old_option_becomes_one_that_the_command_has(command, old, new, capsy
         "-",
     ]
     said = "" if (command, old) in STAY else f"forcefit: {old} is now {' '.join(new)}\n"
-    assert capsys.readouterr().err == said
-    options = options_of(command)
+    assert capsys.readouterr().err.startswith(said)
+    options = options_of(" ".join(present))
     assert old not in options
     assert new[0] in options
     # with a value of its own in the table, or with that of the old option, or none
     assert len(new) == 1 or options[new[0]]
 
 
+@pytest.mark.parametrize(("old", "new"), [("free", "margin_free"), ("rigid", "margin")])
+def test_an_old_value_becomes_the_margin_of_that_name(old, new):
+    words = ["assembly", "tolerances", "r.toml"]
+    assert with_new_names([*words, "--compliant", old, "free"])[3:] == [
+        "--quantities", new, "free"
+    ]  # fmt: skip
+    assert with_new_names([*words, f"--compliant={old}"])[3:] == [f"--quantities={new}"]
+
+
 def test_words_after_two_dashes_and_of_other_commands_stay(capsys):
     for words in (
         ["assembly", "sweep", "--", "--tangent"],
-        ["validation", "crosscheck", "r", "--stiffness"],
+        ["validation", "validity", "r", "--stiffness"],
     ):
         assert with_new_names(words) == words
     assert capsys.readouterr().err == ""

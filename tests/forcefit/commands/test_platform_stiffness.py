@@ -64,7 +64,7 @@ def test_a_free_motion_is_null_and_exit_status_1(run, tmp_path):
     [
         ["stiffness", "--state", "exact", "--load", "fz=5"],
         ["deflection", "--along", "fz=0:5:5"],
-        ["deflection", "--along", "fz=0:5:5", "--exact"],
+        ["deflection", "--along", "fz=0:5:5", "--state", "exact"],
         ["deflection", "--along", "fz=0:5:5", "--follow"],
         ["frequencies", "--state", "exact", "--load", "fz=5"],
     ],
@@ -120,7 +120,7 @@ def test_the_chart_is_written(run, tmp_path):
         "--figure", str(picture),
     )  # fmt: skip
     assert picture.stat().st_size > 1000
-    assert "stiffness exact" in out
+    assert "state exact" in " ".join(out.split())
     assert status in {0, 1}
 
 

@@ -42,7 +42,7 @@ def test_every_load_of_a_curve_is_reported():
     said = []
     posture = home_posture(load_robot("hexapod"))
     deflection_curve(
-        posture, 5, np.array([0.0, -10.0, -20.0]), exact=True,
+        posture, 5, np.array([0.0, -10.0, -20.0]), state="exact",
         progress=lambda what, done, most: said.append(what),
     )  # fmt: skip
     # beside those that bracket what happens on the way

@@ -12,8 +12,8 @@ from forcefit.inputs.locking import locked_file
 ROOT = Path(__file__).parents[3]
 
 
-def test_a_locked_file_is_refused_until_it_is_let_go(tmp_path):
-    """In the same process too: a run that begins another of the same file."""
+def test_locked_file_is_refused_until_released(tmp_path):
+    """Also within one process."""
     path = tmp_path / "map.nc.journal"
     with locked_file(path):
         with pytest.raises(BlockingIOError), locked_file(path, wait=False):
@@ -24,7 +24,7 @@ def test_a_locked_file_is_refused_until_it_is_let_go(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_lock_that_a_killed_program_left_stops_nobody(tmp_path):
+def test_lock_of_a_killed_program_is_taken(tmp_path):
     path = tmp_path / "map.nc.journal"
     held = f"""
 import os
@@ -69,10 +69,10 @@ main()
         "assembly solve irsbot2 --pose tx=0.1,tz=-0.5 --json {}.json",
     ],
 )
-def test_a_command_needs_nothing_that_only_posix_has(tmp_path, words):
-    """Modules and functions that Windows lacks: the same answer without them.
+def test_commands_run_without_posix_modules(tmp_path, words):
+    """Without modules and functions that Windows lacks the answer is the same.
 
-    Only what runs in the command's own process is tried.
+    Only the command's own process is tested.
     """
     search = {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])}
     answers = []

@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 import xarray
 
-from assembly.statistics.plot import (
-    allocation_figure,
-    histogram_figure,
-    tornado_figure,
-)
+from assembly.statistics.plot import allocation_figure, histogram_figure, tornado_figure
 from assembly.sweeps.maps import map_figure, path_figure
 from forcefit.inputs.errors import plot_label
 

@@ -1,4 +1,4 @@
-"""Every file is written whole or not at all, by one function."""
+"""Files are written whole or not at all."""
 
 import ast
 import multiprocessing
@@ -117,7 +117,7 @@ WRITE = {
 
 @pytest.mark.parametrize("name", WRITE)
 @pytest.mark.parametrize("before", [None, b"what stood there\n"])
-def test_a_full_disk_is_one_message_and_the_old_file_stays(tmp_path, name, before):
+def test_full_disk_is_one_message_and_keeps_the_old_file(tmp_path, name, before):
     path = tmp_path / name
     if before is not None:
         path.write_bytes(WRITTEN.get(path.suffix, before))
@@ -173,7 +173,7 @@ def test_a_failure_while_writing_leaves_the_old_file(tmp_path):
     assert [p.read_text() for p in tmp_path.iterdir()] == ["old"]
 
 
-def test_a_file_keeps_its_mode_and_a_link_leads_where_it_led(tmp_path):
+def test_file_keeps_its_mode_and_link_its_target(tmp_path):
     path, link = tmp_path / "real.json", tmp_path / "link.json"
     path.write_text("{}")
     path.chmod(0o600)
@@ -185,7 +185,7 @@ def test_a_file_keeps_its_mode_and_a_link_leads_where_it_led(tmp_path):
 
 
 @pytest.mark.parametrize("device", ["/dev/null", "/dev/full"])
-def test_a_device_is_refused_and_stays_one(tmp_path, device):
+def test_device_file_is_refused_and_kept(tmp_path, device):
     for target in (Path(device), tmp_path / "link"):
         if target.name == "link":
             target.symlink_to(device)
@@ -210,7 +210,7 @@ def test_a_robot_file_written_by_hand_is_not_replaced(tmp_path):
         check_writable(path, ROBOT)
 
 
-def test_odd_paths_are_one_message():
+def test_odd_paths_are_refused():
     for path in ("a\0b.json", "x" * 300 + ".json", "", ".", "/dev/null/x.json"):
         with pytest.raises(BadInput):
             check_writable(path, JSON)
@@ -227,7 +227,7 @@ def write_many(path, mark, count):
 
 
 def test_two_programs_at_once_leave_one_of_their_files(tmp_path):
-    """Each waits for the other: no mixture, and nothing beside it."""
+    """Each waits for the other: no mixture, and no other file."""
     path, fork = tmp_path / "x.txt", multiprocessing.get_context("fork")
     both = [fork.Process(target=write_many, args=(path, mark, 30)) for mark in "ab"]
     for one in both:
@@ -243,7 +243,7 @@ def test_two_programs_at_once_leave_one_of_their_files(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["x.txt"]
 
 
-def test_what_a_killed_program_left_is_replaced(tmp_path):
+def test_part_file_of_a_killed_program_is_replaced(tmp_path):
     path = tmp_path / "x.txt"
     child = os.fork()
     if not child:

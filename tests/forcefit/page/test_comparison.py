@@ -39,7 +39,7 @@ def test_every_change_is_found_the_largest_first():
     ]
     assert seen.changes[1].relative == -0.5
     assert seen.changes[1].unit == "m"
-    assert seen.changes[1].name == "certified worst case, pose, shift"
+    assert seen.changes[1].name == "certified worst case, pose, platform translation"
     assert [c.place for c in seen.only] == [("new",)]
     assert compare(BEFORE, BEFORE, ("x", "x")).changes == ()
 
@@ -65,7 +65,7 @@ def test_figures_of_the_top_come_before_components_that_changed_more():
 def test_a_comparison_is_a_page_without_charts():
     text = comparison_page(compare(BEFORE, AFTER, ("x", "y")), Provenance())
     rows = {row[0].text: row[1:] for row in parse(text).tables[0][1:]}
-    cells = rows["certified worst case, pose, shift"]
+    cells = rows["certified worst case, pose, platform translation"]
     assert [cell.text for cell in cells] == ["0.8 mm", "0.4 mm", "-50 %"]
     assert [cell.value for cell in cells[:2]] == [8e-4, 4e-4]
     assert len(text) < 100_000
@@ -79,7 +79,10 @@ def test_the_command_compares_a_page_with_a_json_file(tmp_path, run):
     for page in pages:
         status, printed, err = run("report", "compare", first, second, "--report", page)
         assert (status, err) == (0, "")
-    assert "certified worst case, pose, shift: 0.0008 to 0.0004 m (-50 %)" in printed
+    expected = (
+        "certified worst case, pose, platform translation: 0.0008 to 0.0004 m (-50 %)"
+    )
+    assert expected in printed
     status, printed, _ = run("report", "compare", *pages, "--json", "-")
     assert status == 0
     assert json.loads(printed)["changes"] == []

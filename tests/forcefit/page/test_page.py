@@ -9,7 +9,7 @@ from forcefit.inputs.errors import BadInput
 from forcefit.page.charts import Axis, Layer, bars, chart, matrix, value_map
 from forcefit.page.page import Page, Provenance, Tile, page, results_in, section
 from forcefit.page.tables import Column, Value, table
-from forcefit.page.units import shown_in
+from forcefit.results.units import shown_in
 from tests.pages_for_tests import parse
 
 ODD = "</script><b>&\"' $x$ \\u003c"

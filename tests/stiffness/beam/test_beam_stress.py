@@ -1,4 +1,4 @@
-"""Peak stress of beams: the books, a membrane solved numerically, symmetries."""
+"""Peak stress of beams: textbooks, a membrane solved numerically, symmetries."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_a_pulled_beam_carries_force_over_area_everywhere(section):
     ],
 )
 def test_a_bent_beam_has_moment_over_section_modulus(section, modulus_y, modulus_z):
-    """Handbook section moduli; a long arm drowns the shear to 1e-4 at the base."""
+    """Handbook section moduli; with a long arm shear adds less than 3e-4."""
     for moment, modulus in ([7.0, 0.0], modulus_y), ([0.0, 7.0], modulus_z):
         stress, _ = peak_beam_stress(section, 0.0, [0, *moment, 0, 0, 0])
         assert stress == pytest.approx(7 / modulus, rel=1e-12)
@@ -60,7 +60,7 @@ def test_a_bent_beam_has_moment_over_section_modulus(section, modulus_y, modulus
     ],
 )
 def test_shear_alone_is_the_books(section, shape):
-    """Both directions, and at the neutral fibre; thin tube to its wall, 2.5e-4."""
+    """In both directions, at the neutral fibre; a thin tube to 2.5e-4."""
     thin = 3e-4 if shape == 2.0 else 1e-12
     for axis in (4, 5):
         wrench = np.zeros(6)
@@ -104,8 +104,8 @@ def test_a_twisted_rectangle_is_timoshenkos_table(ratio, k):
 
 @pytest.mark.parametrize("section", [PLATE, {"width": 0.05, "height": 0.02}])
 def test_stresses_of_a_rectangle_add_up_to_their_forces(section):
-    """Integrals over the section by Simpson's rule, exact but for torsion, whose
-    short sides have a kink's worth of error; and free outer faces."""
+    """Integrals over the section by Simpson's rule.  Torsion, with a kink at the short
+    sides, is to 5e-4.  Outer faces are free of shear across."""
     fibres, influence = section_stress(section)
     y, z = fibres.reshape(33, 33, 2).transpose(2, 0, 1)
     sigma, tau_y, tau_z = influence.reshape(33, 33, 3, 6).transpose(2, 3, 0, 1)
@@ -173,7 +173,7 @@ def membrane(section, cells):
 @pytest.mark.parametrize("wall", [0.004, 0.002])
 def test_a_twisted_box_is_a_membranes(wall):
     """Walls 1/10 and 1/20 of the shorter side.  Bredt's theory with the wall's own
-    twist leaves the corners out, 2 to 4 % of J; its stress is good to 4 and 2 %."""
+    twist neglects the corners, 2 to 4 % of J; its stress is accurate to 4 and 2 %."""
     section = BOX | {"wall": wall}
     J, right, upper = membrane(section, 8)
     stress, _ = peak_beam_stress(section, 0.2, [1.0, 0, 0, 0, 0, 0])
@@ -191,7 +191,7 @@ def test_bending_and_torsion_of_a_crank():
 
 
 def test_a_moment_at_the_tip_can_outdo_the_base():
-    """fz L against my: nothing but shear is left at the base."""
+    """fz L cancels my: only shear acts at the base."""
     stress, where = peak_beam_stress(BAR, 0.5, [0, 50.0, 0, 0, 0, 100.0])
     assert where[0] == 0.5
     assert stress == pytest.approx(50 / (np.pi * 0.04**3 / 4), rel=1e-3)
@@ -209,16 +209,6 @@ def test_turning_the_wrench_about_a_round_beam_changes_nothing(section, rng):
     np.testing.assert_allclose(place, there @ turn.T, atol=1e-12)
 
 
-@pytest.mark.parametrize("section", [PLATE, BOX])
-def test_a_quarter_turn_swaps_width_and_height(section, rng):
-    turned = section | {"width": section["height"], "height": section["width"]}
-    wrench = rng.normal(size=(50, 6))
-    quarter = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
-    one, _ = peak_beam_stress(section, 0.2, wrench)
-    other, _ = peak_beam_stress(turned, 0.2, wrench @ np.kron(np.eye(2), quarter).T)
-    np.testing.assert_allclose(other, one, rtol=1e-12)
-
-
 @pytest.mark.parametrize("section", SECTIONS)
 def test_a_mirrored_wrench_gives_the_same_peak(section, rng):
     """z to -z: forces keep x and y, moments keep z."""
@@ -231,7 +221,7 @@ def test_a_mirrored_wrench_gives_the_same_peak(section, rng):
 
 
 @pytest.mark.parametrize("section", SECTIONS)
-def test_many_wrenches_at_once_are_one_after_the_other(section, rng):
+def test_many_wrenches_give_the_peaks_of_each(section, rng):
     wrench = rng.normal(size=(3, 1000, 6))
     stress, where = peak_beam_stress(section, 0.2, wrench)
     assert stress.shape == (3, 1000)
@@ -268,7 +258,7 @@ def test_many_wrenches_at_once_are_one_after_the_other(section, rng):
         (BAR, 0.1, np.full(6, np.nan), "finite numbers"),
     ],
 )
-def test_what_cannot_be_answered_is_refused(section, length, wrench, message):
+def test_wrong_stress_input_is_refused(section, length, wrench, message):
     with pytest.raises(BadInput, match=message):
         peak_beam_stress(section, length, wrench)
 
@@ -280,7 +270,7 @@ def test_what_cannot_be_answered_is_refused(section, length, wrench, message):
 ])  # fmt: skip
 @pytest.mark.parametrize("length", [0.0, 0.02, 1.0])
 def test_a_quarter_turn_of_section_and_wrench_turns_the_peak(section, length):
-    """y becomes z and z becomes -y; short beams, whose shear and torsion count, too."""
+    """y becomes z and z becomes -y; also short beams, with shear and torsion."""
     rng = np.random.default_rng(9)
     turned = section | {"width": section["height"], "height": section["width"]}
     quarter = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
@@ -294,37 +284,6 @@ def test_a_quarter_turn_of_section_and_wrench_turns_the_peak(section, length):
     assert alike.mean() > 0.9
     sides = {tuple(np.sign(np.round(place[1:], 9))) for place in where}
     assert len(sides) >= 4
-
-
-@pytest.mark.parametrize("size", [(0.03, 0.05, 0.004), (0.05, 0.03, 0.001)])
-def test_a_boxs_shear_flows_on_around_its_corners(size):
-    """What leaves one side enters the next, counterclockwise, of torsion and of both
-    forces; a force's flow is nothing at the middles of the sides across it."""
-    width, height, wall = size
-    section = {"width": width, "height": height, "wall": wall}
-    fibres, influence = section_stress(section)
-    sides = fibres.reshape(4, -1, 2)
-    middles = sides.mean(axis=1)
-    outward = middles / np.linalg.norm(middles, axis=1)[:, None]
-    around = outward @ np.array([[0.0, 1.0], [-1.0, 0.0]])
-    tau = influence[:, 1:].reshape(4, sides.shape[1], 2, 6)
-    flow = np.einsum("ki,kpil->kpl", around, tau)[..., [0, 4, 5]]
-    across = np.einsum("ki,kpil->kpl", outward, tau)
-    assert np.abs(across).max() < 1e-9 * np.abs(flow).max()
-    found = 0
-    for k in range(4):
-        for j in range(k):
-            apart = np.linalg.norm(sides[k][:, None] - sides[j][None], axis=2)
-            for p, q in np.argwhere(apart < 1e-12):
-                steps = (flow[k, p] - flow[j, q]) / np.abs(flow).max(axis=(0, 1))
-                np.testing.assert_allclose(steps, 0, atol=1e-9)
-                found += 1
-    assert found == 4
-    for k, direction in enumerate(outward):
-        middle = np.linalg.norm(sides[k] - middles[k], axis=1).argmin()
-        for force in (0, 1):
-            if abs(direction[force]) > 0.5:
-                assert abs(flow[k, middle, 1 + force]) < 1e-9 * np.abs(flow).max()
 
 
 # [N] weight along -z; wrench at the tip; largest moment; its place from the base
@@ -351,19 +310,6 @@ def test_a_heavy_beam_bends_as_in_the_books(name):
         assert where[0] == pytest.approx(place, abs=1e-12)
 
 
-def test_a_propped_beams_own_field_moment_is_found_where_shear_vanishes():
-    """9 q L^2 / 128 at 3/8 of the length from the prop, when the base is relieved."""
-    relieved = [0, -W * LENGTH / 8, 0, 0, 0, 3 * W / 8 - W / 8]
-    stress, where = peak_beam_stress(PLATE, LENGTH, relieved, [0, 0, -W])
-    # M(s) = M_tip - (F s - W s^2 / 2 L): extremum at s = F L / W
-    s = np.linspace(0, LENGTH, 100_001)
-    moments = relieved[1] - relieved[5] * s + W * s**2 / 2 / LENGTH
-    worst = np.abs(moments).argmax()
-    expected = 6 * abs(moments[worst]) / (0.02 * 0.05**2)
-    assert stress == pytest.approx(expected, rel=1e-9)
-    assert where[0] == pytest.approx(LENGTH - s[worst], abs=1e-4)
-
-
 @pytest.mark.parametrize("section", SECTIONS)
 def test_a_hanging_beam_carries_its_weight_at_the_top(section):
     stress, where = peak_beam_stress(section, LENGTH, np.zeros(6), [W, 0, 0])
@@ -373,7 +319,7 @@ def test_a_hanging_beam_carries_its_weight_at_the_top(section):
 
 @pytest.mark.parametrize("section", SECTIONS)
 def test_a_heavy_beams_parts_agree_with_the_whole(section, rng):
-    """Cut anywhere: the outer part's wrench at the cut loads the inner part's tip."""
+    """The wrench of the outer part at any cut loads the inner part's tip."""
     for _ in range(20):
         wrench, weight = rng.normal(size=6) * [1, 1, 1, 20, 20, 20], rng.normal(size=3)
         weight *= 30

@@ -81,15 +81,12 @@ def test_the_size_of_a_bar_is_its_radius_in_any_unit():
             assert size == pytest.approx(3 * unit / math.sqrt(3), rel=1e-14)
 
 
-@pytest.mark.parametrize(
-    "section",
-    [
-        lambda nu: round_section(1.0, nu),
-        lambda nu: rectangular_section(1.0, 2.0, nu),
-        lambda nu: box_section(1.0, 2.0, 0.1, nu),
-        lambda nu: i_section(1.0, 2.0, 0.1, 0.1, nu),
-    ],
-)
+@pytest.mark.parametrize("section", [
+    lambda nu: round_section(1.0, nu),
+    lambda nu: rectangular_section(1.0, 2.0, nu),
+    lambda nu: box_section(1.0, 2.0, 0.1, nu),
+    lambda nu: i_section(1.0, 2.0, 0.1, 0.1, nu),
+])  # fmt: skip
 def test_poissons_ratio_lies_between_minus_one_and_a_half(section):
     for nu in (-0.999, 0.499):
         assert section(nu).area > 0
@@ -159,14 +156,3 @@ def test_shear_factors_of_thin_sections_are_cowpers_integral(b, h, nu):
     share = 2 * b * flange / (2 * b * flange + (h - flange) * web)
     rectangle = rectangular_section(1.0, 1.0, nu).shear_y
     assert beam.shear_y == pytest.approx(share * rectangle, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("web", "flange"), [(0.06, 0.008), (0.07, 0.008), (0.006, 0.05), (0.006, 0.06)]
-)
-def test_an_i_has_a_web_narrower_than_it_and_flanges_that_leave_one(web, flange):
-    """Of 60 by 100 mm: either alone is refused, and what is just within is not."""
-    words = "i_section: web or flange is thicker than the section allows"
-    with pytest.raises(BadInput, match=words):
-        i_section(0.06, 0.1, web, flange, NU)
-    assert i_section(0.06, 0.1, min(web, 0.0599), min(flange, 0.0499), NU).area > 0

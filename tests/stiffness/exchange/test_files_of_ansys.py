@@ -1,4 +1,4 @@
-"""Matrices as Ansys writes them: one half, rows in an order of its own, a mapping."""
+"""Matrices of Ansys: one half, rows in another order, with a mapping."""
 
 import numpy as np
 import pytest
@@ -113,7 +113,7 @@ def test_nodes_of_a_named_selection_with_decimal_commas(solid):
         import_link(folder / "full.mtx", nodes=folder / "nodes.txt", unit="mm", **ENDS)
 
 
-def test_six_freedoms_a_node(tmp_path):
+def test_mapping_of_six_freedoms_a_node_is_read(tmp_path):
     """A superelement of two nodes, the second one first."""
     B = np.random.default_rng(0).normal(size=(12, 12))
     K = B @ B.T
@@ -127,18 +127,15 @@ def test_six_freedoms_a_node(tmp_path):
     np.testing.assert_allclose(read.matrix.toarray()[np.ix_(back, back)], K)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (node_vector([1, 1, 2]), "found 2 nodes, expected 3"),
-        (node_vector([1, 2, 3, 4, 5]), "expected those of a matrix with 12 rows"),
-        ("1 1 UX\n2 1 UQ\n", "found the label 'UQ'"),
-        ("1 1 UX\n3 1 UY\n", "rows that do not run from 1"),
-        ("1 1\n", "expected row, node and label"),
-        ("Matrix Eqn\n", "rows that do not run from 1"),
-    ],
-)
-def test_a_mapping_that_is_none(text, message, tmp_path):
+@pytest.mark.parametrize(("text", "message"), [
+    (node_vector([1, 1, 2]), "found 2 nodes, expected 3"),
+    (node_vector([1, 2, 3, 4, 5]), "expected those of a matrix with 12 rows"),
+    ("1 1 UX\n2 1 UQ\n", "found the label 'UQ'"),
+    ("1 1 UX\n3 1 UY\n", "rows that do not run from 1"),
+    ("1 1\n", "expected row, node and label"),
+    ("Matrix Eqn\n", "rows that do not run from 1"),
+])  # fmt: skip
+def test_wrong_mapping_is_refused_in_one_line(text, message, tmp_path):
     (tmp_path / "k.mtx").write_text(matrix_market(csc_array(np.eye(12))))
     (tmp_path / "k.mapping").write_text(text)
     with pytest.raises(BadInput) as caught:
@@ -157,47 +154,41 @@ def test_a_mapping_that_is_none(text, message, tmp_path):
          "expected a number"),
     ],
 )  # fmt: skip
-def test_a_harwell_boeing_file_that_is_none(change, message, tmp_path):
+def test_wrong_harwell_boeing_file_is_refused(change, message, tmp_path):
     text = harwell_boeing(csc_array(np.eye(12)), right_side=False)
     (tmp_path / "k.matrix").write_text(change(text))
     with pytest.raises(BadInput, match=message):
         read_matrix(tmp_path / "k.matrix")
 
 
-@pytest.mark.parametrize(
-    ("head", "numbers"),
-    [
-        ("coordinate real general", "3 3 5\n1 1 2\n2 2 3\n3 3 0.04D2\n1 2 1\n2 1 1\n"),
-        ("coordinate integer symmetric", "3 3 4\n1 1 2\n2 2 3\n3 3 4\n2 1 1\n"),
-        ("array real general", "3 3\n2\n1\n0\n1\n3\n0\n0\n0\n4\n"),
-        ("array real symmetric", "3 3\n2\n1\n0\n3\n0\n4\n"),
-    ],
-)
+@pytest.mark.parametrize(("head", "numbers"), [
+    ("coordinate real general", "3 3 5\n1 1 2\n2 2 3\n3 3 0.04D2\n1 2 1\n2 1 1\n"),
+    ("coordinate integer symmetric", "3 3 4\n1 1 2\n2 2 3\n3 3 4\n2 1 1\n"),
+    ("array real general", "3 3\n2\n1\n0\n1\n3\n0\n0\n0\n4\n"),
+    ("array real symmetric", "3 3\n2\n1\n0\n3\n0\n4\n"),
+])  # fmt: skip
 def test_every_kind_of_matrix_market(head, numbers, tmp_path):
-    """Full ones run down their columns; of symmetric ones the lower half is there."""
+    """Arrays are column by column; symmetric matrices have the lower half."""
     matrix = np.array([[2.0, 1, 0], [1, 3, 0], [0, 0, 4]])
     path = tmp_path / "k.mtx"
     path.write_text(f"%%MatrixMarket matrix {head}\n% a comment\n{numbers}")
     assert np.array_equal(read_matrix(path, nodes=[1]).matrix.toarray(), matrix)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("coordinate pattern general\n2 2 1\n1 1\n", "no Matrix Market file"),
-        ("coordinate real general\n2 2 3\n1 1 1\n2 2 1\n", "not as many as said"),
-        ("coordinate real general\n2 2 2\n1 1 1\n3 2 1\n", "a place beyond 2 by 2"),
-        ("coordinate real general\n2 2 2\n1 1 1\n2 1.5 1\n", "a place beyond"),
-        ("coordinate real general\n", "expected a square"),
-        ("coordinate real general\n2 2\n", "not as many as said"),
-        ("coordinate real general\n1e9 1e9 0\n", "expected a square"),
-        ("array real general\n1000000 1000000\n1\n", "expected 1000000000000"),
-        ("array real general\n2 3\n1 1 1 1 1 1\n", "found 2 by 3 numbers"),
-        ("array real general\n2 2\n1 1 x 1\n", "expected a number"),
-    ],
-)
-def test_a_damaged_matrix_market_file_is_one_line(text, message, tmp_path):
-    """SciPy's reader takes some of these for a matrix, or allocates what they claim."""
+@pytest.mark.parametrize(("text", "message"), [
+    ("coordinate pattern general\n2 2 1\n1 1\n", "no Matrix Market file"),
+    ("coordinate real general\n2 2 3\n1 1 1\n2 2 1\n", "not as many as said"),
+    ("coordinate real general\n2 2 2\n1 1 1\n3 2 1\n", "a place beyond 2 by 2"),
+    ("coordinate real general\n2 2 2\n1 1 1\n2 1.5 1\n", "a place beyond"),
+    ("coordinate real general\n", "expected a square"),
+    ("coordinate real general\n2 2\n", "not as many as said"),
+    ("coordinate real general\n1e9 1e9 0\n", "expected a square"),
+    ("array real general\n1000000 1000000\n1\n", "expected 1000000000000"),
+    ("array real general\n2 3\n1 1 1 1 1 1\n", "found 2 by 3 numbers"),
+    ("array real general\n2 2\n1 1 x 1\n", "expected a number"),
+])  # fmt: skip
+def test_damaged_matrix_market_file_is_refused(text, message, tmp_path):
+    """SciPy's reader accepts some of these, or allocates their stated size."""
     (tmp_path / "k.mtx").write_text(f"%%MatrixMarket matrix {text}")
     with pytest.raises(BadInput, match=message):
         read_matrix(tmp_path / "k.mtx")

@@ -34,7 +34,7 @@ def write_solid(folder, nodes, K):
 
 
 def deck(nodes, order):
-    """An input deck of Abaqus or CalculiX: nodes, and lines that are none."""
+    """An input deck of Abaqus or CalculiX: nodes and other lines."""
     lines = [f"{i + 1:7}, {x!r}, {y!r}, {z!r}" for i, (x, y, z) in order(nodes)]
     return "\n".join([
         "*Heading", "** made for a test", "*Part, name=bar", "*Node, nset=all", *lines,
@@ -148,7 +148,7 @@ def test_grids_of_nastran_in_narrow_wide_and_free_fields(tmp_path):
 
 
 def test_a_grid_in_other_axes_is_refused(tmp_path):
-    """Where its coordinate system lies, the line does not say."""
+    """The line does not define its coordinate system."""
     path = tmp_path / "bar.bdf"
     path.write_text("GRID,9,4,1.,2.,3.\n")
     with pytest.raises(BadInput, match="line 1: found 'GRID,9,4"):
@@ -156,7 +156,7 @@ def test_a_grid_in_other_axes_is_refused(tmp_path):
 
 
 def test_of_a_punch_file_s_matrices_stiffness_and_mass_are_chosen(tmp_path):
-    """Square ones beside a rectangular one that also begins with M."""
+    """Square matrices next to a rectangular one whose name begins with M."""
     path = tmp_path / "part.pch"
     path.write_text(
         "DMIG    KAAX           0       6       2       0\n"

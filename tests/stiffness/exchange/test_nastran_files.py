@@ -1,4 +1,4 @@
-"""DMIG in every layout of its lines, and which of a file's matrices is taken."""
+"""DMIG in every layout of its lines, and the choice between a file's matrices."""
 
 import numpy as np
 import pytest

@@ -108,7 +108,7 @@ def test_a_linear_field_is_exact_on_any_mesh(rng, order, layers):
 
 
 @pytest.mark.parametrize("curved", [False, True])
-def test_the_matrix_is_scikit_fems(curved):
+def test_stiffness_matrix_equals_that_of_scikit_fem(curved):
     """A second code, whose weak form shares nothing with ours but the rule."""
     import skfem
     from scipy.spatial import cKDTree
@@ -136,7 +136,7 @@ def test_the_matrix_is_scikit_fems(curved):
 
 @both_orders
 def test_a_polynomial_of_the_elements_degree_has_its_energy(rng, order):
-    """A second road: the strain energy of u = A m, m all monomials of the degree, by
+    """A second method: the strain energy of u = A m, m all monomials of the degree, by
     differentiating monomials and a tensor rule on the whole box."""
     size = np.array([0.5, 0.6, 0.8])
     mesh = isoparametric(box_solid((1, 2, 2), size), order)
@@ -159,14 +159,6 @@ def test_a_polynomial_of_the_elements_degree_has_its_energy(rng, order):
     trace = np.trace(strain, axis1=1, axis2=2)
     energy = LAM * trace**2 + 2 * MU * (strain**2).sum(axis=(1, 2))
     assert energies == pytest.approx(w @ energy, rel=1e-12)
-
-
-@both_orders
-def test_stiffness_is_symmetric_definite_and_reciprocal(order):
-    _, solution = solved(bar_solid(2, 4, 0.04, 0.2), order)
-    K = solution.stiffness
-    np.testing.assert_allclose(K, K.T, atol=0)
-    assert np.linalg.eigvalsh(scaled(K, K))[0] > 0.01
 
 
 @both_orders
@@ -225,19 +217,6 @@ def test_reading_at_another_tip_is_a_screw_map(order):
     A = screw_map(there - near)
     expected = A.T @ one.stiffness @ A
     assert np.abs(scaled(other.stiffness - expected, expected)).max() < 1e-11
-
-
-@both_orders
-def test_superlu_and_pardiso_agree(order):
-    mesh = curved_mesh(order, layers=True)
-    upper = assemble(mesh, *constants(mesh))
-    free = np.ones(upper.shape[0], dtype=bool)
-    free[np.unique(mesh.faces[mesh.patch == 0])[:, None] * 3 + np.arange(3)] = False
-    part = upper[free][:, free]
-    loads = np.random.default_rng(0).normal(size=(part.shape[0], 2))
-    slow = solve(part, loads, "SuperLU")
-    fast = solve(part, loads, solver_name())
-    np.testing.assert_allclose(fast, slow, rtol=0, atol=1e-9 * np.abs(slow).max())
 
 
 @pytest.mark.parametrize("name", sorted({"SuperLU", solver_name()}))
@@ -325,8 +304,7 @@ def harmonic_slope(x):
 
 
 @pytest.mark.parametrize(
-    ("order", "counts"),
-    [(2, (6, 12)), pytest.param(3, (4, 8), marks=pytest.mark.slow)],
+    ("order", "counts"), [(2, (6, 12)), pytest.param(3, (4, 8), marks=pytest.mark.slow)]
 )
 def test_strains_converge_with_the_power_of_the_mesh(order, counts):
     """The gradient of a harmonic function is in equilibrium without body force.

@@ -1,4 +1,4 @@
-"""Error estimates: what they are blind to, what they see, and that they cover."""
+"""Error estimates: exact fields, known errors, coverage."""
 
 from functools import cache
 
@@ -8,10 +8,7 @@ import pytest
 from stiffness.beam.beam import beam_compliance
 from stiffness.beam.sections import round_section
 from stiffness.fem.adaptive_step import (
-    DEFAULT_EFFECTIVITY,
-    SAFETY_FACTOR,
     estimated_error,
-    refine_level,
     solve_level,
 )
 from stiffness.fem.condensation import condense, rigid_motions
@@ -101,7 +98,7 @@ def test_linear_strains_leave_no_error_and_quadratic_ones_do(rng, singular):
     assert np.diag(estimate[1]).min() > 1e-5 * E
 
 
-def test_at_a_singular_edge_it_is_the_energy_of_what_is_not_linear():
+def test_indicator_at_a_singular_edge_is_the_nonlinear_energy():
     """u = (0, 0, z^3 / 3): of the stress of z^2 an element's best linear part is taken
     off, here by least squares; the share is the same for all, near one."""
     mesh = isoparametric(box_solid((2, 1, 3), (0.5, 0.6, 0.8)))
@@ -127,7 +124,7 @@ def test_at_a_singular_edge_it_is_the_energy_of_what_is_not_linear():
 
 
 def shifted(excess, kind="distributing-both"):
-    """Compliance of a bar, and what a shape of a slightly larger radius changes."""
+    """Compliance of a bar, and geometry errors of a slightly larger radius."""
     solid = bar_solid(2, 5, R, 0.25)
     mesh = isoparametric(solid)
     lam, mu = constants(mesh)
@@ -155,17 +152,6 @@ def test_a_bar_thinner_than_its_shape_is_as_much_softer_as_the_books_say(excess)
     )
     exact = np.diag(one - other)[i] / np.diag(one)[i]
     np.testing.assert_allclose(-estimate, exact, rtol=0.02)
-
-
-def test_only_round_faces_of_bent_elements_can_leave_their_shapes():
-    """Interfaces are planes; a face's share is that of its own piece of the side."""
-    level = bar(1, 6)
-    each = geometry_errors(
-        level.mesh, level.solid.shapes, level.solution.fields, *constants(level.mesh)
-    )
-    side = level.mesh.patch == 2
-    assert np.abs(each[~side]).max() == 0
-    assert np.abs(each[side]).max() > 0
 
 
 @pytest.mark.parametrize(
@@ -198,23 +184,21 @@ def test_the_estimate_covers_the_true_error_on_one_mesh(mesh):
     assert abs(K[2, 2] / TORSION - 1) < told[2]
 
 
-def test_what_the_elements_indicate_is_what_they_miss():
-    """Before any safety: bending's indicated error, within 1.5 of the true one."""
+def test_indicated_error_is_near_the_true_error():
+    """Bending's error without the safety factor is within 1.5 of the true one."""
     for mesh in ((1, 6), (1, 12), (2, 12), (2, 24)):
         K, indicated, shape = bar(*mesh).totals()
         true = K[0, 0] / BENDING - 1 - shape[0, 0] / BENDING
         assert 1 / 1.5 < indicated[0, 0] / BENDING / true < 1.5
 
 
-def test_stiffness_falls_and_two_meshes_tell_the_fall():
-    """The index is between the safety factor and that times twice the default."""
+def test_two_meshes_bound_the_error_of_the_finer():
     history = [bar(*mesh).totals() for mesh in ((1, 6), (2, 12))]
-    error, factor = estimated_error(history)
+    error, _ = estimated_error(history)
     K = history[1][0]
     assert history[0][0][0, 0] > K[0, 0] > BENDING
     true = K[0, 0] / BENDING - 1
     assert true < error[0, 0] / K[0, 0] < 5 * true
-    assert SAFETY_FACTOR <= factor <= 2 * SAFETY_FACTOR * DEFAULT_EFFECTIVITY
 
 
 # --- what is left on free surfaces ---------------------------------------------------
@@ -235,7 +219,7 @@ def plate(*counts):
     return solve_level(solid, [Material(E, NU)], centers, "rigid").totals()
 
 
-def test_tractions_left_on_a_free_face_store_what_undoes_them():
+def test_residual_tractions_of_a_unit_cube_have_the_energy_by_hand():
     """A shear s over a unit cube leaves s on four faces, whose triangles are 1 by 1:
     2 s^2 / mu / pi times their height 1 / sqrt 2, by hand; a pull across nothing."""
     mesh = isoparametric(box_solid((1, 1, 1), np.ones(3)))
@@ -248,7 +232,7 @@ def test_tractions_left_on_a_free_face_store_what_undoes_them():
     assert np.abs(estimate - np.diag([estimate[0, 0], 0])).max() == 0
 
 
-def test_a_twisted_thin_plates_error_is_seen_on_one_mesh_and_on_two():
+def test_error_of_a_twisted_thin_plate_is_covered():
     """Elements 7 to 15 mm wide on a 2 mm plate, whose layer is 0.6 mm deep at its free
     edges: the true error of twisting is 1.4 and 0.7 %."""
     history = [plate(4, 1, 8), plate(8, 1, 16)]
@@ -261,19 +245,10 @@ def test_a_twisted_thin_plates_error_is_seen_on_one_mesh_and_on_two():
 
 
 def test_a_layer_takes_most_of_the_error_at_the_clamped_edges():
-    """The same tetrahedra without parts: more than twice the error in bending."""
+    """The same tetrahedra without layers have more than twice the error in bending."""
     solid = split_joining_edges(bar_solid(2, 12, R, L), (0, 1))
     mesh = isoparametric(solid)
     centers = np.array([[0, 0, 0], [0, 0, L]])
     whole = condense(mesh, *constants(mesh), centers).stiffness
     cut = bar(2, 12).solution.stiffness
     assert whole[0, 0] / BENDING - 1 > 2 * (cut[0, 0] / BENDING - 1) > 0
-
-
-def test_refining_grows_by_what_was_asked_and_what_its_neighbours_need():
-    level = bar(1, 6)
-    count = len(level.solid.cells)
-    sizes = [len(refine_level(level, growth).cells) for growth in (1.0, 1.5, 3.0)]
-    assert sizes[0] == count
-    assert 1.5 * count <= sizes[1] < sizes[2]
-    assert 3.0 * count <= sizes[2] <= 20 * count

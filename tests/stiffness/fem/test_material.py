@@ -15,12 +15,12 @@ def test_without_a_density_a_material_has_no_mass():
 
 
 @pytest.mark.parametrize("density", [-1e-9, np.inf, np.nan])
-def test_a_density_that_is_none_is_refused(density):
+def test_wrong_density_is_refused(density):
     with pytest.raises(BadInput, match="density"):
         Material(2.1e11, 0.3, density)
 
 
-def test_an_element_is_of_the_last_material_that_says_its_centre():
+def test_element_has_the_last_material_that_contains_its_centre():
     """Lame's constants, at the mean of the four corners, curved or not."""
     solid = box_solid((2, 1, 3), np.array([0.1, 0.1, 0.1]))
     mesh = isoparametric(solid, 3, layered(solid, (0, 1)))

@@ -98,14 +98,11 @@ def test_stresses_on_both_sides_of_the_face_are_their_own(rod):
     np.testing.assert_allclose(stresses[~soft], STEEL * strain, rtol=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        (["rod"], 'solid "tube" has no material; expected one of its own'),
-        (["", "rood"], r'no solid "rood"; did you mean "rod"\?'),
-        (["", "rod+tub"], r'no solid "tub"; did you mean "tube"\?'),
-    ],
-)
+@pytest.mark.parametrize(("given", "message"), [
+    (["rod"], 'solid "tube" has no material; expected one of its own'),
+    (["", "rood"], r'no solid "rood"; did you mean "rod"\?'),
+    (["", "rod+tub"], r'no solid "tub"; did you mean "tube"\?'),
+])  # fmt: skip
 def test_a_solid_that_is_unknown_or_lacks_a_material_is_named(given, message):
     surface = rod_in_tube(INNER, OUTER, LENGTH)
     with pytest.raises(BadInput, match=message):

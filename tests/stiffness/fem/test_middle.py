@@ -29,7 +29,7 @@ def largest_share(E, K):
     return np.linalg.eigvals(np.linalg.solve(K, E)).real.max()
 
 
-def test_half_of_a_small_error_is_taken_off_and_the_other_half_told():
+def test_middle_stiffness_subtracts_half_of_a_small_error():
     K = np.diag([1e3, 2e3, 3e3, 4e5, 5e5, 6e5])
     middle, told = middle_stiffness(K, 0.02 * K, NONE)
     np.testing.assert_allclose(middle, 0.99 * K, rtol=1e-14)
@@ -37,7 +37,7 @@ def test_half_of_a_small_error_is_taken_off_and_the_other_half_told():
 
 
 @given(st.integers(0, 10**6), st.floats(1e-6, 30.0))
-def test_every_stiffness_of_the_interval_is_within_what_is_told(seed, size):
+def test_stated_error_covers_the_whole_interval(seed, size):
     """K_h less any share of E, also where E is larger than K_h."""
     K_h, E = random_definite(seed), random_definite(seed + 1, size)
     middle, told = middle_stiffness(K_h, E, NONE)
@@ -58,7 +58,7 @@ def test_at_least_half_of_every_motions_stiffness_is_left(seed, size):
     assert least == pytest.approx(expected, rel=1e-6)
 
 
-def test_the_geometrys_error_moves_nothing_and_is_told_whatever_its_sign():
+def test_geometry_error_is_stated_without_moving_the_middle():
     K, E = random_definite(3), random_definite(4, 1e-3)
     geometry = 1e-4 * random_definite(5) * np.where(np.eye(6), -1, 1)
     middle, told = middle_stiffness(K, E, geometry)
@@ -87,7 +87,7 @@ def bar():
     return solve_bar({"width": 0.25, "height": 0.25}, Material(2.0, 0.3), options)
 
 
-def test_a_link_is_softer_than_its_mesh_by_what_it_tells(bar):
+def test_link_is_softer_than_its_mesh_by_the_stated_error(bar):
     """Both are ends of one interval: K_h above, the link in the middle."""
     K_h, K = bar.level.solution.stiffness, bar.link.stiffness
     above = np.diag(scaled(K_h - K, K))

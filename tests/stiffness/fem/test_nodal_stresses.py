@@ -1,23 +1,19 @@
 """Stresses at nodes: exact for linear fields, the same in turned axes."""
 
-import re
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from forcefit.inputs.table import BadInput
-from stiffness.fem import stress as stress_module
-from stiffness.fem.elements import isoparametric, lame
+from stiffness.fem.elements import Elements, isoparametric, lame, node_gradients
 from stiffness.fem.error_indicator import VOIGT
 from stiffness.fem.stress import (
-    StressInfluence,
     _nodal_stresses,
-    peak_stress,
     stress_influence,
     von_mises,
 )
 from stiffness.fem.stress_error import nodes_by_material
+from stiffness.mesh.lagrange import face_nodes, lattice
 from stiffness.screws import rotation_matrix
 from tests.solids_for_tests import bar_solid, box_solid
 
@@ -59,7 +55,7 @@ def test_a_linear_field_has_its_stress_at_every_node(rng, order):
     np.testing.assert_allclose(found, [stress] * len(mesh.nodes), rtol=1e-9)
 
 
-def test_at_a_seam_each_material_has_its_own_stress():
+def test_each_material_has_its_own_stress_at_a_seam():
     """Two materials under one strain: the stress is 3 or 7, and nothing between."""
     mesh = isoparametric(box_solid((1, 1, 2), (1.0, 1.0, 2.0)), 2)
     high = mesh.nodes[mesh.cells[:, :4]].mean(axis=1)[:, 2] > 1
@@ -103,7 +99,7 @@ def box_of_stress(tip_scale=1.0):
 
 
 @pytest.mark.parametrize("scale", [1.0, 1.5, 0.5])
-def test_nothing_nearer_to_an_end_than_the_larger_radius_is_told(scale):
+def test_stresses_near_the_ends_are_excluded(scale):
     """A stretch of one along z, lam and lam + 2 mu, five times for a unit force."""
     solved = box_of_stress(scale)
     stress = stress_influence(solved)
@@ -118,77 +114,34 @@ def test_nothing_nearer_to_an_end_than_the_larger_radius_is_told(scale):
     assert np.abs(stress.influence[:, :5]).max() < 1e-12
 
 
-def test_a_layer_at_just_the_distance_belongs_to_it():
-    """Nodes at an eighth of the height; a hair more and these are out."""
-    solved = box_of_stress()
-    for away, lowest in ((0.125, 0.125), (0.125 * (1 + 1e-6), 0.25), (0.0, 0.0)):
-        stress = stress_influence(solved, away)
-        assert stress.places[:, 2].min() == pytest.approx(lowest)
-    assert len(stress.places) == len(solved.level.mesh.nodes)
-    words = "stress: nothing of the link is 0.6 m away from its interfaces; "
-    words += "the furthest node is 0.5 m"
-    with pytest.raises(BadInput, match=re.escape(words)):
-        stress_influence(solved, 0.6)
+def one_element(rng, order, bend):
+    """A tetrahedron whose lattice's points are all shifted by some share."""
+    corners = np.array([[0.1, 0, 0], [1, 0.2, 0], [0, 0.9, 0.1], [0.3, 0.2, 0.8]])
+    nodes = lattice(order) / order @ corners
+    nodes += bend * rng.uniform(-1, 1, nodes.shape)
+    return Elements(
+        order, nodes, np.arange(len(nodes))[None], face_nodes(order), np.zeros(4, int),
+        np.zeros(4, int), np.array([bend > 0]),
+    )  # fmt: skip
 
 
-def test_the_peak_is_at_the_node_of_the_largest_equivalent_stress(rng):
-    places, influence = rng.normal(size=(9, 3)), rng.normal(size=(9, 6, 6))
-    stress = StressInfluence(places, influence, 0.1)
-    wrench = rng.normal(size=6)
-    each = [von_mises(wrench @ node) for node in influence]
-    value, place = stress.peak(wrench)
-    assert value == pytest.approx(max(each))
-    np.testing.assert_allclose(place, places[int(np.argmax(each))])
-    words = "9 nodes at least 0.1 m away from both interfaces"
-    assert stress.region.startswith(words)
-    assert not stress.reentrant_edges
-
-
-@pytest.mark.parametrize(
-    ("tip_moment", "place", "largest", "whole"),
-    [
-        # arms in lengths of the beam: the force bends the base most, or the tip if a
-        # moment there turns against it
-        (0.0, 0.1, 0.9, 1.0),
-        (0.5, 0.1, 1.4, 1.5),
-        (-1.5, 0.9, 1.4, 1.5),
-    ],
-)
-def test_beside_the_peak_stands_the_beams_between_the_same_sections(
-    rng, monkeypatch, tip_moment, place, largest, whole
-):
-    """A bar in any direction from anywhere, M = (tip's + L - x) F, stress M R / I."""
-    axes = rotation_matrix(rng.normal(size=3))
-    d, u = axes[:, 0], axes[:, 1]
-    base, length, radius, force = np.array([3.0, -2.0, 1.0]), 2.0, 0.03, 7.0
-    wrench = np.r_[tip_moment * length * force * np.cross(d, u), force * u]
-    field = StressInfluence(rng.normal(size=(4, 3)), rng.normal(size=(4, 6, 6)), 0.2)
-    asked = []
-
-    def influence(solved, away):
-        asked.append(away)
-        return field
-
-    monkeypatch.setattr(stress_module, "stress_influence", influence)
-    link = SimpleNamespace(base=base, tip=base + length * d)
-    solved = SimpleNamespace(link=link)
-    peak = peak_stress(solved, wrench, section={"radius": radius}, away=0.2)
-    assert asked == [0.2]
-    unit = length * force * radius / (np.pi / 4 * radius**4)
-    stress, where = peak.beam
-    # of the 360 fibres one is within half a degree of the furthest
-    assert stress == pytest.approx(largest * unit, rel=1e-4)
-    assert peak.beam_whole == pytest.approx(whole * unit, rel=1e-4)
-    assert (where - base) @ d == pytest.approx(place * length)
-    out = (where - base) - place * length * d
-    assert np.linalg.norm(out) == pytest.approx(radius)
-    assert abs(out @ u) == pytest.approx(radius, rel=1e-4)
-    value, somewhere = field.peak(wrench)
-    assert peak.von_mises == value
-    np.testing.assert_array_equal(peak.place, somewhere)
-    np.testing.assert_array_equal(peak.wrench, wrench)
-    assert (peak.away, peak.region) == (0.2, field.region)
-    alone = peak_stress(solved, wrench)
-    assert alone.von_mises == value
-    assert alone.beam is None
-    assert np.isnan(alone.beam_whole)
+@pytest.mark.parametrize("order", [2, 3])
+@pytest.mark.parametrize("bend", [0.0, 0.03])
+def test_gradients_at_nodes_are_those_of_any_field_of_the_element(rng, order, bend):
+    """Of a crooked one of linear fields, of a straight one of its own degree's."""
+    mesh = one_element(rng, order, bend)
+    ((part, G),) = node_gradients(mesh)
+    assert part.tolist() == [0]
+    slope = rng.normal(size=(3, 3))
+    field = mesh.nodes @ slope.T
+    np.testing.assert_allclose(
+        np.einsum("qax,ai->qix", G[0], field), [slope] * len(field), atol=1e-9
+    )
+    if not bend:
+        x, y, z = mesh.nodes.T
+        value, exact = x * y + y**2, [y, x + 2 * y, 0 * z]
+        if order == 3:
+            value, exact = x * y * z + y**2, [y * z, x * z + 2 * y, x * y]
+        np.testing.assert_allclose(
+            G[0].swapaxes(1, 2) @ value, np.transpose(exact), atol=1e-9
+        )

@@ -32,7 +32,7 @@ def test_a_heavy_cantilever_is_bent_by_what_hangs_beyond_each_section(bar):
 
 
 def test_the_peak_of_the_weight_is_that_of_the_beam(bar):
-    """From 50 mm off the wall on; over the whole length 6 rho g A L^2 / 2 / h^3."""
+    """From 50 mm off the wall; over the whole length 6 rho g A L^2 / 2 / h^3."""
     peak = peak_stress(bar, np.zeros(6), section=SECTION, up=[0, 1, 0], away=0.05,
                        gravity=[0, -G, 0])  # fmt: skip
     whole = 3 * DENSITY * G / SIDE

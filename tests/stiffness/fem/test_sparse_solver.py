@@ -1,4 +1,4 @@
-"""Sparse systems solved, the solver chosen, the cost predicted."""
+"""Sparse systems and the choice of the solver."""
 
 import sys
 
@@ -12,7 +12,7 @@ from stiffness.fem.sparse_solver import _mkl, solve, solver_name
 
 @pytest.fixture
 def chosen():
-    """The solver's name, looked for again in the test and after it."""
+    """Return ``solver_name`` with an empty cache, cleared again after the test."""
     solver_name.cache_clear()
     yield solver_name
     solver_name.cache_clear()
@@ -30,64 +30,20 @@ def test_the_whole_matrix_is_solved_from_its_upper_triangle(rng, name, columns):
     np.testing.assert_allclose(solve(csr_array(np.triu(A)), loads), x, atol=1e-10)
 
 
-def test_without_its_package_there_is_superlu(monkeypatch, chosen):
+def test_superlu_is_used_without_pypardiso(monkeypatch, chosen):
     monkeypatch.setattr(sparse_solver, "find_spec", lambda _: None)
     assert chosen() == "SuperLU"
 
 
-def test_a_package_that_does_not_load_is_as_none(monkeypatch, chosen):
-    """As where MKL's library is of another machine."""
+def test_superlu_is_used_if_pypardiso_does_not_load(monkeypatch, chosen):
+    """For example with MKL's library of another architecture."""
     monkeypatch.setattr(sparse_solver, "find_spec", lambda _: object())
     monkeypatch.setattr(sparse_solver, "_mkl", lambda: None)
     monkeypatch.setitem(sys.modules, "pypardiso", None)
     assert chosen() == "SuperLU"
 
 
-class Listed:
-    """A file as a package lists it."""
-
-    def __init__(self, path):
-        self.name, self.path = path.name, path
-
-    def locate(self):
-        return self.path
-
-
-@pytest.mark.parametrize("library", ["libmkl_rt.so.2", "mkl_rt.2.dll"])
-def test_mkls_library_is_the_one_that_its_package_lists_and_that_is_there(
-    monkeypatch, tmp_path, library
-):
-    """Not the one to link against, none that is gone, no other one."""
-    names = ["readme.txt", "libmkl_core.so.2", "mkl_rt.lib", "libmkl_rt.gone", library]
-    for name in names:
-        if "gone" not in name:
-            (tmp_path / name).touch()
-    listed = [Listed(tmp_path / name) for name in names]
-    monkeypatch.setattr(sparse_solver, "files", lambda _: listed)
-    assert _mkl() == str(tmp_path / library)
-    monkeypatch.setattr(sparse_solver, "files", lambda _: listed[:4])
-    assert _mkl() is None
-    monkeypatch.setattr(sparse_solver, "files", lambda _: None)
-    assert _mkl() is None
-
-
-@pytest.mark.parametrize("best", ["PARDISO", "SuperLU"])
-def test_unless_another_is_wanted_the_machines_best_solver_is_used(monkeypatch, best):
-    asked = []
-
-    def by_pardiso(upper, loads):
-        asked.append("PARDISO")
-        return loads / 2
-
-    monkeypatch.setattr(sparse_solver, "_solve_with_pardiso", by_pardiso)
-    monkeypatch.setattr(sparse_solver, "solver_name", lambda: best)
-    twice, loads = csr_array(2.0 * np.eye(3)), np.ones((3, 2))
-    for wish in (None, "PARDISO", "SuperLU"):
-        np.testing.assert_allclose(solve(twice, loads, wish), 0.5)
-    assert len(asked) == (2 if best == "PARDISO" else 1)
-
-
-def test_where_mkl_is_not_installed_there_is_no_library(monkeypatch):
+def test_missing_mkl_gives_no_library(monkeypatch):
     def absent(name):
         raise sparse_solver.PackageNotFoundError(name)
 

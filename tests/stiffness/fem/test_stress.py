@@ -1,4 +1,4 @@
-"""Stress: superposition, closed forms of bars, the singular edge kept out."""
+"""Stress: superposition, closed forms of bars, the region without singular edges."""
 
 import numpy as np
 import pytest
@@ -38,8 +38,8 @@ def notched(keep):
 
 
 def test_inner_edges_without_a_fillet_are_named():
-    """A notch in the column's middle has two; a whole column has none, and neither
-    do its clamped outlines count, which are further away than is looked."""
+    """A notch in the column's middle has two; a whole column has none.  Its clamped
+    outlines are outside the region."""
     whole = notched(lambda x: np.full(len(x), True))
     notch = notched(lambda x: (x[:, 0] < 0.05) | (np.abs(x[:, 2] - 0.2) > 0.1))
     assert not whole.reentrant_edges
@@ -55,16 +55,13 @@ def test_von_mises_by_hand():
     assert von_mises([5.0, 5, 5, 0, 0, 0]) == 0
 
 
-@pytest.mark.parametrize(
-    ("wrench", "expected"),
-    [
-        ([0, 0, 0, 0, 0, 1e3], 1e3 / AREA),
-        ([1e3, 0, 0, 0, 0, 0], 1e3 * R / SECOND),
-        ([0, 0, 1e3, 0, 0, 0], np.sqrt(3) * 1e3 * R / (2 * SECOND)),
-    ],
-)
+@pytest.mark.parametrize(("wrench", "expected"), [
+    ([0, 0, 0, 0, 0, 1e3], 1e3 / AREA),
+    ([1e3, 0, 0, 0, 0, 0], 1e3 * R / SECOND),
+    ([0, 0, 1e3, 0, 0, 0], np.sqrt(3) * 1e3 * R / (2 * SECOND)),
+])  # fmt: skip
 def test_a_bar_in_the_middle_has_the_stress_of_the_books(solved, wrench, expected):
-    """Four radii from both ends the ends are forgotten (e^-4 a radius): 0.3 %,
+    """Four radii from both ends end effects have decayed (e^-4 a radius): 0.3 %,
     the mesh's (averaged at nodes, elements of half the radius)."""
     stress = stress_influence(solved, away=4 * R)
     assert stress.peak(wrench)[0] == pytest.approx(expected, rel=3e-3)
@@ -104,7 +101,8 @@ def test_the_region_is_stated_and_the_edge_kept_out(solved):
     assert stress.places[:, 2].min() >= R * (1 - 1e-9)
     assert stress.places[:, 2].max() <= (L - R) * (1 + 1e-9)
     assert "at least 0.04 m away" in stress.region
-    with pytest.raises(BadInput, match="nothing of the link is 1 m away"):
+    words = "stress: nothing of the link is 1 m away from its interfaces; the furthest"
+    with pytest.raises(BadInput, match=f"^{words} node is 0.2 m$"):
         stress_influence(solved, away=1.0)
 
 

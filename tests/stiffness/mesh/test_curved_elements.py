@@ -1,4 +1,4 @@
-"""Bent elements: on their shapes, of their shapes' volume, none folded."""
+"""Curved elements: on their shapes, of their shapes' volume, none inverted."""
 
 import numpy as np
 import pytest
@@ -7,14 +7,13 @@ from stiffness.fem.elements import integration, isoparametric, lame, triangle_ar
 from stiffness.fem.error_indicator import geometry_errors
 from stiffness.mesh.curved_elements import (
     curved_elements,
-    patches_of_cells,
     refine_inverted,
 )
 from stiffness.mesh.edge_grading import layered, split_joining_edges
 from stiffness.mesh.lagrange import lattice, shape_functions
 from stiffness.mesh.solid import Solid, boundary_faces
 from stiffness.surface.primitives import Plane, Sphere
-from tests.solids_for_tests import bar_solid, box_cells, box_solid, outward
+from tests.solids_for_tests import bar_solid, box_cells, outward
 
 HALF = 0.5  # tangent of half the angle that the shell's piece is seen under
 SOLID_ANGLE = 4 * np.arcsin(HALF**2 / (1 + HALF**2))
@@ -54,13 +53,13 @@ def layers_of_bar(rings, layers, order):
 
 
 def side_errors(mesh):
-    """[1] by which the side's nodes leave the cylinder, of its radius."""
+    """[-] distance of the side's nodes from the cylinder over its radius."""
     nodes = mesh.nodes[np.unique(mesh.faces[mesh.patch == 2])]
     return np.abs(np.hypot(*nodes[:, :2].T) / 0.04 - 1)
 
 
 def test_nodes_and_layers_follow_the_cylinder():
-    """Cubic elements leave it by the fourth power of their size, cut or not."""
+    """Cubic elements have an error of the fourth power of their size, cut or not."""
     errors = {rings: layers_of_bar(rings, 2 * rings, 3) for rings in (2, 4)}
     for k in range(2):
         coarse, fine = (side_errors(errors[rings][k]).max() for rings in (2, 4))
@@ -77,7 +76,7 @@ def volume(mesh):
 
 
 def test_the_volume_of_a_round_bar_converges_with_the_sixth_power():
-    """What is left of an arc lies to both sides of it, for edges and faces alike; the
+    """Edges and faces deviate to both sides of an arc, so that errors cancel; the
     quadratic elements' error falls with the fourth."""
     exact = np.pi * 0.04**2 * 0.2
     for order, power, least in ((2, 4, 1e-5), (3, 6, 1e-7)):
@@ -104,7 +103,7 @@ def shell_volume(inner, outer):
 
 
 def test_a_spheres_volume_converges_with_the_sixth_power():
-    """Faces bent both ways, hollow and round; nodes at the outline on both shapes."""
+    """Concave and convex faces, with nodes of the outline on both shapes."""
     error = []
     for n in (1, 2, 4):
         mesh = isoparametric(shell((n, n, n), 0.6, 1.0))
@@ -149,9 +148,9 @@ THIN = [((2, 2, 1), 0.95), ((4, 4, 1), 0.96), ((5, 5, 1), 0.965), ((8, 8, 1), 0.
 
 @pytest.mark.parametrize(("counts", "inner"), THIN)
 @pytest.mark.parametrize("order", [2, 3])
-def test_no_element_is_turned_over_however_thin_the_wall(counts, inner, order):
-    """A face that bulges by a quarter of the wall would fold its tetrahedron: these
-    are straightened; each has the hand of its straight corners everywhere."""
+def test_elements_of_thin_walls_are_not_inverted(counts, inner, order):
+    """A face that bulges by a quarter of the wall would invert its tetrahedron: such
+    elements are straightened, and all have the orientation of their corners."""
     solid = shell(counts, inner, 1.0)
     bent = curved_elements(solid, order)
     assert bent.inverted.any()
@@ -165,8 +164,8 @@ def test_no_element_is_turned_over_however_thin_the_wall(counts, inner, order):
 
 
 @pytest.mark.parametrize(("counts", "inner"), THIN[1:3])
-def test_halving_what_would_fold_brings_the_shape_nearer(counts, inner):
-    """Straightened elements leave the shape; smaller ones by less than half of it."""
+def test_refining_inverted_elements_brings_the_volume_nearer(counts, inner):
+    """Straightened elements deviate from the shape, smaller ones by less than half."""
     solid = shell(counts, inner, 1.0)
     error = [
         abs(volume(isoparametric(s)) / shell_volume(inner, 1.0) - 1)
@@ -175,26 +174,7 @@ def test_halving_what_would_fold_brings_the_shape_nearer(counts, inner):
     assert error[1] < error[0] / 2
 
 
-def test_what_does_not_fold_is_left_as_it_is():
+def test_elements_that_are_not_inverted_are_kept():
     for solid in (shell((2, 2, 2), 0.6, 1.0), bar_solid(2, 4, 0.04, 0.2)):
         assert not curved_elements(solid, 3).inverted.any()
         assert refine_inverted(solid, 3) is solid
-
-
-def test_a_cells_faces_are_of_the_boundarys_patches_or_inside():
-    """The k-th face lacks corner 3 - k; looked up one by one, however corners are
-    numbered."""
-    solid = box_solid((4, 3, 3), (1.0, 1.0, 1.0))
-    name = np.random.default_rng(8).permutation(len(solid.points))
-    points = np.empty_like(solid.points)
-    points[name] = solid.points
-    numbers = np.arange(len(solid.faces)) % 7
-    cells, faces = name[solid.cells], name[solid.faces]
-    solid = Solid(points, cells, faces, numbers, (None,) * 7)
-    corners = np.sort(cells, axis=1)
-    known = {frozenset(f): n for f, n in zip(solid.faces, numbers, strict=True)}
-    expected = [
-        [known.get(frozenset(np.delete(cell, 3 - k)), -1) for k in range(4)]
-        for cell in corners
-    ]
-    assert patches_of_cells(solid.faces, solid.patch, corners).tolist() == expected

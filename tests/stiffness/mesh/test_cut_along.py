@@ -1,4 +1,4 @@
-"""Interfaces that end where the surface goes on smoothly."""
+"""Interfaces whose outline has no sharp edge."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ from stiffness.surface.primitives import Plane
 from stiffness.surface.smooth_outline import smooth_outline
 from tests.solids_for_tests import box_solid, rounded_block
 
-X, Z = np.array([1.0, 0, 0]), np.array([0.0, 0, 1])
+Z = np.array([0.0, 0, 1])
 
 
 def area_of(solid, patch):

@@ -1,4 +1,4 @@
-"""Slender and thin-walled bars, which a mesher of equal edges never finishes."""
+"""Slender and thin-walled bars, meshed without the mesher."""
 
 import numpy as np
 import pytest
@@ -90,7 +90,7 @@ def test_a_slender_bar_lies_where_its_surface_does():
         assert solid.volumes().sum() == pytest.approx(volume, rel=0.03)
 
 
-def test_other_parts_are_left_to_the_mesher():
+def test_slender_bar_declines_other_parts():
     """A stubby bar, a tapered one, and one that a disc holds in its middle only."""
     stubby = check_surface(*cylinder(0.02, 0.1), "bar")
     assert slender_bar(stubby, *ends(0.1)) is None

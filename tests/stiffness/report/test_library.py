@@ -214,7 +214,7 @@ def test_a_build_file_that_is_none_is_refused(tmp_path, change, message):
     assert message in str(caught.value)
 
 
-def test_the_commands_build_list_look_up_and_export(tmp_path):
+def test_the_commands_build_and_read(tmp_path):
     spec = tmp_path / "spec.toml"
     spec.write_text(EXAMPLE.read_text())
     folder = tmp_path / "link_library"
@@ -228,22 +228,22 @@ def test_the_commands_build_list_look_up_and_export(tmp_path):
 
     keys = json.loads(run("build", spec, "--json", "-"))["keys"]
     assert len(keys) == 16
-    assert run("list", folder).count("\n") == 16
+    assert run("read", folder).count("\n") == 16
     at = "length=0.37,radius=0.02,young=6e10,poisson=0.3"
-    table = json.loads(run("look-up", folder, "--at", at, "--json", "-"))
+    table = json.loads(run("read", folder, "--at", at, "--json", "-"))
     truth = exact(0.37, 0.02)
     gap = np.abs(scaled(np.array(table["stiffness"]) - truth, truth)).max()
     assert gap < table["relative_error_estimate"] < 0.02
-    rows = list(csv.DictReader(io.StringIO(run("export", folder))))
+    rows = list(csv.DictReader(io.StringIO(run("read", folder, "--to", "csv"))))
     assert len(rows) == 16
     row = next(r for r in rows if r["length"] == "0.45" and r["radius"] == "0.04")
     assert float(row["K_RX_RX"]) == pytest.approx(exact(0.45, 0.04)[0, 0], rel=1e-9)
-    text = run("export", folder, "--to", "mapdl", "--key", keys[0])
+    text = run("read", folder, "--to", "mapdl", "--key", keys[0])
     assert text.count("RMORE") == 12
     with pytest.raises(BadInput, match="--key: missing"):
-        run("export", folder, "--to", "adams")
+        run("read", folder, "--to", "adams")
     with pytest.raises(BadInput, match="expected NAME=NUMBER"):
-        run("look-up", folder, "--at", "length")
+        run("read", folder, "--at", "length")
 
 
 def test_other_programs_get_translations_first():
@@ -375,7 +375,7 @@ def test_shipped_square_links_are_their_beams_with_stiffer_ends(shape):
 @pytest.mark.parametrize("length", [0.19, 0.46])
 def test_the_shipped_library_refuses_outside(length):
     result = CliRunner().invoke(
-        app, ["library", "look-up", str(SHIPPED / "tube"), "--at", f"length={length}"]
+        app, ["library", "read", str(SHIPPED / "tube"), "--at", f"length={length}"]
     )
     assert isinstance(result.exception, BadInput)
     assert "outside the grid, 0.2 .. 0.45" in str(result.exception)

@@ -136,7 +136,9 @@ def test_without_poissons_ratio_tension_has_no_ends():
 def test_slenderness_refuses_before_it_works(options, message):
     with pytest.raises(BadInput) as caught:
         CliRunner().invoke(
-            app, ["slenderness", *MATERIAL, *options], catch_exceptions=False
+            app,
+            ["compare", "--ratios", "5,10", *MATERIAL, *options],
+            catch_exceptions=False,
         )
     assert message in str(caught.value)
 
@@ -180,7 +182,7 @@ def test_an_l_from_a_file_is_two_beams(tmp_path):
     for a force along y at the tip: both legs bend, the first twists."""
     path = curve_file(tmp_path, L_BRACKET)
     result = CliRunner().invoke(
-        app, ["curve", str(path), *MATERIAL, "--theory", "euler", "--json", "-"]
+        app, ["beam", str(path), *MATERIAL, "--theory", "euler", "--json", "-"]
     )
     C = np.array(json.loads(result.stdout)["compliance"])
     pieces = read_curve(path, 0.3)

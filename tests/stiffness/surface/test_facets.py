@@ -52,7 +52,7 @@ def test_facets_are_the_same_in_every_unit(unit):
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
 def test_one_facet_alone_is_flat(size):
-    """However narrow its corners are: unit normals, distances from its plane."""
+    """Unit normals and distances from its plane, also of narrow corners."""
     corners = size * np.array([[0.0, 0, 2], [1, 0, 2], [0.05, 0.1, 2]])
     facet = Facets(corners, np.array([[0, 1, 2]]))
     np.testing.assert_allclose(facet.normals, [[0, 0, 1]] * 3, atol=1e-12)

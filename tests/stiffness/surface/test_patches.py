@@ -9,7 +9,7 @@ from stiffness.mesh.mesh import mesh_solid
 from stiffness.screws import rotation_matrix
 from stiffness.surface.facets import Facets
 from stiffness.surface.interface import parse_interface
-from stiffness.surface.patches import find_patches, triangles_on
+from stiffness.surface.patches import find_patches
 from stiffness.surface.primitives import (
     Cone,
     Plane,
@@ -23,11 +23,6 @@ from stiffness.surface.primitives import (
 )
 from stiffness.surface.surface import check_surface
 from tests.solids_for_tests import bar
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(3)
 
 
 def samples(shape, rng):
@@ -78,25 +73,8 @@ def test_gradients_are_those_of_the_distance(fit, shape, rng):
         np.testing.assert_allclose(gradients[:, k], slope, atol=1e-8)
 
 
-def test_a_point_goes_to_the_corner_of_three_planes(rng):
-    planes = tuple(Plane(0.1 * axis, axis) for axis in np.eye(3))
-    np.testing.assert_allclose(
-        project(rng.uniform(0, 0.2, (5, 3)), planes), 0.1, atol=1e-14
-    )
-
-
-def test_facets_of_a_cylinder_are_known_as_one(rng):
-    surface = bar()
-    patches = find_patches(surface, parse_interface("z=0"), parse_interface("z=0.1"))
-    assert len(patches.shapes) == 3
-    side = patches.shapes[2]
-    assert isinstance(side, Cone)
-    assert side.radius == pytest.approx(0.02, rel=1e-9)
-    assert side.slope == pytest.approx(0, abs=1e-9)
-
-
 def test_a_slot_is_two_planes_and_two_half_cylinders():
-    """Tangent faces: no sharp edge tells them apart."""
+    """Tangent faces, without a sharp edge between them."""
     angle = np.linspace(-np.pi / 2, np.pi / 2, 17)
     half = 0.02 * np.column_stack([np.cos(angle), np.sin(angle)])
     outline = np.concatenate([half + [0.03, 0], -half - [0.03, 0]])
@@ -173,19 +151,6 @@ def test_a_barrels_mesh_has_its_volume_not_its_facets(tmp_path):
     assert abs(volume / exact - 1) < 3e-4
 
 
-def test_a_disc_is_an_outline_of_triangles_or_refused():
-    """An end of radius 0.02 as a fan from its middle: the whole end is a disc; a
-    smaller one would cut every triangle of the fan."""
-    surface = bar()
-    whole = triangles_on(surface, parse_interface("disc=0,0,0/0,0,1/0.02"), "base")
-    assert len(whole) == 32
-    with pytest.raises(BadInput, match=r"cuts 32 triangles; a disc must be an outline"):
-        triangles_on(surface, parse_interface("disc=0,0,0/0,0,1/0.01"), "base")
-
-
-def test_an_interface_off_the_part_is_refused_with_the_parts_box():
-    plane = parse_interface("z=0.2")
-    with pytest.raises(BadInput, match=r"no face .* z = 0 .. 0.1 m"):
-        find_patches(bar(), parse_interface("z=0"), plane)
+def test_one_interface_at_both_ends_is_refused():
     with pytest.raises(BadInput, match="the same faces"):
         find_patches(bar(), parse_interface("z=0"), parse_interface("z=0"))

@@ -89,31 +89,6 @@ def test_a_plane_looks_where_its_facets_look(sign):
     np.testing.assert_allclose(fitted.normal, sign * AXIS, atol=1e-14)
 
 
-def test_a_torus_is_found_in_any_direction_it_is_thin_in():
-    """A quarter of one: its thinnest direction is not its axis."""
-    torus = CASES["torus"][0]
-    turn = np.linspace(0, np.pi / 2, 9)
-    u, v = np.linalg.svd(AXIS[None])[2][1:]
-    spokes = np.cos(turn)[:, None] * u + np.sin(turn)[:, None] * v
-    points = np.concatenate([
-        CENTER + (2 + 0.5 * np.cos(a)) * spokes + 0.5 * np.sin(a) * AXIS for a in ANGLES
-    ])
-    fitted = fit_torus(points, torus.signed(points)[1])
-    np.testing.assert_allclose(fitted.signed(points)[0], 0, atol=1e-12)
-    assert fitted.radius == pytest.approx(2, rel=1e-10)
-    assert fitted.tube == pytest.approx(0.5, rel=1e-10)
-
-
-def test_too_few_points_give_the_first_guess():
-    """Least squares need as many points as parameters."""
-    cylinder = Cone(CENTER, AXIS, 2.0)
-    points = ring_points([2.0, 2.0], [-1.0, 1.0], 3)[:5]
-    normals = cylinder.signed(ring_points([2.0], [0.0]))[1]
-    fitted = fit_cone(points, normals)
-    assert fitted.slope == 0
-    np.testing.assert_allclose(fitted.signed(points)[0], 0, atol=1e-12)
-
-
 def test_projecting_nothing_gives_nothing():
     assert project(np.zeros((0, 3)), (CASES["plane"][0],)).shape == (0, 3)
 

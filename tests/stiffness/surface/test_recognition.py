@@ -1,4 +1,4 @@
-"""Shapes that meet tangentially, and flat faces that are none of them."""
+"""Shapes that meet tangentially, and flat faces."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A stepped shaft with a fillet: its shapes are those it was turned with, no others."""
+"""Shapes of a stepped shaft with a fillet."""
 
 import pytest
 
@@ -10,12 +10,8 @@ from tests.solids_for_tests import shouldered_shaft
 
 
 @pytest.mark.parametrize(("around", "rows"), [(36, 6), (48, 8), (48, 12)])
-def test_a_shoulder_and_the_first_row_of_its_fillet_are_no_torus(around, rows):
-    """Radii 15 and 10 mm, fillet 2 mm: three planes, two cylinders and one torus.
-
-    Three coaxial circles of corners always lie on a torus; here the shoulder's two and
-    the next one did, and the fillet ended in an inner edge.
-    """
+def test_shoulder_and_fillet_of_a_shaft_are_recognised(around, rows):
+    """Radii 15 and 10 mm, fillet 2 mm: three planes, two cylinders and one torus."""
     points, triangles = shouldered_shaft(0.015, 0.010, 0.002, around, rows)
     surface = check_surface(points, triangles, "shaft")
     patches = find_patches(surface, *map(parse_interface, ("z=0", "z=0.12")))
@@ -35,8 +31,8 @@ def test_a_shoulder_and_the_first_row_of_its_fillet_are_no_torus(around, rows):
             assert high - low < 1e-9
 
 
-def test_a_fillet_is_found_where_many_congruent_facets_are_not():
-    """Of 20 seeds none told a shape: all were on one ring of the shaft, 48 the same."""
+def test_fillet_is_found_among_many_congruent_facets():
+    """The shaft has 48 congruent facets in each ring."""
     step = (0.0322355, 0.0772355)
     points, triangles = shouldered_shaft(0.0134315, 0.01, 0.002402, 48, 8, step, 0.005)
     surface = check_surface(points, triangles, "shaft")

@@ -1,4 +1,4 @@
-"""What a surface is refused for, to the last triangle, and what is mended in it."""
+"""Refusals and repairs of surfaces."""
 
 import re
 
@@ -32,7 +32,7 @@ def test_a_triangles_vector_is_its_area_along_its_normal_wherever_it_lies():
 
 
 def test_a_digest_is_of_the_geometry_alone():
-    """To the last bit of a coordinate and the last corner; of no name, no layout."""
+    """It depends on every bit of coordinates and corners, not on name or layout."""
     one = Surface(CUBE, CUBE_TRIANGLES, "one")
     same = Surface(np.asfortranarray(CUBE), CUBE_TRIANGLES.astype(np.int32), "other")
     assert one.digest() == same.digest()
@@ -50,7 +50,7 @@ def test_a_digest_is_of_the_geometry_alone():
         (1.001e-3, "mm", None), (0.999e-3, "mm", "m"), (0.999e-3, "m", "m"),
     ],
 )  # fmt: skip
-def test_a_part_of_no_plausible_size_betrays_its_unit(size, unit, hint):
+def test_part_of_implausible_size_is_refused_with_a_unit(size, unit, hint):
     """A millimetre to twenty metres across."""
     points = CUBE * size / (0.1 * np.sqrt(3))
     if hint is None:
@@ -63,7 +63,7 @@ def test_a_part_of_no_plausible_size_betrays_its_unit(size, unit, hint):
 
 
 def test_a_step_file_states_its_own_unit(tmp_path, monkeypatch):
-    """What is said beside it does not count; for other files it does."""
+    """The given unit counts for other files only."""
     points, triangles = cylinder()
     monkeypatch.setattr(
         surface_module, "_read_triangles", lambda *_: (points, triangles, None)
@@ -88,8 +88,8 @@ def test_a_step_file_of_the_wrong_unit_is_told_the_likely_one(size, unit, monkey
         read_surface("bar.step", "inch")
 
 
-def test_points_of_no_triangle_are_of_no_concern():
-    """Neither one that is no number nor one far away."""
+def test_points_of_no_triangle_are_ignored():
+    """Neither NaN nor a distant point."""
     points = np.concatenate([[[np.nan] * 3, [1e6, 0, 0]], CUBE])
     surface = check_surface(points, CUBE_TRIANGLES + 2, "cube")
     assert surface.volume == pytest.approx(1e-3)
@@ -107,8 +107,8 @@ def test_a_triangle_of_two_corners_is_dropped_and_named(pair):
 
 @pytest.mark.parametrize("turned", [1, 5, 7, 11])
 @pytest.mark.parametrize("hollow", [False, True])
-def test_however_triangles_are_turned_the_part_is_the_same(rng, turned, hollow):
-    """The smaller number of a shell's is turned; then a shell that is inside out."""
+def test_turned_triangles_are_repaired_and_named(rng, turned, hollow):
+    """The smaller number of triangles is turned, then a shell that is inside out."""
     mixed = CUBE_TRIANGLES.copy()
     some = rng.choice(12, turned, replace=False)
     mixed[some] = mixed[some][:, ::-1]
@@ -184,7 +184,7 @@ def test_surface_that_bounds_no_solid_is_refused(points, triangles, message):
         check_surface(points, triangles, "part")
 
 
-def test_where_a_surface_cuts_itself_is_said():
+def test_place_where_a_surface_cuts_itself_is_named():
     """The cube's top drawn up to a spike, or down through its bottom: the middle of two
     triangles that cross is named, one of the spike's and one of the bottom's."""
     sides = [t for t in CUBE_TRIANGLES if not (CUBE[t][:, 2] == 0.1).all()]

@@ -1,5 +1,6 @@
 """Surfaces from MSH and STEP, and readers in a process of their own."""
 
+import json
 import subprocess
 import sys
 
@@ -82,16 +83,13 @@ def test_a_cube_of_gmsh_is_a_cube(tmp_path, content, capfd):
     assert capfd.readouterr().out == ""  # `--json -` prints there
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ("no mesh at all", "not a readable MSH file"),
-        (msh2(TRIANGLES, 2)[:300], "not a readable MSH file"),
-        (msh2([(1, 2)], 1), "holds neither triangles nor tetrahedra"),
-        (msh2(TRIANGLES[:-1], 2), "the surface is open"),
-    ],
-)
-def test_a_msh_file_that_is_none_is_refused(tmp_path, content, message, capfd):
+@pytest.mark.parametrize(("content", "message"), [
+    ("no mesh at all", "not a readable MSH file"),
+    (msh2(TRIANGLES, 2)[:300], "not a readable MSH file"),
+    (msh2([(1, 2)], 1), "holds neither triangles nor tetrahedra"),
+    (msh2(TRIANGLES[:-1], 2), "the surface is open"),
+])  # fmt: skip
+def test_wrong_msh_file_is_refused(tmp_path, content, message, capfd):
     path = tmp_path / "bad.msh"
     path.write_text(content)
     with pytest.raises(BadInput, match=message):
@@ -151,7 +149,7 @@ gmsh.write(sys.argv[1])
 """
 
 
-def test_of_several_solids_one_is_read_by_its_name(tmp_path):
+def test_one_of_several_solids_is_read_by_its_name(tmp_path, run):
     """A cylinder of 20 x 100 mm beside a box of 10 x 20 x 30 mm; facets cost 0.3 %."""
     pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
     path = tmp_path / "two.step"
@@ -168,6 +166,11 @@ def test_of_several_solids_one_is_read_by_its_name(tmp_path):
     assert volumes == pytest.approx(exact, rel=4e-3)
     with pytest.raises(BadInput, match='no solid "screw"'):
         read_surface(f"{path}#screw")
+    status, out, _ = run("stiffness", "fea", path, "--part", "list", "--json", "-")
+    solids = json.loads(out)["solids"]
+    assert status == 0
+    assert [solid["name"] for solid in solids] == names
+    assert [solid["volume"] for solid in solids] == pytest.approx(exact, rel=1e-6)
 
 
 TOUCHING = """
@@ -206,7 +209,7 @@ def test_solids_are_listed_and_several_that_touch_are_read_as_one(tmp_path):
 @pytest.mark.parametrize("binary", [0, 1])
 @pytest.mark.parametrize("version", [2.2, 4.1])
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_what_gmsh_writes_is_read(tmp_path, gmsh, version, binary, dimension):
+def test_files_written_by_gmsh_are_read(tmp_path, gmsh, version, binary, dimension):
     gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 24)
     gmsh.option.setNumber("Mesh.MshFileVersion", version)
     gmsh.option.setNumber("Mesh.Binary", binary)
@@ -227,7 +230,7 @@ def test_a_broken_step_file_is_refused(tmp_path, gmsh):
 
 @pytest.mark.parametrize("kept", [0.3, 0.6, 0.9])
 def test_a_file_that_crashes_its_reader_is_refused(tmp_path, kept):
-    """VTK reads beyond the end of a binary PLY file that is cut, and dies of it."""
+    """VTK crashes on a truncated binary PLY file."""
     pyvista = pytest.importorskip("pyvista")
     path = tmp_path / "part.ply"
     pyvista.PolyData.from_regular_faces(*cylinder()).save(path)
@@ -237,7 +240,7 @@ def test_a_file_that_crashes_its_reader_is_refused(tmp_path, kept):
         read_surface(path)
 
 
-def test_a_reader_that_does_not_end_is_stopped(tmp_path, monkeypatch):
+def test_reader_is_stopped_at_its_time_limit(tmp_path, monkeypatch):
     """The time limit of the reader's process; none reads a file within 1 ms."""
     path = tmp_path / "part.vtk"
     path.write_text("# vtk DataFile Version 3.0\n")

@@ -1,4 +1,4 @@
-"""Solids of links meshed as coarsely as a test can do with."""
+"""Coarse meshes of links' solids, for quick tests."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from validation.assumptions import solid_links
 
 @pytest.fixture(scope="module")
 def coarse_solids():
-    """Bars good to one per cent."""
+    """Solve bars to an accuracy of one per cent."""
     with pytest.MonkeyPatch.context() as patch:
         solid_links._bar.cache_clear()
         options = FemOptions(0.01, budget=Budget(unknowns=60_000))

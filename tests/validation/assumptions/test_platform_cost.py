@@ -49,7 +49,7 @@ def posture():
     return posture
 
 
-def test_a_solid_moved_as_a_whole_costs_nothing_and_else_is_a_beam():
+def test_solid_link_has_no_rigid_energy_and_the_stiffness_of_a_beam():
     """Square section 1 x 2, length 6: K_E within the few per cent of its held ends."""
     link = BeamLink({"width": 0.05, "height": 0.1}, 70e9, 0.3, up=(0, 1, 1))
     frame = Frame("tip", translation=[0.1, 0.2, -0.2], link=link)
@@ -64,7 +64,7 @@ def test_a_solid_moved_as_a_whole_costs_nothing_and_else_is_a_beam():
 
 
 @pytest.mark.slow
-def test_virtual_joints_lose_nothing_of_solids_that_act_at_their_ends(posture):
+def test_virtual_joints_reproduce_solids_loaded_at_their_ends(posture):
     """Condensed K_E against the displacement method over all bodies: rounding."""
     costs = platform_costs([posture])
     assert costs.meshed[0] < 1e-9
@@ -75,7 +75,7 @@ def test_virtual_joints_lose_nothing_of_solids_that_act_at_their_ends(posture):
 
 
 @pytest.mark.slow
-def test_one_link_costs_the_platform_what_it_costs_itself():
+def test_cost_of_a_single_link_is_that_of_the_platform():
     frame = Frame("tip", translation=[0.3, 0.0, 0.0], link=ROUND)
     posture = home_posture(Robot("cantilever", "tip", (frame,)))
     solid = solid_link(frame)
@@ -88,7 +88,7 @@ def test_one_link_costs_the_platform_what_it_costs_itself():
     assert costs.by_link == {"tip": pytest.approx(costs.beams)}
 
 
-def test_many_poses_cost_what_each_costs_alone():
+def test_cost_of_many_poses_equals_that_of_each():
     robot = load_robot("irsbot2")
     postures = [place_robot(robot, {"tx": x, "tz": -0.5}) for x in (0.0, 0.2)]
     both = platform_costs(postures)
@@ -101,7 +101,7 @@ def test_many_poses_cost_what_each_costs_alone():
     assert both.beams[0] != pytest.approx(both.beams[1], rel=1e-3)
 
 
-def test_what_cannot_be_compared_is_refused():
+def test_robots_without_solids_or_stiffness_are_refused():
     rigid = Robot("rigid", "tip", (Frame("tip", translation=[0.3, 0, 0]),))
     with pytest.raises(NoSolids, match="no link has a shape"):
         platform_costs([home_posture(rigid)])
@@ -112,7 +112,7 @@ def test_what_cannot_be_compared_is_refused():
 
 
 @pytest.mark.slow
-def test_the_command_names_the_link_that_costs_most(run, tmp_path):
+def test_validity_command_names_the_link_of_largest_cost(run, tmp_path):
     path, picture = tmp_path / "triangle.toml", tmp_path / "cost.svg"
     write_robot(triangle(), path)
     status, out, _ = run(
@@ -126,7 +126,7 @@ def test_the_command_names_the_link_that_costs_most(run, tmp_path):
     assert "that link alone a beam" in picture.read_text()
 
 
-def test_the_command_over_poses_gives_median_largest_and_where(run, tmp_path):
+def test_validity_over_poses_reports_median_and_largest(run, tmp_path):
     """One pose of three out of reach; a list of the same poses says the same."""
     listed = tmp_path / "poses.csv"
     listed.write_text("id,pose.tx,pose.tz\na,0,-0.5\nb,0.2,-0.5\nc,3,-0.5\n")
@@ -150,15 +150,12 @@ def test_the_command_over_poses_gives_median_largest_and_where(run, tmp_path):
     assert "% at tx=" in out
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--grid", "tx=0", "--pose", "tx=0"], "expected one of --pose or --joint"),
-        (["--figure", "a.png"], "--figure: expected --solids too"),
-        (["--grid", "qx=0"], "unknown pose component"),
-    ],
-)
-def test_what_does_not_go_together_is_refused(run, words, message):
+@pytest.mark.parametrize(("words", "message"), [
+    (["--grid", "tx=0", "--pose", "tx=0"], "expected one of --pose or --joint"),
+    (["--figure", "a.png"], "--figure: expected --solids too"),
+    (["--grid", "qx=0"], "unknown pose component"),
+])  # fmt: skip
+def test_options_that_exclude_each_other_are_refused(run, words, message):
     status, _, err = run("validation", "validity", "irsbot2", *words)
     assert status == 2
     assert message in err

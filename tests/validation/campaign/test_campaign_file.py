@@ -1,4 +1,4 @@
-"""Campaign folders: what must load does, what must not says why in one line."""
+"""Campaign folders: sound ones are read, wrong ones are refused in one line."""
 
 import math
 import re
@@ -14,7 +14,7 @@ from validation.campaign.campaign import number_rows
 from validation.campaign.campaign_file import read_campaign
 
 
-def test_a_campaign_is_what_its_files_say(tmp_path):
+def test_campaign_has_the_content_of_its_files(tmp_path):
     """Two arms by hand: x = cos q1 + 0.8 cos(q1 + q2), y likewise."""
     campaign = read_campaign(write_campaign(tmp_path / "first"))
     assert campaign.name == "first"
@@ -36,7 +36,7 @@ def test_a_campaign_is_what_its_files_say(tmp_path):
     assert not campaign.measured.flags.writeable
 
 
-def test_taking_rows_keeps_their_order_and_their_numbers(tmp_path):
+def test_take_keeps_the_order_and_numbers_of_rows(tmp_path):
     campaign = read_campaign(write_campaign(tmp_path))
     some = campaign.take([3, 1])
     assert some.ids == ("m4", "m2")
@@ -47,13 +47,13 @@ def test_taking_rows_keeps_their_order_and_their_numbers(tmp_path):
     assert len(campaign.take([])) == 0
 
 
-def test_rows_are_numbered_by_first_use():
+def test_number_rows_counts_by_first_occurrence():
     numbers = number_rows([2.0, 1.0, 2.0 + 1e-12, -0.0, 0.0], [math.nan] * 5)
     np.testing.assert_array_equal(numbers, [0, 1, 0, 2, 2])
 
 
-def test_poses_and_joints_name_the_same_configurations(tmp_path):
-    """The tool's poses written down as a command give the joints back."""
+def test_commanded_poses_give_the_commanded_joints(tmp_path):
+    """The tool's poses of commanded joints, given as commands."""
     joints = read_campaign(write_campaign(tmp_path / "joints"))
     tool = joints.transforms[:, joints.robot.index("tool")]
     rows = [
@@ -67,7 +67,7 @@ def test_poses_and_joints_name_the_same_configurations(tmp_path):
     np.testing.assert_array_equal(poses.configuration, joints.configuration)
 
 
-def test_a_machine_without_drives_is_always_at_home(tmp_path):
+def test_machine_without_drives_has_one_configuration(tmp_path):
     robot = 'name = "post"\nplatform = "top"\n[[frame]]\nname = "top"\n'
     robot += 'parent = "base"\ntranslation = [0, 0, 2]\n'
     folder = write_campaign(tmp_path, robot=robot, head="id,meas.tz,cov.temperature",
@@ -77,7 +77,7 @@ def test_a_machine_without_drives_is_always_at_home(tmp_path):
     np.testing.assert_array_equal(campaign.repeat, [0, 0])
 
 
-def test_a_robot_may_be_built_in(tmp_path):
+def test_campaign_reads_a_built_in_robot(tmp_path):
     folder = write_campaign(tmp_path, head="id,pose.tx,pose.tz,meas.tx",
                             rows=["a,0.05,-0.5,1e-5"],
                             toml={"robot": '"irsbot2"'})  # fmt: skip
@@ -85,7 +85,7 @@ def test_a_robot_may_be_built_in(tmp_path):
 
 
 def test_labels_in_any_script_and_spaces_are_read(tmp_path):
-    """Only control characters are refused, not what a spreadsheet may write."""
+    """Only control characters are refused."""
     rows = [r.replace(f"m{k}", f"Übung\u00a0{k} é٣") for k, r in enumerate(ROWS, 1)]
     assert read_campaign(write_campaign(tmp_path, rows=rows)).ids[0].startswith("Ü")
 
@@ -128,7 +128,7 @@ def test_a_measured_motion_is_converted_to_si(tmp_path):
     assert campaign.take([0]).motion_units == campaign.motion_units
 
 
-def test_a_mark_before_the_text_and_carriage_returns_are_accepted(tmp_path):
+def test_byte_order_mark_and_carriage_returns_are_accepted(tmp_path):
     folder = write_campaign(tmp_path)
     table = folder / "measurements.csv"
     text = table.read_text().replace("\n", "\r\n") + "\r\n\r\n"
@@ -137,14 +137,14 @@ def test_a_mark_before_the_text_and_carriage_returns_are_accepted(tmp_path):
     assert len(read_campaign(folder / "campaign.toml")) == 4
 
 
-def test_sigma_of_a_reading_goes_before_that_of_the_device(tmp_path):
+def test_sigma_of_a_row_replaces_that_of_the_device(tmp_path):
     rows = ["a,0,0,1e-5,2e-5,3e-6,", "b,0,0,1e-5,,,"]
     head = "id,q.one,q.two,meas.tx,meas.ty,sigma.tx,sigma.ty"
     sigma = read_campaign(write_campaign(tmp_path, head=head, rows=rows)).sigma
     np.testing.assert_array_equal(sigma[:, 3:5], [[3e-6, 5e-6], [5e-6, 5e-6]])
 
 
-def test_a_device_somewhere_in_the_room_may_read_far(tmp_path):
+def test_unknown_registration_allows_large_positions_not_rotations(tmp_path):
     rows = ["a,0,0,1,2,3,-5.5,10,2,0,0,1"]
     head = "id,q.one,q.two,meas.rx,meas.ry,meas.rz,meas.tx,meas.ty,meas.tz,"
     head += "cov.temperature,cov.time,cov.approach"
@@ -186,20 +186,10 @@ BAD_TABLES = {
         r'line 2 \(id "m1"\), meas.tx: found "0,00001", expected a finite number \[m\]'
         r'; a decimal "," is not read here: write "0.00001", or say \[table\] delimi'
         r'ter = ";", decimal = "," in campaign.toml and part cells by ";"'),
-    "decimal commas under one label": (HEAD, [ROWS[0].replace("1.5", '"1,5"')] * 2,
-        r'line 2 \(id "m1"\), cov.temperature: found "1,5", .* a decimal "," is not'),
     "a NUL in a label": (HEAD, [ROWS[0].replace("m1", "m\0"), *ROWS[1:]],
-        r"line 2 holds NUL; expected a text file"),
-    "NULs at the end": (HEAD, [*ROWS, "\0" * 50],
-        r"line 6 holds NUL; expected a text file"),
-    "a NUL in a column's name": (HEAD.replace("cov.time", "cov.t\0"), ROWS,
-        r"line 1 holds NUL; expected a text file"),
-    "a NUL in a number": (HEAD, [ROWS[0].replace("1e-05", "1\0e-05")],
         r"line 2 holds NUL; expected a text file"),
     "a line break in a label": (HEAD, [ROWS[0].replace("m1", '"m\n1"')],
         r"line 3, \"id\": found 'm\\n1', expected text without line breaks"),
-    "a delete character": (HEAD, [ROWS[0].replace("m1", "m\x7f")],
-        r"line 2, \"id\": found 'm\\x7f', expected text without"),
     "ragged": (HEAD, [*ROWS[:2], "m9,0.1"], r"line 4: found 2 cells, expected 11 as"),
     "empty": (None, [], r"measurements.csv: empty; expected a header"),
     "no rows": (HEAD, [], r"measurements.csv: no rows; expected one row a measurement"),
@@ -235,9 +225,7 @@ BAD_TABLES = {
         r'line 3 \(id "b"\): pose tx=5, ty=1 cannot be reached'),
     "a pose in mm": ("id,pose.tx,pose.ty,meas.tx", ["a,500,1000,0"],
         r"pose.tx: found 500, expected a position in m; if it is in other units"),
-    "negative sigma": ("id,q.one,q.two,meas.tx,sigma.tx", ["a,0,0,0,-1e-6"],
-        r"sigma.tx: found -1e-06 m, expected one standard deviation > 0"),
-    "no sigma of zero": ("id,q.one,q.two,meas.tx,sigma.tx", ["a,0,0,0,0"],
+    "sigma of zero": ("id,q.one,q.two,meas.tx,sigma.tx", ["a,0,0,0,0"],
         r"sigma.tx: found 0 m, expected one standard deviation > 0"),
     "sigma of 5 m": ("id,q.one,q.two,meas.tx,sigma.tx", ["a,0,0,0,5"],
         r"sigma.tx: found 5, expected a length in m, at most the robot's"),
@@ -248,7 +236,7 @@ BAD_TABLES = {
 
 
 @pytest.mark.parametrize("case", BAD_TABLES)
-def test_a_table_that_makes_no_sense_is_refused_in_one_line(case, tmp_path):
+def test_wrong_table_is_refused_in_one_line(case, tmp_path):
     head, rows, message = BAD_TABLES[case]
     folder = write_campaign(tmp_path, head=head, rows=rows)
     with pytest.raises(BadInput, match=message) as caught:
@@ -284,7 +272,7 @@ BAD_TOML = {
 
 
 @pytest.mark.parametrize("case", BAD_TOML)
-def test_a_campaign_file_that_makes_no_sense_is_refused_in_one_line(case, tmp_path):
+def test_wrong_campaign_file_is_refused_in_one_line(case, tmp_path):
     toml, rest, message = BAD_TOML[case]
     folder = write_campaign(tmp_path, toml=toml, noise=rest)
     with pytest.raises(BadInput, match=message) as caught:
@@ -293,7 +281,7 @@ def test_a_campaign_file_that_makes_no_sense_is_refused_in_one_line(case, tmp_pa
     assert "\n" not in str(caught.value)
 
 
-def test_a_file_that_is_no_table_is_not_printed(tmp_path):
+def test_refusal_does_not_print_the_content_of_another_file(tmp_path):
     folder = write_campaign(tmp_path)
     (folder / "measurements.csv").write_text("root:secret:0:0\nother:words\n")
     with pytest.raises(BadInput, match="names no column") as caught:
@@ -301,19 +289,19 @@ def test_a_file_that_is_no_table_is_not_printed(tmp_path):
     assert "secret" not in str(caught.value)
 
 
-def test_a_folder_that_is_not_there_says_so(tmp_path):
+def test_missing_folder_is_refused(tmp_path):
     with pytest.raises(BadInput, match=r"gone/campaign.toml: cannot be read: No such"):
         read_campaign(tmp_path / "gone")
 
 
-def test_a_robot_file_that_is_wrong_is_named_itself(tmp_path):
+def test_wrong_robot_file_of_a_campaign_is_named(tmp_path):
     folder = write_campaign(tmp_path, robot=ARM.replace("one", "base", 1))
     with pytest.raises(BadInput, match=r"robot.toml: frame"):
         read_campaign(folder)
 
 
-def test_the_files_of_the_docs_are_read(tmp_path):
-    """Both blocks together: irsbot2 at 100 mm, 10 N written as 0,01 kN."""
+def test_campaign_files_of_the_docs_are_read(tmp_path):
+    """All blocks together: irsbot2 at 100 mm, 10 N written as 0,01 kN."""
     docs = Path(__file__).parents[3] / "docs" / "campaigns.md"
     blocks = re.findall(r"```toml\n(.*?)```", docs.read_text("utf-8"), flags=re.S)
     assert len(blocks) == 3
@@ -359,7 +347,7 @@ def test_a_row_is_read_point_by_point(tmp_path):
     assert campaign.take([3]).targets.tolist() == [[0, 0.2, 0]]
 
 
-def test_several_tables_are_sessions(tmp_path):
+def test_each_of_several_tables_is_a_session(tmp_path):
     folder = write_campaign(tmp_path, toml={"measurements": '["a.csv", "b.csv"]'})
     (folder / "a.csv").write_text(f"{HEAD}\n{ROWS[0]}\n")
     (folder / "b.csv").write_text(f"{HEAD}\n{ROWS[1]}\n{ROWS[2]}\n")
@@ -381,7 +369,7 @@ def test_several_tables_are_sessions(tmp_path):
     ("id,q.one,q.two,meas.tx", "m1,0,0,1e-5", "[points]\ntx = [0, 0, 0]\n",
      'points: found "tx"'),
 ])  # fmt: skip
-def test_sessions_and_points_that_make_no_sense(head, cells, extra, message, tmp_path):
+def test_wrong_sessions_and_points_are_refused(head, cells, extra, message, tmp_path):
     with pytest.raises(BadInput) as error:
         read_campaign(write_campaign(tmp_path, head, [cells], extra=extra))
     assert message in str(error.value)

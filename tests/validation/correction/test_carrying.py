@@ -1,4 +1,4 @@
-"""A saved robot in a new session: found again, or said not to be known."""
+"""Carrying a saved robot to a new session."""
 
 import json
 from dataclasses import replace
@@ -33,10 +33,10 @@ def a_machine(tmp_path):
 
 
 def measured(folder, rows, reach, sessions=None, zero=0.0, wave=None):
-    """The machine measured by a device that stands somewhere else, noise added.
+    """Measure the machine, with noise, by a device in another place.
 
-    The device's place is put in by rigid motion of the points, not by the effect; so is
-    a wave (sine, cosine) [m] of an hour in its readings, with the clock beside it.
+    The device's place is a rigid motion of the points, independent of the effect; so is
+    a wave (sine, cosine) [m] with a period of an hour.  The clock is recorded with it.
     """
     rng = np.random.default_rng(rows)
     saved = load_robot(folder / "saved.toml")
@@ -73,7 +73,7 @@ def measured(folder, rows, reach, sessions=None, zero=0.0, wave=None):
 
 
 def with_a_wave(machine, sine, cosine):
-    """The saved file has a slow wave, learned on another day."""
+    """Add to the saved file a slow wave that was learned on another day."""
     numbers = {"sine": sine, "cosine": cosine, "period": HOUR}
     wave = Function("reading", ("tx",), ("time",), "slow_wave", numbers)
     saved = load_robot(machine / "saved.toml")
@@ -89,7 +89,7 @@ def carried(run, machine, folder, *words):
     return code, text, json.loads(file.read_text())["sessions"], out
 
 
-def test_a_robot_is_carried_over_by_a_few_rows(machine, run):
+def test_robot_is_carried_to_a_new_session_by_few_rows(machine, run):
     folder = measured(machine, 60, 0.8)
     code, _, (day,), out = carried(run, machine, folder, "--setup", "12")
     assert code == 0
@@ -108,9 +108,8 @@ def test_a_robot_is_carried_over_by_a_few_rows(machine, run):
     assert again.error.position < 1.3 * SIGMA
 
 
-def test_rows_of_one_place_do_not_suffice_and_say_so(machine, run):
-    """Forty rows within a milliradian tell a place, and no turn of the device."""
-    folder = measured(machine, 40, 1e-3)
+def test_rows_of_one_place_do_not_suffice(machine, run):
+    """Forty rows within a milliradian determine a place, not the device's rotation."""
     wide = measured(machine, 60, 0.8)
     text = (wide / "measurements.csv").read_text().splitlines()
     folder = measured(machine, 40, 1e-3)
@@ -125,19 +124,8 @@ def test_rows_of_one_place_do_not_suffice_and_say_so(machine, run):
     assert day["uncertainty"] > 10 * day["left_in_setup"]
 
 
-@pytest.mark.slow
-def test_zeros_set_anew_are_found_when_asked_for(machine, run):
-    folder = measured(machine, 80, 0.8, zero=5e-4)
-    _, _, (without,), _ = carried(run, machine, folder, "--setup", "30")
-    _, _, (day,), _ = carried(run, machine, folder, "--setup", "30", "--fit",
-                              "registration,zeros")  # fmt: skip
-    assert day["error"]["normalised"] < 1.4
-    # the first joint's zero is a turn of the base: the registration's, too
-    assert without["error"]["normalised"] < 1.4
-
-
-def test_a_robot_diagnosed_and_saved_foretells_its_own_days(machine, run):
-    """The device stood elsewhere each day: the file says where, and noise is left."""
+def test_saved_robot_predicts_its_own_sessions(machine, run):
+    """The device stood elsewhere each day; the residual is noise."""
     tight = load_robot(machine / "declared.toml")
     tight = replace(
         tight, frames=tuple(replace(f, clearance=None) for f in tight.frames)
@@ -161,8 +149,8 @@ def test_sessions_are_carried_one_by_one(machine, run):
     assert set(load_robot(out).session_effects) == {"a", "b"}
 
 
-def test_a_drift_stays_behind_where_there_is_no_clock(machine, run):
-    """The other day's wave of 15 sigma is not this day's, and is not written."""
+def test_drift_is_not_carried_over_without_a_clock(machine, run):
+    """The wave of another day, 15 sigma, is not written to the carried file."""
     folder = measured(machine, 60, 0.8)
     with_a_wave(machine, 3e-4, 1e-4)
     code, said, (day,), out = carried(run, machine, folder, "--setup", "12")
@@ -173,8 +161,8 @@ def test_a_drift_stays_behind_where_there_is_no_clock(machine, run):
     assert load_robot(out).functions == ()
 
 
-def test_a_drift_is_fitted_anew_to_set_up_rows_over_the_day(machine, run):
-    """Today's wave is another one; every fourth row tells it to a third of sigma."""
+def test_drift_is_fitted_again_to_set_up_rows(machine, run):
+    """Every fourth row determines today's wave to a third of sigma."""
     folder = measured(machine, 80, 0.8, wave=(-2e-4, 1e-4))
     with_a_wave(machine, 3e-4, 1e-4)
     rows = ",".join(map(str, range(1, 81, 4)))
@@ -191,7 +179,7 @@ def test_a_drift_is_fitted_anew_to_set_up_rows_over_the_day(machine, run):
 
 
 def test_set_up_rows_of_the_first_minutes_leave_a_drift_open(machine, run):
-    """As large as it was, 2e-4 m: half an hour later it is unknown."""
+    """The prior is 2e-4 m; half an hour later the drift is unknown."""
     folder = measured(machine, 60, 0.8, wave=(0.0, 0.0))
     with_a_wave(machine, 2e-4, 2e-4)
     code, said, (day,), _ = carried(run, machine, folder, "--setup", "10")
@@ -208,7 +196,7 @@ def test_set_up_rows_of_the_first_minutes_leave_a_drift_open(machine, run):
     (["--setup", "6"], "nothing but set-up"),
     (["--setup", "3", "--fit", "zero"], '--fit: found "zero"; did you mean "zeros"'),
 ])  # fmt: skip
-def test_set_up_rows_that_are_none_are_refused(words, message, machine, run):
+def test_wrong_set_up_rows_are_refused(words, message, machine, run):
     folder = measured(machine, 6, 0.8)
     code, _, error = run("validation", "carry", str(machine / "saved.toml"),
                          str(folder), *words)  # fmt: skip

@@ -1,4 +1,4 @@
-"""Commands corrected: the machine stands where it should, by hand and simulated."""
+"""Corrected commands, by hand and on simulated machines."""
 
 import csv
 import json
@@ -44,7 +44,7 @@ def two_links(x, y, length):
     return first, second
 
 
-def test_a_longer_link_and_a_zero_are_undone_as_by_hand(tmp_path, run):
+def test_compensation_of_a_longer_link_and_a_zero_is_that_by_hand(tmp_path, run):
     robot, table = written(tmp_path, LONGER + ZERO, ["a,0.3,0.9", "b,-0.2,1.2"])
     out, offsets = tmp_path / "out.csv", tmp_path / "offsets.csv"
     left = tmp_path / "diagnosis.json"
@@ -71,8 +71,8 @@ def test_a_longer_link_and_a_zero_are_undone_as_by_hand(tmp_path, run):
     assert found["before"]["position"] > 8e-3 > 1e-8 > found["after"]["position"]
 
 
-def test_a_joint_stays_within_its_limits(tmp_path, run):
-    """The second joint may not stretch: the tip comes as near as the first allows."""
+def test_compensation_keeps_joints_within_their_limits(tmp_path, run):
+    """The second joint is at its limit: the first angle gives the least distance."""
     text = LONGER.replace("position = 0.5", "position = 0.5\nlimits = [0.0, 0.9]")
     robot, table = written(tmp_path, text, ["a,0.3,0.9"])
     found = compensate(read_commands(table, load_robot(robot)))
@@ -86,7 +86,7 @@ def test_a_joint_stays_within_its_limits(tmp_path, run):
     )
 
 
-def test_what_only_the_device_shows_is_left_unless_asked_for(tmp_path):
+def test_registration_is_compensated_only_on_request(tmp_path):
     shift = '[[effect]]\nname = "registration"\nparameters = { "base.tx" = 1e-3 }\n'
     robot, table = written(tmp_path, ARM + shift, ["a,0.3,0.9"])
     targets = read_commands(table, load_robot(robot))
@@ -118,11 +118,11 @@ std = { "1.sine" = 2e-4 }
 
 
 @pytest.mark.parametrize("name", ["arm6", "delta", "hexapod"])
-def test_a_simulated_machine_is_brought_where_it_should_be(name, tmp_path):
-    """Measured in another program, not by the model that corrected it.
+def test_compensation_brings_a_simulated_machine_to_its_target(name, tmp_path):
+    """The machine is simulated by another program.
 
-    What is left is what finite motions add to the linear model: the square of the
-    errors over the size of the robot, some nanometres here.
+    The residual is of second order: the square of the errors over the size of the
+    robot, some nanometres here.
     """
     robot = load_robot(name)
     frames = tuple(replace(f, clearance=None) for f in robot.frames)
@@ -181,7 +181,7 @@ parameters = { "0" = OFF }
 
 @pytest.mark.parametrize("off", [2e11, -5.0, 1e-3])
 def test_a_correction_larger_than_the_robot_is_refused(off, tmp_path, run):
-    """A slide that is off by metres is a wrong function: its command stays."""
+    """The command of a slide whose function shifts it by metres is kept."""
     robot, table = written(
         tmp_path, SLIDE.replace("OFF", repr(off)), ["a,0.3"], "id,q.carriage"
     )

@@ -27,7 +27,7 @@ def explained(tmp_path, run, *words, effects=(BANDED, FORMULA, LAG)):
     return text, json.loads(file.read_text())["functions"]
 
 
-def test_curves_are_what_the_parameters_say(tmp_path, run):
+def test_explained_curves_follow_their_parameters(tmp_path, run):
     text, (wave, formula, lag) = explained(tmp_path, run)
     x = np.array(wave["x"])
     assert (x[0], x[-1]) == pytest.approx((-np.pi, np.pi))
@@ -44,7 +44,7 @@ def test_curves_are_what_the_parameters_say(tmp_path, run):
     assert "gear of the drive: screw rz at drive" in text
 
 
-def test_a_range_and_a_figure_can_be_asked_for(tmp_path, run):
+def test_explain_takes_a_range_and_writes_a_figure(tmp_path, run):
     figure = tmp_path / "curves.svg"
     _, (wave, *_) = explained(
         tmp_path, run, "--over", "q.drive=0:1", "--figure", str(figure)
@@ -70,7 +70,9 @@ def test_two_variables_give_three_curves(tmp_path, run):
     (("--over", "q.driv=0:1"), (PUBLIC,), 'did you mean "q.drive"'),
     (("--over", "q.drive=1:0"), (PUBLIC,), "expected LEAST:LARGEST"),
 ])  # fmt: skip
-def test_what_cannot_be_shown_is_refused(words, effects, message, tmp_path, run):
+def test_explain_refuses_wrong_functions_and_ranges(
+    words, effects, message, tmp_path, run
+):
     code, _, error = run(
         "validation", "explain", str(arm_with(tmp_path, *effects)), *words
     )

@@ -1,4 +1,4 @@
-"""A robot is known where it was measured: rows beyond that are named."""
+"""The learned range of a robot, and rows beyond it."""
 
 import json
 from dataclasses import replace
@@ -23,7 +23,7 @@ def robot_file(tmp_path):
     return path
 
 
-def test_the_range_of_all_that_acts_but_time_and_rows_left_out(tmp_path):
+def test_learned_range_covers_variables_without_time_and_outliers(tmp_path):
     robot = read_robot(robot_file(tmp_path))
     campaign = read_commands(write_campaign(tmp_path / "c", HEAD, ROWS), robot)
     ranges = learned_range(campaign, np.array([True, True, False]))
@@ -33,7 +33,7 @@ def test_the_range_of_all_that_acts_but_time_and_rows_left_out(tmp_path):
     assert ranges["load.fz"] == (0.0, 0.0)
 
 
-def test_a_twentieth_of_the_range_more_is_no_matter(tmp_path):
+def test_learned_range_has_a_margin_of_a_twentieth(tmp_path):
     robot = read_robot(robot_file(tmp_path))
     for tilt, outside in ((0.4, 0), (0.42, 0), (0.43, 1), (-0.03, 1)):
         rows = [f"a,0.1,0.2,{tilt},0,0", "b,0.5,0.2,0.2,9,0"]
@@ -50,10 +50,10 @@ def test_a_twentieth_of_the_range_more_is_no_matter(tmp_path):
     (("q.two", "q.one"), "scaled_waves", "1.sine", 1),
     (("q.one",), "powers", "1", 1),
 ])  # fmt: skip
-def test_a_joint_that_turned_once_more_is_where_it_was(
+def test_full_turn_of_a_joint_stays_in_the_learned_range(
     variables, form, name, outside, tmp_path
 ):
-    """Unless a function of its angle does not repeat after a turn."""
+    """Except for functions of its angle that are not periodic."""
     robot = read_robot(robot_file(tmp_path))
     if variables:
         one = Function("base", ("tx",), variables, form, {name: 1e-6})
@@ -66,7 +66,7 @@ def test_a_joint_that_turned_once_more_is_where_it_was(
     assert [one.rows for one in beyond(robot, read_commands(half, robot))] == [1]
 
 
-def test_what_a_campaign_does_not_record_is_not_outside(tmp_path):
+def test_unrecorded_covariate_is_not_outside_the_learned_range(tmp_path):
     path = tmp_path / "learned.toml"
     path.write_text('learned_range = { "cov.tilt" = [0.2, 0.4] }\n' + ARM)
     robot = read_robot(path)
@@ -74,7 +74,7 @@ def test_what_a_campaign_does_not_record_is_not_outside(tmp_path):
     assert beyond(robot, read_commands(folder, robot)) == ()
 
 
-def test_the_file_keeps_it(tmp_path):
+def test_robot_file_keeps_the_learned_range(tmp_path):
     robot = read_robot(robot_file(tmp_path))
     write_robot(robot, tmp_path / "again.toml")
     again = read_robot(tmp_path / "again.toml")
@@ -82,7 +82,7 @@ def test_the_file_keeps_it(tmp_path):
 
 
 @pytest.mark.parametrize("command", ["predict", "compensate"])
-def test_commands_say_what_leaves_it(tmp_path, run, command):
+def test_commands_warn_of_rows_beyond_the_learned_range(tmp_path, run, command):
     table = tmp_path / "new.csv"
     table.write_text("id,q.one,q.two,cov.tilt\na,0.3,0.1,0.2\nb,0.3,0.5,0.9\n")
     out, answer = tmp_path / "out.csv", tmp_path / "answer.json"
@@ -97,7 +97,7 @@ def test_commands_say_what_leaves_it(tmp_path, run, command):
     assert (one["variable"], one["learned"], one["rows"]) == ("cov.tilt", [0, 0.4], 1)
 
 
-def test_a_range_must_be_one(tmp_path, run):
+def test_reversed_learned_range_is_refused(tmp_path, run):
     path = tmp_path / "wrong.toml"
     path.write_text('learned_range = { "cov.tilt" = [1.0, 0.4] }\n' + ARM)
     code, _, error = run("validation", "explain", str(path))

@@ -1,4 +1,4 @@
-"""A robot's own numbers in a new session: prior and readings, weighed by hand."""
+"""A robot's parameters in a new session: prior and readings, weighted by hand."""
 
 from dataclasses import replace
 
@@ -9,8 +9,8 @@ from assembly.files.robot_file import read_robot
 from assembly.measurement.predict import predict as predict_rows
 from assembly.model.function import Function
 from tests.campaigns_for_tests import campaign_of
+from tests.elastic_arm_for_tests import arm, with_errors
 from tests.validation.diagnosis.test_sessions import FRAMES, measured
-from tests.validation.diagnosis.test_simulated import arm
 from validation.campaign.campaign_file import read_campaign, read_commands
 from validation.correction.carried_file import save
 from validation.correction.carrying import carry
@@ -35,7 +35,7 @@ SIGMA = 1e-5
 
 
 def wet_post(readings, wet, covariance, folder, numbers=("0", "1")):
-    """A post that shifts along x with ``wet``, which its file says was nothing."""
+    """A post that shifts along x with ``wet``; its file declares no shift."""
     measured = np.full((len(readings), 6), np.nan)
     measured[:, 3] = readings
     campaign = campaign_of(measured, SIGMA, wet=np.array(wet, dtype=float))
@@ -65,8 +65,8 @@ def test_a_number_is_the_weighted_mean_of_prior_and_readings(tmp_path):
     assert known.covariance[0, 0] == pytest.approx(1 / (told + prior), rel=1e-6)
 
 
-def test_what_the_fit_knew_of_sums_stays_known(tmp_path):
-    """Only a + b was known; dry rows tell a again, and b makes up for it where wet."""
+def test_known_sums_of_parameters_stay_known(tmp_path):
+    """Only a + b was known; dry rows determine a, and b follows."""
     s, little, a = 1e-4, 1e-9, 5e-5
     C = s**2 * np.array([[1, -1], [-1, 1]]) + little**2 * np.eye(2)
     wet = [0] * 8 + [1] * 8
@@ -80,10 +80,10 @@ def test_what_the_fit_knew_of_sums_stays_known(tmp_path):
     assert numbers["0"] + numbers["1"] == pytest.approx(0.0, abs=0.01 * a)
 
 
-def test_a_machine_that_changed_by_more_than_the_fit_was_uncertain_is_followed(
+def test_change_beyond_the_saved_deviation_is_followed(
     tmp_path,
 ):
-    """Twenty standard deviations: what is known is widened, and so is its spread."""
+    """At twenty standard deviations the prior and its spread are widened."""
     s, y = 2e-6, 4e-5
     saved, declared = wet_post([y] * 40, [1] * 40, [[s**2]], tmp_path, ("1",))
     carried = carry(saved, declared, np.arange(40) < 20, ())
@@ -94,7 +94,7 @@ def test_a_machine_that_changed_by_more_than_the_fit_was_uncertain_is_followed(
     assert day.suffices
 
 
-def test_the_file_that_is_written_foretells_what_was_judged(tmp_path):
+def test_carried_file_predicts_the_judged_rows(tmp_path):
     s, y = 3e-5, 4e-5
     saved, declared = wet_post([y] * 12, [1] * 12, [[s**2]], tmp_path, ("1",))
     carried = carry(saved, declared, np.arange(12) < 8, ())
@@ -107,7 +107,7 @@ def test_the_file_that_is_written_foretells_what_was_judged(tmp_path):
     assert again.spread[:, 3] == pytest.approx(carried.sessions[0].uncertainty)
 
 
-def test_numbers_of_one_session_are_not_the_machines(tmp_path):
+def test_machine_numbers_exclude_those_of_a_session(tmp_path):
     saved, _ = wet_post([0.0] * 12, [1] * 12, np.eye(2) * 1e-12, tmp_path)
     clock = Function("reading", ("tx",), ("time",), "powers", {"1": 1e-9})
     robot = replace(
@@ -129,8 +129,8 @@ def test_numbers_of_one_session_are_not_the_machines(tmp_path):
     assert len(own) == 2
 
 
-def test_a_compliance_stays_above_nothing():
-    """Taken from by more than there is, a thousandth stays; a rigid joint is rigid."""
+def test_compliance_stays_positive():
+    """At least a thousandth of the compliance stays; a rigid joint stays rigid."""
     robot = campaign_of(np.zeros((1, 6))).robot
     K = np.diag([np.inf, np.inf, np.inf, 1e6, np.inf, np.inf])
     soft = replace(robot, frames=(replace(robot.frames[0], joint_stiffness=K),))
@@ -146,11 +146,9 @@ def test_a_compliance_stays_above_nothing():
     ("base", "ry", "screw"), ("reading", "ry", "screw"), ("reading", "tz", "screw"),
     ("j2", "rz", "screw"), ("j2", "rz", "compliance"),
 ])  # fmt: skip
-def test_slopes_of_functions_are_what_a_small_change_does(
-    where, component, kind, tmp_path
-):
-    """By differences of the predicting function, under load, a device anywhere."""
-    robot, rng = arm(), np.random.default_rng(2)
+def test_slopes_of_functions_are_finite_differences(where, component, kind, tmp_path):
+    """By differences of the prediction, under load, with a registered device."""
+    robot, rng = with_errors(arm()), np.random.default_rng(2)
     lines = ["id,q.j1,q.j2,q.j3,load.fx,load.fz,load.mz"]
     for i, q in enumerate(rng.uniform(-1, 1, (5, 6))):
         lines.append(",".join(map(str, [f"m{i}", *q[:3], *(40 * q[3:])])))
@@ -178,8 +176,8 @@ def test_slopes_of_functions_are_what_a_small_change_does(
 
 
 @pytest.mark.slow
-def test_a_spring_that_became_softer_is_found_by_twenty_rows(tmp_path):
-    """Monday's machine is diagnosed; on Tuesday its drive gives a quarter more."""
+def test_softer_spring_is_found_by_twenty_rows(tmp_path):
+    """On Monday the machine is diagnosed; on Tuesday its drive is a quarter softer."""
     springs = {"monday": 5e4, "tuesday": 4e4}
     days = {}
     for day, stiffness in springs.items():

@@ -1,4 +1,4 @@
-"""What belongs to a session: which numbers, how large, and what stays the robot's."""
+"""Unknowns of a session, their prior sizes, and the robot without them."""
 
 from dataclasses import replace
 
@@ -25,8 +25,8 @@ def saved():
     )
 
 
-def test_the_robot_alone_has_neither_place_nor_time(saved):
-    """The tool is the robot's; what a session is named for stays in that session."""
+def test_without_session_drops_registration_and_functions_of_time(saved):
+    """The tool stays with the robot, functions of a session stay in that session."""
     alone = without_session(saved)
     assert alone.effects == {"registration": {"tool.tx": 0.02}}
     assert alone.functions == (SPRING, OTHER_DAY)
@@ -58,7 +58,7 @@ def test_powers_of_time_are_each_as_large_as_they_were(saved):
     assert unknowns.prior**-0.5 == pytest.approx([1e-4, 2e-8, 1e-12])
 
 
-def test_without_a_clock_only_what_was_asked_for_is_fitted(saved):
+def test_without_a_clock_only_requested_unknowns_are_fitted(saved):
     unknowns = session_unknowns(saved, ("registration", "zeros"), clock=False)
     owners = {owner for owner, _ in unknowns.names}
     assert owners == {"registration", "encoder_offset"}

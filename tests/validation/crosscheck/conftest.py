@@ -21,9 +21,9 @@ def posture(irsbot2):
 
 @pytest.fixture
 def broken(monkeypatch):
-    """Breaks a term; columns made before it broke, or while it was, are forgotten.
+    """Break a term of the numpy model, and clear cached columns.
 
-    In the model in numpy: the compiled one has each term a second time.
+    The compiled model has each term a second time.
     """
     from assembly.linear.closure import _virtual_joints
     from assembly.linear.energy import solve_assembly

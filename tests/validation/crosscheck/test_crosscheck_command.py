@@ -19,7 +19,7 @@ pytestmark = pytest.mark.exudyn
 
 
 @pytest.mark.parametrize("more", [[], ["--with-clearance"]])
-def test_the_command_does_not_pass_a_robot_without_errors(more):
+def test_crosscheck_does_not_pass_a_robot_without_errors(more):
     outcome = run("irsbot2", "--pose", "tx=0,tz=-0.5", "--scale", "1,0.5", *more)
     assert outcome.exit_code == 1
     assert "NOT CHECKED" in outcome.output
@@ -27,8 +27,8 @@ def test_the_command_does_not_pass_a_robot_without_errors(more):
     assert not re.search(r"\bok\b", outcome.output)
 
 
-def test_the_readmes_example_compares_a_draw_of_errors(tmp_path):
-    """The errors of the file replace the robot's; the seed says which draw."""
+def test_readme_example_compares_a_draw_of_errors(tmp_path):
+    """The errors of the file replace the robot's; the seed selects the draw."""
     target, root = tmp_path / "check.json", Path(__file__).parents[3]
     example = root / "examples" / "irsbot2_errors.toml"
     outcome = "validation crosscheck irsbot2 --errors examples/irsbot2_errors.toml"
@@ -48,7 +48,7 @@ def run(*arguments):
     return CliRunner().invoke(app, ["crosscheck", *arguments])
 
 
-def test_the_command_writes_the_public_keys(tmp_path):
+def test_crosscheck_writes_the_public_keys(tmp_path):
     target = tmp_path / "check.json"
     picture = tmp_path / "slope.png"
     outcome = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100",
@@ -70,12 +70,12 @@ def test_the_command_writes_the_public_keys(tmp_path):
     assert picture.stat().st_size > 1000
 
 
-def test_the_command_keeps_clearances_if_asked(tmp_path):
-    """Springs in a row that miss each other by more than the clearance between them."""
+def test_crosscheck_keeps_clearances_on_request(tmp_path):
+    """Springs in series with a misfit larger than the clearance between them."""
     target, file = tmp_path / "check.json", tmp_path / "robot.toml"
     gap = np.array([0, 0, 0, 2e-4, 1e-4, 5e-5])
-    play = Clearance(radial=2e-5, axial=1e-5)
-    write_robot(coaxial_beams(gap, clearance=play), file)
+    loose = Clearance(radial=2e-5, axial=1e-5)
+    write_robot(coaxial_beams(gap, clearance=loose), file)
     outcome = run(str(file), "--with-clearance", "--scale", "0.5,0.25", "--json",
                   str(target))  # fmt: skip
     assert outcome.exit_code == 0, outcome.output
@@ -88,21 +88,18 @@ def test_the_command_keeps_clearances_if_asked(tmp_path):
     assert isinstance(refused.exception, BadInput)
 
 
-def test_the_command_fails_with_status_1(monkeypatch):
+def test_failed_crosscheck_has_exit_status_1(monkeypatch):
     MUTATIONS["lever arm missing"](monkeypatch)
     outcome = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100")
     assert outcome.exit_code == 1
     assert "FAIL" in outcome.output or "cannot" in outcome.output
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("slope.txt", "expected a picture: .png or .svg or .pdf"),
-        ("no/such/folder/slope.png", "no/such/folder; expected one that exists"),
-    ],
-)
-def test_a_figure_that_cannot_be_written_is_bad_input(name, message, tmp_path):
+@pytest.mark.parametrize(("name", "message"), [
+    ("slope.txt", "expected a picture: .png or .svg or .pdf"),
+    ("no/such/folder/slope.png", "no/such/folder; expected one that exists"),
+])  # fmt: skip
+def test_crosscheck_refuses_a_figure_that_cannot_be_written(name, message, tmp_path):
     outcome = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100",
                "--scale", "1,0.5", "--figure", str(tmp_path / name))  # fmt: skip
     assert isinstance(outcome.exception, BadInput)
@@ -110,7 +107,7 @@ def test_a_figure_that_cannot_be_written_is_bad_input(name, message, tmp_path):
 
 
 @pytest.mark.parametrize("text", ["1", "1,1", "1,0", "1;0.5", "1,nan"])
-def test_the_command_refuses_bad_scales(text):
+def test_crosscheck_refuses_wrong_scales(text):
     outcome = run("irsbot2", "--scale", text)
     assert isinstance(outcome.exception, BadInput)
     assert f'--scale: found "{text}", expected at least two' in str(outcome.exception)

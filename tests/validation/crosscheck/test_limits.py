@@ -40,7 +40,7 @@ def test_higher_orders_do_not_change_the_slope_whatever_they_cancel():
 
 
 def test_a_difference_of_third_order_has_no_first_order_either():
-    """Where symmetry takes the second order away: no fault of the linear model."""
+    """Where symmetry removes the second order."""
     assert slope_check(SCALES, SCALES**3, 0.0, 0.1).verdict == "ok"
 
 
@@ -57,7 +57,7 @@ def test_the_slope_is_that_of_the_first_two_orders_at_the_smallest_scale(
     ).verdict == ("fails")
 
 
-def test_noise_that_may_be_the_whole_first_order_is_no_signal():
+def test_noise_as_large_as_the_first_order_is_no_signal():
     """1e-10 on differences of 2e-10 at the smallest scale; with 1e-12 it is a slope."""
     rng = np.random.default_rng(1)
     right = 2e-10 * (SCALES[:, None] / SCALES[-1]) ** 2 * [1.0, 0.0, 0.0]

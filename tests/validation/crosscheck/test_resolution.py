@@ -1,4 +1,4 @@
-"""The smallest changes that a cross-check notices: two bars on one line by hand."""
+"""The smallest changes that a cross-check detects, for two bars on one line by hand."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -22,13 +22,13 @@ ERROR, CLEARANCE, STIFFNESS = 4e-4, 1e-4, 1e6  # [m], [m], [N/m]
 
 def bars(clearance=CLEARANCE):
     """Two bars that lack 0.4 mm on the x axis, and a disc of 0.1 mm where they meet."""
-    play = Clearance(radial=clearance) if clearance else None
+    loose = Clearance(radial=clearance) if clearance else None
     gap = [0, 0, 0, ERROR, 0, 0]
-    return home_posture(coaxial_beams(gap, (STIFFNESS, STIFFNESS), clearance=play))
+    return home_posture(coaxial_beams(gap, (STIFFNESS, STIFFNESS), clearance=loose))
 
 
 def found(posture, metric):
-    """By name, with the linear model in the simulation's place: it is not asked."""
+    """By name, with the linear model in place of the simulation."""
     simulated = SimpleNamespace(held=False)
     pairs = tuple(
         Pair(s, solve_assembly(scaled(posture, s)), simulated, None) for s in (1.0, 0.5)
@@ -46,7 +46,7 @@ def without(robot, pairs):
     return PoseMetric(robot, pairs, True, False)
 
 
-def test_a_clearance_is_noticed_by_the_energy_that_it_saves():
+def test_smallest_noticed_clearance_follows_from_the_energy_saved():
     """E = k (e - c)^2 / 4: a share d of c changes it by 2 c d / (e - c)."""
     by_name = found(bars(), with_clearances)
     (clearance,) = (r for r in by_name.values() if r.kind == "clearance")
@@ -56,14 +56,14 @@ def test_a_clearance_is_noticed_by_the_energy_that_it_saves():
     assert (clearance.value, clearance.unproved) == (CLEARANCE, False)
 
 
-def test_an_error_is_noticed_by_the_energy_that_it_costs():
+def test_smallest_noticed_error_follows_from_the_energy_cost():
     """A share d of e changes E by 2 e d / (e - c)."""
     (error,) = (r for r in found(bars(), with_clearances).values() if r.kind == "error")
     expected = TOLERANCE * (ERROR - CLEARANCE) / (2 * ERROR)
     assert error.smallest == pytest.approx(expected, rel=0.02)
 
 
-def test_a_bar_is_noticed_by_half_of_what_it_gives_way():
+def test_smallest_noticed_stiffness_is_twice_the_bound():
     """Of two equal springs in a row one makes half the energy: 2 b for the bound b."""
     for clearance, metric, bound in (
         (CLEARANCE, with_clearances, TOLERANCE),
@@ -75,8 +75,8 @@ def test_a_bar_is_noticed_by_half_of_what_it_gives_way():
             assert link.smallest == pytest.approx(2 * bound, rel=0.02)
 
 
-def test_what_no_load_reaches_is_unproved_and_said_to_be():
-    """The bars are pulled along x: a clearance of 20 um along z changes nothing."""
+def test_unloaded_clearance_is_reported_as_unproved():
+    """The bars are loaded along x: a clearance of 20 um along z has no effect."""
     frames = [
         f if f.clearance is None
         else replace(f, clearance=replace(f.clearance, axial=2e-5))
@@ -94,10 +94,8 @@ def test_what_no_load_reaches_is_unproved_and_said_to_be():
 @pytest.mark.slow
 @pytest.mark.exudyn
 @pytest.mark.parametrize(("share", "passed"), [(0.5, True), (2.0, False)])
-def test_a_simulation_with_a_wrong_clearance_is_told_beyond_what_is_noticed(
-    monkeypatch, share, passed
-):
-    """Half of the smallest change passes, twice of it fails: by Exudyn's contact."""
+def test_wrong_clearance_beyond_the_resolution_fails(monkeypatch, share, passed):
+    """Half of the smallest change passes, twice as much fails."""
     posture = bars()
     right = crosscheck.crosscheck(posture, clearances=True)
     (clearance,) = (r for r in right.resolutions if r.kind == "clearance")

@@ -1,4 +1,4 @@
-"""K_C against Exudyn, also where forced assembly stiffens the robot."""
+"""K_C against Exudyn, also of forced assemblies."""
 
 import json
 from dataclasses import replace
@@ -18,12 +18,11 @@ SLOW = ("hexapod", "orthoglide", "arm6")
 
 
 @pytest.mark.parametrize(
-    "name",
-    ["four_bar", *(pytest.param(n, marks=pytest.mark.slow) for n in SLOW)],
+    "name", ["four_bar", *(pytest.param(n, marks=pytest.mark.slow) for n in SLOW)]
 )
 @pytest.mark.parametrize("links", ["spring", "beam"])
 def test_robots_without_errors_are_as_stiff_in_the_simulation(name, links):
-    """Nothing is bent there, so that beams are K_E too."""
+    """Beams are not bent there, so that they equal K_E."""
     answer = check_stiffness(home_posture(load_robot(name)), links=links)
     assert answer.differences["linearised"] < 1e-8
     assert answer.differences["exact"] < 1e-6
@@ -31,10 +30,10 @@ def test_robots_without_errors_are_as_stiff_in_the_simulation(name, links):
 
 
 @pytest.mark.slow
-def test_a_forced_assembly_is_as_stiff_in_the_simulation():
-    """At the paper's full errors: the classical matrix is off by 5 %, the tangent not.
+def test_forced_assembly_is_as_stiff_in_the_simulation():
+    """At the paper's full errors the nominal matrix is off by 5 %.
 
-    A moment is there too, by dead forces on both sides.
+    The load has a moment, of dead forces in both models.
     """
     case = NUMBERS["cases"][1]
     posture = place_robot(irsbot2_with(case), {"tx": 0.1, "tz": -0.5})
@@ -57,7 +56,7 @@ def test_a_loaded_robot_is_as_stiff_in_the_simulation(force):
 
 
 def test_a_pin_pressed_into_its_hole_is_held_along_the_rim():
-    """By F/c, and by its arm; the simulation finds it by smoothed contacts."""
+    """Its stiffness is F/c and that of its arm."""
     force, bound, k = 300.0, 5e-5, 1e6
     link = MatrixLink(np.diag([1e4, 1e4, 1e4, k, k, k]))
     frames = (
@@ -76,14 +75,14 @@ def test_a_pin_pressed_into_its_hole_is_held_along_the_rim():
     assert answer.tolerance == 2e-2
 
 
-def test_a_wrong_stiffness_is_found_out():
+def test_wrong_stiffness_fails():
     answer = check_stiffness(home_posture(load_robot("four_bar")))
     assert answer.passed
     wrong = replace(answer.exact, root=answer.exact.root * (1 + 1e-5))
     assert not replace(answer, exact=wrong).passed
 
 
-def test_a_road_that_is_too_uncertain_decides_nothing():
+def test_uncertain_method_does_not_decide():
     answer = check_stiffness(home_posture(load_robot("four_bar")))
     noisy = replace(answer.simulated, stepped=answer.simulated.stepped * 1.1)
     assert not replace(answer, simulated=noisy).passed
@@ -129,7 +128,7 @@ def test_platforms_that_stand_elsewhere_are_in_another_equilibrium():
     assert "FAILED" in other.text()
 
 
-def test_a_joint_that_is_locked_and_elastic_is_named_where_it_is_bent():
+def test_bent_joint_that_is_locked_and_elastic_is_named():
     robot = load_robot("four_bar")
     frames = [
         replace(f, joint_stiffness=np.diag([np.inf, 1e3, 1e3, np.inf, np.inf, 1e6]))
@@ -144,9 +143,9 @@ def test_a_joint_that_is_locked_and_elastic_is_named_where_it_is_bent():
     assert "undecided: crank_pin" in bent.text()
 
 
-def test_the_command_says_what_it_compared(run):
+def test_crosscheck_of_stiffness_reports_both_compliances(run):
     status, out, _ = run(
-        "validation", "crosscheck", "four_bar", "--stiffness", "--load", "fy=-50",
+        "validation", "crosscheck", "four_bar", "--state", "exact", "--load", "fy=-50",
         "--links", "spring", "--json", "-",
     )  # fmt: skip
     answer = json.loads(out)
@@ -154,7 +153,13 @@ def test_the_command_says_what_it_compared(run):
     assert answer["passed"]
     assert np.array(answer["compliance"]["multibody"]).shape == (6, 6)
     status, _, err = run(
-        "validation", "crosscheck", "four_bar", "--stiffness", "--figure", "x.png"
+        "validation",
+        "crosscheck",
+        "four_bar",
+        "--state",
+        "exact",
+        "--figure",
+        "x.png",
     )
     assert status == 2
-    assert "--stiffness: not with" in err
+    assert "--state: not with" in err

@@ -1,4 +1,4 @@
-"""Candidates: their columns, their numbers, and where they may act."""
+"""Candidate functions: columns, parameters and variables."""
 
 from dataclasses import replace
 
@@ -7,15 +7,10 @@ import pytest
 
 from assembly.effects.functions import AXES
 from assembly.files.robot_file import read_robot
-from assembly.model.robot import BeamLink, Frame, Robot
 from tests.bar_for_tests import BEAM, LENGTH, along, bar
 from tests.campaigns_for_tests import ARM
 from validation.campaign.campaign_file import read_commands
-from validation.diagnosis.candidates import (
-    Candidate,
-    CandidatePart,
-    variables_of,
-)
+from validation.diagnosis.candidates import Candidate, CandidatePart, variables_of
 from validation.diagnosis.function_forms import CandidateShape
 from validation.diagnosis.responses import responses
 from validation.diagnosis.sensitivities import Sensitivities
@@ -25,7 +20,7 @@ LINE = CandidateShape("powers", ("0", "1"))
 
 
 def arm_sensitivities(folder, bend):
-    """Of the planar arm at twelve configurations, the second drive at bend q^2; q."""
+    """Sensitivities of the planar arm at twelve angles q of the first drive."""
     table = folder / "commands.csv"
     q = np.linspace(0.2, 1.7, 12).round(6)
     lines = [f"m{i},{a:.6f},{bend * a * a:.6f}" for i, a in enumerate(q)]
@@ -47,14 +42,7 @@ def one_at(components, shape=LINE):
     return Candidate((part,), "screw", shape)
 
 
-def test_numbers_of_a_function_are_zero_until_they_are_found():
-    shape = CandidateShape("step", ("size",), (("at", 0.5),))
-    (function,) = one_at(("tx",), shape).functions()
-    assert function.parameters == {"size": 0.0, "at": 0.5}
-    assert (function.where, function.variables) == ("reading", ("q.one",))
-
-
-def test_two_powers_are_orthonormal_and_a_column_of_nothing_stays(sensitivities):
+def test_basis_is_orthonormal_and_keeps_zero_columns(sensitivities):
     s, q = sensitivities
     columns, mixed = s.basis(("q.one",), LINE)
     np.testing.assert_allclose(columns.T @ columns / 12, np.eye(2), atol=1e-12)
@@ -65,8 +53,8 @@ def test_two_powers_are_orthonormal_and_a_column_of_nothing_stays(sensitivities)
 
 
 @pytest.mark.parametrize("units", [1.0, 1e-12])
-def test_numbers_are_those_of_the_form_by_component(sensitivities, units):
-    """T x, and their deviations; as small as they may be."""
+def test_parameters_are_named_by_component(sensitivities, units):
+    """T x and its standard deviations, at any scale."""
     s, _ = sensitivities
     _, mixed = s.basis(("q.one",), LINE)
     x, std = units * np.array([1.0, -2.0, 0.5, 3.0]), units * np.full(4, 0.1)
@@ -82,8 +70,8 @@ def test_numbers_are_those_of_the_form_by_component(sensitivities, units):
     )
 
 
-def test_components_that_are_not_seen_are_left_out(sensitivities):
-    """Of one that is left its numbers have no name before theirs; of none, nothing."""
+def test_components_below_their_deviation_are_omitted(sensitivities):
+    """Parameters of a single component have no prefix."""
     s, _ = sensitivities
     _, mixed = s.basis(("q.one",), LINE)
     x = np.array([1e-12, 0.0, 1e-3, 2e-3])
@@ -97,23 +85,9 @@ def test_components_that_are_not_seen_are_left_out(sensitivities):
     assert s.fitted(one_at(("tx", "rz")), np.zeros(4), np.full(4, 1e-4)) == []
 
 
-def arm(drives, beams):
-    """A chain of so many drives and, behind them, of so many beams along x."""
-    beam = BeamLink({"radius": 0.03}, 70e9, 0.33)
-    frames, parent = [], "base"
-    for k in range(drives):
-        turning = {"joint": "revolute", "actuated": True}
-        frames.append(Frame(f"j{k}", parent, **turning))
-        parent = f"j{k}"
-    for k in range(beams):
-        frames.append(Frame(f"b{k}", parent, [0.5, 0, 0], link=beam))
-        parent = f"b{k}"
-    return Robot("arm", parent, tuple(frames))
-
-
 @pytest.mark.parametrize("axis", range(6))
-def test_what_a_component_does_by_place(axis):
-    """A base swings the tip about its origin; a spring gives by its wrench."""
+def test_sensitivity_of_a_component_depends_on_its_place(axis):
+    """A base rotates the tip about its origin; a spring deforms by its wrench."""
     campaign = bar([0.3, -0.2, 3.0, 1.0, 5.0, -2.0], link=BEAM)
     conditions = conditions_of(campaign)
     response = responses(conditions)
@@ -132,19 +106,8 @@ def test_what_a_component_does_by_place(axis):
     np.testing.assert_allclose(soft, load[:, axis, None] * unit, atol=1e-7)
 
 
-@pytest.mark.parametrize("units", [1e-6, 1.0, 1e6])
-def test_a_column_has_mean_square_one_in_any_unit(units):
-    heat = units * np.array([3.0, -1, 2, 0.5, 4, -2, 1, 0.1])
-    campaign = bar(temperature=heat)
-    conditions = conditions_of(campaign)
-    s = Sensitivities(conditions, responses(conditions))
-    columns, _ = s.basis(("cov.temperature",), CandidateShape("powers", ("1",)))
-    expected = heat / np.sqrt(np.mean(heat**2))
-    np.testing.assert_allclose(columns[:, 0], expected, rtol=1e-12)
-
-
-def test_what_was_varied_and_is_known_in_every_row_may_count():
-    """A load that stays, a temperature that one row lacks, a time of zero do not."""
+def test_variables_are_varied_and_known_in_every_row():
+    """Not a constant load, a temperature missing in a row, or a time of zero."""
     varying = np.linspace(-1.0, 0.5, 8)
     lacking = np.where(np.arange(8) == 3, np.nan, varying)
     conditions = conditions_of(bar(
@@ -179,7 +142,7 @@ rotation = [0.0, -1.5707963267948966, 0.0]
 
 
 def test_positions_and_loads_that_vary_by_rounding_are_no_variables(tmp_path):
-    """A slide turned by pi/2 as files write it: cos(pi/2) is 6e-17, not zero."""
+    """A slide rotated by pi/2, whose cosine is 6e-17 in floating point."""
     (tmp_path / "slide.toml").write_text(SLIDE)
     x = np.linspace(0.0, 0.5, 9).round(3)
     lines = [f"m{i},{a},{5 * a},{1e-17 * a}" for i, a in enumerate(x)]

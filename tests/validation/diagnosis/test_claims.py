@@ -36,8 +36,8 @@ def first(fit):
 
 @pytest.mark.parametrize(("times", "claimed"), [(0.98, False), (1.02, True)])
 @pytest.mark.parametrize("sign", [1, -1])
-def test_a_length_is_claimed_from_one_chance_in_a_thousand(times, claimed, sign):
-    """Its standard deviation is sigma / sqrt(8): of eight readings along the bar."""
+def test_length_is_claimed_at_one_in_a_thousand(times, claimed, sign):
+    """Its standard deviation is sigma / sqrt(8), from eight readings along the bar."""
     length = sign * times * SURE * SIGMA[3] / np.sqrt(8)
     plain = bar(link=BEAM)
     fit = machine(bar(link=BEAM, measured=fit_of(plain, length)), LONGER)
@@ -45,17 +45,19 @@ def test_a_length_is_claimed_from_one_chance_in_a_thousand(times, claimed, sign)
     assert first(fit) == claimed
 
 
-def test_a_stiffness_that_nothing_softens_is_no_effect():
-    """At its lower bound, zero: there is no parameter to be told."""
+def test_drive_that_turns_against_its_load_is_rigid_and_no_effect():
+    """The compliance is at its lower bound, zero, and no parameter is reported."""
     seen = np.tile([0, 0, -3e-4, 0, 0, 0], (8, 1))
     fit = machine(bar([0, 0, 30.0, 0, 0, 0], seen), SOFTER, start=1e-6)
+    assert fit.x == pytest.approx([0.0], abs=1e-9)
+    assert fit.robot.effects == {}
     assert numbers(fit) == []
     assert not first(fit)
     assert first(machine(gives_way(30.0, 2e5), SOFTER, start=1e-6))
 
 
-def test_two_effects_that_do_the_same_are_both_unsupported():
-    """Heat that never changes is a length: either may be anything."""
+def test_two_equivalent_effects_are_both_unsupported():
+    """At a constant temperature expansion and length are equivalent."""
     heat = {"temperature": np.full(8, 5.0)}
     plain = bar(link=BEAM, **heat)
     campaign = bar(link=BEAM, measured=fit_of(plain, 1e-3), **heat)
@@ -65,8 +67,8 @@ def test_two_effects_that_do_the_same_are_both_unsupported():
         assert first(machine(campaign, one))
 
 
-def test_an_unknown_at_its_bound_supports_nothing():
-    """An expansion of 5e-4 per kelvin, which no material has, stops there."""
+def test_effect_at_its_bound_is_not_supported():
+    """The bound is 5e-4 per kelvin, which no material has."""
     heat = {"temperature": np.full(8, 5.0)}
     plain = bar(link=BEAM, **heat)
     most = 5e-4 * LENGTH * 5.0
@@ -78,8 +80,8 @@ def test_an_unknown_at_its_bound_supports_nothing():
 
 
 @pytest.mark.parametrize(("value", "claimed"), [(1.5, True), (1.05, False)])
-def test_an_exponent_at_its_bound_is_no_law(value, claimed):
-    """Of a contact: what gives it its name must not be where it may go no further."""
+def test_exponent_at_its_bound_is_not_supported(value, claimed):
+    """The exponent of a contact must not be at its bound."""
     slots = (
         Slot(("drive.give",), Unknown("give", 1e-6, 0.0, 1.0), 0.0),
         Slot(("drive.exponent",), Unknown("exponent", 0.5, 1.05, 6.0), 1.5, True),
@@ -93,7 +95,7 @@ def test_an_exponent_at_its_bound_is_no_law(value, claimed):
     assert supported(fit, one) == claimed
 
 
-def test_what_has_no_number_and_where_a_device_stands_are_not_in_question():
+def test_effects_without_parameters_and_device_frames_are_supported():
     fit = machine(bar(link=BEAM), LONGER)
     assert not first(fit)
     finite = Acting(Hypothesis("geometric_stiffening", (), ()), np.zeros(0))
@@ -102,7 +104,7 @@ def test_what_has_no_number_and_where_a_device_stands_are_not_in_question():
 
 
 def softer(robot, x, variance):
-    """The bar's fit of 1 / factor - 1 of its link's modulus."""
+    """A fit of 1 / factor - 1 of the link's modulus."""
     one = hypothesis("modulus_scale", "tip", "tip.softer", Unknown("softer", 0.1))
     unknowns = Unknowns(robot, (Acting(one, np.zeros(1)),))
     C, nothing = np.array([[variance]]), np.zeros((0, 1))
@@ -114,10 +116,8 @@ def softer(robot, x, variance):
     (0.8, 0.72, 0.8 * 0.81 * 1e-3),
     (None, 0.9, 0.81 * 1e-3),
 ])  # fmt: skip
-def test_a_parameter_is_as_sure_as_the_machine_s_and_not_the_difference_s(
-    declared, value, std
-):
-    """1 / factor - 1 is fitted: of factor f its uncertainty is f squared times."""
+def test_parameter_deviation_is_that_of_the_factor(declared, value, std):
+    """1 / factor - 1 is fitted: the deviation of factor f is f^2 times its own."""
     robot = bar(link=BEAM).robot
     if declared is not None:
         robot = replace(robot, effects={"modulus_scale": {"tip": declared}})
@@ -127,16 +127,16 @@ def test_a_parameter_is_as_sure_as_the_machine_s_and_not_the_difference_s(
     assert sigma == pytest.approx(std, rel=1e-6)
 
 
-def test_what_no_reading_depends_on_is_no_parameter_found():
-    """Then it is as uncertain as before anything was read."""
+def test_parameter_without_readings_is_not_reported():
+    """Its deviation is that of the prior."""
     robot = bar(link=BEAM).robot
     prior = softer(robot, 0.0, 1.0).unknowns.std[0] ** 2
     assert numbers(softer(robot, 0.0, prior)) == []
     assert len(numbers(softer(robot, 0.0, 0.5 * prior))) == 1
 
 
-def test_a_spring_that_would_be_negative_changes_nothing():
-    """A drive that turns against its moment: compliance 0, and the robot as it was."""
+def test_negative_compliance_is_bounded_at_zero():
+    """A drive that turns against its moment has zero compliance."""
     M = 30.0
     seen = np.tile([0, 0, -M / 1e5, 0, 0, 0], (8, 1))
     campaign = bar(
@@ -151,8 +151,8 @@ def test_a_spring_that_would_be_negative_changes_nothing():
     assert np.array_equal(declared, found)
 
 
-def test_small_unknowns_are_those_of_a_ridge_regression():
-    """The mean of eight readings along the bar, drawn towards zero by its prior."""
+def test_nuisance_parameters_follow_ridge_regression():
+    """The mean of eight readings along the bar, shrunk by its prior."""
     size, std = 3e-6, 2e-6
     plain = bar(link=BEAM)
     campaign = bar(link=BEAM, measured=fit_of(plain, size))

@@ -1,4 +1,4 @@
-"""The command ``validation diagnose``: what it writes, and how it refuses."""
+"""The command ``validation diagnose``: its files and its refusals."""
 
 import json
 
@@ -27,7 +27,7 @@ def small(tmp_path_factory):
     return folder
 
 
-def test_the_command_writes_results_report_and_robot(small, tmp_path, run):
+def test_diagnose_writes_results_report_and_robot(small, tmp_path, run):
     out = {name: tmp_path / name for name in ("d.json", "d.html", "robot.toml")}
     status, printed, err = run(
         "validation", "diagnose", small, "--json", out["d.json"],
@@ -63,7 +63,7 @@ def test_the_command_writes_results_report_and_robot(small, tmp_path, run):
     assert np.abs(fitted - predict(declared).deviation[0]).max() > 1e-5
 
 
-def test_a_robot_is_saved_only_where_something_is_found(tmp_path, run):
+def test_sound_robot_is_not_saved(tmp_path, run):
     folder = measure(tmp_path / "campaign", configurations=8, passes=3)
     status, _, err = run(
         "validation", "diagnose", folder, "--save", tmp_path / "r.toml"
@@ -73,7 +73,7 @@ def test_a_robot_is_saved_only_where_something_is_found(tmp_path, run):
     assert not (tmp_path / "r.toml").exists()
 
 
-def test_what_cannot_be_done_is_said_before_any_work(tmp_path, small, run):
+def test_diagnose_refuses_wrong_outputs_before_any_work(tmp_path, small, run):
     folder = tmp_path / "folder.toml"
     folder.mkdir()
     for words, told in (

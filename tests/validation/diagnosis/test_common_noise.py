@@ -5,19 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.measurement.predict import with_second_order
 from assembly.robots import three_rrr
-from tests.bar_for_tests import BEAM, LONGER, along, bar, machine
+from tests.bar_for_tests import BEAM, LONGER, along, bar, columns_of, machine
+from tests.elastic_arm_for_tests import arm, with_errors
 from tests.points_for_tests import DEVICE, MACHINE, TARGETS, simulated, write_points
-from tests.validation.diagnosis.test_simulated import arm
 from validation.campaign.campaign import number_rows
-from validation.diagnosis.columns import Columns
-from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.lack_of_fit import lack_of_fit
 from validation.diagnosis.results import table
 from validation.diagnosis.select import select
-from validation.diagnosis.signatures import conditions_of
 from validation.diagnosis.whitening import independent
 from validation.multibody.simulation import without_clearance
 from validation.synthetic.design import CampaignDesign
@@ -30,7 +26,7 @@ DESIGN = CampaignDesign(
 
 
 def three_points(visits=VISITS, **covariates):
-    """The bar, three points of whose tip are measured at once, noise of 5 um each."""
+    """The bar with three points of its tip measured together, noise of 5 um each."""
     rows = 3 * visits
     single = bar(link=BEAM, rows=visits, spread=6.0)
     measured = np.zeros((rows, 6))
@@ -50,11 +46,11 @@ CAMPAIGN = three_points(time=60.0 * np.random.default_rng(0).permutation(VISITS)
 
 @pytest.fixture(scope="module")
 def columns():
-    return Columns(CAMPAIGN, Derivatives(with_second_order(conditions_of(CAMPAIGN))))
+    return columns_of(CAMPAIGN)
 
 
 def moved(campaign, sizes, rng):
-    """(R, 6) [m] what every point reads of a motion drawn once for a measurement."""
+    """(R, 6) [m] readings of a random motion of the platform in each measurement."""
     turn, shift = (
         size * rng.normal(size=(len(campaign), 3))[campaign.measured_at_once]
         for size in sizes
@@ -81,7 +77,7 @@ def found(columns, readings, seed, device=DEVICE):
     pytest.param(0.1 * DEVICE, (0.0, 5e-6), marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_noise_in_common_is_found_with_its_sizes(columns, device, sizes):
-    """60 measurements say each size of three components to 5 %; four times that."""
+    """60 measurements of three components: 5 % each, and four times that."""
     rng = np.random.default_rng([7, 1])
     selected = found(columns, moved(CAMPAIGN, sizes, rng), 7, device)
     assert selected.hypotheses == selected.functions == ()
@@ -93,20 +89,9 @@ def test_noise_in_common_is_found_with_its_sizes(columns, device, sizes):
     assert len(told) == any(sizes)
 
 
-def test_points_measured_at_once_are_drawn_together():
-    """Of 600 rows some 500 score functions first: all three of a measurement."""
-    campaign = three_points(200)
-    columns = Columns(campaign, Derivatives(with_second_order(conditions_of(campaign))))
-    rows = np.unique(columns.row[columns.sampled])
-    visits, count = np.unique(campaign.measured_at_once[rows], return_counts=True)
-    assert 480 < len(rows) <= 500
-    assert (count == 3).all()
-    assert len(visits) == len(rows) / 3
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
-def test_a_length_is_found_beside_noise_in_common(columns, seed):
+def test_length_is_found_next_to_common_noise(columns, seed):
     """Its uncertainty is that of the mean of 60 measurements, not of 180 points."""
     true = 2e-5
     rng = np.random.default_rng([seed, 2])
@@ -118,7 +103,7 @@ def test_a_length_is_found_beside_noise_in_common(columns, seed):
     assert selected.values[0] == pytest.approx(true, abs=3.5 * std)
 
 
-def test_a_fit_counts_what_points_have_in_common_once():
+def test_fit_counts_common_noise_once_per_measurement():
     """Of a length: (c^2 + sigma^2/3) / measurements, for a shift c of all points."""
     c = 3 * DEVICE
     common = np.zeros((len(CAMPAIGN), 6, 3))
@@ -131,8 +116,8 @@ def test_a_fit_counts_what_points_have_in_common_once():
 
 
 @pytest.mark.parametrize("repeats", [True, False])
-def test_what_repeats_do_not_show_is_no_noise(repeats):
-    """A motion that is the same whenever a command is repeated has a cause."""
+def test_deviation_equal_in_repeats_is_a_lack_of_fit(repeats):
+    """A motion that is equal in all repeats of a command."""
     rng = np.random.default_rng(3)
     campaign = three_points(80)
     visit = campaign.measured_at_once
@@ -159,8 +144,8 @@ def diagnosed(robot, wanted, seed, folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
-def test_nothing_is_claimed_where_only_the_machine_repeats_badly(seed, tmp_path):
-    robot = arm() if seed % 2 else without_clearance(three_rrr())
+def test_poor_repeatability_alone_claims_nothing(seed, tmp_path):
+    robot = with_errors(arm()) if seed % 2 else without_clearance(three_rrr())
     _, diagnosis = diagnosed(robot, {}, seed, tmp_path)
     assert diagnosis.verdict == "none_needed"
     assert diagnosis.claimed == ()
@@ -174,11 +159,13 @@ def test_nothing_is_claimed_where_only_the_machine_repeats_badly(seed, tmp_path)
 
 
 @pytest.mark.slow
-def test_intervals_cover_beside_noise_in_common(tmp_path):
+def test_intervals_cover_the_truth_next_to_common_noise(tmp_path):
     """An encoder's offset in twelve campaigns: 90 % intervals, 8 of 12 in 99 %."""
     covers, hidden = 0, [(Hidden("encoder_offset", {"j2": 1e-4}), 5.0)]
     for seed in range(12):
-        made, diagnosis = diagnosed(arm(), hidden, 50 + seed, tmp_path / str(seed))
+        made, diagnosis = diagnosed(
+            with_errors(arm()), hidden, 50 + seed, tmp_path / str(seed)
+        )
         (true,) = made.effects
         assert diagnosis.claimed == ("encoder_offset",)
         assert not diagnosis.fit.unknowns.functions

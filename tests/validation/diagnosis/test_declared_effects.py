@@ -1,4 +1,4 @@
-"""Effects that a robot's file declares with wrong numbers: the machine's are saved."""
+"""Effects declared with wrong parameters: those of the machine are saved."""
 
 import json
 from dataclasses import replace
@@ -90,10 +90,10 @@ def widest(campaign, name, true):
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_what_is_fitted_beside_a_declared_effect_is_the_machine(name):
+def test_fit_next_to_a_declared_effect_gives_the_machine(name):
     """Readings of the machine without noise: its numbers, and its readings.
 
-    Whether it is softer or stiffer, longer or shorter than declared.
+    Softer or stiffer, longer or shorter than declared.
     """
     declared, true = WRONG[name]
     campaign = commanded(arm(**{name: declared}))
@@ -118,7 +118,7 @@ def test_what_is_fitted_beside_a_declared_effect_is_the_machine(name):
         assert found == pytest.approx(true, rel=2e-2)
 
 
-def test_no_effect_with_numbers_is_left_out():
+def test_every_effect_with_parameters_is_tested():
     assert WRONG.keys() | {"geometric_stiffening"} == LIBRARY.keys()
 
 
@@ -136,7 +136,7 @@ PLANAR_CASES = {
 
 @pytest.mark.parametrize("name", PLANAR_CASES)
 def test_a_declared_effect_that_differs_is_found_and_saved(name, tmp_path):
-    """By hand: drives and beams of a plane.  The machine's numbers are saved."""
+    """Drives and beams of a plane; the saved parameters are the machine's."""
     declared, true, machine = PLANAR_CASES[name]
     campaign = measured(tmp_path / name, seed=4, configurations=12, passes=3, **machine)
     robot = replace(campaign.robot, effects={name: declared})

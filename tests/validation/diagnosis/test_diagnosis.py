@@ -17,10 +17,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import norm
 
-from assembly.effects import apply_effects
-from assembly.kinematics.posture import place_robot
-from assembly.measurement.conditions import as_declared
-from assembly.measurement.predict import predict, with_finite_motions
 from examples.campaign_folder import data_folder
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import plain
@@ -28,10 +24,8 @@ from tests.planar_arm_for_tests import SIGMA, measured
 from validation.campaign.campaign_file import read_campaign
 from validation.diagnosis import trace
 from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.holdout import HeldOut
 from validation.diagnosis.report import report_page
 from validation.diagnosis.results import effects, table
-from validation.diagnosis.saving import corrected
 from validation.diagnosis.sentence import sentence
 from validation.diagnosis.text import text
 
@@ -52,7 +46,7 @@ CASES = {
 
 @pytest.fixture(scope="module")
 def diagnosed(tmp_path_factory):
-    """By name of a case: what is found. Each once."""
+    """A function that diagnoses a case once."""
 
     @cache
     def find(name):
@@ -69,7 +63,7 @@ def numbers(found, effect):
 
 
 def assert_within(found, effect, truth):
-    """Three standard deviations, which are no larger than a fifth of the truth."""
+    """Check values within three standard deviations, at most a fifth of the truth."""
     values = numbers(found, effect)
     assert values.keys() == truth.keys()
     for name, (value, std) in values.items():
@@ -78,7 +72,7 @@ def assert_within(found, effect, truth):
 
 
 def left_by_the_truth(name, found, folder):
-    """[-] rms of what the truth leaves on the rows held out: their noise."""
+    """[-] rms of the noise of the held-out rows."""
     exact = measured(folder, seed=1, noise=0.0, **CASES[name])
     z = (found.campaign.measured - exact.measured) / SIGMA
     return float(np.sqrt(np.nanmean(z[found.held.rows] ** 2)))
@@ -95,8 +89,8 @@ def test_one_effect_is_named_and_measured(diagnosed, tmp_path):
     assert found.noise.position == pytest.approx(SIGMA[3])
 
 
-def test_noise_that_lasts_widens_what_is_known(diagnosed, tmp_path):
-    """Four fifths of the noise last 200 s; the effect is the same, less sure."""
+def test_correlated_noise_widens_standard_deviations(diagnosed, tmp_path):
+    """Four fifths of the noise have a time constant of 200 s."""
     exact = measured(tmp_path, seed=1, noise=0.0, **CASES["one"])
     time = exact.covariates["time"]
     R = 0.8 * np.exp(-np.abs(time[:, None] - time) / 200.0) + 0.2 * np.eye(len(time))
@@ -113,8 +107,8 @@ def test_noise_that_lasts_widens_what_is_known(diagnosed, tmp_path):
     assert abs(value - 3e5) < 3 * std
 
 
-def test_noise_that_repeats_show_to_be_larger_is_told(diagnosed, tmp_path):
-    """Three times what is stated: errors stay in the sigma stated, no cause named."""
+def test_noise_above_sigma_is_reported_without_a_cause(diagnosed, tmp_path):
+    """Three times the stated sigma, in which errors are reported."""
     exact = measured(tmp_path, noise=0.0, force=0.0, temperature=0.0)
     noise = 3.0 * SIGMA * np.random.default_rng(6).normal(size=(len(exact), 6))
     found = diagnose(replace(exact, measured=exact.measured + noise))
@@ -131,8 +125,8 @@ def test_noise_that_repeats_show_to_be_larger_is_told(diagnosed, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["none", "one", "pair"])
-def test_the_sequence_leads_from_the_declared_model_to_the_machine(name, diagnosed):
-    """Steps that the machine lacks are left out; the last row is the error after."""
+def test_model_sequence_leads_from_the_declared_to_the_fitted_model(name, diagnosed):
+    """Only steps that the machine has; the last row is the error after."""
     found = diagnosed(name)
     terms = {"none": []}.get(name, ["library effects"])
     assert [step.term for step in found.sequence] == ["declared", *terms]
@@ -140,11 +134,14 @@ def test_the_sequence_leads_from_the_declared_model_to_the_machine(name, diagnos
     assert first.error == found.before
     assert first.unknowns == 0
     assert last.error == found.after
+    written = table(found)["ladder"][-1]
+    assert written["kept_aside_sigma"] == found.after.normalised
+    assert written["kept_aside_rms"] == found.after.position
     if terms:
         assert last.unknowns == pytest.approx(len(found.fit.x), abs=0.01)
 
 
-def test_a_sound_model_is_left_alone(diagnosed):
+def test_sound_model_is_not_changed(diagnosed):
     found = diagnosed("none")
     assert (found.verdict, found.claimed) == ("none_needed", ())
     assert found.before == found.after
@@ -162,8 +159,8 @@ def test_two_effects_are_named_together(diagnosed, tmp_path):
     assert found.after.normalised <= 1.05 * left_by_the_truth("pair", found, tmp_path)
 
 
-def test_heat_that_never_changes_may_be_a_length(diagnosed):
-    """The class is named, and the temperature that would decide."""
+def test_constant_temperature_makes_expansion_and_length_ambiguous(diagnosed):
+    """The equivalent effects and the temperature that separates them are named."""
     found = diagnosed("confounded")
     assert (found.verdict, found.claimed) == ("ambiguous", ())
     best = {names for names, p in found.alternatives if p > 0.3}
@@ -175,7 +172,7 @@ def test_heat_that_never_changes_may_be_a_length(diagnosed):
 
 
 @pytest.mark.slow
-def test_what_no_effect_explains_is_learned(diagnosed):
+def test_unexplained_deviation_is_learned(diagnosed):
     found = diagnosed("outside")
     assert (found.verdict, found.claimed) == ("learned", ())
     assert found.after.normalised < found.before.normalised
@@ -184,8 +181,8 @@ def test_what_no_effect_explains_is_learned(diagnosed):
 
 
 @pytest.mark.slow
-def test_a_device_anywhere_with_blunders_and_gaps(diagnosed):
-    """A turn of the first drive is the device's; the second's offset is seen."""
+def test_unknown_registration_with_outliers_and_gaps_is_explained(diagnosed):
+    """The first drive's offset is part of the device frame; the second's is found."""
     found = diagnosed("device")
     assert (found.verdict, found.claimed) == ("explained", ("encoder_offset",))
     value, std = numbers(found, "encoder_offset")["two"]
@@ -197,8 +194,8 @@ def test_a_device_anywhere_with_blunders_and_gaps(diagnosed):
 
 
 @pytest.mark.slow
-def test_models_chosen_by_some_rows_are_fitted_to_all(tmp_path, monkeypatch):
-    """The same answer, narrower than by those rows; blunders among the others too."""
+def test_model_selected_on_a_subset_is_fitted_to_all_rows(tmp_path, monkeypatch):
+    """Parameters are narrower than from the subset; all outliers are found."""
     campaign = measured(tmp_path / "device", seed=1, **CASES["device"])
     monkeypatch.setattr(trace, "_SEARCHED", 30)
     found = diagnose(campaign)
@@ -260,31 +257,6 @@ def test_a_diagnosis_shows_its_verdict_on_a_few_lines(diagnosed):
     assert found.summary() == text(found)
 
 
-def test_a_corrected_robot_predicts_what_the_fit_predicts(diagnosed):
-    found = diagnosed("pair")
-    robot, campaign = corrected(found), found.campaign
-    assert robot.effects.keys() == {"encoder_offset", "thermal_expansion"}
-    for row in (0, 21):
-        commanded = dict(zip(("one", "two"), campaign.coordinates[row], strict=False))
-        here = as_declared(
-            place_robot(robot, joints=commanded), campaign.loads[row],
-            covariates={"temperature": campaign.covariates["temperature"][row]},
-        )  # fmt: skip
-        there = with_finite_motions(apply_effects(here, robot.effects))
-        told = predict(there).deviation[0]
-        expected = campaign.measured[row] - found.residual_after[row]
-        assert told == pytest.approx(expected, abs=1e-12)
-
-
-def test_without_rows_to_spare_nothing_is_said_of_rows_held_out(diagnosed):
-    """A campaign of one block: what is judged is what was fitted."""
-    found = diagnosed("none")
-    every = np.ones(len(found.campaign), dtype=bool)
-    alone = replace(found, held=HeldOut("none", (every,), "no rows held out"))
-    assert "on the rows fitted, too few to hold any out" in sentence(alone)
-    assert "rows held out in 5 folds" in sentence(found)
-
-
 ODD = ("$x^{<b>&_\\$", "a$b_ \\frac{<i>")  # a formula and a tag to other programs
 
 
@@ -316,8 +288,8 @@ def test_a_report_shows_odd_names_as_they_are_written(diagnosed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(TRUTH))
-def test_campaigns_of_the_simulation_are_understood(name):
-    """The verdict and the effects as the simulation's side accepts them."""
+def test_simulated_campaigns_get_an_accepted_verdict(name):
+    """The verdict and effects are among those that the truth accepts."""
     truth = TRUTH[name]
     found = diagnose(read_campaign(CAMPAIGNS / name))
     accepted = set(truth["accept_verdicts"])
@@ -336,8 +308,8 @@ def test_campaigns_of_the_simulation_are_understood(name):
 
 
 @pytest.mark.slow
-def test_practice_campaigns_of_another_program(tmp_path):
-    """By the score that came with them: nothing wrong, parameters within 3 std.
+def test_practice_campaigns_of_another_program_score_without_error(tmp_path):
+    """Scored by the program that came with them: parameters within 3 std.
 
     After / perfect model: 1.15 is 2.6 standard deviations of the rms of 25 rows' noise.
     """

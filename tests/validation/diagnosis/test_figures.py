@@ -1,4 +1,4 @@
-"""The robot of a diagnosis' page, against what was measured of it."""
+"""The robot drawn on a diagnosis' page, against its readings."""
 
 from dataclasses import replace
 
@@ -17,8 +17,8 @@ def diagnosed(tmp_path_factory):
     return diagnose(measured(folder, seed=1, stiffness=(np.inf, 7e4)))
 
 
-def test_the_robot_drawn_stands_where_it_was_measured(diagnosed):
-    """Within five sigma of the reading, where the declared model errs by far more."""
+def test_drawn_robot_is_at_its_measured_pose(diagnosed):
+    """Within five sigma of the reading; the declared model is off by twenty."""
     row, name = worst_row(diagnosed)
     assert name == "position"
     aside = diagnosed.held.rows & ~diagnosed.outliers

@@ -19,14 +19,6 @@ def test_priors_of_all_forms_sum_to_one(name):
     assert np.exp(forms.log_priors(found)).sum() == pytest.approx(1.0)
 
 
-def test_steps_are_tried_between_nearly_all_rows():
-    steps = [s for s in forms.every(CONDITIONS, "time") if s.form == "step"]
-    levels = np.sort([dict(s.given)["at"] for s in steps])
-    for jump in np.arange(3.5, 26.0):
-        # rows on both sides of a jump are told apart by some level
-        assert ((levels > jump - 0.5) & (levels <= jump + 0.5)).any()
-
-
 def test_products_have_a_form_that_a_robot_file_can_store():
     from assembly.effects.forms import FORMS
 

@@ -1,4 +1,4 @@
-"""Rows that judge: which they are, and which of two models predicts them better."""
+"""Which rows are held out."""
 
 import numpy as np
 import pytest
@@ -16,8 +16,8 @@ def held_in(campaign):
     (60, "split", 15), (80, "split", 20), (240, "split", 60), (1000, "split", 100),
     (59, "folds", 59), (9, "folds", 9),
 ])  # fmt: skip
-def test_whole_configurations_judge(configurations, how, judge):
-    """A quarter of 60, 60 of some hundreds, a tenth of many; each in a fold of few."""
+def test_whole_configurations_are_held_out(configurations, how, judge):
+    """A quarter, at most 60, or a tenth of many; all of them in folds of few."""
     repeat = np.random.default_rng(0).permutation(np.repeat(range(configurations), 2))
     campaign = campaign_of(np.ones((len(repeat), 6)), repeat=repeat)
     held = hold_out(campaign)
@@ -32,7 +32,7 @@ def test_whole_configurations_judge(configurations, how, judge):
 
 
 def test_few_configurations_are_held_out_by_spans_of_time():
-    """Sixteen spans of three rows, each whole and in one fold; order of time counts."""
+    """Sixteen spans of three rows in the order of time, each in one fold."""
     order = np.random.default_rng(0).permutation(48)
     campaign = campaign_of(
         np.ones((48, 6)), repeat=np.arange(48) % 3, time=60.0 * order
@@ -45,7 +45,7 @@ def test_few_configurations_are_held_out_by_spans_of_time():
 
 
 @pytest.mark.parametrize(("rows", "folds"), [(1, 1), (2, 2), (3, 3), (7, 5)])
-def test_of_few_rows_every_one_judges(rows, folds):
+def test_every_one_of_few_rows_is_held_out(rows, folds):
     campaign = campaign_of(np.ones((rows, 6)), time=60.0 * np.arange(rows))
     parts = held_in(campaign)
     assert len(parts) == folds

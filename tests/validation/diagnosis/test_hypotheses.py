@@ -1,11 +1,10 @@
-"""Which hypotheses a campaign can tell anything about, listed by hand."""
+"""Hypotheses that a campaign can test, listed by hand."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from assembly.model.robot import Frame, Robot
 from tests.bar_for_tests import BEAM, bar
 from validation.diagnosis.hypotheses import hypotheses
 from validation.diagnosis.signatures import conditions_of
@@ -34,7 +33,7 @@ def named(conditions, loads=()):
 def test_an_effect_needs_its_covariate_in_every_row_and_once_not_zero(
     covariate, effect, values, told
 ):
-    """One that settles needs time that passes, too."""
+    """An effect that settles needs times that differ."""
     conditions = conditions_of(bar(link=BEAM))
     given = replace(conditions, **{covariate: values})
     assert (effect in named(given)) is told
@@ -43,7 +42,7 @@ def test_an_effect_needs_its_covariate_in_every_row_and_once_not_zero(
 
 
 def test_a_load_is_off_in_directions_in_which_it_was_recorded():
-    """The factor and those offsets; either by itself; none of another direction."""
+    """The factor and the offsets of recorded directions, together or alone."""
     found = named(conditions_of(bar(link=BEAM)), ["fy", "mz"])["load_gain"]
     assert found == [
         [("factor",), ("offset.mz",), ("offset.fy",)], [("factor",)],
@@ -59,34 +58,3 @@ def test_components_of_weight_and_of_a_foundation_act_together_or_one_by_one():
     base = [(f"compliance.{axis}",) for axis in ("rx", "ry", "rz", "tx", "ty", "tz")]
     assert found["base_compliance"] == [base, *([one] for one in base)]
     assert found["geometric_stiffening"] == [[]]
-
-
-def test_an_exponent_is_shared_by_all_contacts_of_a_hypothesis():
-    """Two drives: each its own stiffness, or one; at three exponents."""
-    turning = {"joint": "revolute", "actuated": True}
-    robot = Robot("arm", "tip", (
-        Frame("one", **turning), Frame("two", "one", [0.3, 0, 0], **turning),
-        Frame("tip", "two", [0.2, 0, 0]),
-    ))  # fmt: skip
-    plain = conditions_of(bar())
-    T = np.tile(robot.fixed_transforms, (8, 1, 1, 1))
-    conditions = replace(
-        plain, robot=robot, coordinates=np.zeros((8, 3)), transforms=T,
-        errors=np.zeros((8, 3, 6)),
-    )  # fmt: skip
-    found = [h for h in hypotheses(conditions, []) if h.effect == "contact_stiffening"]
-    shapes = [(h.where, [slot.names for slot in h.slots]) for h in found]
-    one, two = ("one.give",), ("two.give",)
-    both, exponents = ("one", "two"), ("one.exponent", "two.exponent")
-    ways = [
-        (both, [one, two, exponents]), (both, [(*one, *two), exponents]),
-        (("one",), [one, ("one.exponent",)]), (("two",), [two, ("two.exponent",)]),
-    ]  # fmt: skip
-    assert shapes == [way for way in ways for _ in range(3)]
-    assert [h.slots[-1].start for h in found] == [1.5, 2.0, 3.0] * 4
-    assert [h.slots[-1].shape for h in found] == [True] * 12
-    shared = found[3].public(robot, [1e-6, 2.0])
-    assert shared == pytest.approx({
-        "one.coefficient": 1e12, "one.exponent": 2.0,
-        "two.coefficient": 1e12, "two.exponent": 2.0,
-    })  # fmt: skip

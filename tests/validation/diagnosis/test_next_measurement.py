@@ -1,9 +1,10 @@
-"""The measurement that would decide, on a bar whose answers are known by hand."""
+"""The next measurement, on a bar with closed forms."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tests.bar_for_tests import (
     BEAM,
@@ -19,12 +20,11 @@ from tests.bar_for_tests import (
     machine,
 )
 from tests.planar_arm_for_tests import SIGMA
-from validation.diagnosis import next_measurement as module
 from validation.diagnosis.next_measurement import next_measurement
 from validation.diagnosis.signatures import conditions_of
 
 
-def test_another_temperature_tells_heat_from_length():
+def test_another_temperature_separates_expansion_from_length():
     """d'(I + J C J')^-1 d with d = alpha L 10 K / sigma along the bar, by hand.
 
     R readings at T leave the length sigma^2 / R and the expansion that much over
@@ -46,8 +46,8 @@ def test_another_temperature_tells_heat_from_length():
 
 
 @pytest.mark.parametrize(("power", "worth"), [(1.5, True), (0.9, False)])
-def test_a_measurement_is_worth_a_standard_deviation(power, worth):
-    """Of heat and length as above, by an expansion that differs by so much."""
+def test_next_measurement_needs_a_power_of_one(power, worth):
+    """Expansion against length, for an expansion of given power."""
     R, T = 8, 5.0
     heat = {"temperature": np.full(R, T)}
     plain = bar(link=BEAM, **heat)
@@ -59,25 +59,14 @@ def test_a_measurement_is_worth_a_standard_deviation(power, worth):
     assert (found is not None) == worth
 
 
-def test_the_pose_is_said_where_poses_were_commanded():
-    """A bar of 0.8 m at a quarter turn; x, y, z and the rotation vector."""
-    campaign = replace(bar(rows=3, spread=np.pi), commanded="pose")
-    found = module._configuration(campaign, conditions_of(campaign), 1)
-    assert list(found) == [f"pose.{name}" for name in module.POSE]
-    shift = [found[f"pose.{k}"] for k in ("tx", "ty", "tz")]
-    turn = [found[f"pose.{k}"] for k in ("rx", "ry", "rz")]
-    assert shift == pytest.approx([0, LENGTH, 0], abs=1e-12)
-    assert turn == pytest.approx([0, 0, np.pi / 2], abs=1e-12)
-
-
-def test_nothing_decides_between_one_explanation_and_itself():
+def test_equal_models_have_no_next_measurement():
     campaign = bar(link=BEAM)
     here = conditions_of(campaign)
     fit = machine(campaign, LONGER)
     assert next_measurement(campaign, here, fit, [fit]) is None
 
 
-def test_a_configuration_between_decides_where_the_measured_ones_are_alike():
+def test_next_configuration_lies_between_the_measured_ones():
     """A turned encoder and an eccentric one at 0 and at 2 pi: e = e cos q.
 
     Between, they differ by e (1 - cos q) in the direction of either, of information
@@ -95,9 +84,19 @@ def test_a_configuration_between_decides_where_the_measured_ones_are_alike():
     information = 1 / SIGMA[2] ** 2 + LENGTH**2 / SIGMA[4] ** 2
     power = (e * (1 - np.cos(q))) ** 2 * information / 1.5
     assert found.power == pytest.approx(power, rel=1e-3)
+    by_pose = next_measurement(
+        replace(campaign, commanded="pose"), here, turned, [eccentric]
+    )
+    pose = [by_pose.configuration[f"pose.{k}"] for k in ("tx", "ty", "tz")]
+    expected = [LENGTH * np.cos(q), LENGTH * np.sin(q), 0]
+    assert pose == pytest.approx(expected, abs=1e-9)
+    turn = [by_pose.configuration[f"pose.{k}"] for k in ("rx", "ry", "rz")]
+    assert Rotation.from_rotvec(turn).as_matrix() == pytest.approx(
+        Rotation.from_rotvec([0, 0, q]).as_matrix(), abs=1e-9
+    )
 
 
-def test_a_range_of_temperatures_is_left_by_half_of_it():
+def test_next_temperature_exceeds_the_range_by_half():
     """20 to 60: low, middle, or 20 + 1.5 times 40, which is the farthest."""
     heat = {"temperature": np.linspace(20.0, 60.0, 8)}
     plain = bar(link=BEAM, **heat)
@@ -110,7 +109,7 @@ def test_a_range_of_temperatures_is_left_by_half_of_it():
         assert found.covariates == {"temperature": 80.0}
 
 
-def test_a_load_that_decides_is_half_as_large_again_and_no_more_than_is_needed():
+def test_next_load_is_half_as_large_again():
     """A drive that gives under M against one that is turned: by 1.5 M, or -1.5 M."""
     M, k = 30.0, 2e5
     campaign = gives_way(M, k)

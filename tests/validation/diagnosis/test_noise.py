@@ -1,17 +1,13 @@
-"""Scale of the noise, and blunders."""
+"""Scale of the noise, and outliers."""
 
 import numpy as np
 import pytest
 
 from validation.diagnosis.gaussian import scale
-from validation.diagnosis.noise import (
-    findings,
-    probability_good,
-    repeat_scatter,
-)
+from validation.diagnosis.noise import findings, probability_good, repeat_scatter
 
 
-def test_blunders_are_told_from_noise():
+def test_outliers_are_distinguished_from_noise():
     rng = np.random.default_rng(0)
     z = rng.normal(size=600)
     z[[5, 77, 300]] += [40.0, -25.0, 12.0]
@@ -19,7 +15,7 @@ def test_blunders_are_told_from_noise():
     assert set(np.flatnonzero(good < 0.5)) == {5, 77, 300}
 
 
-def test_noise_alone_hardly_has_blunders():
+def test_noise_alone_has_outliers_at_the_expected_rate():
     rng = np.random.default_rng(1)
     called = [
         (probability_good(rng.normal(size=600) ** 2) < 0.5).any() for _ in range(300)
@@ -28,14 +24,14 @@ def test_noise_alone_hardly_has_blunders():
     assert np.mean(called) < 0.03
 
 
-def test_many_readings_far_off_are_no_blunders():
+def test_many_large_residuals_are_not_outliers():
     z = np.random.default_rng(2).normal(size=600)
     z[:60] += 30.0
     assert (probability_good(z**2) == 1).all()
 
 
 @pytest.mark.parametrize("true", [0.5, 1.0, 3.0])
-def test_scale_follows_what_is_left(true):
+def test_noise_scale_equals_that_of_the_residual(true):
     z = true * np.random.default_rng(3).normal(size=2000)
     tau, std = scale(float(z @ z), 2000)
     assert tau == pytest.approx(true, rel=0.05)
@@ -54,7 +50,7 @@ def test_repeats_scatter_by_their_own_mean():
     (0.4, (0.5, 40), ["residual"]),
     (1.0, (2.0, 40), ["repeatable"]), (1.0, (2.0, 2), []),
 ])  # fmt: skip
-def test_noise_is_told_of_where_it_is_not_as_stated(tau, repeats, told):
+def test_noise_other_than_stated_is_a_finding(tau, repeats, told):
     found = findings(tau, 0.03, repeats, memory=False)
     assert len(found) == len(told)
     assert all(word in one for word, one in zip(told, found, strict=True))
@@ -63,12 +59,12 @@ def test_noise_is_told_of_where_it_is_not_as_stated(tau, repeats, told):
 @pytest.mark.parametrize(("common", "words"), [
     ((1.2e-5, 5e-6), "5 um, 12 urad"), ((0.0, 2.54e-5), "25.4 um"), ((0.0, 0.0), ""),
 ])  # fmt: skip
-def test_noise_in_common_is_told_with_its_sizes(common, words):
+def test_common_noise_is_a_finding_with_its_sizes(common, words):
     told = findings(1.0, 0.03, (1.0, 40), memory=False, common=common)
     head = "noise common to the points of a row: "
     assert told == ((head + words,) if words else ())
 
 
-def test_without_repeats_noise_in_common_is_not_sure():
+def test_common_noise_without_repeats_is_reported_as_uncertain():
     (told,) = findings(1.0, 0.03, (0.0, 0), memory=False, common=(0.0, 5e-6))
     assert "a cause that was not recorded would look the same" in told

@@ -1,4 +1,4 @@
-"""Nuisance parameters of a loaded bar, worked out by hand, and what they add."""
+"""Nuisance parameters of a loaded bar, by hand."""
 
 from dataclasses import replace
 
@@ -7,13 +7,8 @@ import pytest
 
 from assembly.measurement.predict import predict
 from assembly.model.robot import Frame, Robot
-from tests.bar_for_tests import LENGTH, along, bar
-from tests.planar_arm_for_tests import SIGMA
-from validation.diagnosis.nuisance import (
-    nuisance,
-    with_compliance,
-    with_error,
-)
+from tests.bar_for_tests import LENGTH, bar
+from validation.diagnosis.nuisance import nuisance, with_compliance, with_error
 from validation.diagnosis.responses import responses
 from validation.diagnosis.signatures import conditions_of, whiten
 
@@ -28,20 +23,15 @@ def loaded():
 
 
 def of_both_kinds(campaign, conditions, response):
-    """Geometric errors and springs, none of which is an effect of the library."""
+    """Geometric errors and springs that are no effect of the library."""
     small = nuisance(
         campaign, conditions, response, np.zeros((campaign.cells.sum(), 0))
     )
     return small.take(~small.spring), small.take(small.spring)
 
 
-def column(campaign, screws):
-    """Whitened readings of screws (R, 6) of the tip, base axes."""
-    return (screws / SIGMA).ravel()
-
-
-def test_columns_are_what_a_unit_of_each_does(loaded):
-    """A drive turned about z, a tip shifted along itself; springs times the moment."""
+def test_geometry_and_springs_that_readings_show_are_listed_with_their_bounds(loaded):
+    """30 N along z at the end of the bar bend it about x and y of the base."""
     campaign, conditions, response = loaded
     geometry, springs = of_both_kinds(campaign, conditions, response)
     assert not geometry.declared
@@ -49,27 +39,12 @@ def test_columns_are_what_a_unit_of_each_does(loaded):
     # 0.2 rad and a tenth of the longest body
     assert geometry.most == pytest.approx([*[0.2] * 3, *[0.1 * LENGTH] * 3] * 2)
     assert (springs.most == np.inf).all()
-    by_place = dict(
-        zip(zip(geometry.frame.tolist(), geometry.axis.tolist(), strict=True),
-            geometry.columns.T, strict=True)
-    )  # fmt: skip
-    across = np.cross([0, 0, 1.0], along(campaign))
-    turned = np.hstack([np.tile([0, 0, 1.0], (8, 1)), LENGTH * across])
-    shifted = np.hstack([np.zeros((8, 3)), along(campaign)])
-    atol = 1e-6 / SIGMA.min()
-    np.testing.assert_allclose(by_place[0, 2], column(campaign, turned), atol=atol)
-    np.testing.assert_allclose(by_place[1, 3], column(campaign, shifted), atol=atol)
     # of the platform, no spring; the drive carries 4 N m about z
     assert set(springs.frame.tolist()) == {0}
-    (about,) = np.flatnonzero(springs.axis == 2)
-    np.testing.assert_allclose(
-        springs.columns[:, about], 4 * column(campaign, turned), atol=atol
-    )
-    # 30 N along z at the end of the bar bend it about x and y of the base
     assert set(springs.axis.tolist()) == {0, 1, 2, 5}
 
 
-def test_tolerances_say_sizes_and_zero_says_that_a_direction_is_exact(loaded):
+def test_tolerances_set_prior_sizes_and_zero_excludes_a_direction(loaded):
     campaign, _, _ = loaded
     tolerance = np.array([1e-3, 0, 1e-3, 2e-4, 0, 1e-4])
     frames = (replace(campaign.robot.frames[0], tolerance=tolerance),
@@ -87,8 +62,8 @@ def test_tolerances_say_sizes_and_zero_says_that_a_direction_is_exact(loaded):
     assert geometry.take(own).columns.shape == (48, 4)
 
 
-def test_what_is_not_loaded_or_not_read_has_no_unknowns():
-    """Nothing is loaded: no springs; only x is read: what moves it."""
+def test_unloaded_or_unread_directions_have_no_unknowns():
+    """Without load there are no springs; only directions that move x have unknowns."""
     seen = np.full((8, 6), np.nan)
     seen[:, 3] = 0.0
     campaign = bar(measured=seen)
@@ -100,8 +75,8 @@ def test_what_is_not_loaded_or_not_read_has_no_unknowns():
     assert geometry.columns.shape == (8, 4)
 
 
-def test_columns_add_up_to_what_a_robot_with_them_reads(loaded):
-    """Errors and springs of a size that is small, built into the robot."""
+def test_columns_sum_to_the_readings_of_a_changed_robot(loaded):
+    """Small errors and springs, built into the robot."""
     campaign, conditions, response = loaded
     geometry, springs = of_both_kinds(campaign, conditions, response)
     rng = np.random.default_rng(1)
@@ -123,7 +98,7 @@ def test_springs_of_no_compliance_stay_as_declared():
 
 
 def test_springs_of_passive_joints_leave_their_own_motion_free():
-    """1e-7 m/N in series with a bearing that is rigid but for its turning."""
+    """1e-7 m/N in series with a rigid bearing that is free to rotate."""
     hinge = Frame("hinge", "base", joint="revolute")
     robot = Robot("a", "tip", (hinge, Frame("tip", "hinge")))
     first, axes = np.zeros(2, int), np.array([2, 4])

@@ -47,7 +47,7 @@ def refitted(columns, std, z, wet):
     return np.sqrt(np.mean(left**2))
 
 
-def test_parts_of_a_range_are_foretold_as_by_refits():
+def test_range_errors_equal_those_of_refits():
     rng = np.random.default_rng(8)
     wet = rng.uniform(0, 3, ROWS)
     z = rng.normal(size=ROWS) + 3 * wet

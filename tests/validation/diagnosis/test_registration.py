@@ -1,4 +1,4 @@
-"""Where a device stands, from positions or rotations of some rows."""
+"""The device frame, from positions or rotations."""
 
 from dataclasses import replace
 
@@ -7,19 +7,19 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from assembly.effects.registration import BASE
+from assembly.kinematics.posture import place_robot
+from assembly.measurement.predict import predict
+from assembly.model.robot import Frame, Robot
 from forcefit.inputs.table import BadInput
 from tests.bar_for_tests import LENGTH, along, bar
-from validation.diagnosis.registration import (
-    coarse_frame,
-    register,
-)
+from validation.diagnosis.registration import coarse_frame, register
 from validation.diagnosis.signatures import conditions_of
 
 TURN, SHIFT = [0.3, -0.2, 0.5], [1.0, 0.5, -2.0]
 
 
 def seen_by(turn, shift):
-    """(8, 6) what a device reads of a bar that is as declared."""
+    """(8, 6) readings of a device of a bar without errors."""
     p, R = LENGTH * along(bar()), Rotation.from_rotvec(turn)
     return np.hstack([np.tile(turn, (8, 1)), R.apply(p) + shift - p])
 
@@ -35,7 +35,7 @@ def test_without_a_position_the_shift_is_zero():
 
 @pytest.mark.parametrize("cell", range(6))
 def test_rows_that_lack_a_cell_do_not_take_part(cell):
-    """What they have of that kind is wrong, and so is a row without a model."""
+    """The other cells of such a row are wrong here."""
     seen = seen_by(TURN, SHIFT)
     kind = slice(0, 3) if cell < 3 else slice(3, 6)
     seen[2, kind] += 0.3
@@ -51,8 +51,8 @@ def test_rows_that_lack_a_cell_do_not_take_part(cell):
     assert list(guess.values()) == pytest.approx([*TURN, *SHIFT], abs=1e-9)
 
 
-def test_rotations_of_a_machine_that_turns_are_seen_turned():
-    """R = D M: the device's rotation is left when the model's is taken off the right;
+def test_device_rotation_is_found_next_to_a_turned_model():
+    """R = D M: the device's rotation D follows from R and the model's rotation M;
     of several that differ, the mean."""
     model = np.array([0.02, -0.03, 0.04])
     own = Rotation.from_rotvec(model)
@@ -80,8 +80,8 @@ def test_three_points_off_one_line_are_enough(points):
 
 
 @pytest.mark.parametrize("known", ["campaign", "conditions"])
-def test_without_sessions_of_both_one_device_is_that_of_all_rows(known):
-    """Half the rows are seen from elsewhere: a compromise, the same in all."""
+def test_sessions_missing_on_one_side_share_one_device(known):
+    """All rows share one device frame."""
     seen, sessions = seen_by(TURN, SHIFT), np.array(["a", "b"] * 4)
     campaign = bar(measured=seen)
     conditions = conditions_of(campaign)
@@ -91,3 +91,78 @@ def test_without_sessions_of_both_one_device_is_that_of_all_rows(known):
         conditions = replace(conditions, session=sessions)
     found = register(campaign, conditions)
     assert found.base == pytest.approx([*TURN, *SHIFT], abs=1e-9)
+
+
+@pytest.mark.parametrize("turn", [[0.6, -0.5, 0.62], [0.0, 3.0, 0.0]])
+@pytest.mark.parametrize("cells", ["all", "points", "one rotation"])
+def test_a_device_anywhere_in_the_room_is_found_exactly(turn, cells):
+    """p' = R p + t and R' = R without noise: 1 rad and 3 m."""
+    campaign = bar()
+    R, t = Rotation.from_rotvec(turn), np.array([2.0, -2.0, 1.0])
+    p = LENGTH * along(campaign)
+    seen = np.hstack([np.tile(turn, (8, 1)), R.apply(p) + t - p])
+    if cells == "points":
+        seen[:, :3] = np.nan
+    if cells == "one rotation":
+        seen[1:, :3] = np.nan
+    campaign = bar(measured=seen)
+    # without errors of the model a first guess is right already
+    guess = coarse_frame(campaign, conditions_of(campaign))
+    assert list(guess.values()) == pytest.approx([*turn, *t], abs=1e-8)
+    found = register(campaign, conditions_of(campaign))
+    assert found.base[:3] == pytest.approx(turn, abs=1e-9)
+    assert found.base[3:] == pytest.approx(t, abs=1e-9)
+
+
+def test_collinear_points_do_not_determine_the_device_rotation():
+    """Five places of a slide half a metre from the base, without rotations."""
+    robot = Robot("slide", "tip", (
+        Frame("rail", translation=[0.3, 0.5, -0.2], rotation=[0.4, 0.2, 0]),
+        Frame("slide", "rail", joint="prismatic", actuated=True),
+        Frame("tip", "slide", [0.1, 0, 0]),
+    ))  # fmt: skip
+    placed = [place_robot(robot, joints={"slide": 0.1 * k}) for k in range(5)]
+    seen = np.zeros((5, 6))
+    seen[:, :3] = np.nan
+    campaign = replace(
+        bar(rows=5, measured=seen), robot=robot,
+        coordinates=np.stack([p.coordinates for p in placed]),
+        transforms=np.stack([p.transforms for p in placed]),
+    )  # fmt: skip
+    with pytest.raises(BadInput, match="measured points off one line"):
+        register(campaign, conditions_of(campaign))
+
+
+def test_device_is_found_next_to_declared_errors():
+    """The declared error of the tip, 4 mm, is not part of the device frame."""
+    plain = bar()
+    errors = np.zeros((2, 6))
+    errors[1] = [0, 0, 0, 1e-3, 4e-3, -2e-3]
+    robot = plain.robot.with_errors(errors)
+    turn, t = np.array([0.3, -0.2, 0.5]), np.array([1.0, 0.5, -2.0])
+    R = Rotation.from_rotvec(turn)
+    q = plain.coordinates[:, 0]
+    off = Rotation.from_rotvec(np.outer(q, [0, 0, 1])).apply(errors[1, 3:])
+    p = LENGTH * along(plain)
+    seen = np.hstack([np.full((8, 3), np.nan), R.apply(p + off) + t - p])
+    campaign = replace(bar(measured=seen), robot=robot)
+    guess = coarse_frame(campaign, conditions_of(campaign))
+    assert list(guess.values()) == pytest.approx([*turn, *t], abs=1e-8)
+
+
+def test_each_session_has_a_device_of_its_own():
+    """Two device frames in two sessions; a session without rows is refused."""
+    plain, sessions = bar(), np.array(["a", "b"] * 4)
+    p, seen = LENGTH * along(plain), np.zeros((8, 6))
+    seen[:, :3] = np.nan
+    where = {"a": ([0.1, 0.2, -0.3], [1.0, 2.0, 0.5]), "b": ([0, 0, 1.0], [-1.0, 0, 0])}
+    for k, name in enumerate(sessions):
+        turn, t = where[name]
+        seen[k, 3:] = Rotation.from_rotvec(turn).apply(p[k]) + t - p[k]
+    campaign = replace(bar(measured=seen), session=sessions)
+    found = register(campaign, conditions_of(campaign))
+    left = campaign.measured - predict(found).deviation
+    assert np.abs(left[:, 3:]).max() < 1e-9
+    unknown = replace(campaign, session=np.array(["a"] * 8))
+    with pytest.raises(BadInput, match='session "b" has no row'):
+        register(unknown, conditions_of(campaign))

@@ -1,16 +1,12 @@
-"""Effects linearised together, against the finite motion of a drive and a bar."""
+"""Effects linearised together, against finite motions of a drive and a bar."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from assembly.measurement.predict import with_second_order
-from tests.bar_for_tests import BEAM, LENGTH, bar
-from validation.diagnosis.columns import Columns
-from validation.diagnosis.derivatives import Derivatives
+from tests.bar_for_tests import BEAM, LENGTH, bar, columns_of
 from validation.diagnosis.relinearise import Relinearisation
-from validation.diagnosis.signatures import conditions_of
 from validation.diagnosis.states import Models
 from validation.diagnosis.weighted_readings import WeightedReadings
 
@@ -20,7 +16,7 @@ CAMPAIGN = bar(link=BEAM, rows=20, spread=5.0)
 
 @pytest.fixture(scope="module")
 def columns():
-    return Columns(CAMPAIGN, Derivatives(with_second_order(conditions_of(CAMPAIGN))))
+    return columns_of(CAMPAIGN)
 
 
 def moved():
@@ -67,7 +63,7 @@ def test_linearised_elements_are_exact_at_their_values(columns):
     assert [e.origin for e in again] == elements
 
 
-def test_a_model_finds_values_that_a_linear_one_misses(columns):
+def test_relinearised_model_finds_values_that_a_linear_one_misses(columns):
     elements, xs = effects(columns)
     z = moved() + np.random.default_rng(0).normal(size=120)
     again = known(columns, z)
@@ -80,9 +76,9 @@ def test_a_model_finds_values_that_a_linear_one_misses(columns):
         assert abs(e.values(mean) - x) < 4 * spread
 
 
-def test_a_spring_that_is_a_drives_compliance_is_no_nuisance(columns):
+def test_spring_of_a_drive_is_an_effect_and_not_a_nuisance(columns):
     loaded = replace(CAMPAIGN, loads=np.tile([0, 0, 5.0, 0, 9.0, 0], (20, 1)))
-    loose = Columns(loaded, Derivatives(with_second_order(conditions_of(loaded))))
+    loose = columns_of(loaded)
     small, robot = loose.nuisance, CAMPAIGN.robot
     springs = {
         (robot.frames[f].name, int(axis))

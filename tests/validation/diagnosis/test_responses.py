@@ -1,4 +1,4 @@
-"""Answers to small screws, by hand, one posture or many."""
+"""Responses to small screws, by hand, at one posture or many."""
 
 from dataclasses import replace
 
@@ -30,11 +30,11 @@ def turns_of(campaign):
 
 
 @pytest.mark.parametrize("rows", [1, 50, 51, 120])
-def test_screws_are_carried_along_the_bar_and_loads_back(rows):
-    """However many postures there are, and in whatever order they come again.
+def test_responses_carry_screws_along_the_bar_and_loads_back(rows):
+    """For any number and order of postures.
 
-    A drive's screw turns the whole bar, in the base's axes; the tip's is read as it
-    is, in those of the bar.  At the drive is the moment of the forces at the tip.
+    A drive's screw rotates the whole bar, in base axes; the tip's is read in the
+    axes of the bar.  The wrench at the drive has the moment of the forces at the tip.
     """
     campaign, once = loaded(rows)
     order = np.append(np.arange(rows)[::-1], np.arange(0, rows, 3))
@@ -53,8 +53,8 @@ def test_screws_are_carried_along_the_bar_and_loads_back(rows):
     assert not found.wrenches[:, 1].any()
 
 
-def test_a_device_reads_small_screws_where_and_as_it_stands():
-    """R (t + r x arm), arm to the point it sees; its turn after b by Rodrigues."""
+def test_readings_of_small_screws_follow_the_device_frame():
+    """R (t + r x arm), with the arm to the measured point; rotations by Rodrigues."""
     campaign, conditions = loaded()
     b, point, tool = np.array([0.4, -0.9, 0.7]), [0.1, -0.2, 0.3], [0.05, 0.02, -0.1]
     conditions = replace(
@@ -76,7 +76,7 @@ def test_a_device_reads_small_screws_where_and_as_it_stands():
         )
 
 
-def test_a_row_without_a_solution_answers_nothing():
+def test_row_without_a_solution_has_zero_response():
     """A closed chain with an unknown error; other rows are as before."""
     at = home_posture(five_bar())
     three = replace(
@@ -97,10 +97,10 @@ def test_a_row_without_a_solution_answers_nothing():
 
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("closed", [False, True])
-def test_play_that_rests_changes_no_answer(held, closed):
-    """To first order: it stays where the load has taken it, and the same goes through.
+def test_resting_clearance_changes_no_response(held, closed):
+    """To first order the joint stays where the load has shifted it.
 
-    Of an open chain, and of one that closes.
+    For an open and a closed chain.
     """
     if closed:
         robot, loose = five_bar(), "right.elbow"
@@ -109,9 +109,9 @@ def test_play_that_rests_changes_no_answer(held, closed):
     else:
         campaign, conditions = loaded()
         robot, loose = campaign.robot, "drive"
-    play = Clearance(radial=1e-5, axial=2e-5)
+    clearance = Clearance(radial=1e-5, axial=2e-5)
     frames = tuple(
-        replace(f, clearance=play if f.name == loose else f.clearance)
+        replace(f, clearance=clearance if f.name == loose else f.clearance)
         for f in robot.frames
     )
     there = replace(conditions, robot=replace(robot, frames=frames))
@@ -126,8 +126,8 @@ def test_play_that_rests_changes_no_answer(held, closed):
     assert tight.wrenches.any()
 
 
-def test_play_of_one_of_two_springs_side_by_side_shifts_no_load():
-    """Each carries half: what closes is looked at as if all play were gone."""
+def test_clearance_of_one_of_two_parallel_springs_shifts_no_load():
+    """Each carries half: responses are those without clearance."""
     spring = np.eye(6) * 1e6
     robot = Robot("pair", "end_a", (
         Frame("a", joint_stiffness=spring, clearance=Clearance(radial=1e-5)),
@@ -136,3 +136,13 @@ def test_play_of_one_of_two_springs_side_by_side_shifts_no_load():
     ), (("end_a", "end_b"),))  # fmt: skip
     found = responses(as_declared(home_posture(robot), [0, 0, 0, 30.0, 0, 0]))
     assert found.wrenches[0, [0, 2], 3] == pytest.approx([15.0, 15.0], rel=1e-9)
+
+
+def test_wrenches_are_proportional_to_small_loads():
+    """Zero is what is rounding beside the largest, and not beside 1 N."""
+    load = np.array([0, 0, 3.0, 0, 5.0, 0])
+    one = responses(conditions_of(bar(load, link=BEAM)))
+    tiny = responses(conditions_of(bar(1e-12 * load, link=BEAM)))
+    assert np.abs(one.wrenches).max() > 1.0
+    assert 1e12 * tiny.wrenches == pytest.approx(one.wrenches, rel=1e-9, abs=1e-9)
+    assert tiny.screws == pytest.approx(one.screws)

@@ -1,7 +1,7 @@
-"""A base that rocks, and a tilt sensor on it: a motion with gain one, or one fitted.
+"""A rocking base with a tilt sensor: a measured motion of known or fitted gain.
 
-The machine is turned rigidly, by rotation matrices about its base; the model under test
-knows such a turn as a function of the base, to first order.
+The machine is rotated rigidly, by rotation matrices about its base; the model under
+test has the rotation as a function of the base, to first order.
 """
 
 from dataclasses import replace
@@ -64,15 +64,15 @@ def with_gain(campaign, gain):
     return replace(campaign, robot=replace(campaign.robot, functions=(turn,)))
 
 
-def test_a_known_gain_leaves_noise(rocking):
-    """1 mrad at 0.7 m is some twenty sigma; 0.2 mrad of it too much, some four."""
+def test_known_gain_of_a_measured_motion_leaves_noise(rocking):
+    """1 mrad at 0.7 m is some twenty sigma; a gain too large by 0.2 mrad, some four."""
     assert predict(rocking).error.normalised > 8
     assert 0.85 < predict(with_gain(rocking, GAIN)).error.normalised < 1.15
     assert predict(with_gain(rocking, 1.0)).error.normalised > 2
 
 
 def test_an_unknown_gain_is_learned(rocking):
-    """Of 180 readings and more of turns of 1 mrad: the gain to a few thousandths."""
+    """240 readings of rotations of 1 mrad determine the gain to a few thousandths."""
     found = diagnose(rocking)
     assert found.verdict == "learned"
     assert 0.8 < found.after.normalised < 1.2

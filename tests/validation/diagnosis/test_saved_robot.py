@@ -1,4 +1,4 @@
-"""The robot that is saved is the one whose errors are printed."""
+"""The saved robot has the printed errors."""
 
 import json
 from dataclasses import asdict, replace
@@ -25,12 +25,12 @@ ROWS = 72  # configurations, so that one split judges
 
 
 def machine():
-    """Frames that are all a little off, and a third drive that is set wrongly."""
+    """Errors of all frames, and an offset of the third drive."""
     return arm(encoder_offset={"j3": 2e-3}).with_errors(ERRORS)
 
 
 def read(campaign, seed=5):
-    """What the machine reads for the commands of a campaign, with noise."""
+    """Readings of the machine for the commands of a campaign, with noise."""
     noise = SIGMA * np.random.default_rng(seed).normal(size=(len(campaign), 6))
     seen = predicted(replace(campaign, robot=machine())).deviation + noise
     return replace(campaign, measured=seen)
@@ -48,8 +48,8 @@ def saved(found, tmp_path_factory):
     return read_robot(path)
 
 
-def test_the_file_predicts_the_errors_that_are_printed(found, saved):
-    """To the ten digits of the file: all rows without outliers."""
+def test_saved_robot_predicts_the_printed_errors(found, saved):
+    """To the ten digits of the file, over all rows but outliers."""
     again = predict(replace(found.campaign, robot=saved).take(~found.outliers))
     printed = asdict(found.saved)
     assert asdict(again.error) == pytest.approx(printed, rel=1e-6)
@@ -57,8 +57,8 @@ def test_the_file_predicts_the_errors_that_are_printed(found, saved):
     assert written["error"]["saved"] == pytest.approx(printed)
 
 
-def test_the_error_after_is_of_a_machine_that_never_saw_its_rows(found):
-    """The same unknowns, fitted to the other rows alone from where a fit begins."""
+def test_error_after_is_of_a_fit_without_the_held_out_rows(found):
+    """The same unknowns, fitted to the other rows alone."""
     assert found.held.how == "split"
     used = ~found.held.rows & ~found.outliers
     blind = np.where(found.held.rows[:, None], np.nan, found.campaign.measured)
@@ -72,7 +72,7 @@ def test_the_error_after_is_of_a_machine_that_never_saw_its_rows(found):
     assert 0.75 < found.after.normalised < 1.35
 
 
-def test_what_is_saved_is_fitted_to_all_rows(found, saved):
+def test_saved_robot_is_fitted_to_all_rows(found, saved):
     rows = ~found.outliers
     assert saved.diagnosis["rows_fitted"] == rows.sum() == found.fitted.sum()
     assert len(found.fit.residual) == 6 * rows.sum()
@@ -83,7 +83,7 @@ def test_what_is_saved_is_fitted_to_all_rows(found, saved):
 
 @pytest.mark.parametrize("change", ["noise", "anything"])
 def test_readings_held_out_change_nothing_but_the_errors(found, change):
-    """Effects, functions, probabilities and what is unknown are chosen without them."""
+    """Effects, functions, probabilities and unknowns are selected without them."""
     rng = np.random.default_rng(8)
     held, readings = found.held.rows, found.campaign.measured.copy()
     size = SIGMA if change == "noise" else 1e-2
@@ -103,8 +103,8 @@ def test_readings_held_out_change_nothing_but_the_errors(found, change):
         assert not again.claimed
 
 
-def test_no_fold_is_given_the_readings_by_which_it_is_judged(monkeypatch):
-    """Each is searched and fitted with NaN there; all rows but at the end."""
+def test_folds_are_fitted_without_their_held_out_readings(monkeypatch):
+    """Held-out readings are NaN in each fold; the last fit uses all rows."""
     given, looked = [], []
 
     class Enough(Exception):
@@ -134,17 +134,8 @@ def test_no_fold_is_given_the_readings_by_which_it_is_judged(monkeypatch):
         assert np.array_equal(seen, fitted)
 
 
-def test_the_last_row_of_the_sequence_is_the_error_after(found):
-    assert found.sequence[0].error == found.before
-    assert found.sequence[-1].error == found.after
-    written = table(found)
-    last, after = written["ladder"][-1], written["error"]["after"]
-    assert last["kept_aside_sigma"] == after["normalised"]
-    assert last["kept_aside_rms"] == after["position"]
-
-
-def test_the_file_knows_the_point_that_was_measured(found, saved):
-    """Readings of a table are of it; those of another point say so."""
+def test_saved_robot_keeps_the_measured_point(found, saved):
+    """Predictions at another point name the point of identification."""
     point = tuple(found.campaign.reference_point.tolist())
     assert saved.reference_point == pytest.approx(point)
     same = predict(replace(found.campaign, robot=saved)).table()
@@ -155,8 +146,8 @@ def test_the_file_knows_the_point_that_was_measured(found, saved):
     assert told["reference_point"] == [0.0, 0.0, 0.0]
 
 
-def test_a_bare_table_is_read_at_the_point_of_the_file(found, tmp_path, run):
-    """Through the command: two rows, as predicted for the campaign's."""
+def test_table_without_campaign_uses_the_point_of_the_saved_robot(found, tmp_path, run):
+    """By the command, for two rows of the campaign."""
     save(found, tmp_path / "robot.toml")
     campaign = found.campaign.take(np.arange(2))
     names = ("mx", "my", "mz", "fx", "fy", "fz")
@@ -184,8 +175,8 @@ def test_a_bare_table_is_read_at_the_point_of_the_file(found, tmp_path, run):
     assert {f"std.{c}" for c in ("rx", "tz")} <= set(head)
 
 
-def test_nine_readings_in_ten_lie_in_their_intervals(found, saved):
-    """Of 120 rows that were not measured before: by covariance and noise.
+def test_predicted_intervals_cover_nine_readings_in_ten(found, saved):
+    """120 new rows: intervals of covariance and noise.
 
     720 readings whose errors of the model are common: five standard errors of 0.011.
     """
@@ -198,8 +189,8 @@ def test_nine_readings_in_ten_lie_in_their_intervals(found, saved):
     assert told.spread.max() > 0.1 * SIGMA.min()
 
 
-def test_the_file_knows_how_sure_its_numbers_are(found, saved):
-    """Of every number that was fitted; errors within what it says of them."""
+def test_saved_robot_has_the_covariance_of_its_parameters(found, saved):
+    """Of every fitted parameter."""
     known = read_covariance(saved)
     assert len(known.numbers) == len(found.fit.x)
     assert np.linalg.eigvalsh(known.covariance).min() > -1e-20
@@ -207,8 +198,8 @@ def test_the_file_knows_how_sure_its_numbers_are(found, saved):
     assert any(kind == "geometric_error" for kind, _ in names)
 
 
-def test_components_that_were_not_measured_are_named_and_uncertain(tmp_path):
-    """Heights alone: x and y are as open as errors of frames are large."""
+def test_unmeasured_components_are_named_and_uncertain(tmp_path):
+    """Heights alone are measured: x and y are uncertain by the errors of frames."""
     seen = read(commanded(arm(), 24))
     blind = seen.measured.copy()
     blind[:, :5] = np.nan
@@ -230,8 +221,8 @@ def test_components_that_were_not_measured_are_named_and_uncertain(tmp_path):
     assert np.isnan(std["rotation"])
 
 
-def test_a_machine_that_predicts_worse_is_not_saved(found, tmp_path, run, monkeypatch):
-    """Exit 1 and no file, whatever the verdict; better ones are saved."""
+def test_robot_that_predicts_worse_is_not_saved(found, tmp_path, run, monkeypatch):
+    """Exit status 1 and no file, whatever the verdict."""
     folder = tmp_path / "campaign"
     folder.mkdir()
     worse = replace(found, after=found.before, before=found.after, verdict="learned")

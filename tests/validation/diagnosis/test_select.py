@@ -1,18 +1,14 @@
-"""The search of a diagnosis, on a drive and a bar whose readings are closed forms."""
+"""The search of a diagnosis, on a drive and a bar with closed forms."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from assembly.measurement.predict import with_second_order
-from tests.bar_for_tests import BEAM, LENGTH, along, bar
-from validation.diagnosis.columns import Columns
-from validation.diagnosis.derivatives import Derivatives
+from tests.bar_for_tests import BEAM, LENGTH, along, bar, columns_of
 from validation.diagnosis.elements import Dense
 from validation.diagnosis.search import Search
 from validation.diagnosis.select import select
-from validation.diagnosis.signatures import conditions_of
 from validation.diagnosis.weighted_readings import WeightedReadings
 
 ROWS = 40
@@ -24,17 +20,17 @@ ACROSS = np.cross([0, 0, 1], along(CAMPAIGN))
 
 @pytest.fixture(scope="module")
 def columns():
-    return Columns(CAMPAIGN, Derivatives(with_second_order(conditions_of(CAMPAIGN))))
+    return columns_of(CAMPAIGN)
 
 
 def turned(angle):
-    """(R, 6) readings of a bar whose drive stands wrong by angles (R,)."""
+    """(R, 6) readings of a bar whose drive is off by angles (R,)."""
     still = np.zeros((ROWS, 2))
     return np.hstack([still, angle[:, None], LENGTH * angle[:, None] * ACROSS])
 
 
 def found(columns, readings, seed=0, *, noise=1.0):
-    """What is selected of readings (R, 6) and noise in every cell but each fourth."""
+    """Selection from readings (R, 6) with noise, in three of four cells."""
     z = (readings / CAMPAIGN.sigma).ravel()
     z = z + noise * np.random.default_rng(seed).normal(size=len(z))
     cells = columns.row % 4 > 0
@@ -42,7 +38,7 @@ def found(columns, readings, seed=0, *, noise=1.0):
 
 
 @pytest.mark.parametrize("noise", [0.5, 1.0, 2.0, 3.0])
-def test_noise_teaches_nothing_whatever_sigma_was_stated(columns, noise):
+def test_noise_of_any_scale_selects_nothing(columns, noise):
     selected = found(columns, np.zeros((ROWS, 6)), noise=noise)
     assert selected.hypotheses == selected.functions == ()
     assert max(selected.probability.values(), default=0.0) < 0.1
@@ -69,7 +65,7 @@ def test_waves_of_a_gear_are_found_with_their_number(columns):
     assert one.probability > 0.9
 
 
-def test_growth_with_time_is_no_drift_of_the_reading(columns):
+def test_growth_with_time_is_not_a_drift_of_the_reading(columns):
     sigma = CAMPAIGN.sigma[0, 3]
     grown = 12 * sigma * (TIME / TIME.max())[:, None] * along(CAMPAIGN)
     selected = found(columns, np.hstack([np.zeros((ROWS, 3)), grown]))
@@ -78,7 +74,7 @@ def test_growth_with_time_is_no_drift_of_the_reading(columns):
     assert selected.functions[0].candidate.parts[0].where != "reading"
 
 
-def test_blunders_are_left_out(columns):
+def test_search_excludes_outliers(columns):
     sigma = CAMPAIGN.sigma[0, 3]
     readings = np.zeros((ROWS, 6))
     readings[[1, 10, 21], [3, 4, 3]] = 40 * sigma
@@ -87,16 +83,7 @@ def test_blunders_are_left_out(columns):
     assert (selected.weights < 0.5).sum() == 3
 
 
-def test_no_reading_is_looked_at_but_those_given(columns):
-    other = replace(CAMPAIGN, measured=np.full((ROWS, 6), 1.0))
-    same = Columns(other, Derivatives(with_second_order(conditions_of(other))))
-    readings = turned(np.full(ROWS, 3e-4))
-    one, two = found(columns, readings), found(same, readings)
-    assert one.models == two.models
-    assert np.array_equal(one.values, two.values)
-
-
-def test_functions_scored_together_are_worth_what_each_is_worth_alone(columns):
+def test_joint_scores_of_functions_equal_single_scores(columns):
     rng = np.random.default_rng(4)
     z = 5 * rng.normal(size=6 * ROWS)
     every = np.ones(len(z), dtype=bool)
@@ -112,12 +99,12 @@ def test_functions_scored_together_are_worth_what_each_is_worth_alone(columns):
     assert together == pytest.approx(alone, rel=1e-6)
 
 
-def test_what_readings_see_by_rounding_alone_is_no_place():
+def test_places_seen_by_rounding_alone_are_excluded():
     campaign = bar(link=BEAM, rows=ROWS, spread=0.0, time=TIME)
     measured = np.full((ROWS, 6), np.nan)
     measured[:, 3] = 0.0  # along the bar: turning the drive moves it by rounding
     campaign = replace(campaign, measured=measured)
-    known = Columns(campaign, Derivatives(with_second_order(conditions_of(campaign))))
+    known = columns_of(campaign)
     assert (("drive", "rz", "screw"),) not in known.functions.places.names
     assert (("tip", "tx", "screw"),) in known.functions.places.names + [
         p for equal in known.functions.places.equal for p in equal
@@ -125,7 +112,7 @@ def test_what_readings_see_by_rounding_alone_is_no_place():
 
 
 @pytest.mark.parametrize("size", [6.0, 25.0])
-def test_one_row_alone_teaches_no_function(columns, size):
+def test_single_row_selects_no_function(columns, size):
     readings = np.zeros((ROWS, 6))
     readings[17] = size * CAMPAIGN.sigma[17] * [1, -1, 1, 1, -1, 1]
     selected = found(columns, readings)

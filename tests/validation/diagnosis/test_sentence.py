@@ -11,12 +11,7 @@ from validation.diagnosis import sentence as module
 from validation.diagnosis.calibration import Calibration
 from validation.diagnosis.holdout import HeldOut
 from validation.diagnosis.lack_of_fit import Trend
-from validation.diagnosis.sentence import (
-    calibration_text,
-    formula,
-    open_text,
-    sentence,
-)
+from validation.diagnosis.sentence import calibration_text, formula, open_text, sentence
 
 
 def test_a_product_of_two_variables_names_both():

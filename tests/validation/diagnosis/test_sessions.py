@@ -1,4 +1,4 @@
-"""Campaigns of several sessions, made by the program of springs."""
+"""Campaigns of several sessions, simulated with springs."""
 
 import re
 
@@ -8,7 +8,7 @@ import pytest
 from assembly.files.robot_file import read_robot, write_robot
 from forcefit.inputs.errors import BadInput
 from tests.campaigns_for_tests import write_campaign
-from tests.validation.diagnosis.test_simulated import arm
+from tests.elastic_arm_for_tests import arm, with_errors
 from validation.campaign.campaign_file import read_campaign, read_commands
 from validation.correction.prediction import predict
 from validation.diagnosis.diagnose import diagnose
@@ -27,7 +27,7 @@ FRAMES = {"monday": [0.3, -0.2, 0.5, 1.2, -0.4, 0.7], "tuesday": [0, 0, 1, 2, 0,
 
 
 def registration(session, *, placed):
-    """The tool of a session, and where its device stands."""
+    """Registration of a session: its tool and its device frame."""
     numbers = {f"tool.{k}": v for k, v in zip(SCREW[3:], TOOLS[session], strict=True)}
     if placed:
         base = zip(SCREW, FRAMES[session], strict=True)
@@ -36,9 +36,9 @@ def registration(session, *, placed):
 
 
 def measured(folder, hidden, common=(), known=True):
-    """A campaign of the arm, each session with what is hidden in it and in all."""
+    """Write a campaign of the arm with effects of each session and of all."""
     folder.mkdir(exist_ok=True)
-    robot, body, head = arm(), [], None
+    robot, body, head = with_errors(arm()), [], None
     for number, (session, own) in enumerate(hidden.items()):
         rng = np.random.default_rng(70 + number)
         plan = plan_campaign(robot, DESIGN, rng)
@@ -74,8 +74,8 @@ def parameters(found, name, session=None):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("known", [True, False])
-def test_every_session_has_its_zeros_and_its_tool(known, tmp_path):
-    """A spring that all share is found beside them; the file says all of it."""
+def test_zeros_and_tool_are_found_for_each_session(known, tmp_path):
+    """A common spring is found together with them, and saved."""
     spring = Hidden("drive_compliance", {"j2": SPRING})
     hidden = {
         s: [Hidden("encoder_offset", ZEROS[s]), registration(s, placed=not known)]
@@ -112,8 +112,8 @@ def test_every_session_has_its_zeros_and_its_tool(known, tmp_path):
 
 
 @pytest.mark.slow
-def test_sessions_of_one_machine_have_nothing_of_their_own(tmp_path):
-    """What all share is claimed for all, and saved without a session."""
+def test_common_effects_are_claimed_for_all_sessions(tmp_path):
+    """Common effects are claimed and saved without a session."""
     zeros = Hidden("encoder_offset", ZEROS["monday"])
     folder = measured(tmp_path, {"monday": [], "tuesday": []}, [zeros])
     diagnosis = diagnose(read_campaign(folder))
@@ -125,8 +125,8 @@ def test_sessions_of_one_machine_have_nothing_of_their_own(tmp_path):
 
 
 @pytest.mark.slow
-def test_every_session_drifts_in_its_own_way(tmp_path):
-    """Other components, and 900 s on one day against 2000 s on the other."""
+def test_drift_is_found_for_each_session(tmp_path):
+    """Different components, and time constants of 900 s and 2000 s."""
     drifts = {
         "monday": {"amplitude.tx": 8e-5, "amplitude.ry": 1e-4, "time_constant": 900.0},
         "tuesday": {
@@ -150,7 +150,7 @@ def test_every_session_drifts_in_its_own_way(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_campaign_says_what_else_may_differ(tmp_path):
+def test_per_session_effects_are_read_from_the_campaign(tmp_path):
     """A load cell with another gain each day, 10 % and -8 %."""
     gains = {"monday": 1.1, "tuesday": 0.92}
     hidden = {s: [Hidden("load_gain", {"factor": g})] for s, g in gains.items()}
@@ -171,14 +171,14 @@ def test_a_campaign_says_what_else_may_differ(tmp_path):
     ('"load_gain"', "per_session: found"),
     ("[3]", "found 3, expected effects"),
 ])  # fmt: skip
-def test_what_cannot_differ_by_session_is_refused(given, message, tmp_path):
+def test_wrong_per_session_effect_is_refused(given, message, tmp_path):
     folder = write_campaign(tmp_path / "days", toml={"per_session": given})
     with pytest.raises(BadInput, match=re.escape(message)):
         read_campaign(folder)
 
 
 def in_two_tables(folder, shift):
-    """An arm read on two days; on one humidity shifts it, on the other it is warm."""
+    """An arm on two days: humidity is recorded on one, temperature on the other."""
     rng = np.random.default_rng(3)
     days = {"dry": "temperature", "wet": "humidity"}
     tables = '["dry.csv", "wet.csv"]'
@@ -195,8 +195,8 @@ def in_two_tables(folder, shift):
     return folder
 
 
-def test_a_function_acts_in_the_sessions_that_have_its_covariate(tmp_path):
-    """20 um for each of ten parts of humidity, which one of two tables records."""
+def test_function_acts_only_in_sessions_with_its_covariate(tmp_path):
+    """20 um for each of ten parts of humidity, recorded in one of two tables."""
     folder = in_two_tables(tmp_path / "days", 2e-5)
     diagnosis = diagnose(read_campaign(folder))
     assert diagnosis.verdict == "learned"
@@ -210,7 +210,7 @@ def test_a_function_acts_in_the_sessions_that_have_its_covariate(tmp_path):
     assert again.error.normalised == pytest.approx(diagnosis.saved.normalised)
 
 
-def test_a_covariate_of_one_table_alone_is_no_matter_where_nothing_depends_on_it(
+def test_covariate_of_one_table_is_ignored_without_dependence(
     tmp_path,
 ):
     campaign = read_campaign(in_two_tables(tmp_path / "days", 0.0))

@@ -1,8 +1,8 @@
-"""Set-up blunders of machines whose readings are known: each is found, by its column.
+"""Set-up blunders of machines with known readings, found by column.
 
-The machine is a built-in robot whose commands, loads or readings are written down
-wrongly after it was placed and measured rightly; it has errors of its own of a
-millimetre, which no correction explains.
+The machine is a built-in robot whose commands, loads or readings are changed after
+it was placed and measured; it has errors of its own of a millimetre, which no
+correction explains.
 """
 
 from dataclasses import replace
@@ -68,7 +68,7 @@ class Machine:
         return transforms[:, self.robot.index(self.robot.platform)], deviation
 
     def campaign(self, rotations=False):
-        """What is written down, as it stands now."""
+        """The campaign of the present commands, loads and readings."""
         coordinates, transforms = placed(self.robot, self.q)
         T = transforms[:, self.robot.index(self.robot.platform)]
         gap = Rotation.from_matrix(self.turns @ np.swapaxes(T[:, :3, :3], 1, 2))
@@ -88,7 +88,7 @@ class Machine:
 
 
 def found(campaign):
-    """Blunders, with conditions as the robot's file declares them."""
+    """Return the blunders, under the declared conditions."""
     posture = Posture(campaign.robot, campaign.coordinates, campaign.transforms, 0.0)
     conditions = as_declared(posture, campaign.loads, point=campaign.reference_point)
     return setup_blunders(campaign, conditions)
@@ -137,7 +137,7 @@ def test_exchanged_joints_are_named(rng, pair):
     assert said(machine.campaign()) == {("exchanged", names)}
 
 
-def test_two_blunders_together_are_both_named(rng):
+def test_two_set_up_blunders_are_both_named(rng):
     machine = Machine(rng, unknown=True)
     machine.q[:, 1] *= -1
     machine.q[:, 3] += np.pi / 2
@@ -206,7 +206,7 @@ def test_rotations_that_were_misread_are_named(rng, change, kind, words):
 )  # fmt: skip
 @pytest.mark.parametrize("unknown", [False, True])
 def test_machine_that_is_only_inaccurate_has_no_blunder(rng, name, unknown):
-    """Errors of a millimetre are a hundred sigma, and no blunder."""
+    """Errors of a millimetre, a hundred sigma, are no blunder."""
     machine = Machine(rng, name, spread=0.005, unknown=unknown)
     assert said(machine.campaign(rotations=True)) == set()
 
@@ -220,7 +220,7 @@ def test_drives_of_a_closed_chain_are_named(rng):
     assert said(machine.campaign()) == {("sign", (name,))}
 
 
-def test_readings_of_single_blunders_do_not_hide_it(rng):
+def test_outliers_do_not_hide_a_reversed_joint(rng):
     machine = Machine(rng)
     machine.q[:, 2] *= -1
     machine.points[[3, 17]] += 5.0
@@ -232,7 +232,7 @@ def test_campaign_within_its_noise_has_no_blunder(rng):
 
 
 def test_springs_that_do_not_respond_are_no_blunder_of_units(rng):
-    """The file's drives are soft, the machine is stiff: no load is in another unit."""
+    """The declared drives are soft, the machine is stiff."""
     machine = Machine(rng, force=1e3)
     T, _ = machine.declared(machine.q, machine.loads)
     machine.points = T[:, :3, 3] + T[:, :3, :3] @ POINT
@@ -247,7 +247,7 @@ def test_heights_alone_name_a_joint_where_the_device_is_known(rng):
 
 
 def commanded_by_pose(machine, change):
-    """The campaign of a machine whose commanded poses are written down changed."""
+    """The campaign of a machine with changed commanded poses."""
     T, _ = machine.declared(machine.q, machine.loads)
     turns = Rotation.from_matrix(T[:, :3, :3])
     postures, _ = place_many(machine.robot, change(T[:, :3, 3], turns))
@@ -293,7 +293,7 @@ def test_commanded_places_in_another_unit_are_named(rng):
 
 
 def test_orientations_alone_of_two_sessions_show_a_reversed_joint(rng):
-    """The device stands elsewhere in the second; no position was read."""
+    """The device frame changes between sessions; no position is measured."""
     machine = Machine(rng, unknown=True)
     machine.q[:, 4] *= -1
     first = np.arange(ROWS) < 12

@@ -1,4 +1,4 @@
-"""Conditions of a campaign and tangents of its effects, on a bar known by hand."""
+"""Conditions of a campaign and tangents of its effects, on a bar by hand."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ import pytest
 from assembly.measurement.predict import predict
 from assembly.model.function import Function
 from forcefit.inputs.table import BadInput
-from tests.bar_for_tests import bar, fit_of
+from tests.bar_for_tests import BEAM, LONGER, bar, fit_of
 from tests.planar_arm_for_tests import SIGMA
 from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.hypotheses import Hypothesis
@@ -21,8 +21,8 @@ from validation.diagnosis.signatures import (
 from validation.diagnosis.trace import FINITE
 
 
-def test_the_weight_has_the_direction_that_covariates_say():
-    """Zero where they do not."""
+def test_weight_has_the_direction_of_the_gravity_covariates():
+    """Zero where there are none."""
     along = {"gravity.x": np.arange(8.0), "gravity.z": np.full(8, -9.81)}
     here = conditions_of(bar(**along))
     expected = np.column_stack([np.arange(8.0), np.zeros(8), np.full(8, -9.81)])
@@ -33,7 +33,7 @@ def test_the_weight_has_the_direction_that_covariates_say():
 @pytest.mark.parametrize("name", ["bed", "approach"])
 @pytest.mark.parametrize("given", [True, False])
 def test_a_function_of_a_covariate_needs_its_column(name, given):
-    """But for the side from which one comes, which rows before may tell."""
+    """Except ``approach``, which follows from the rows before."""
     function = (
         Function("reading", ("tx",), ("q.drive",), "reversal", {"0": 1e-6})
         if name == "approach"
@@ -55,7 +55,7 @@ def test_components_of_the_load_that_act_anywhere_are_named():
     assert loaded_components(replace(bar(), loads=loads)) == ["mz", "fy"]
 
 
-def test_the_residual_is_the_reading_less_what_is_declared():
+def test_residual_is_reading_minus_declared_prediction():
     """A bar declared 0.1 mm longer, read 0.3 mm longer; some cells not measured."""
     plain = bar()
     errors = np.zeros((2, 6))
@@ -72,7 +72,7 @@ def test_the_residual_is_the_reading_less_what_is_declared():
 
 
 def test_a_visible_effect_without_unknowns_is_an_offset():
-    """Of a soft drive that turns far, finite motions say much."""
+    """A soft drive with a large rotation."""
     spring = np.diag([np.inf, np.inf, 2e3, np.inf, np.inf, np.inf])
     campaign = bar([0, 0, 0, 0, 150.0, 0], spring=spring)
     tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
@@ -80,3 +80,19 @@ def test_a_visible_effect_without_unknowns_is_an_offset():
     exact = predict(replace(tangents.derivatives.conditions, exact=True)).deviation
     assert found.offset == pytest.approx(whiten(campaign, exact) - tangents.declared)
     assert found.columns.shape == (48, 0)
+
+
+@pytest.mark.parametrize("x", [0.0, 3e-4, -2e-3])
+def test_a_length_has_the_same_tangent_about_any_value(x):
+    """1 / sigma along the bar, and nothing at zero; another length beside it too."""
+    campaign = bar(link=BEAM)
+    tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
+    expected = whiten(campaign, fit_of(campaign, 1.0))
+    beside = {"encoder_offset": {"drive": 1e-9}}
+    for found in (
+        tangents.at_start(LONGER),
+        tangents.about(LONGER, np.array([x]), {}),
+        tangents.about(LONGER, np.array([x]), beside),
+    ):
+        assert found.columns[:, 0] == pytest.approx(expected, abs=1e-6 * expected.max())
+        assert found.offset == pytest.approx(np.zeros(len(expected)), abs=1e-6)

@@ -1,4 +1,4 @@
-"""Noise that points of one measurement have in common, made independent."""
+"""Whitening of noise that points of one measurement have in common."""
 
 from dataclasses import replace
 
@@ -48,7 +48,7 @@ def test_noise_in_common_of_size_zero_changes_nothing():
 
 
 def two_points(rows=40):
-    """The bar with two points of its tip measured at once; rows mixed up."""
+    """The bar with two points of its tip measured together; rows in random order."""
     plain = bar(rows=rows)
     every = np.random.default_rng(2).permutation(np.repeat(np.arange(rows), 2))
     seen, which = {}, []
@@ -66,7 +66,7 @@ def two_points(rows=40):
 
 
 def test_motions_of_the_platform_are_about_the_points_centre():
-    """A rotation of the platform moves each point by its arm, and their mean not."""
+    """A rotation of the platform moves each point by its arm, but not their mean."""
     campaign = two_points()
     motions = platform_motions(campaign, _reading(campaign))
     centre = np.mean(list(campaign.points.values()), axis=0)

@@ -21,7 +21,7 @@ START = 1_700_000_000  # [s] of the first command
 
 
 def write_bag(path, plugin, transforms):
-    """A rosbag2 of what the device of the planar arm read, a second after commands."""
+    """Write a rosbag2 of readings of the planar arm, a second after commands."""
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -61,8 +61,8 @@ def write_bag(path, plugin, transforms):
 
 @pytest.mark.parametrize("transforms", [False, True])
 @pytest.mark.parametrize("plugin", ["SQLITE3", "MCAP"])
-def test_a_bag_is_joined_to_commands_by_time(tmp_path, run, plugin, transforms):
-    """Doubles are kept whole: what is left is rounding, as from a table."""
+def test_bag_is_joined_to_commands_by_time(tmp_path, run, plugin, transforms):
+    """Double precision is kept: deviations are rounding."""
     pytest.importorskip("rosbags")
     lab = Lab(tmp_path)
     lab.commands([START + 60 * k for k in range(len(ANGLES))])
@@ -78,7 +78,7 @@ def test_a_bag_is_joined_to_commands_by_time(tmp_path, run, plugin, transforms):
     assert np.abs(campaign.measured[:, 3:]).max() < 1e-12
 
 
-def test_a_bag_that_is_none_is_one_line(tmp_path):
+def test_damaged_bag_is_refused_in_one_line(tmp_path):
     pytest.importorskip("rosbags")
     (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information: {}\n")
     for path in (tmp_path, tmp_path / "no.bag"):
@@ -87,11 +87,11 @@ def test_a_bag_that_is_none_is_one_line(tmp_path):
         assert "\n" not in str(error.value)
 
 
-def test_without_rosbags_it_says_what_to_install(tmp_path, monkeypatch):
+def test_missing_rosbags_names_the_package_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "rosbags.highlevel", None)
     with pytest.raises(BadInput, match=r"install forcefit\[ros\], or export"):
         read_bag(tmp_path / "lab.bag")
 
 
-def test_a_name_that_no_file_can_have_is_no_bag():
+def test_overlong_name_is_no_bag():
     assert not is_bag("x" * 300)

@@ -1,4 +1,4 @@
-"""Files as devices' programs write them: every one holds the same perfect readings.
+"""Exports of devices' programs, all with the same exact readings.
 
 The readings come from the planar arm's closed form, so a campaign made of any of these
 files has deviations that are rounding.
@@ -33,7 +33,7 @@ def lab(tmp_path):
 
 
 def imported(lab, run, text, encoding="utf-8"):
-    """What the command says of an export, as JSON."""
+    """Import an export and return the command's JSON."""
     lab.folder.joinpath("export.txt").write_bytes(text.encode(encoding))
     status, out, err = run(*lab.words(), "--json", "-")
     assert status == 0, err
@@ -41,7 +41,7 @@ def imported(lab, run, text, encoding="utf-8"):
 
 
 def refused(lab, run, text):
-    """The one line that refuses an export; nothing is written."""
+    """Return the line that refuses an export, and check that nothing is written."""
     lab.export(text)
     status, out, err = run(*lab.words())
     assert (status, out) == (2, "")
@@ -50,7 +50,7 @@ def refused(lab, run, text):
 
 
 def assert_exact(lab, readings=None):
-    """Deviations of the campaign are rounding, and as many as given are there."""
+    """Check that deviations are rounding, and the number of readings."""
     campaign = read_campaign(lab.folder / "campaign")
     assert np.nanmax(np.abs(campaign.measured[:, 3:])) < 1e-9
     if readings is not None:
@@ -91,78 +91,105 @@ def test_leica_export_with_a_zero_uncertainty_is_read(lab, run, encoding):
     assert campaign.covariates["time"] == pytest.approx(60.0 * np.arange(13))
 
 
-WIDE_HEADS = {
-    "prefix": ",".join(f"{n} {a} [mm]" for n in "ABC" for a in "XYZ"),
-    "dots": ",".join(f"arm.{n}.{a}" for n in "ABC" for a in "xyz"),
-    "suffix": ",".join(f"{a}_{n}" for n in "ABC" for a in "xyz"),
-    "joined": ",".join(f"{n}{a}" for n in "ABC" for a in "xyz"),
-    "numbered": ",".join(f"{a}{k}" for k in (1, 2, 3) for a in "xyz"),
-    "twice": ",".join("XYZ" * 3),
+def with_commas(lines):
+    """Decimal commas, as in German exports; dates keep their points."""
+    return [line.replace(".", ",").replace("02,03,", "02.03.") for line in lines]
+
+
+def hidden(lines):
+    """A target that was hidden in the fifth line."""
+    cells = lines[4].split(",")
+    cells[2:5] = "", "", ""
+    return [*lines[:4], ",".join(cells), *lines[5:]]
+
+
+AXES = ",".join("XYZ" * 3)
+MOTIVE = [
+    "Format Version,1.23,Capture Frame Rate,120.0,Length Units,Millimeters", "",
+    ",Type," + ",".join(["Marker"] * 9),
+    ",Name," + ",".join(f"arm:{n}" for n in "ABC" for _ in "xyz"),
+    ",ID," + ",".join(["7"] * 9), ",," + ",".join(["Position"] * 9),
+    "Frame,Time (Seconds)," + AXES,
+]  # fmt: skip
+VICON = ["Trajectories", "100", ",,arm:A,,,arm:B,,,arm:C,,", "Frame,Sub Frame," + AXES,
+         ",,mm" + 8 * ",mm"]  # fmt: skip
+GERMAN = with_commas(
+    points(line="p{k}::{name};{x!r};{y!r};{z!r};02.03.2026;10:{k:02d}:00")
+)
+FARO = "FARO CAM2 2023\nReport: robot 7\n{}\nCoordinate System: World\n\n"
+FARO += "Name\tX\tY\tZ\tDeviation"
+FARO_ROWS = list(points(line="p{k}::{name}\t{x!r}\t{y!r}\t{z!r}\t0.0021"))
+BLANKS = list(points(line="p{k}::{name}   {x!r}  {y!r}  {z!r}"))
+STATED, COMMA = {"unit": None}, {"unit": None, "decimal": '","'}
+# head, body, keys of the targets file
+EXPORTS = {
+    "prefix": (",".join(f"{n} {a} [mm]" for n in "ABC" for a in "XYZ"), rows(), {}),
+    "dots": (",".join(f"arm.{n}.{a}" for n in "ABC" for a in "xyz"), rows(), {}),
+    "suffix": (",".join(f"{a}_{n}" for n in "ABC" for a in "xyz"), rows(), {}),
+    "joined": (",".join(f"{n}{a}" for n in "ABC" for a in "xyz"), rows(), {}),
+    "numbered": (",".join(f"{a}{k}" for k in (1, 2, 3) for a in "xyz"), rows(), {}),
+    "axes alone": (AXES, rows(), {}),
+    "commands in rows": (
+        "Point," + ",".join(f"{n} {a} [mm]" for n in "ABC" for a in "XYZ"),
+        reversed(list(rows(line="p{k}"))), {},
+    ),
+    # a target that was hidden is missing
+    "Vicon": ("\n".join(VICON), hidden(list(rows(line="{k}00,0"))), STATED),
+    "Motive": ("\n".join(MOTIVE), rows(line="{k},0.{k}"), STATED),
+    "German": ("Punkt;X [mm];Y [mm];Z [mm];Datum;Uhrzeit", GERMAN, COMMA),
+    "slash": ("Punktname;X / mm;Y / mm;Z / mm;Datum;Zeit", GERMAN, COMMA),
+    "underline": ("Point Name;X_mm;Y_mm;Z_mm;Date;Time", GERMAN, COMMA),
+    "FARO": (FARO.format("Units: Millimeters"), FARO_ROWS, STATED),
+    "FARO in": (FARO.format("Units in mm"), FARO_ROWS, STATED),
+    "FARO unit": (FARO.format("unit\tmm"), FARO_ROWS, STATED),
+    "blanks": ("Point Name    X          Y          Z", BLANKS, {}),
+    "blanks, units": ("Point  X [mm]  Y [mm]  Z [mm]", BLANKS, {}),
+    "blank, units": ("Point X [mm] Y [mm] Z [mm]", BLANKS, {}),
+    # the commands are separated by commas and have points
+    "commas": ("Point;X [mm];Y [mm];Z [mm]",
+               with_commas(points(line="p{k}::{name};{x!r};{y!r};{z!r}")), COMMA),
+}  # fmt: skip
+EXPORTS = {
+    name: (head, list(body), keys) for name, (head, body, keys) in EXPORTS.items()
 }
 
 
-@pytest.mark.parametrize("head", WIDE_HEADS)
-def test_table_with_all_targets_in_a_row_is_read(lab, run, head):
-    table = imported(lab, run, "\n".join([WIDE_HEADS[head], *rows()]))
-    assert (table["readings"], table["rows"]) == (39, 13)
-    assert_exact(lab, 39)
-
-
-def test_wide_table_is_joined_by_the_commands_in_its_rows(lab, run):
-    head = "Point," + WIDE_HEADS["prefix"]
-    body = list(rows(line="p{k}"))
-    table = imported(lab, run, "\n".join([head, *reversed(body)]))
-    assert (table["joined_by"], table["readings"]) == ("name", 39)
-    assert_exact(lab, 39)
+@pytest.mark.parametrize("name", EXPORTS)
+def test_export_of_a_device_program_is_read_exactly(lab, run, name):
+    head, body, keys = EXPORTS[name]
+    lab.targets(**keys)
+    encoding = "utf-8-sig" if name == "commas" else "utf-8"
+    text = "\n".join([head, *body])
+    if name == "Vicon":
+        text = text.replace("\n", "\r\n")
+    table = imported(lab, run, text, encoding)
+    readings = 38 if name == "Vicon" else 39
+    assert (table["readings"], table["rows"]) == (readings, 13)
+    assert_exact(lab, readings)
+    named = any("p3" in line for line in body)
+    assert table["joined_by"] == ("name" if named else "order")
+    if name == "Vicon":
+        assert "1 readings without coordinates" in table["left_out"][0]
+    if "Dat" in head:  # Datum, Date
+        times = read_campaign(lab.folder / "campaign").covariates["time"]
+        assert times == pytest.approx(60.0 * np.repeat(np.arange(13), 3))
 
 
 @pytest.mark.parametrize("before", [None, "{k}", "{k}.5"])
-def test_rows_of_numbers_alone_are_all_targets_in_their_order(lab, run, before):
-    """A counter or a time before them is told by the targets' distances."""
+def test_rows_of_numbers_are_targets_in_their_order(lab, run, before):
+    """A counter or a time before them is recognised by the targets' distances."""
     body = [row + ",35.1,-2.5,0.4" for row in rows(line=before)]
     assert imported(lab, run, "\n".join(body))["readings"] == 39
     assert_exact(lab, 39)
 
 
-def test_rows_without_any_reading_are_one_line(lab, run):
+def test_rows_without_readings_are_refused(lab, run):
     line = refused(lab, run, "\n".join(["NaN " * 9] * 13))
     assert "found no" in line
 
 
-def test_vicon_trajectories_are_read(lab, run):
-    """Names above merged cells, units below; a target that was hidden is missing."""
-    body = list(rows(line="{k}00,0"))
-    cells = body[4].split(",")
-    cells[2:5] = "", "", ""
-    body[4] = ",".join(cells)
-    head = ["Trajectories", "100", ",,arm:A,,,arm:B,,,arm:C,,",
-            "Frame,Sub Frame,X,Y,Z,X,Y,Z,X,Y,Z", ",,mm" + 8 * ",mm"]  # fmt: skip
-    lab.targets(unit=None)
-    table = imported(lab, run, "\r\n".join([*head, *body]))
-    assert table["readings"] == 38
-    assert "1 readings without coordinates" in table["left_out"][0]
-    assert_exact(lab, 38)
-
-
-def test_motive_csv_is_read(lab, run):
-    """OptiTrack's: properties, then name, ID and kind of each column above the axes."""
-    head = [
-        "Format Version,1.23,Capture Frame Rate,120.0,Length Units,Millimeters",
-        "",
-        ",Type," + ",".join(["Marker"] * 9),
-        ",Name," + ",".join(f"arm:{n}" for n in "ABC" for _ in "xyz"),
-        ",ID," + ",".join(["7"] * 9),
-        ",," + ",".join(["Position"] * 9),
-        "Frame,Time (Seconds)," + ",".join("XYZ" * 3),
-    ]
-    lab.targets(unit=None)
-    table = imported(lab, run, "\n".join([*head, *rows(line="{k},0.{k}")]))
-    assert table["readings"] == 39
-    assert_exact(lab, 39)
-
-
 def test_motive_rigid_body_is_read_without_its_markers(lab, run):
-    """Its rotation is a quaternion x, y, z, w; its markers have its name too."""
+    """Its rotation is a quaternion x, y, z, w; its markers also have its name."""
     lab.targets("A", unit=None, noise_rotation=1e-4)
     kinds = ["Rotation"] * 4 + ["Position"] * 6
     head = [
@@ -182,57 +209,9 @@ def test_motive_rigid_body_is_read_without_its_markers(lab, run):
     assert_exact(lab, 13)
 
 
-@pytest.mark.parametrize(
-    "head",
-    ["Punkt;X [mm];Y [mm];Z [mm];Datum;Uhrzeit",
-     "Punktname;X / mm;Y / mm;Z / mm;Datum;Zeit",
-     "Point Name;X_mm;Y_mm;Z_mm;Date;Time"],
-)  # fmt: skip
-def test_german_headers_and_units_after_a_slash_are_read(lab, run, head):
-    lab.targets(unit=None, decimal='","')
-    line = "p{k}::{name};{x!r};{y!r};{z!r};02.03.2026;10:{k:02d}:00"
-    body = [line.replace(".", ",").replace("02,03,", "02.03.")
-            for line in points(line=line)]  # fmt: skip
-    imported(lab, run, "\n".join([head, *body]))
-    assert_exact(lab, 39)
-    times = read_campaign(lab.folder / "campaign").covariates["time"]
-    assert times == pytest.approx(60.0 * np.repeat(np.arange(13), 3))
-
-
-@pytest.mark.parametrize("stated", ["Units: Millimeters", "Units in mm", "unit\tmm"])
-def test_lines_before_the_header_are_passed_over_and_say_the_unit(lab, run, stated):
-    head = ["FARO CAM2 2023", "Report: robot 7", stated, "Coordinate System: World", ""]
-    lab.targets(unit=None)
-    body = points(line="p{k}::{name}\t{x!r}\t{y!r}\t{z!r}\t0.0021")
-    text = "\n".join([*head, "Name\tX\tY\tZ\tDeviation", *body])
-    assert imported(lab, run, text)["joined_by"] == "name"
-    assert_exact(lab, 39)
-
-
-@pytest.mark.parametrize(
-    "head",
-    ["Point Name    X          Y          Z", "Point  X [mm]  Y [mm]  Z [mm]",
-     "Point X [mm] Y [mm] Z [mm]"],
-)  # fmt: skip
-def test_header_of_words_in_a_table_of_blanks_is_read(lab, run, head):
-    body = points(line="p{k}::{name}   {x!r}  {y!r}  {z!r}")
-    assert imported(lab, run, "\n".join([head, *body]))["joined_by"] == "name"
-    assert_exact(lab, 39)
-
-
 def test_unit_stated_in_the_file_and_another_declared_are_refused(lab, run):
     line = refused(lab, run, "Units: Inches\nname;x;y;z\nA;1;2;3")
     assert 'line 1: found the unit "in", the targets file says "mm"' in line
-
-
-def test_decimal_comma_of_an_export_does_not_touch_a_table_of_commas(lab, run):
-    """The commands are parted by commas and have points."""
-    lab.targets(unit=None, decimal='","')
-    body = [
-        line.replace(".", ",") for line in points(line="p{k}::{name};{x!r};{y!r};{z!r}")
-    ]
-    imported(lab, run, "\n".join(["Point;X [mm];Y [mm];Z [mm]", *body]), "utf-8-sig")
-    assert_exact(lab, 39)
 
 
 def test_decimal_is_declared_for_each_table(lab, run):
@@ -249,7 +228,7 @@ def test_decimal_is_declared_for_each_table(lab, run):
 
 
 def test_time_of_the_commands_reaches_the_campaign(lab, run):
-    """The export has no clock; the table of commands has one, in minutes."""
+    """The export has no time; the table of commands has one, in minutes."""
     lab.commands([str(0.5 * k) for k in range(13)], head="id,q.one,q.two")
     text = (lab.folder / "commands.csv").read_text().replace("time", "time [min]")
     (lab.folder / "commands.csv").write_text(text)
@@ -259,17 +238,14 @@ def test_time_of_the_commands_reaches_the_campaign(lab, run):
     assert campaign.covariates["time"] == pytest.approx(times)
 
 
-@pytest.mark.parametrize(
-    ("column", "message"),
-    [
-        ("cov.temperature [K]", None),
-        ("cov.temperature [°C]", None),
-        ("cov.humidity [%]", None),
-        ("cov.temperature [kg]", 'found the unit "kg"'),
-        ("load.fx [mm]", 'found the unit "mm"'),
-    ],
-)
-def test_units_of_commands_are_those_of_their_kind(lab, run, column, message):
+@pytest.mark.parametrize(("column", "message"), [
+    ("cov.temperature [K]", None),
+    ("cov.temperature [°C]", None),
+    ("cov.humidity [%]", None),
+    ("cov.temperature [kg]", 'found the unit "kg"'),
+    ("load.fx [mm]", 'found the unit "mm"'),
+])  # fmt: skip
+def test_units_of_commands_must_match_their_quantity(lab, run, column, message):
     lab.commands(range(13))
     path = lab.folder / "commands.csv"
     path.write_text(path.read_text().replace("time", column), encoding="utf-8")
@@ -285,7 +261,7 @@ def test_units_of_commands_are_those_of_their_kind(lab, run, column, message):
 
 @pytest.mark.parametrize("nothing", ["NaN", "", "-", "#N/A"])
 def test_reading_without_coordinates_is_missing_and_keeps_its_place(lab, run, nothing):
-    """Joined by order: the readings after it belong to the commands after it."""
+    """Joined by order, later readings belong to later commands."""
     lab.targets("A")
     body = list(points("A", "A;{x!r};{y!r};{z!r}"))
     body[6] = f"A;{nothing};{nothing};{nothing}"
@@ -296,7 +272,7 @@ def test_reading_without_coordinates_is_missing_and_keeps_its_place(lab, run, no
     assert "p6" not in lab.table()["id"]
 
 
-def test_reading_that_a_file_has_twice_is_named(lab, run):
+def test_repeated_reading_is_named(lab, run):
     body = list(points(line=SPATIAL_ANALYZER))
     table = imported(lab, run, "\n".join([*body, body[4]]))
     assert table["readings"] == 39
@@ -304,8 +280,8 @@ def test_reading_that_a_file_has_twice_is_named(lab, run):
     assert 'line 40 ("Main::p1::B"): the same reading twice' in line
 
 
-def test_reading_that_is_one_too_many_is_named(lab, run):
-    """Joined by order a repeated line moves all that follow."""
+def test_surplus_reading_is_named(lab, run):
+    """Joined by order, a repeated line shifts all later readings."""
     body = list(points("A", "{name} {x!r} {y!r} {z!r}"))
     lab.targets("A")
     line = refused(lab, run, "\n".join([*body[:6], body[5], *body[6:]]))
@@ -313,7 +289,7 @@ def test_reading_that_is_one_too_many_is_named(lab, run):
     assert line.endswith("; line 7 repeats line 6")
 
 
-def test_what_is_there_twice_in_the_commands_is_named(lab, run):
+def test_duplicates_in_the_commands_are_named(lab, run):
     path = lab.folder / "commands.csv"
     text = path.read_text()
     path.write_text(text.replace("p5", "p3"))
@@ -332,15 +308,12 @@ def changed(change):
     return "\n".join(points(line=SPATIAL_ANALYZER, change=lambda k, n, p: change(p)))
 
 
-@pytest.mark.parametrize(
-    ("factor", "words"),
-    [
-        (1 / 25.4, "times 25.4, as in taken for mm"),
-        (25.4, "times 0.03937, as mm taken for in"),
-        (1e-3, "times 1000, as m taken for mm"),
-        (1 / 304.8, "times 304.8, as ft taken for mm"),
-    ],
-)
+@pytest.mark.parametrize(("factor", "words"), [
+    (1 / 25.4, "times 25.4, as in taken for mm"),
+    (25.4, "times 0.03937, as mm taken for in"),
+    (1e-3, "times 1000, as m taken for mm"),
+    (1 / 304.8, "times 304.8, as ft taken for mm"),
+])  # fmt: skip
 def test_lengths_of_another_unit_are_refused_with_the_factor(lab, run, factor, words):
     line = refused(lab, run, changed(lambda p: factor * p))
     assert f"unit: the readings fit far better {words}" in line
@@ -354,15 +327,12 @@ def test_left_handed_coordinates_are_refused(lab, run, axis):
     assert "left-handed: the readings fit far better with one axis reversed" in line
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (lambda p: p * [1, -1, 1], "where y is the device's -y"),
-        (lambda p: p[[1, 0, 2]], "where x is the device's y, y is the device's x"),
-    ],
-)
+@pytest.mark.parametrize(("change", "words"), [
+    (lambda p: p * [1, -1, 1], "where y is the device's -y"),
+    (lambda p: p[[1, 0, 2]], "where x is the device's y, y is the device's x"),
+])  # fmt: skip
 def test_axes_of_a_known_registration_are_named(lab, run, change, words):
-    """The base's axes stand: which one is reversed can be told."""
+    """With known base axes the reversed one is named."""
     lab.targets(registration='"known"')
 
     def base(k, name, p):
@@ -381,44 +351,39 @@ def test_targets_declared_in_millimetres_are_refused_with_the_factor(lab, run):
     assert "0.001 times as far, all alike, as mm taken for m" in line
 
 
-def test_targets_that_are_elsewhere_are_remarked(lab, run):
-    """B was mounted 60 mm from its place: its distances are not those declared."""
+def moved_mount(k, name, p):
+    """B is mounted 60 mm from its declared place."""
+    turn = Rotation.from_euler("z", sum(ANGLES[k]))
+    return p + (name == "B") * TURN.inv().apply(turn.apply([0, 0.06, 0]))
 
-    def change(k, name, p):
-        turn = Rotation.from_euler("z", sum(ANGLES[k]))
-        return p + (name == "B") * TURN.inv().apply(turn.apply([0, 0.06, 0]))
 
-    lab.export("\n".join(points(line=SPATIAL_ANALYZER, change=change)))
+def no_target(k, name, p):
+    return np.random.default_rng([k, ord(name)]).normal(0, 0.8, 3)
+
+
+SHUFFLED = list(points("A", "{x!r} {y!r} {z!r}"))
+REMARKS = {
+    "other distances": ("ABC", points(line=SPATIAL_ANALYZER, change=moved_mount),
+        "remark: A and B are read 0.162 .. 0.162 m apart, declared 0.143"),
+    "other order": ("A", SHUFFLED[::2] + SHUFFLED[1::2],
+        "are they joined to the right ones?"),
+    "no targets": ("ABC", points(line=SPATIAL_ANALYZER, change=no_target),
+        "distances differ from row to row, whatever was commanded"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REMARKS)
+def test_readings_that_do_not_fit_targets_or_commands_are_remarked(lab, run, case):
+    names, lines, remark = REMARKS[case]
+    lab.targets(names)
+    lab.export("\n".join(lines))
     status, out, _ = run(*lab.words())
     assert status == 0
-    assert "remark: A and B are read 0.162 .. 0.162 m apart, declared 0.143" in out
-
-
-def test_readings_that_do_not_follow_the_commands_are_remarked(lab, run):
-    """Joined by order, and the commands were written down in another."""
-    lab.targets("A")
-    body = list(points("A", "{x!r} {y!r} {z!r}"))
-    lab.export("\n".join(body[::2] + body[1::2]))
-    status, out, _ = run(*lab.words())
-    assert status == 0
-    assert "are they joined to the right ones?" in out
-
-
-def test_columns_that_are_no_places_of_targets_are_remarked_as_such(lab, run):
-    """No command can be to blame where the targets' own distances come and go."""
-
-    def change(k, name, p):
-        return np.random.default_rng([k, ord(name)]).normal(0, 0.8, 3)
-
-    lab.export("\n".join(points(line=SPATIAL_ANALYZER, change=change)))
-    status, out, _ = run(*lab.words())
-    assert status == 0
-    assert "distances differ from row to row, whatever was commanded" in out
+    assert remark in out
 
 
 @pytest.mark.parametrize("piece", ["[", "(", " [", "0", "<body>"])
-def test_endless_cell_is_refused_by_its_line(lab, run, piece):
-    """Looking for a unit in 200 000 brackets took minutes."""
+def test_very_long_cell_is_refused_with_its_line(lab, run, piece):
     lines = list(points(line=SPATIAL_ANALYZER))
     lines[1] += piece * 200_000 + "x"
     line = refused(lab, run, "\n".join(lines))
@@ -467,7 +432,7 @@ ORIENTATIONS = {
 @pytest.mark.filterwarnings("ignore:Gimbal")
 @pytest.mark.parametrize("kind", ORIENTATIONS)
 def test_orientations_become_rotations_of_the_platform(lab, run, kind):
-    """The platform stands as commanded; how the target is mounted is found."""
+    """The mount of the target is found from commanded poses."""
     head, values, keys = ORIENTATIONS[kind]
     lab.targets("A", noise_rotation=1e-4, **keys)
     text = "\n".join(["X,Y,Z," + head, *oriented_rows(values)])
@@ -503,22 +468,20 @@ def test_declared_mount_gives_the_rotations_themselves(lab, run, rng):
          "orientation: found"),
     ],
 )  # fmt: skip
-def test_orientations_that_are_not_certain_are_refused(
-    lab, run, head, values, keys, message
-):
+def test_ambiguous_orientations_are_refused(lab, run, head, values, keys, message):
     lab.targets("A", noise_rotation=1e-4, **keys)
     text = "\n".join(["X,Y,Z," + head, *oriented_rows(values)])
     assert message in refused(lab, run, text)
 
 
-def test_orientations_are_passed_over_without_their_noise(lab, run):
+def test_orientations_without_stated_noise_are_ignored(lab, run):
     head, values, _ = ORIENTATIONS["quaternion"]
     lab.targets("A")
     imported(lab, run, "\n".join(["X,Y,Z," + head, *oriented_rows(values)]))
     assert not [name for name in lab.table() if name.startswith("meas.r")]
 
 
-def test_orientation_of_one_of_several_targets_is_the_platforms(lab, run):
+def test_orientation_of_one_target_is_that_of_the_platform(lab, run):
     """Wide: A has a quaternion, B and C are points."""
     head = "A x,A y,A z,A qw,A qx,A qy,A qz,B x,B y,B z,C x,C y,C z"
     lab.targets(noise_rotation=1e-4)
@@ -537,8 +500,8 @@ def test_orientation_of_one_of_several_targets_is_the_platforms(lab, run):
 # -- cells and clocks ---------------------------------------------------------------
 
 
-def test_cells_are_parted_by_what_most_lines_have(tmp_path):
-    """A preamble of other marks does not decide; quoted marks do not part cells."""
+def test_delimiter_is_the_mark_of_most_lines(tmp_path):
+    """A preamble with other marks and quoted marks do not count."""
     path = tmp_path / "a.txt"
     path.write_text('a title, of a file\n"p, 1";2;3\n"p, 2";4;5\n"p, 3";6;7\n')
     cells = [cells for _, cells in read_sheet(path).rows]
@@ -548,7 +511,7 @@ def test_cells_are_parted_by_what_most_lines_have(tmp_path):
     assert (sheet.decimal, sheet.rows[0][1]) == (",", ["p1", "1,5", "2,5", "3,5"])
 
 
-def test_file_that_is_no_text_is_refused(tmp_path):
+def test_binary_file_is_refused(tmp_path):
     path = tmp_path / "a.txt"
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(40) + b"name,x,y,z")
     with pytest.raises(BadInput, match="holds NUL"):

@@ -1,4 +1,4 @@
-"""A tracker's files to a campaign: the device's own place is known to the tests."""
+"""A tracker's files to a campaign, with a known device frame."""
 
 import csv
 import json
@@ -8,7 +8,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.campaigns_for_tests import ARM
-from validation.campaign.campaign import Campaign
 from validation.campaign.campaign_file import read_campaign
 from validation.exchange.device_table import Writing, parse_time
 
@@ -32,7 +31,7 @@ def seen(angles, name):
 
 
 class Lab:
-    """A folder in which files for an import are written."""
+    """A folder with files for an import."""
 
     def __init__(self, folder):
         self.folder = folder
@@ -90,7 +89,7 @@ SPATIAL_ANALYZER = "Main::p{k}::{name}, {x!r}, {y!r}, {z!r}"
 
 
 def test_spatial_analyzer_text_joined_by_name(lab, run):
-    """Perfect readings: deviations are rounding, and the device is found again."""
+    """Exact readings: deviations are rounding, and the device frame is found."""
     lab.export("// a comment\n" + "\n".join(points(line=SPATIAL_ANALYZER)))
     status, out, err = run(*lab.words(), "--json", "-")
     assert status == 0, err
@@ -110,8 +109,8 @@ def test_spatial_analyzer_text_joined_by_name(lab, run):
     assert 'robot = "../robot.toml"' in declared
 
 
-def test_one_command_from_a_device_s_file_to_the_verdict(lab, run):
-    """Readings of the declared arm itself, noise apart: it lacks nothing."""
+def test_import_diagnoses_a_device_file(lab, run):
+    """Readings of the declared arm with noise."""
     noise = np.random.default_rng(1).normal(size=(len(ANGLES), 3))
     lab.export("\n".join(points(
         "A", "p{k}, {x!r}, {y!r}, {z!r}", lambda k, name, p: p + 1e-5 * noise[k]
@@ -128,15 +127,6 @@ def test_one_command_from_a_device_s_file_to_the_verdict(lab, run):
     assert status == 0, err
     assert json.loads(out)["verdict"] == "none_needed"
     assert report.stat().st_size < 5e6
-
-
-@pytest.mark.skipif(
-    "points" not in Campaign.__dataclass_fields__, reason="campaigns have no points yet"
-)
-def test_several_targets_are_points_of_the_campaign(lab, run):
-    lab.export("\n".join(points(line=SPATIAL_ANALYZER)))
-    assert run(*lab.words())[0] == 0
-    assert len(read_campaign(lab.folder / "campaign")) == 39
 
 
 def test_a_german_table_with_times_and_uncertainty(lab, run):
@@ -212,7 +202,7 @@ def test_targets_exchanged_in_every_row_are_refused(lab, run):
 
 
 def test_readings_joined_by_order_and_read_twice(lab, run):
-    """Two files: the second has every point again; a name alone says no command."""
+    """Two files with the same points; names without commands are joined by order."""
     lab.export("\n".join(points(line="{name} {x!r} {y!r} {z!r}")))
     assert run(*lab.words())[0] == 0
     lab.folder.joinpath("campaign/measurements.csv").unlink()
@@ -224,26 +214,23 @@ def test_readings_joined_by_order_and_read_twice(lab, run):
     assert lab.table()["id"][:4] == ["p0", "p0.2", "p1", "p1.2"]
 
 
-@pytest.mark.parametrize(
-    ("text", "targets", "message"),
-    [
-        ("name x y\nA 1 2", {}, "found no column z"),
-        ("name;x;y;z\nA;1;2;3", {"unit": None}, "found no unit of lengths"),
-        ("name;x [furlong];y;z\nA;1;2;3", {}, 'found the unit "furlong"'),
-        ("name;x;y;z\nA;1,5;2;3", {}, "if that is a decimal mark say decimal"),
-        ("name;x;y;z\nA;1;2", {}, "found 3 cells, expected 4"),
-        ("name;x;y;z\nD;1;2;3", {}, 'the name of one target in it: "A", "B", "C"'),
-        ("A 1 2 3\nA 1 2 4", {}, 'found 2 readings of "A" for 13 commands'),
-        ("name;x;y;z;time\nA;1;2;3;noon", {}, "expected a time: seconds"),
-        ("name;x;y;z;date\nA;1;2;3;3/4/2026 10:00:00", {}, 'expected dates = "day_fi'),
-        ("name;x;y;z;U95 x\nA;1;2;3;-4", {}, "found -0.002 m, expected >= 0"),
-        ("", {}, "empty; expected a table"),
-        ("A 1 2 3", {"unit": '"ft"'}, "unit: found 'ft'"),
-        ("A 1 2 3", {"robot": None}, "robot: missing"),
-        ("A 1 2 3", {"windw": 3}, 'unknown key "windw"; did you mean "window"?'),
-    ],
-)
-def test_wrong_files_are_one_line(lab, run, text, targets, message):
+@pytest.mark.parametrize(("text", "targets", "message"), [
+    ("name x y\nA 1 2", {}, "found no column z"),
+    ("name;x;y;z\nA;1;2;3", {"unit": None}, "found no unit of lengths"),
+    ("name;x [furlong];y;z\nA;1;2;3", {}, 'found the unit "furlong"'),
+    ("name;x;y;z\nA;1,5;2;3", {}, "if that is a decimal mark say decimal"),
+    ("name;x;y;z\nA;1;2", {}, "found 3 cells, expected 4"),
+    ("name;x;y;z\nD;1;2;3", {}, 'the name of one target in it: "A", "B", "C"'),
+    ("A 1 2 3\nA 1 2 4", {}, 'found 2 readings of "A" for 13 commands'),
+    ("name;x;y;z;time\nA;1;2;3;noon", {}, "expected a time: seconds"),
+    ("name;x;y;z;date\nA;1;2;3;3/4/2026 10:00:00", {}, 'expected dates = "day_fi'),
+    ("name;x;y;z;U95 x\nA;1;2;3;-4", {}, "found -0.002 m, expected >= 0"),
+    ("", {}, "empty; expected a table"),
+    ("A 1 2 3", {"unit": '"ft"'}, "unit: found 'ft'"),
+    ("A 1 2 3", {"robot": None}, "robot: missing"),
+    ("A 1 2 3", {"windw": 3}, 'unknown key "windw"; did you mean "window"?'),
+])  # fmt: skip
+def test_wrong_device_file_is_refused_in_one_line(lab, run, text, targets, message):
     lab.targets(**targets)
     lab.export(text)
     status, out, err = run(*lab.words())
@@ -252,16 +239,13 @@ def test_wrong_files_are_one_line(lab, run, text, targets, message):
     assert not (lab.folder / "campaign").exists()
 
 
-@pytest.mark.parametrize(
-    ("head", "message"),
-    [
-        ("id,q.one,q.to", 'unknown column "q.to"; did you mean "q.two"?'),
-        ("id,q.one,cov.a", "expected a column for every drive"),
-        ("id,q.one,q.two [grad]", 'found the unit "grad"'),
-        ("ids,q.one,q.two", 'unknown column "ids"'),
-    ],
-)
-def test_wrong_commands_are_one_line(lab, run, head, message):
+@pytest.mark.parametrize(("head", "message"), [
+    ("id,q.one,q.to", 'unknown column "q.to"; did you mean "q.two"?'),
+    ("id,q.one,cov.a", "expected a column for every drive"),
+    ("id,q.one,q.two [grad]", 'found the unit "grad"'),
+    ("ids,q.one,q.two", 'unknown column "ids"'),
+])  # fmt: skip
+def test_wrong_table_of_commands_is_refused_in_one_line(lab, run, head, message):
     lab.commands(head=head)
     lab.export("\n".join(points(line=SPATIAL_ANALYZER)))
     status, _, err = run(*lab.words())
@@ -269,7 +253,7 @@ def test_wrong_commands_are_one_line(lab, run, head, message):
     assert message in err.splitlines()[-1]
 
 
-def test_what_is_there_is_not_written_over(lab, run):
+def test_import_does_not_overwrite_a_campaign(lab, run):
     lab.export("\n".join(points(line=SPATIAL_ANALYZER)))
     assert run(*lab.words())[0] == 0
     status, _, err = run(*lab.words())

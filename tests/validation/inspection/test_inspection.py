@@ -28,7 +28,7 @@ HEAD = ",".join([
 
 
 def elastic_campaign(folder, rng, temperature=None, heat=0.0, device=None, **more):
-    """Twelve configurations of an elastic arm under two loads, each twice; noise.
+    """Twelve configurations of an elastic arm under two loads, each twice, with noise.
 
     ``heat`` [1/K] lengthens both arms; ``device`` is where the measuring device stands.
     """
@@ -61,7 +61,7 @@ def texts(campaign):
 
 
 def sound(rng, **changes):
-    """A design with nothing to say against it, changed by name."""
+    """A design without weakness, with changes by name."""
     rows = 60
     kinds = np.concatenate([rng.permutation(20) for _ in range(3)])
     loads = np.zeros((rows, 6))
@@ -111,13 +111,13 @@ SAYINGS = {
 
 
 @pytest.mark.parametrize("case", SAYINGS)
-def test_what_is_lost_is_said(case, rng):
+def test_weakness_of_a_design_is_remarked(case, rng):
     changes, sentence = SAYINGS[case]
     assert any(sentence in text for text in texts(sound(rng, **changes)))
 
 
-def test_a_sound_design_is_called_sound(rng):
-    """The post has no joints and each configuration one load here: said, no more."""
+def test_sound_design_has_one_remark(rng):
+    """The only remark is that each configuration has one load."""
     found = [t for t in texts(sound(rng)) if " fine: " not in t]
     assert found == [
         "load careful: No configuration was measured under two loads: what the load "
@@ -125,7 +125,7 @@ def test_a_sound_design_is_called_sound(rng):
     ]
 
 
-def test_noise_beside_the_stated_sigma_is_said(rng):
+def test_noise_other_than_the_stated_sigma_is_remarked(rng):
     noisy = sound(rng, measured=rng.normal(size=(60, 6)) * 2e-5)
     assert any("repeats careful: Repeats scatter 2.0" in t or "Repeats scatter 1.9" in t
                for t in texts(noisy))  # fmt: skip
@@ -133,7 +133,7 @@ def test_noise_beside_the_stated_sigma_is_said(rng):
     assert any("Repeats scatter only 0." in t for t in texts(quiet))
 
 
-def test_suspects_in_a_row_are_hardly_mistakes(rng):
+def test_consecutive_suspects_are_remarked(rng):
     """Six readings 30 sigma off at once, or spread over the session."""
     for rows, sentence in (
         (range(10, 16), "suspects careful: Readings far from their repeats follow"),
@@ -145,7 +145,7 @@ def test_suspects_in_a_row_are_hardly_mistakes(rng):
         assert [t.startswith(sentence or "?") for t in found] == [True] * bool(sentence)
 
 
-def test_rounded_readings_are_seen(rng):
+def test_rounded_readings_are_remarked(rng):
     rounded = (
         np.round(rng.normal(size=(60, 6)) * 1e-5, 4)
         + 1e-4 * (np.arange(60) % 2)[:, None]
@@ -154,13 +154,13 @@ def test_rounded_readings_are_seen(rng):
     assert any(text in t for t in texts(sound(rng, measured=rounded)))
 
 
-def test_deviations_in_millimetres_are_asked_about(rng):
+def test_deviations_of_implausible_size_are_remarked(rng):
     """30 mm on a post of 1 m."""
     large = rng.uniform(-0.03, 0.03, (60, 6))
     assert any("is the unit m, and is" in t for t in texts(sound(rng, measured=large)))
 
 
-def test_covariates_that_rise_together_are_named(rng):
+def test_correlated_covariates_are_remarked(rng):
     warm = np.arange(60) / 10 + rng.normal(size=60) / 10
     found = texts(sound(rng, temperature=warm))
     assert any(
@@ -168,16 +168,16 @@ def test_covariates_that_rise_together_are_named(rng):
     )
 
 
-def test_a_correlation_is_that_of_numpy(rng):
+def test_correlation_equals_that_of_numpy(rng):
     x, y = rng.normal(size=(2, 30))
     assert correlation(x, y) == pytest.approx(np.corrcoef(x, y)[0, 1], rel=1e-12)
     assert correlation(x, np.ones(30)) == 0.0
 
 
-def test_at_one_temperature_heat_and_length_are_one(tmp_path, rng):
-    """Both lengthen the same beams; while it varies they are told apart.
+def test_constant_temperature_does_not_separate_expansion_from_length(tmp_path, rng):
+    """Both lengthen the same beams; a varying temperature separates them.
 
-    A body that follows one temperature has it.
+    A body with delay has the constant temperature too.
     """
     constant = inspect_campaign(elastic_campaign(tmp_path / "a", rng, temperature=6.0))
     assert (
@@ -194,7 +194,7 @@ def test_at_one_temperature_heat_and_length_are_one(tmp_path, rng):
     assert why == "needs cov.temperature, not 0 in every row"
 
 
-def test_an_encoder_offset_at_the_base_turns_the_measuring_frame(tmp_path, rng):
+def test_unknown_registration_absorbs_the_first_encoder_offset(tmp_path, rng):
     """Turning the first joint about the base's z is what base.rz does."""
     known = inspect_campaign(elastic_campaign(tmp_path / "a", rng)).separability
     i = known.names.index("encoder_offset")
@@ -207,8 +207,8 @@ def test_an_encoder_offset_at_the_base_turns_the_measuring_frame(tmp_path, rng):
     assert 0 < unknown.left[i] < 0.9 < known.left[i]
 
 
-def test_a_device_that_cannot_be_located_is_said(tmp_path):
-    """One angle in two rows: inspected all the same."""
+def test_device_that_cannot_be_located_is_remarked(tmp_path):
+    """One angle in two rows."""
     rows = ["a,0.1,0.2,1e-5", "b,0.1,0.2,2e-5"]
     folder = write_campaign(tmp_path, "id,q.one,q.two,meas.rz", rows,
                             toml={"registration": '"unknown"'})  # fmt: skip
@@ -217,7 +217,7 @@ def test_a_device_that_cannot_be_located_is_said(tmp_path):
     assert "The registration cannot be found." in first.text
 
 
-def test_a_signature_is_the_derivative_by_hand(tmp_path, rng):
+def test_signature_is_the_derivative_by_hand(tmp_path, rng):
     """The second encoder 1e-5 rad off: the tool turns about the elbow by so much."""
     campaign = elastic_campaign(tmp_path, rng)
     found = design_signatures(campaign).columns["encoder_offset"]
@@ -235,10 +235,8 @@ def test_a_signature_is_the_derivative_by_hand(tmp_path, rng):
 
 
 @pytest.mark.parametrize("registration", ["known", "unknown"])
-def test_heat_is_kept_out_of_the_noise_wherever_the_device_stands(
-    registration, tmp_path, rng
-):
-    """12 sigma of expansion, told in the axes of a device turned by 2 rad, 5 m away."""
+def test_expansion_does_not_enter_the_noise_estimate(registration, tmp_path, rng):
+    """12 sigma of expansion, in the axes of a device rotated by 2 rad, 5 m away."""
     device = None
     if registration == "unknown":
         device = Rotation.from_rotvec([0.5, -1.2, 1.5]), np.array([3.0, -4.0, 1.0])
@@ -250,7 +248,7 @@ def test_heat_is_kept_out_of_the_noise_wherever_the_device_stands(
     assert noise.taken_out["temperature"] < 1e-9
 
 
-def test_the_command_writes_everything(tmp_path, rng, run):
+def test_inspect_writes_every_section(tmp_path, rng, run):
     elastic_campaign(tmp_path / "arm", rng, temperature=6.0)
     status, out, _ = run("validation", "inspect", tmp_path / "arm", "--json", "-")
     assert status == 0
@@ -278,7 +276,7 @@ def test_the_command_writes_everything(tmp_path, rng, run):
     assert "What this campaign cannot tell:" in out
 
 
-def test_the_command_refuses_what_is_no_campaign(tmp_path, run):
+def test_inspect_refuses_a_folder_without_campaign(tmp_path, run):
     status, out, err = run("validation", "inspect", tmp_path, "--json", "-")
     assert status == 2
     assert out == ""
@@ -286,7 +284,7 @@ def test_the_command_refuses_what_is_no_campaign(tmp_path, run):
     assert "Traceback" not in err
 
 
-def test_a_dh_table_without_alpha_is_told(tmp_path):
+def test_dh_table_without_alpha_is_remarked(tmp_path):
     flat = ARM.replace("translation = [1.0, 0, 0]\n", "dh = { a = 1.0 }\n")
     assert flat != ARM
     campaign = read_campaign(write_campaign(tmp_path / "campaign", robot=flat))

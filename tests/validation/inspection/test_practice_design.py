@@ -27,7 +27,7 @@ NAMES = sorted(TRUTH)
 
 @pytest.fixture(scope="module")
 def inspections():
-    """All of them, each once."""
+    """Inspections of all campaigns."""
     return {n: inspect_campaign(read_campaign(PRACTICE / n)) for n in NAMES}
 
 

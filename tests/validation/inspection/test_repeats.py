@@ -19,7 +19,7 @@ def interleaved(rng, rows=120, kinds=40):
     return np.concatenate([rng.permutation(kinds) for _ in range(passes)])[:rows]
 
 
-def test_noise_is_the_pooled_variance_of_the_textbook():
+def test_noise_is_the_pooled_variance():
     """Sets (1, 3), (2, 2, 5) and a single: sums of squares 2 and 6 over 1 + 2."""
     measured = np.full((6, 6), np.nan)
     measured[:, 3] = [1, 3, 2, 2, 5, 100]
@@ -33,7 +33,7 @@ def test_noise_is_the_pooled_variance_of_the_textbook():
     np.testing.assert_allclose(noise.component_interval[3], [low, high])
 
 
-def test_a_missing_cell_is_missing_in_its_component_only():
+def test_missing_cell_lowers_only_its_component():
     """Two rows, one of them without tx: five components repeat."""
     measured = np.zeros((2, 6))
     measured[1] = 2.0
@@ -44,14 +44,14 @@ def test_a_missing_cell_is_missing_in_its_component_only():
     assert noise.ratio == pytest.approx(np.sqrt(2))
 
 
-def test_nothing_measured_twice_tells_nothing():
+def test_rows_without_repeats_give_no_noise():
     assert repeat_noise(campaign_of(np.zeros((5, 6)))) is None
     measured = np.full((2, 6), np.nan)
     measured[0, 0] = measured[1, 1] = 1.0
     assert repeat_noise(campaign_of(measured, 1.0, [0, 0])) is None
 
 
-def test_slow_changes_and_set_means_are_one_least_squares(rng):
+def test_noise_equals_that_of_a_joint_least_squares_fit(rng):
     """The same by a column for every set and a general solver, cells missing."""
     repeat = interleaved(rng, 40, 15)
     measured = rng.normal(size=(40, 6))
@@ -74,7 +74,7 @@ def test_slow_changes_and_set_means_are_one_least_squares(rng):
     assert found.component_degrees.sum() == pytest.approx(found.degrees)
 
 
-def test_drift_is_kept_out_of_the_noise(rng):
+def test_drift_does_not_enter_the_noise(rng):
     """Settling of 20 sigma and 5 sigma a kelvin, repeats interleaved."""
     time = np.arange(120.0)
     temperature = 3 * np.sin(time / 17)
@@ -91,7 +91,7 @@ def test_drift_is_kept_out_of_the_noise(rng):
         assert noise.taken_out["temperature"] < 1e-6
 
 
-def test_intervals_hold_the_truth_as_often_as_they_say(rng):
+def test_intervals_cover_the_truth_at_the_stated_rate(rng):
     """400 campaigns: 90 % +- 3 standard deviations of a count, 0.855 ... 0.945; a
     suspect in at most 1 % + 3 standard deviations of them, 0.025."""
     inside = suspected = 0
@@ -106,7 +106,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(rng):
     assert suspected / 400 <= 0.025
 
 
-def test_time_that_changes_nothing_is_seldom_said_to(rng):
+def test_time_without_effect_is_reported_at_the_stated_rate(rng):
     """Chances of noise alone are uniform: 5 % +- 3 standard deviations of 300."""
     time = np.arange(60.0)
     below = 0
@@ -129,7 +129,7 @@ def test_outliers_are_named_and_left_out(rng):
     assert noise.interval[0] < 1 < noise.interval[1]
 
 
-def test_few_repeats_are_not_spent_on_slow_changes(rng):
+def test_few_repeats_fit_no_slow_changes(rng):
     """Three pairs tell 18 numbers, slow changes in time alone would take 24."""
     readings = rng.normal(size=(20, 6)) * SIGMA
     repeat = np.r_[np.arange(17), [0, 1, 2]]
@@ -138,13 +138,13 @@ def test_few_repeats_are_not_spent_on_slow_changes(rng):
     assert noise.degrees == 18
 
 
-def test_what_does_not_vary_is_not_looked_for():
+def test_constant_covariates_are_not_fitted():
     campaign = campaign_of(np.zeros((4, 6)), temperature=np.full(4, 6.0),
                            approach=np.array([1.0, -1, 1, 1]))  # fmt: skip
     assert set(slow_changes(campaign)) == {"time", "approach"}
 
 
-def test_the_order_of_repeats_is_seen(rng):
+def test_revisits_classify_the_order_of_repeats(rng):
     readings = np.zeros((60, 6))
     row = campaign_of(readings, repeat=np.repeat(np.arange(20), 3))
     assert revisits(row, row.repeat).order == "back to back"
@@ -180,7 +180,7 @@ def test_points_read_at_once_are_one_visit():
     assert revisits(campaign, in_one_go).order == "back to back"
 
 
-def test_time_goes_before_the_order_of_the_file(rng):
+def test_revisits_use_time_instead_of_file_order(rng):
     """Rows sorted by repeat in the file, measured in passes."""
     order = np.tile(np.arange(20), 3)
     sort = np.argsort(order, kind="stable")

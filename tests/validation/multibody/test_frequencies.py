@@ -23,7 +23,7 @@ def extrapolated(posture, count, elements):
 
 
 def in_pieces(posture, pieces):
-    """Every beam cut."""
+    """Cut every beam into pieces."""
     robot = posture.robot
     links = {
         f.name: replace(f.link, pieces=pieces)

@@ -32,11 +32,6 @@ from validation.multibody.simulation import (
 pytestmark = pytest.mark.exudyn
 
 
-@pytest.fixture
-def rng():
-    return np.random.default_rng(7)
-
-
 def overconstrained(rng, errors):
     """A table on three legs: clamped beams, joint springs and a free slide."""
     legs, closures = [], []
@@ -144,26 +139,26 @@ def test_rigid_parts_that_do_not_fit_are_a_named_failure():
 
 
 def test_a_load_that_nothing_resists_is_a_named_failure():
-    """A free pin under 10 N m: at once, and it says when."""
+    """A free pin under 10 N m."""
     frames = (Frame("pin", joint="revolute"), Frame("tip", "pin"))
     posture = home_posture(Robot("pendulum", "tip", frames))
     with pytest.raises(SimulationFailed, match="no equilibrium while closures are pul"):
         simulate_assembly(posture, load=[0, 0, 10.0, 0, 0, 0])
 
 
-def test_nothing_is_printed(capfd, rng):
+def test_simulation_prints_nothing(capfd, rng):
     simulate_assembly(coaxial(1e-4 * np.ones(6)))
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_spring_needs_its_matrix():
+def test_spring_link_without_matrix_is_refused():
     with pytest.raises(BadInput, match="link of frame 'a' is to be a spring"):
         simulate_assembly(coaxial(np.zeros(6)), model=SimulationModel("spring"))
     with pytest.raises(BadInput, match="links = 'shell', expected one of"):
         simulate_assembly(coaxial(np.zeros(6)), model=SimulationModel("shell"))
 
 
-def test_without_clearance_leaves_passive_joints_free():
+def test_without_clearance_keeps_passive_joints_free():
     clearance = Clearance(radial=1e-5, spin=0.1)
     robot = Robot("pin", "pin", (Frame("pin", joint="revolute", clearance=clearance),))
     assert without_clearance(robot).frames[0].clearance is None
@@ -182,8 +177,8 @@ def test_the_logarithm_undoes_the_exponential(rng):
         np.testing.assert_allclose(inverse(T), exponential(-screw), atol=1e-14)
 
 
-def test_the_closing_sequence_goes_from_open_to_shut(rng):
-    """First what the errors alone do, last the assembly; gaps shrink evenly."""
+def test_closing_sequence_closes_gaps_evenly(rng):
+    """From the open robot with errors to the assembly, in even steps."""
     posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     robot = posture.robot
     sequence = closing_sequence(posture, steps=5)
@@ -210,7 +205,7 @@ def resident():
 
 
 @pytest.mark.slow
-def test_five_hundred_models_leave_nothing_behind(rng):
+def test_repeated_simulations_do_not_leak_memory(rng):
     """Resident memory after the first fifty, in MiB; a leaked model is half of one."""
     posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     for _ in range(50):
@@ -222,8 +217,8 @@ def test_five_hundred_models_leave_nothing_behind(rng):
 
 
 @pytest.mark.slow
-def test_models_with_contacts_and_models_that_fail_leave_nothing_behind():
-    """Functions that Exudyn calls hold their model; those of a hundred are let go.
+def test_simulations_with_contacts_and_failures_do_not_leak_memory():
+    """User functions of Exudyn hold their model until it is released.
 
     Every other one runs out of time; a leaked model is half a MiB.
     """

@@ -76,7 +76,7 @@ def campaign(tmp_path, rows):
     return write_campaign(tmp_path / "lab", head=HEAD, rows=rows)
 
 
-def test_a_campaign_s_figures(run, tmp_path):
+def test_iso_command_computes_the_standards_figures(run, tmp_path):
     """The arm of 1 m and 0.8 m, stretched along x and along y: 1.8 sqrt(2) m apart."""
     quarter = repr(np.pi / 2)
     rows = [
@@ -88,7 +88,9 @@ def test_a_campaign_s_figures(run, tmp_path):
             for side in (1, -1)
         )
     ]
-    status, out, _ = run("validation", "iso", campaign(tmp_path, rows), "--json", "-")
+    status, out, _ = run(
+        "validation", "inspect", campaign(tmp_path, rows), "--iso", "--json", "-"
+    )
     table = json.loads(out)
     assert status == 0
     poses = {pose["label"]: pose for pose in table["iso_9283"]["poses"]}
@@ -109,14 +111,14 @@ def test_a_campaign_s_figures(run, tmp_path):
     assert axis["systematic_deviation"] == pytest.approx(1e-4 + 2e-5, rel=1e-9)
 
 
-def test_figures_need_repeats(run, tmp_path):
+def test_iso_command_refuses_a_campaign_without_repeats(run, tmp_path):
     folder = campaign(tmp_path, ["a,0,0,0,0,0,0,1", "b,0.1,0,0,0,0,1,1"])
-    status, _, err = run("validation", "iso", folder)
+    status, _, err = run("validation", "inspect", "--iso", folder)
     assert status == 2
     assert "found no command that was measured twice" in err
 
 
-def test_where_the_device_stands_does_not_matter_to_repeatability(tmp_path, rng):
+def test_repeatability_does_not_depend_on_the_device_frame(tmp_path, rng):
     """A law: turned and shifted readings have the same RP and distances."""
     d = rng.normal(size=(30, 3))
     Q = np.linalg.qr(rng.normal(size=(3, 3)))[0]
@@ -162,7 +164,7 @@ def test_distance_accuracy_pairs_poses_of_one_session_only(tmp_path):
     assert np.abs(list(found.values())).max() < 1e-15
 
 
-def test_positioning_of_an_axis_is_told_apart_by_load(tmp_path):
+def test_positioning_of_an_axis_is_separate_for_each_load(tmp_path):
     """A deflection of 1 mm under a load is no deviation along the axis: E = 20 um."""
     rows = [
         f"{name}{fx}{side}{k},{angle},0,{1e-5 * (fx + side)},0,0,{side},{fx}"

@@ -1,4 +1,4 @@
-"""What governs the worst case: bounds with one imperfection removed."""
+"""Governing imperfections: bounds with one imperfection removed."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ def chain(*parts):
     return home_posture(Robot("chain", f"f{len(parts) - 1}", tuple(frames)))
 
 
-def test_errors_of_a_chain_add_up_and_so_do_what_is_left_without_one():
+def test_governing_rows_are_bounds_without_one_imperfection():
     """Along x errors 3 and -1, along z clearances 4: sqrt(2^2 + 4^2) of 0.1 mm."""
     rows = governing(chain((3e-4, None), (-1e-4, None), (0.0, 4e-4)))
     seen = [(one["part"], one["what"], one["translation"]) for one in rows]
@@ -38,7 +38,7 @@ def test_errors_of_a_chain_add_up_and_so_do_what_is_left_without_one():
     assert [one["rotation"] for one in rows] == pytest.approx([0.0] * 3, abs=1e-12)
 
 
-def test_a_joints_own_motion_is_not_taken_for_a_clearance():
+def test_own_motion_of_a_joint_is_not_a_clearance():
     posture = chain((0.0, None), (1e-4, None))
     first, second = posture.robot.frames
     hinge = replace(first, joint="revolute", clearance=Clearance(spin=0.1))
@@ -47,5 +47,5 @@ def test_a_joints_own_motion_is_not_taken_for_a_clearance():
     assert [(one["part"], one["what"]) for one in rows] == [("f1", ERROR)]
 
 
-def test_a_perfect_robot_has_nothing_that_governs():
+def test_perfect_robot_has_no_governing_rows():
     assert governing(chain((0.0, None), (0.0, None))) == []

@@ -55,7 +55,7 @@ def results(tmp_path_factory):
 
 
 @pytest.mark.exudyn
-def test_a_study_answers_as_the_reference_does(results):
+def test_study_agrees_with_the_reference(results):
     outcome, _, steps = results
     point = NUMBERS["cases"][0]["points"][0]
     assert outcome.solution["energy"] == pytest.approx(point["energy"], rel=1e-10)
@@ -142,7 +142,7 @@ def test_the_page_names_things_in_words(results):
     _, folder, _ = results
     seen = parse((folder / "report.html").read_text())
     shown = " ".join(c.text for table in seen.tables for row in table for c in row)
-    assert "degrees of freedom left when the drives are locked" in shown
+    assert "degrees of freedom with locked drives" in shown
     assert not re.search(
         r"locked_|_residual|_excess|_gap|_open|margin_|_error\b", shown
     )
@@ -196,7 +196,7 @@ QUIET = "[checks]\npicture = false\n"
 def test_a_study_of_a_robot_without_errors_says_that_nothing_was_checked(
     tmp_path, name
 ):
-    """Every built-in robot; it once ended in a division by zero, or passed."""
+    """Every built-in robot."""
     text = f'robot = "{name}"\nscales = [1.0, 0.5]\n{QUIET}'
     if name == "irsbot2":
         text += "[pose]\ntx = 0.0\ntz = -0.5\n"
@@ -225,7 +225,7 @@ most = [1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4]
 
 @pytest.mark.exudyn
 def test_a_study_of_a_just_constrained_robot_says_what_could_not_be_checked(tmp_path):
-    """Its errors cost neither energy nor play: the simulation alone has a say."""
+    """Its errors store no energy: only the simulation can check it."""
     text = JUST_CONSTRAINED + QUIET
     results = run_study(read_study(study_file(tmp_path, text)))
     assert results.verdicts == {"reference": "no signal", "crosscheck": "passed"}
@@ -269,12 +269,8 @@ def test_a_reference_without_an_answer_does_not_pass(tmp_path, monkeypatch):
     assert "Not compared: cvxpy: the problem" in report_page(results)
 
 
-def test_the_headline_is_the_worst_play_over_the_map(tmp_path):
-    """A five-bar's play, free: least energy rests it in the middle.
-
-    The bound at a pose is that of ``assembly error``, over the map the largest of the
-    bounds there; a pose error with another play says which.
-    """
+def test_headline_is_the_worst_clearance_over_the_map(tmp_path):
+    """At a pose the bound of ``assembly error``, over the map the largest of these."""
     text = 'robot = "five_bar"\ngrid = "tx=-0.01:0.01:0.01,ty=0.15"\n'
     text += QUIET + "crosscheck = false\nreference = false\n"
     text += "[pose]\ntx = 0.0\nty = 0.15\n"
@@ -308,7 +304,6 @@ def test_a_manipulator_that_cannot_be_assembled_is_reported_not_raised(tmp_path)
     results = run_study(read_study(study_file(tmp_path, 'robot = "stuck.toml"\n')))
     assert results.solution["status"] == "cannot assemble"
     assert not results.passed
-    results.study.folder.joinpath("x")
     assert verdict(results).startswith(
         "No answer at this pose: cannot assemble, a rigid"
     )
@@ -340,14 +335,10 @@ def test_a_manipulator_that_cannot_be_assembled_is_reported_not_raised(tmp_path)
         ("title", "scales = [1, -1]\ntitle", "expected at least two different fact"),
         ("title", "scales = [[1]]\ntitle", "scales: found [1] as number 1, expected"),
         ("title", "title = 1 #", "title: found 1, expected a string"),
-        ("title", "title", None),
     ],
 )  # fmt: skip
-def test_every_mistake_in_a_study_file_is_one_message(tmp_path, old, new, message):
+def test_wrong_study_file_is_refused_in_one_line(tmp_path, old, new, message):
     path = study_file(tmp_path, SMALL.replace(old, new, 1))
-    if message is None:
-        assert read_study(path).robot.name == "irsbot2"
-        return
     with pytest.raises(BadInput) as error:
         read_study(path)
     text = str(error.value)

@@ -41,7 +41,7 @@ EFFECTS = {
     "load_gain": {"factor": 1.2, "offset.fx": 3.0},
     "drift": {"amplitude.tz": 1e-5, "time_constant": 60.0},
 }
-ELSEWHERE = {  # finite motions: test_synthetic_campaigns; play: test_generator
+ELSEWHERE = {  # finite motions: test_synthetic_campaigns; clearance: test_generator
     "geometric_stiffening", "joint_clearance"
 }  # fmt: skip
 
@@ -88,7 +88,7 @@ def machine(robot):
     return as_declared(both, loads, point=POINT, covariates=UNDER), rows
 
 
-def test_no_effect_is_left_out():
+def test_every_effect_of_the_library_is_tested():
     assert EFFECTS.keys() | ELSEWHERE == LIBRARY.keys()
 
 
@@ -99,7 +99,7 @@ def test_no_effect_is_left_out():
     [pytest.param(n, marks=[pytest.mark.slow] * (i % 3 > 0))
      for i, n in enumerate(EFFECTS)],
 )  # fmt: skip
-def test_an_effect_adds_what_the_machine_that_has_it_shows(
+def test_effect_adds_the_deviation_of_a_machine_that_has_it(
     name, program, robot, machine
 ):
     """With finite motions to 30 nm or nrad, of up to 500 um and urad.

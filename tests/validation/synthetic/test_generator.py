@@ -67,12 +67,12 @@ def close(contribution, expected, relative, floor=1e-11):
 
 
 @pytest.mark.parametrize("point", [(0, 0, 0), (0.1, -0.2, 0.05)])
-def test_a_perfect_robot_without_load_deviates_by_nothing(point):
+def test_perfect_robot_without_load_has_no_deviation(point):
     readings = simulate_readings(one_link(), np.array(point), [row(0.4), row(-1.2)])
     assert np.abs(readings).max() < 1e-12
 
 
-def test_a_declared_error_is_in_the_reading_exactly():
+def test_declared_error_is_read_exactly():
     """A turn by e about the drive's axis: the tip goes to L (cos, sin)(q + e)."""
     q, e = 0.3, 0.02
     contribution = simulate_readings(
@@ -96,16 +96,15 @@ def test_weight_bends_a_beam_with_a_body_at_its_end(added, g):
     close(contribution, [0, slope, 0, 0, 0, -sag], 1e-5, 2.4e-8)
 
 
-def test_a_warm_beam_is_longer_along_itself(added):
-    """Alpha T L = 2e-5 x 5 x 0.5 m, exact."""
+@pytest.mark.parametrize(
+    ("name", "parameter", "longer"),
+    [("thermal_expansion", 2e-5, 2e-5 * 5 * L), ("link_length", 3e-4, 3e-4)],
+)
+def test_a_beam_is_longer_along_itself(added, name, parameter, longer):
+    """Alpha T L of a warm beam, exact."""
     q = 0.7
-    contribution = added("thermal_expansion", {"tip": 2e-5}, row(q))
-    close(contribution, [0, 0, 0, 5e-5 * math.cos(q), 5e-5 * math.sin(q), 0], 1e-9)
-
-
-def test_a_longer_beam_is_longer_along_itself(added):
-    contribution = added("link_length", {"tip": 3e-4}, row(-0.4))
-    close(contribution, [0, 0, 0, 3e-4 * math.cos(0.4), -3e-4 * math.sin(0.4), 0], 1e-9)
+    contribution = added(name, {"tip": parameter}, row(q))
+    close(contribution, longer * np.array([0, 0, 0, np.cos(q), np.sin(q), 0]), 1e-9)
 
 
 def test_a_longer_beam_also_bends_more(added):
@@ -148,7 +147,7 @@ def test_an_encoder_that_reads_wrong_turns_the_beam(added, name):
     close(contribution, [0, 0, d, L * dx, L * dy, 0], 1e-9)
 
 
-def test_the_measuring_frame_stands_off_and_the_target_too(added):
+def test_registration_moves_measuring_frame_and_target(added):
     """Exact: B R and B (p + R tool); a turn by b about z, then a shift."""
     q, b, shift, tool = 0.5, 0.01, [1e-3, -2e-3, 3e-3], [2e-3, 0, 1e-3]
     given = {"base.rz": b, "base.tx": shift[0], "base.ty": shift[1]}
@@ -169,7 +168,7 @@ def test_a_softer_beam_bends_more(added):
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_load_takes_up_play(added, side):
+def test_load_shifts_a_joint_by_its_clearance(added, side):
     """A force along x shifts the beam by the radial clearance, towards the force."""
     clearance = {"drive.radial": 3e-5, "drive.axial": 1e-5, "drive.tilt": 0.0}
     contribution = added(
@@ -178,7 +177,7 @@ def test_a_load_takes_up_play(added, side):
     close(contribution, [0, 0, 0, 3e-5 * side, 0, 0], 2e-3, 1e-8)
 
 
-def test_play_that_no_load_takes_up_moves_nothing(added):
+def test_clearance_without_load_moves_nothing(added):
     clearance = {"drive.radial": 3e-5, "drive.axial": 1e-5, "drive.tilt": 1e-4}
     assert np.abs(added("joint_clearance", clearance, row())).max() < 1e-9
 
@@ -193,7 +192,7 @@ def test_friction_holds_an_elastic_joint_back(added, approach):
 
 @pytest.mark.parametrize("exponent", [1.5, 1.0, 2.0])
 @pytest.mark.parametrize("force", [10.0, -0.1])
-def test_a_contact_yields_as_its_law_says(added, exponent, force):
+def test_contact_deforms_by_its_power_law(added, exponent, force):
     """F L = c d^n beside all else that yields."""
     c = 2e7
     given = {"drive.coefficient": c, "drive.exponent": exponent}
@@ -202,7 +201,7 @@ def test_a_contact_yields_as_its_law_says(added, exponent, force):
     close(contribution[[2, 4]], [d, d * L], 1e-4)
 
 
-def test_a_load_that_is_not_the_one_recorded(added):
+def test_load_gain_and_offset_bend_the_beam(added):
     """((f - 1) P + offset) (L^3/3EI + L/kGA)."""
     P, f, more = 2.0, 1.1, 0.3
     given = {"factor": f, "offset.fz": more}
@@ -211,14 +210,14 @@ def test_a_load_that_is_not_the_one_recorded(added):
     assert contribution[5] == pytest.approx(((f - 1) * P + more) * bend, rel=1e-7)
 
 
-def test_the_reading_drifts(added):
+def test_drift_rises_exponentially(added):
     given = {"amplitude.ry": 2e-5, "amplitude.tz": -1e-5, "time_constant": 150.0}
     rise = 1 - math.exp(-2.0)  # at 300 s
     close(added("drift", given, row()), [0, 2e-5 * rise, 0, 0, 0, -1e-5 * rise], 1e-12)
 
 
 @pytest.mark.parametrize("program", ["multibody", "springs"])
-def test_what_a_linear_model_misses_is_added(program):
+def test_geometric_stiffening_adds_the_finite_rotation(program):
     """A turn by e: L (cos e - 1) along the beam, L (sin e - e) across."""
     e = 0.02
     robot = one_link(error=np.array([0, 0, e, 0, 0, 0]))
@@ -234,7 +233,7 @@ def test_what_a_linear_model_misses_is_added(program):
     assert campaign.strength["geometric_stiffening"] == pytest.approx(5.0, rel=1e-9)
 
 
-def test_effects_outside_the_library(added):
+def test_effects_outside_the_library_follow_their_formulas(added):
     """A drive's softness (1 + cos 3q)/2, swelling, T^2, a stand, a sagging target."""
     q, F = 0.3, 10.0
     pushed = row(q, load=(0, 0, 0, -F * math.sin(q), F * math.cos(q), 0))
@@ -267,7 +266,7 @@ def two_walls():
     return Robot("walls", "a", frames, (("a", "b"),))
 
 
-def test_a_closed_loop_shares_what_does_not_fit(added):
+def test_closed_loop_shares_a_misfit_by_stiffness(added):
     """Equal springs: half of a length, of an offset, of a strain; F / (k1 + k2)."""
     robot = two_walls()
     rest = {f.name: 0.0 for f in robot.frames}
@@ -284,17 +283,6 @@ def test_a_closed_loop_shares_what_does_not_fit(added):
     pulled = replace(where, load=np.array([0, 0, 0, F, 0, 0]))
     soft = added("modulus_scale", {"a": 0.5, "b": 0.5}, pulled, robot)
     assert soft[3] == pytest.approx(F / (2 * k), rel=1e-5)
-
-
-def test_errors_of_the_declared_robot_and_an_effect_add_up(added):
-    """First order: what an effect adds does not depend on small declared errors."""
-    rng = np.random.default_rng(3)
-    wrong = one_link(error=1e-4 * rng.normal(size=6))
-    for name, given in (
-        ("encoder_offset", {"drive": 1e-4}), ("thermal_expansion", {"tip": 2e-5}),
-    ):  # fmt: skip
-        perfect, real = (added(name, given, row(0.4), r) for r in (None, wrong))
-        close(real, perfect, 0, 3e-8)
 
 
 @pytest.mark.parametrize(
@@ -317,22 +305,21 @@ def test_errors_of_the_declared_robot_and_an_effect_add_up(added):
          "outliers: found 5, expected at most the 4 rows"),
     ],
 )  # fmt: skip
-def test_a_campaign_that_nobody_could_measure_is_refused(make, message):
+def test_impossible_noise_or_design_is_refused(make, message):
     with pytest.raises(BadInput) as caught:
         make()
     assert message in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--rotation", "-inf"], "rotation: found -inf"),
-        (["--error-size", "nan"], "--error-size: found nan"),
-        (["--outliers", "200"], "found 200, expected at most the 116 rows"),
-        (["--seed", "-1"], "--seed"),
-    ],
-)
-def test_the_command_refuses_them_and_writes_nothing(run, tmp_path, words, message):
+@pytest.mark.parametrize(("words", "message"), [
+    (["--rotation", "-inf"], "rotation: found -inf"),
+    (["--error-size", "nan"], "--error-size: found nan"),
+    (["--outliers", "200"], "found 200, expected at most the 116 rows"),
+    (["--seed", "-1"], "--seed"),
+])  # fmt: skip
+def test_generate_refuses_wrong_options_and_writes_nothing(
+    run, tmp_path, words, message
+):
     folder, truth = tmp_path / "c", tmp_path / "t.json"
     generate = ["validation", "generate", "arm6", folder, "--truth", truth]
     status, _, err = run(*generate, "--program", "springs", *words)

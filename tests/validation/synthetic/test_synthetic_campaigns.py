@@ -87,7 +87,7 @@ def test_every_effect_reaches_its_strength(name):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_what_the_loads_do_not_show_is_drawn_anew(seed):
+def test_effect_that_the_loads_do_not_show_is_drawn_again(seed):
     """Forces at a point on the wrist's axis do not twist it: another drive is soft."""
     arm = two_axes()
     wrist = Frame("j3", "tool", joint="revolute", actuated=True, joint_stiffness=SPRING)
@@ -100,7 +100,7 @@ def test_what_the_loads_do_not_show_is_drawn_anew(seed):
     assert set(campaign.effects[0].parameters) & {"j1", "j2"}
 
 
-def test_noise_is_what_was_asked_for():
+def test_noise_has_the_requested_standard_deviation():
     """240 x 6 readings: their rms is 1 within 3/sqrt(2 x 1440) = 0.06 at 3 sigma."""
     design = replace(SMALL, rows=240)
     campaign = quick({}, design=design, noise=Noise(3e-5, 2e-6), seed=2)
@@ -120,7 +120,7 @@ def test_two_effects_add_up_to_first_order():
 
 @pytest.mark.exudyn
 @pytest.mark.parametrize("name", ["3rrr", "hexapod", "arm6"])
-def test_both_programs_agree(name):
+def test_multibody_and_springs_give_the_same_readings(name):
     """Beams and springs differ by what a beam's own bending adds: second order."""
     rng = np.random.default_rng(5)
     robot = without_clearance(load_robot(name))
@@ -161,7 +161,7 @@ def test_springs_and_the_exact_equilibrium_agree_at_any_size(name):
     np.testing.assert_allclose(springs, exact, rtol=0, atol=2e-9)
 
 
-def test_what_is_written_is_read_and_gives_nothing_away(tmp_path):
+def test_written_campaign_is_read_again_and_hides_the_truth(tmp_path):
     noise = Noise(missing=0.05, outliers=2, hidden_frame=1e-3)
     design = replace(SMALL, reference_point=(0, 0, 0.1))
     campaign = quick({"drift": 5.0}, design=design, seed=7, noise=noise)
@@ -189,7 +189,7 @@ def test_what_is_written_is_read_and_gives_nothing_away(tmp_path):
         write_campaign(campaign, tmp_path / "c")
 
 
-def test_a_pose_can_be_commanded(tmp_path):
+def test_campaign_of_commanded_poses_is_read_again(tmp_path):
     robot = without_clearance(load_robot("hexapod"))
     design = CampaignDesign(configurations=3, rows=3, reach=0.1, command="pose")
     campaign = quick({}, robot, design=design)
@@ -202,7 +202,7 @@ def test_a_pose_can_be_commanded(tmp_path):
     np.testing.assert_allclose(readings, np.array(expected)[:, own], rtol=0, atol=1e-9)
 
 
-def test_the_truth_has_what_the_practice_campaigns_have():
+def test_truth_has_the_keys_of_the_practice_campaigns():
     campaign = quick({"drive_compliance": 5.0, "link_length": 3.0}, seed=1)
     truth = json.loads(json.dumps(plain(truth_of(campaign))))
     assert truth["verdict"] == "explained"
@@ -220,7 +220,7 @@ def test_the_truth_has_what_the_practice_campaigns_have():
 
 
 @pytest.mark.parametrize("name", sorted(TRUTH))
-def test_committed_campaigns_are_what_their_truth_says(name):
+def test_committed_campaigns_agree_with_their_truth(name):
     """Made by the multibody simulation, explained by springs: the noise is left.
 
     Its rms is the truth's within 1e-3, and without the hidden effects it is the one
@@ -280,7 +280,7 @@ QUICK = ("self_weight", "drive_compliance", "encoder_offset", "registration",
     [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow)
      for name in LIBRARY if name not in ("joint_clearance", "geometric_stiffening")],
 )  # fmt: skip
-def test_an_effect_is_its_own_best_explanation(name):
+def test_hidden_effect_is_its_own_best_alternative(name):
     design = varied_for(SMALL, [name])
     readings = alternatives(quick({name: 5.0}, design=design, seed=6))
     own = min(one.residual for one in readings if one.names[0].startswith(name))
@@ -290,7 +290,7 @@ def test_an_effect_is_its_own_best_explanation(name):
     assert own <= min(one.residual for one in readings) + 1.0
 
 
-def test_what_cannot_be_hidden_is_refused():
+def test_effect_that_the_robot_cannot_have_is_refused():
     rng = np.random.default_rng(0)
     with pytest.raises(NotApplicable):
         draw_effect("friction_hysteresis", two_axes(spring=None), 1.0, rng)
@@ -308,7 +308,7 @@ def test_what_cannot_be_hidden_is_refused():
         CampaignDesign(temperature="warm")
 
 
-def test_stronger_effects_keep_their_shape():
+def test_strengthened_effects_keep_shape_parameters():
     """Springs softer, errors larger; phases, exponents and time constants stay."""
     given = {"a.coefficient": 1e6, "a.exponent": 1.5}
     stronger = strengthened(Hidden("contact_stiffening", given), 4.0).parameters
@@ -323,7 +323,7 @@ def test_stronger_effects_keep_their_shape():
 
 
 @pytest.mark.slow
-def test_the_command_writes_a_campaign_or_says_why_not(tmp_path):
+def test_generate_writes_a_campaign_or_one_message(tmp_path):
     def run(*words):
         command = [sys.executable, "-m", "forcefit", "validation", "generate", *words]
         return subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)

@@ -10,7 +10,7 @@ from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.load import loads_on_frames
 from assembly.linear.reference.reduction import FreeMotion, reduce_problem
 from assembly.model.robot import Frame, Robot
-from tests.robots_for_tests import coaxial_beams, planar_four_bar, random_robot
+from tests.robots_for_tests import coaxial_beams
 
 
 def reduced(robot, load=None):
@@ -18,24 +18,6 @@ def reduced(robot, load=None):
     posture = home_posture(robot)
     loads = None if load is None else loads_on_frames(posture, load)
     return reduce_problem(linearise(posture), virtual_joints(robot), loads)
-
-
-def test_multipliers_do_on_clearances_what_strains_and_rigid_rows_do(rng):
-    """A_u' l = H' (those of H) - G' (strains), whatever these are."""
-    rigid = 0
-    for seed in range(6):
-        robot = random_robot(np.random.default_rng(seed), 3, link_share=0.3)
-        found = reduced(robot)
-        A_u = found.linearisation.rows @ found.joints.cones
-        strains, free = rng.normal(size=len(found.G)), rng.normal(size=len(found.H))
-        expected = found.H.T @ free - found.G.T @ strains
-        scale = np.abs(expected).max(initial=1e-300)
-        acting = A_u.T @ found.multipliers(strains, free)
-        assert np.abs(acting - expected).max(initial=0.0) < 1e-8 * scale
-        rigid += len(found.k)
-        assert sum(found.ranks.values()) == len(A_u)
-        assert min(found.ranks.values()) >= 0
-    assert rigid
 
 
 def rigid_beams(gap):
@@ -49,11 +31,6 @@ def test_a_rigid_part_is_open_by_its_error_however_small(gap):
     """The reference length is 1 m: a gap is as large as it is."""
     assert reduced(rigid_beams([0, 0, 0, 0, gap, 0])).inconsistent == pytest.approx(gap)
     assert reduced(rigid_beams([gap, 0, 0, 0, 0, 0])).inconsistent == pytest.approx(gap)
-
-
-def test_what_is_closed_to_rounding_is_closed():
-    assert reduced(rigid_beams([0, 0, 0, 0, 5e-13, 0])).inconsistent == 0.0
-    assert reduced(rigid_beams(np.zeros(6))).inconsistent == 0.0
 
 
 def turn_and_slide():
@@ -78,10 +55,3 @@ def test_a_free_motion_is_named_alike_under_any_load(load):
         reduced(turn_and_slide(), load * np.array([0, 0, 0, 0, 0, 2.0]))
     text = str(told.value)
     assert "it moves slide tz; the platform along [0 0 0 0 0 1] [rad, m]" in text
-
-
-@pytest.mark.parametrize("load", [1e-9, 1.0, 1e9])
-def test_a_load_that_springs_resist_drives_nothing(load):
-    robot = planar_four_bar()
-    found = reduced(robot, load * np.array([0, 0, 1.0, 2.0, 3.0, 0]))
-    assert np.isfinite(found.load_multipliers).all()

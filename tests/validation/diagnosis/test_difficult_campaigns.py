@@ -1,4 +1,4 @@
-"""Campaigns on which a diagnosis once failed, by what is known of their machines."""
+"""Difficult campaigns, by what is known of their machines."""
 
 from dataclasses import replace
 from functools import cache
@@ -15,15 +15,17 @@ from validation.diagnosis.saving import save
 
 CASES = DATA.parent / "cases" / "campaigns"
 PRACTICE = DATA / "practice"
-NAMES = (
+FOLDERS = [CASES / name for name in (
     "ax_cum", "crash_singular", "crash_sizes", "declared_effect", "fb_gear", "fb_wear",
     "few_8", "hx_play", "hyst", "points_in_one_go", "zonly",
-)  # fmt: skip
+)] + [PRACTICE / name for name in (
+    "p02_self_weight", "p04_drive_compliance_encoder_offset", "p05_outside",
+)]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def diagnosed():
-    """By folder, each once."""
+    """A function that diagnoses a folder once."""
 
     @cache
     def find(folder):
@@ -35,23 +37,22 @@ def diagnosed():
 
 
 def effect(found, name):
-    """Parameters of an effect: value and standard deviation by name."""
+    """Return an effect's parameters by name."""
     (one,) = [e for e in table(found)["effects"] if e["name"] == name]
     return {p["name"]: p for p in one["parameters"]}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", NAMES)
-def test_the_saved_robot_is_the_one_that_is_printed_and_never_a_worse_one(
-    name, diagnosed, tmp_path
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def test_saved_robot_predicts_the_printed_error_and_a_smaller_one_than_declared(
+    folder, diagnosed, tmp_path
 ):
-    """Without a traceback; by the file and the command that reads it."""
-    found = diagnosed(CASES / name)
+    found = diagnosed(folder)
     if not found.better:
         assert found.verdict != "explained"
         return
     save(found, tmp_path / "robot.toml")
-    data = read_commands(CASES / name, read_robot(tmp_path / "robot.toml"))
+    data = read_commands(folder, read_robot(tmp_path / "robot.toml"))
     told = predict(replace(data, registration="known").take(~found.outliers))
     assert told.error.normalised == pytest.approx(found.saved.normalised, rel=1e-4)
     assert found.after.normalised < found.before.normalised
@@ -59,21 +60,7 @@ def test_the_saved_robot_is_the_one_that_is_printed_and_never_a_worse_one(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [
-    "p02_self_weight", "p04_drive_compliance_encoder_offset", "p05_outside",
-])  # fmt: skip
-def test_robots_of_another_program_s_campaigns_are_saved_as_printed(
-    name, diagnosed, tmp_path
-):
-    found = diagnosed(PRACTICE / name)
-    save(found, tmp_path / "robot.toml")
-    data = read_commands(PRACTICE / name, read_robot(tmp_path / "robot.toml"))
-    told = predict(replace(data, registration="known").take(~found.outliers))
-    assert told.error.normalised == pytest.approx(found.saved.normalised, rel=1e-4)
-
-
-@pytest.mark.slow
-def test_the_expansion_of_a_printer_is_what_it_is(diagnosed, tmp_path):
+def test_expansion_of_a_printer_is_recovered(diagnosed, tmp_path):
     """23.4e-6 per kelvin declared, 12e-6 true."""
     found = diagnosed(CASES / "declared_effect")
     assert (found.verdict, found.claimed) == ("explained", ("thermal_expansion",))
@@ -86,7 +73,7 @@ def test_the_expansion_of_a_printer_is_what_it_is(diagnosed, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_clearance_in_a_leg_is_a_clearance(diagnosed):
+def test_clearance_in_a_leg_is_explained_as_clearance(diagnosed):
     found = diagnosed(CASES / "hx_play")
     assert (found.verdict, found.claimed) == ("explained", ("joint_clearance",))
     springs = table(found)["springs"] or {"parameters": []}
@@ -95,15 +82,15 @@ def test_a_clearance_in_a_leg_is_a_clearance(diagnosed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["fb_wear", "fb_gear"])
-def test_what_the_library_lacks_is_no_effect_of_it(name, diagnosed):
-    """A rod that grows with time; waves of a gear.  Down to the noise."""
+def test_effects_outside_the_library_are_learned(name, diagnosed):
+    """A rod that grows with time, and waves of a gear, are learned to the noise."""
     found = diagnosed(CASES / name)
     assert (found.verdict, found.claimed) == ("learned", ())
     assert found.after.normalised < 1.2
 
 
 @pytest.mark.slow
-def test_scatter_of_repeats_is_no_cause(diagnosed):
-    """Errors are in the sigma stated; what memory does is no drift."""
+def test_scatter_of_repeats_is_not_claimed(diagnosed):
+    """Errors are in units of the stated sigma; hysteresis is not a drift."""
     found = diagnosed(CASES / "hyst")
     assert not set(found.claimed) & {"drift", "encoder_eccentricity"}

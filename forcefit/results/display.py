@@ -4,9 +4,8 @@ A dataclass uses them with one line in its body::
 
     __repr__, _repr_html_ = short_repr, html_table
 
-The figures come from its method ``_figures`` if it has one; else they are its fields,
-abbreviated.  The text is for a console, the table for a notebook; both are a few lines
-for objects of any size.
+The figures come from the object's method ``_figures``, or are its fields, abbreviated.
+The text is for a console, the table for a notebook; both are a few lines long.
 """
 
 import html
@@ -19,12 +18,12 @@ from numpy.typing import ArrayLike, NDArray
 
 Figures = dict[str, str]
 
-_LONGEST = 72  # characters of a value
-_FEW = 6  # numbers that are shown; of more only the count
+_LONGEST = 72  # most characters of a value
+_FEW = 6  # most numbers that are shown; of a longer array only the count
 
 
 def short_repr(self: Any) -> str:
-    """A title and one line for each figure.
+    """Return a title and one line for each figure.
 
     Args:
         self: a dataclass, perhaps with a method ``_figures``.
@@ -39,13 +38,13 @@ def short_repr(self: Any) -> str:
 
 
 def html_table(self: Any) -> str:
-    """The same as a plain table, for notebooks.
+    """Return a title and a table of the figures in HTML, for notebooks.
 
     Args:
         self: a dataclass, perhaps with a method ``_figures``.
 
     Returns:
-        HTML; names from files are escaped.
+        HTML, in which names from files are escaped.
     """
     rows = "".join(
         f'<tr><th style="text-align:left">{html.escape(name)}</th>'
@@ -57,7 +56,7 @@ def html_table(self: Any) -> str:
 
 
 def title(thing: object) -> str:
-    """Kind of an object, and its own name or its robot's, if it has one."""
+    """Return the kind of an object, and its name or its robot's name if it has one."""
     kind = type(thing).__name__
     posture = getattr(thing, "posture", None)
     owner = getattr(thing, "robot", None) or getattr(posture, "robot", None)
@@ -69,7 +68,7 @@ def title(thing: object) -> str:
 
 
 def brief(value: object) -> str:
-    """One short line for any value; its kind, if the value is too long."""
+    """Return a short line for any value; only its kind if the value is too long."""
     if isinstance(value, np.ndarray):
         if 0 < value.size <= _FEW and value.dtype.kind in "fiu":
             return "[" + " ".join(f"{v:.4g}" for v in value.ravel()) + "]"
@@ -89,49 +88,49 @@ def brief(value: object) -> str:
 
 
 def numbers(values: Iterable[float]) -> str:
-    """Numbers in brackets, rounded as by :func:`rounded`."""
+    """Return the numbers in brackets, rounded by :func:`rounded`."""
     return "[" + " ".join(f"{rounded(v):.4g}" for v in values) + "]"
 
 
 def rounded(value: float) -> float:
-    """A number for people: below 1e-9, rounding error in all units used, it is zero."""
+    """Return a number rounded for people; below 1e-9, a rounding error, it is zero."""
     return 0.0 if abs(value) < 1e-9 else float(value)
 
 
 def screw_text(screw: ArrayLike) -> str:
-    """A platform screw (6,) [rad, m] for people."""
+    """Return the text of a platform screw (6,) [rad, m]."""
     s = 1e3 * np.asarray(screw, dtype=float)
     return f"{numbers(s[:3])} mrad, {numbers(s[3:])} mm"
 
 
 def largest(screws: ArrayLike) -> str:
-    """Largest rotation and translation of screws (..., 6) [rad, m], by length."""
+    """Return lengths of largest rotation, translation of screws (..., 6) [rad, m]."""
     parts = np.asarray(screws, dtype=float).reshape(-1, 2, 3)
     turn, shift = 1e3 * np.linalg.norm(parts, axis=-1).max(axis=0, initial=0.0)
     return f"{turn:.4g} mrad, {shift:.4g} mm" if turn or shift else "none"
 
 
 def largest_row(sizes: ArrayLike) -> int:
-    """The first of the largest numbers; equal but for rounding, 1e-9, counts as equal.
+    """Return row of the largest number; of numbers equal within 1e-9, the first.
 
     Args:
         sizes: (k,) >= 0, k > 0.
 
     Returns:
-        Its row, the same on every processor.
+        The row, the same on every processor.
     """
     values = np.asarray(sizes, dtype=float)
     return int(np.argmax(values >= (1 - 1e-9) * np.nanmax(values)))
 
 
 def bracket(bounds: Sequence[float] | NDArray, unit: str) -> str:
-    """Two bounds [rad or m] in thousandths; the unit is mrad or mm."""
+    """Return two bounds [rad or m] in thousandths; the unit is mrad or mm."""
     low, high = 1e3 * bounds[0], 1e3 * bounds[1]
     return f"{low:.6g} to {high:.6g} {unit}" if low < float("inf") else "without bound"
 
 
 def _figures(thing: Any) -> Figures:
-    """The figures of an object by its own method, or its fields."""
+    """Return the figures of an object by its own method, or its fields."""
     if hasattr(thing, "_figures"):
         return thing._figures()
     shown = [one.name for one in fields(thing) if one.repr and one.name != "name"]
@@ -139,6 +138,6 @@ def _figures(thing: Any) -> Figures:
 
 
 def _cut(text: str) -> str:
-    """At most one line of text."""
+    """Return a text on one line, abbreviated to the longest line allowed."""
     text = " ".join(text.split())
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ..."

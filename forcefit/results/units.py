@@ -1,4 +1,4 @@
-"""Units a page shows: those of a drawing, with SI beside them for the switch."""
+"""Display units: of a page by the size of its numbers, of text as the table says."""
 
 import math
 from dataclasses import dataclass
@@ -14,6 +14,12 @@ _SHOWN: dict[str, tuple[tuple[float, str, float], ...]] = {
     "m/N": ((0.0, "µm/N", 1e6),),
     "rad/(N m)": ((0.0, "µrad/(N m)", 1e6),),
 }
+
+
+# display units of text: number shown = factor * number in SI
+FACTORS = {
+    "mm": 1e3, "um": 1e6, "mrad": 1e3, "urad": 1e6, "MPa": 1e-6, "%": 1e2,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)

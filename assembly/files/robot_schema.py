@@ -1,0 +1,94 @@
+"""What a robot file holds, for editors: the keys that its reader knows."""
+
+from assembly.effects import LIBRARY
+from assembly.effects.forms import FORMS
+from assembly.effects.functions import FORMULA
+from assembly.files.function_file import FUNCTION
+from assembly.model.function import KINDS
+from assembly.model.robot import JOINTS
+from forcefit.results.quantities import flag, number, text
+from forcefit.results.records import Each, Either, Listed, Words, record
+from stiffness.surface.surface import UNITS
+
+_DIRECTION = number("direction", "1", "axis")
+_POINT = number("point", "m", "axis")
+_INTERFACE = Either((
+    text('interface, such as "z=0.452"'),
+    record(
+        plane=record(point=_POINT, normal=_DIRECTION),
+        radius_=number("radius", "m"),
+    ),
+    record(bore=record(point=_POINT, axis=_DIRECTION, radius=number("radius", "m"))),
+))  # fmt: skip
+_BEAM = record(
+    theory_=Words(("timoshenko", "euler")), length_=number("length", "m"),
+    axis_=number("axis, this frame's axes", "1", "axis"),
+    up_=number("direction of the height, this frame's axes", "1", "axis"),
+    radius_=number("radius", "m"), inner_radius_=number("inner radius", "m"),
+    width_=number("width", "m"), height_=number("height", "m"),
+    area_=number("area", "m^2"),
+    I_y_=number("second moment of area for bending about y", "m^4"),
+    I_z_=number("second moment of area for bending about z", "m^4"),
+    J_=number("torsion constant", "m^4"),
+    shear_y_=number("shear factor for a force along y"),
+    shear_z_=number("shear factor for a force along z"),
+)  # fmt: skip
+_MESH = record(
+    surface=text("file of the surface: STL, OBJ, PLY, VTK, MSH or STEP"),
+    base=_INTERFACE, tip=_INTERFACE, unit_=Words((*UNITS,)),
+    up_=number("direction that is the frame's up, mesh axes", "1", "axis"),
+    axis_=number("direction from base to tip, this frame's axes", "1", "axis"),
+    interface_=Words(("rigid", "distributing")),
+)  # fmt: skip
+_STIFFNESS = number("stiffness", "N m/rad .. N/m", "screw", "wrench_component")
+_LINK = record(
+    beam_=_BEAM, mesh_=_MESH, stiffness_=_STIFFNESS,
+    library_=text("entry of a stiffness library: path#key"),
+    young_=number("Young's modulus", "Pa"), poisson_=number("Poisson's ratio"),
+    density_=number("density", "kg/m^3"), up_=_DIRECTION,
+    pieces_=number("springs in series of a beam"),
+    parts_=text("solids of other materials", "part"),
+)  # fmt: skip
+_FRAME = record(
+    name=text("name"), parent=text('name of a frame, or "base"'),
+    translation_=number("translation from the parent", "m", "axis"),
+    rotation_=number("rotation vector from the parent", "rad", "axis"),
+    dh_=record(
+        theta_=number("Denavit-Hartenberg theta", "rad"),
+        d_=number("Denavit-Hartenberg d", "m"), a_=number("Denavit-Hartenberg a", "m"),
+        alpha_=number("Denavit-Hartenberg alpha", "rad"),
+    ),
+    joint_=Words((*JOINTS,)), actuated_=flag("actuated"),
+    position_=number("coordinate at home", "rad or m"),
+    limits_=number("least and largest coordinate", "rad or m", "bound"),
+    geometric_error_="geometric_error",
+    tolerance_=number("standard deviations of the geometric error", "rad, m", "screw"),
+    clearance_=record(
+        radial_=number("radial clearance", "m"), axial_=number("axial clearance", "m"),
+        tilt_=number("tilt clearance", "rad"), spin_=number("clearance about z", "rad"),
+    ),
+    joint_stiffness_=Either((
+        number("diagonal stiffness", "N m/rad .. N/m", "screw"), _STIFFNESS,
+    )),
+    link_=_LINK, up_=_DIRECTION, mass_=number("mass", "kg"),
+    centre_of_mass_=number("centre of mass", "m", "axis"),
+)  # fmt: skip
+_NUMBERS = Each(number("parameter", ""))
+_EFFECT = record(
+    name=Words((*LIBRARY, FUNCTION)), parameters_=_NUMBERS, session_=text("session"),
+    label_=text("label"), where_=text('a frame, "base", "reading" or "load"'),
+    kind_=Words(KINDS), components_=text("components", "component"),
+    variables_=text("variables", "variable"), form_=Words((*FORMS, FORMULA)),
+    formula_=text("formula"), std_=_NUMBERS,
+)  # fmt: skip
+_VALUE = Either((number("number", ""), flag("truth value"), text("text")))
+ROBOT_FILE = record(
+    name_=text("name of the robot"), description_=text("description"),
+    platform=text("name of the platform's frame"), frame=Listed(_FRAME),
+    closure_=Listed(record(frames=text("two frames that meet", "frame"))),
+    effect_=Listed(_EFFECT),
+    learned_range_=Each(number("least and largest value", "", "bound")),
+    reference_point_="reference_point",
+    diagnosis_=Each(Either((_VALUE, Listed(_VALUE)))),
+    covariance_=text("file of the covariance"),
+)  # fmt: skip

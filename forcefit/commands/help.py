@@ -1,0 +1,57 @@
+"""Help texts of the commands: options in groups, each under a title of its own."""
+
+from typing import Any
+
+import typer
+from typer.core import TyperCommand
+
+_WHAT = "What"  # options of no other group
+GROUPS = {
+    "Where": (
+        "pose joint grid poses rest mismatch under at along over base tip nodes "
+        "configurations reach stroke setup"
+    ),
+    "How sure": (
+        "accuracy tolerance-rotation tolerance-translation energy-budget draws seed "
+        "confidence fresh calibrate importance scale rotation position diagnosed"
+    ),
+    "Output": "output figure report csv json save offsets truth exaggeration to",
+    "Run": "workers scheduler time-limit help",
+}
+_GROUP_OF = {
+    f"--{name}": title for title, names in GROUPS.items() for name in names.split()
+}
+
+
+class GroupedCommand(TyperCommand):
+    """A command whose help lists its options by group."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write the arguments and each group of options."""
+        rows: dict[str, list[tuple[str, str]]] = {
+            title: [] for title in ("Arguments", _WHAT, *GROUPS)
+        }
+        for param in self.get_params(ctx):
+            record = param.get_help_record(ctx)
+            if record is not None:
+                rows[_title_of(param)].append(record)
+        for title, records in rows.items():
+            if records:
+                with formatter.section(title):
+                    formatter.write_dl(records)
+
+
+class Commands(typer.Typer):
+    """A group of commands whose help lists options by group."""
+
+    def command(self, name: str | None = None, **settings: Any) -> Any:
+        """Register a command, as :meth:`typer.Typer.command`."""
+        return super().command(name, cls=GroupedCommand, **settings)
+
+
+def _title_of(param: Any) -> str:
+    """The title under which the help lists a parameter."""
+    if param.param_type_name == "argument":
+        return "Arguments"
+    groups = [_GROUP_OF[name] for name in param.opts if name in _GROUP_OF]
+    return groups[0] if groups else _WHAT

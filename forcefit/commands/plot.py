@@ -1,0 +1,115 @@
+"""The command ``forcefit assembly plot``, and the option ``--csv`` of others."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from forcefit.commands.options import FigureOption
+from forcefit.inputs.errors import BadInput, nearest
+from forcefit.inputs.writing import PICTURE, TABLE, check_writable, save_figure
+
+
+def _table(path: Path | None) -> Path | None:
+    """Refuse a table that could not be written, before the computation."""
+    if path is not None:
+        check_writable(path, TABLE)
+    return path
+
+
+CsvOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--csv",
+        help="Also write a CSV table: a row for each point, a column for each "
+        "component.",
+        callback=_table,
+    ),
+]
+
+
+def plot(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Of a sweep, draws or tolerances.")
+    ],
+    picture: FigureOption = None,
+    csv: CsvOption = None,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Of the figure: where to stand on other axes, such as draw=3."
+        ),
+    ] = None,
+    kind: Annotated[
+        str | None,
+        typer.Option(
+            help="Of the figure: histogram | tornado | allocation; else what the file "
+            "is."
+        ),
+    ] = None,
+    quantities: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Of the figure, such as stiffness.FX,translation or "
+            "wrench.leg1.link_a.FZ. A variable alone: all components."
+        ),
+    ] = None,
+    rows: Annotated[
+        str | None,
+        typer.Option(
+            help="Of the CSV table: axes of other rows than points, such as "
+            "quantity,group."
+        ),
+    ] = None,
+) -> None:
+    """Plot a saved file, or write it as a CSV table.
+
+    A figure has maps, lines, histograms or tolerances.  A table has a row for each
+    point and a column for each component of every variable.  Its first column, id,
+    counts the rows from 0; heads have the units in brackets.
+    """
+    from assembly.sweeps.point_table import write_point_table
+
+    if picture is None and csv is None:
+        raise BadInput("plot: expected --figure, --csv or both")
+    figure_options = {"--at": at, "--kind": kind, "--quantities": quantities}
+    _check_goes_with("--figure", picture, figure_options)
+    _check_goes_with("--csv", csv, {"--rows": rows})
+    if picture is not None:
+        _plot_file(file, picture, at or [], kind, quantities or [])
+    if csv is not None:
+        axes = [name.strip() for name in rows.split(",")] if rows is not None else []
+        write_point_table(file, csv, axes)
+
+
+def _check_goes_with(option: str, path: Path | None, others: dict[str, Any]) -> None:
+    """Refuse options of an output that is not written."""
+    for name, value in others.items():
+        if value and path is None:
+            raise BadInput(f"{name}: found without {option}, expected both")
+
+
+def _plot_file(
+    file: Path, picture: Path, at: list[str], kind: str | None, quantities: list[str]
+) -> None:
+    """Plot a saved file."""
+    from assembly.statistics.plot import KINDS, figure_of_draws
+    from assembly.sweeps.dataset import open_dataset
+    from assembly.sweeps.maps import figure_of
+
+    if kind is not None and kind not in KINDS:
+        raise BadInput(f'--kind: found "{kind[:60]}"{nearest(kind, KINDS)}')
+    check_writable(picture, PICTURE)
+    places = {}
+    for text in at:
+        name, equals, value = (piece.strip() for piece in text.rpartition("="))
+        if not equals:
+            raise BadInput(f'--at: found "{text[:60]}", expected AXIS=VALUE')
+        places[name] = value
+    names = [part.strip() for text in quantities for part in text.split(",")]
+    data = open_dataset(file)
+    try:
+        figure = figure_of_draws(data, kind, names)
+    except ValueError as error:
+        raise BadInput(f"{file}: {error}") from None
+    save_figure(figure or figure_of(data, places, names), picture)

@@ -1,0 +1,38 @@
+"""The command ``forcefit schema``."""
+
+import json
+from typing import Annotated
+
+import typer
+
+from forcefit.inputs.errors import BadInput, nearest, quoted
+
+
+def schema(
+    name: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="robot, campaign, or a command, such as assembly solve; without "
+            "it all names are listed."
+        ),
+    ] = None,
+) -> None:
+    """Print a JSON Schema: of robot files, campaigns or results.
+
+    Editors complete and check files with it: forcefit schema robot > robot.schema.json
+    """
+    from assembly.files.robot_schema import ROBOT_FILE
+    from forcefit.results.outputs import OUTPUTS
+    from forcefit.results.schema import schema_of
+    from validation.campaign.campaign_schema import CAMPAIGN_FILE
+
+    files = {"robot": ROBOT_FILE, "campaign": CAMPAIGN_FILE}
+    known = {**files, **OUTPUTS}
+    if not name:
+        print("\n".join(known))
+        return
+    wanted = " ".join(name)
+    if wanted not in known:
+        raise BadInput(f"schema: no {quoted(wanted)}{nearest(wanted, known)}")
+    result = schema_of(known[wanted], f"forcefit {wanted}", file=wanted in files)
+    print(json.dumps(result, indent=1))

@@ -1,0 +1,127 @@
+"""The command ``forcefit assembly solve``."""
+
+from typing import Annotated, Any
+
+import typer
+
+from forcefit.commands.options import (
+    GravityOption,
+    JointOption,
+    JsonOption,
+    LoadOption,
+    MismatchOption,
+    PoseOption,
+    RestOption,
+    RobotArgument,
+    UnderOption,
+    declared_under,
+    parse_state,
+    posture_of,
+)
+from forcefit.commands.progress import one_thread, progress_lines
+from forcefit.inputs.errors import BadInput, nearest
+from forcefit.inputs.writing import write_json
+
+_MARGINS = ("margin", "margin_free")
+
+
+def solve(
+    robot: RobotArgument,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
+    load: LoadOption = None,
+    gravity: GravityOption = None,
+    under: UnderOption = None,
+    state: Annotated[
+        str,
+        typer.Option(
+            help="contact (small motions) | exact (finite motions: closures hold "
+            "exactly)."
+        ),
+    ] = "contact",
+    quantities: Annotated[
+        str | None,
+        typer.Option(
+            help="margin: only whether clearances alone let the robot assemble, and "
+            "the factor on them at which they just do."
+        ),
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Close at least energy: pose error, energy, wrenches, margin."""
+    exact = parse_state(state, ("contact", "exact")) == "exact"
+    if quantities is not None:
+        _check_margins(quantities, exact, load=load, gravity=gravity, under=under)
+        _solve_margins(robot, pose, joint, rest, mismatch, json)
+        return
+    applied = declared_under(
+        robot, pose, joint, load, gravity, under, finite=exact, rest=rest,
+        mismatch=mismatch, note=exact,
+    )  # fmt: skip
+    results, text = _exact_results(applied) if exact else _results(applied)
+    _answer(results, text, results["status"], json)
+
+
+def _answer(results: dict[str, Any], text: str, status: str, json: str | None) -> None:
+    """Write and print results; exit status 1 where there is no good answer."""
+    from assembly.model.statuses import OK
+
+    write_json(results, json)
+    if json != "-":
+        print(text)
+    if status != OK:
+        raise typer.Exit(1)
+
+
+def _results(applied: Any) -> tuple[dict[str, Any], str]:
+    """Solution of small motions, problem (22), and its text."""
+    from assembly.model.statuses import OK
+    from assembly.report.results import solution_of, solution_text
+
+    with one_thread():
+        results = solution_of(applied.posture, applied.load, applied.gravity)
+    if results["status"] == OK and applied.conditions.reads_otherwise:
+        results["reading"] = applied.reading(results["platform_screw"])
+    return results, solution_text(results)
+
+
+def _exact_results(applied: Any) -> tuple[dict[str, Any], str]:
+    """Solution of finite motions, and its text."""
+    from assembly.report.results import exact_of, exact_text
+
+    with one_thread(), progress_lines() as update:
+        results = exact_of(
+            applied.posture, applied.load, applied.gravity,
+            lambda done, most: update("steps", done, most),
+        )  # fmt: skip
+    return results, exact_text(results)
+
+
+def _check_margins(quantities: str, exact: bool, **loads: list[str] | None) -> None:
+    """Refuse quantities other than margins, and options that no margin depends on."""
+    for name in (part.strip() for part in quantities.split(",")):
+        if name not in _MARGINS:
+            hint = nearest(name, _MARGINS)
+            raise BadInput(f'--quantities: found "{name[:60]}"{hint}')
+    given = [name for name, texts in loads.items() if texts]
+    for name in [*given, *(["state"] if exact else [])]:
+        raise BadInput(
+            f"--{name}: found with --quantities {quantities}; margins have no loads "
+            "and are of small motions"
+        )
+
+
+def _solve_margins(
+    robot: str, pose: list[str] | None, joint: list[str] | None, rest: str | None,
+    mismatch: str | None, json: str | None,
+) -> None:  # fmt: skip
+    """Whether clearances alone let the robot assemble; links are not computed."""
+    from assembly.report.first_order import singular_status
+    from assembly.report.results import zone_of, zone_text
+
+    posture = posture_of(robot, pose, joint, rest, mismatch, links=False)
+    margins = zone_of(posture) | singular_status(posture)
+    results = {"robot": robot, "zone": margins}
+    _answer(results, zone_text(margins), margins["status"], json)

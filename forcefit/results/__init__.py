@@ -1,0 +1,4 @@
+"""Quantities of all results: one table, from which text, JSON and attributes are made.
+
+Begin with :mod:`forcefit.results.quantities`.
+"""

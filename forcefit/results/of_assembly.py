@@ -1,0 +1,258 @@
+"""What ``--json`` of ``forcefit assembly ...`` holds."""
+
+from collections.abc import Mapping
+
+from forcefit.results.quantities import count, flag, number, text
+from forcefit.results.records import Content, Each, Either, Listed, Record, record
+
+_SHARE = number("share")
+_AXIS = ("axis",)
+# parts that several outputs have
+POSE = record("rx? ry? rz? tx? ty? tz?")
+_POSTURE = record("robot status reason?", pose=POSE)
+INTERVAL = record("probability lower upper undecided?")
+_ESTIMATE = record("value lower upper")
+_MEAN = record("value lower upper", deviation=number("standard deviation", ""))
+_QUANTILES = Each(_ESTIMATE)
+ZONE = record(
+    "status reason? assemblable assemblable_free margin margin_free margin_bound "
+    "margin_free_bound"
+)
+_SOLVED = record(
+    "energy potential? platform_screw",
+    frames=Each(record("clearance link joint wrench joint_wrench start_wrench?")),
+    closures=Listed(record("frames wrench")),
+)
+_LINEARISATION = record(
+    "status? energy? relative_energy?",
+    rotation_=number("rotation, linear minus exact", "rad", *_AXIS),
+    translation_=number("translation, linear minus exact", "m", *_AXIS),
+)
+SOLUTION = record(
+    "nominal_mismatch remarks load gravity reading? method?", _POSTURE, _SOLVED,
+    joints=Each(number("joint coordinate", "rad or m")),
+    mobility=record(
+        "freedoms platform_freedoms freedoms_drives_locked "
+        "platform_freedoms_drives_locked redundant_constraints drives "
+        "locked_freedoms overconstraint smallest_singular_value"
+    ),
+    zone_=ZONE,
+    certificate_=record(
+        "closure_residual reference_length clearance_excess duality_gap relative_gap "
+        "screw_rotation screw_translation screw_rotation_open screw_translation_open "
+        "screw_rotation_error screw_translation_error"
+    ),
+    ranks_=record("free elastic rigid redundant"),
+    linearisation_error_=_LINEARISATION,
+    worst_error_=record("assumption rotation translation"),
+)  # fmt: skip
+_EXACT = record(
+    "remarks?", _POSTURE,
+    energy_="energy", potential_="potential", platform_screw_="platform_screw",
+    frames_=_SOLVED.content["frames"], closures_=_SOLVED.content["closures"],
+    certificate_=record(
+        "closure_residual reference_length clearance_excess stationarity iterations"
+    ),
+    linear_=record("energy platform_screw"), linearisation_error_=_LINEARISATION,
+)  # fmt: skip
+_BOUNDS = record("platform_screw", lower=number("lower bound", ""),
+                 upper=number("upper bound", ""))  # fmt: skip
+_ASSUMPTIONS = Each(
+    record("cuts? method? reason?", rotation=_BOUNDS, translation=_BOUNDS,
+           along_=_BOUNDS)
+)  # fmt: skip
+_ERROR = record(
+    "load? gravity? point? direction? energy? platform_screw? remarks?", _POSTURE,
+    error_=_ASSUMPTIONS, certificate_=record("relative_gap"),
+)  # fmt: skip
+_SHARES = record(
+    links=Each(_SHARE), joints=Each(_SHARE), clearances_=Each(_SHARE),
+    forces_=number("share of the forces present before"),
+)  # fmt: skip
+_ALONG = record(
+    free=number("stiffness, the others free", "N m/rad, N/m"),
+    blocked=number("stiffness, the others blocked", "N m/rad, N/m"),
+)
+_TANGENT = record(
+    "state point compliance stiffness free_motions rigid_wrenches "
+    "characteristic_length centre",
+    eigen=Listed(record("screw pitch", stiffness=number("eigenstiffness", "N/m"))),
+    condition=number("condition of the stiffness"), along=Each(_ALONG),
+    shares=Each(_SHARES),
+)  # fmt: skip
+_CONTACT = record(
+    "", _TANGENT, side_=text("side of the kink"), contacts_=count("closed clearances"),
+    touching_=count("clearances just touching"),
+)  # fmt: skip
+_SLOPES = Each(number("derivative of the compliance", "", "row", "column"))
+PLATFORM_STIFFNESS = record(
+    "load? gravity? remarks?", _POSTURE,
+    Record(_TANGENT.content, frozenset(_TANGENT.content)),
+    contact_=Listed(_CONTACT), letting_go_=_CONTACT,
+    direction_=record("direction", _ALONG, shares=_SHARES),
+    slopes_=_SLOPES, slopes_contact_=_SLOPES, cannot_change_=Each(text("reason")),
+)  # fmt: skip
+_DEFLECTION = record(
+    "state?", _POSTURE,
+    along=text("component of the load"),
+    followed=flag("past limit points"),
+    loads_=number("load", "N m or N", "point"),
+    deflection_=number("deflection", "rad or m", "point"),
+    platform_screw_=number("platform error", "rad, m", "point", "screw"),
+    energy_=number("energy", "J", "point"),
+    stiffness_=number("tangent stiffness", "N m/rad or N/m", "point"),
+    contacts_=text("closed clearances", "point", "name"),
+    free_in_clearances_=flag("free within clearances", "point"),
+    events_=Listed(record(load=number("load", "N m or N"), kind=text("kind of event"),
+                          what=text("what happens"),
+                          deflection=number("deflection", "rad or m"))),
+)  # fmt: skip
+_FREQUENCIES = record(
+    "state remarks idle_motions?",
+    _POSTURE,
+    frequencies_=number("natural frequencies", "Hz", "mode"),
+    modes_=Listed(
+        record(
+            "platform_screw",
+            shares=Each(_SHARE),
+            frequency=number("natural frequency", "Hz"),
+        )
+    ),
+)
+_BY_NAME = Each(number("value", ""))
+_CLEARANCE_MODEL = text("clearance model")
+_REACHED = record(
+    "unit limit?", reached=number("reached by perfect parts", ""),
+    clearances_=Each(number("contribution of the clearance", "")),
+)  # fmt: skip
+_OF_DRAWS = record(
+    "unit draws assembled", of=count("all draws"), clearance_=_CLEARANCE_MODEL,
+    all_draws_=record(infinite=INTERVAL, quantiles=_QUANTILES), zero_=INTERVAL,
+    mean_=_MEAN, quantiles_=_QUANTILES, most_probable_=_ESTIMATE,
+)  # fmt: skip
+_LIMITED = record("", INTERVAL, clearance_=_CLEARANCE_MODEL)
+_STIFFNESS_OF_DRAWS = record(
+    "state", means=text("meaning of the state"),
+    axes=Each(record("unit draws", free=INTERVAL, mean_=_MEAN, quantiles_=_QUANTILES)),
+    free_motions=Listed(record("screw draws")),
+)  # fmt: skip
+_IMPORTANCE = record(
+    base_draws=count("base draws"), clearance=_CLEARANCE_MODEL,
+    quantities=Each(
+        record("reason?", largest_share_left_out=number("largest share left out"),
+               first_index_=Each("first_index"), total_index_=Each("total_index"),
+               rank_=Each("rank"))
+    ),
+    platform=Each(
+        record(
+            error_unit=text("unit of the error"),
+            rotation_part=number("rotation that involves the error", "rad"),
+            translation_part=number("translation that involves the error", "m"),
+            rotation_gain=number("rotation for each unit of error", ""),
+            translation_gain=number("translation for each unit of error", ""),
+        )
+    ),
+)  # fmt: skip
+_STATISTICS = record(
+    "robot seed load gravity draws assembled confidence contact_length duality_gap",
+    pose=POSE, clearance=_CLEARANCE_MODEL, clearance_means=text("its meaning"),
+    assembles=Each(INTERVAL), clearance_not_mixed_=count("draws not mixed"),
+    exceeds=Each(record("limit unit", _LIMITED)), within_limits_=_LIMITED,
+    perfect_parts=Each(_REACHED), perfect_parts_break=Each(_REACHED),
+    quantities=Each(_OF_DRAWS),
+    platform_screw_=record(
+        "draws", clearance=_CLEARANCE_MODEL, mean=number("mean", "rad, m", "screw"),
+        covariance=number("covariance", "rad^2 .. m^2", "screw", "screw"),
+        most_probable=Listed(_ESTIMATE),
+    ),
+    safety_=number("safety", "1", "link"),
+    stress_error_=number("its error", "1", "link"),
+    stiffness_=_STIFFNESS_OF_DRAWS, importance_=_IMPORTANCE,
+)  # fmt: skip
+_CLASS = record(
+    "name tolerance unit", share=_SHARE,
+    scaled_alike=number("if all were scaled alike", ""),
+    cost=number("cost"), loosest_allowed=number("loosest allowed", ""),
+    at_loosest=flag("at the loosest allowed"),
+)  # fmt: skip
+_VERIFICATION = record(
+    "draws verdict confidence", look=count("look"), most_looks=count("looks at most"),
+    worst_posture_yield=number("yield at the worst posture"),
+    posture_yields=number("yield at each posture", "1", "posture"),
+    largest_share_of_a_limit=number("largest share of a limit"),
+    confidence_of_a_look=number("confidence of each look"), **{"yield": INTERVAL},
+)  # fmt: skip
+_ALLOCATION = record(
+    "yield price cuts draws seed contact_length", limits=_BY_NAME,
+    cost=text("law of the cost"), tolerances=Listed(_CLASS),
+    price_alike=number("price if all were scaled alike"),
+    price_bound=number("lower bound of the price"),
+    worst=Each(record(found=number("largest found", ""), proven=number("proven", ""))),
+    proven_scale=number("scale at which all is proven"), verification=_VERIFICATION,
+    clearance=_CLEARANCE_MODEL, distribution=text("distribution within a tolerance"),
+    deviations=number("standard deviations in a tolerance"),
+    perfect_parts=Each(
+        record("unit limit", reached=number("reached by perfect parts", ""),
+               at=text("posture"),
+               looser_without=number("looser tolerances without clearances"),
+               price_without=number("price without clearances"))
+    ),
+)  # fmt: skip
+_PRESENT = record(
+    "postures", quantity=text("margin judged"),
+    largest_margin=number("largest margin"),
+    margins=number("margins", "1", "posture"), at=POSE,
+    factor_on_errors=number("factor on all errors at which it assembles everywhere"),
+    energy_there=number("energy at the largest margin", "J"),
+    assemblable_share=number("share of postures that assemble"),
+    slopes=Listed(
+        record("value", error=text("error"), margin_slope=number("of the margin", ""),
+               share_of_margin=number("share of the margin"),
+               energy_slope=number("of the energy", ""))
+    ),
+)  # fmt: skip
+_TOLERANCES = record(
+    "robot postures grid", left_out=Each(count("postures")), present_=_PRESENT,
+    allocation_=_ALLOCATION,
+)  # fmt: skip
+_SWEEP = Record(
+    record(
+        "robot", output=text("file"), axes=Each(count("points")),
+        points=count("points"), status=Each(count("points")),
+        quantities=Each(
+            record(units=text("unit"), min=number("least", ""),
+                   median=number("median", ""), max=number("largest", ""))
+        ),
+    ).content,
+    closed=False,
+)  # fmt: skip
+ASSEMBLY: Mapping[str, Content] = {
+    "assembly solve": Either((SOLUTION, _EXACT, record("robot", zone=ZONE))),
+    "assembly error": _ERROR,
+    "assembly stiffness": PLATFORM_STIFFNESS,
+    "assembly deflection": _DEFLECTION,
+    "assembly frequencies": _FREQUENCIES,
+    "assembly statistics": _STATISTICS,
+    "assembly tolerances": _TOLERANCES,
+    "assembly sweep": _SWEEP,
+    "convert": record(
+        "robot left_out", platform=text("platform"), frames=count("frames"),
+        closures=count("closures"), files=text("files written", "file"),
+        home=record(
+            open_before=number("loops open in the file's home", "rad or m"),
+            open_after=number("loops open in the home found", "rad or m"),
+            drives_held=flag("drives held"),
+        ),
+        largest_difference=number("largest difference when read back"),
+        compared=Listed(
+            record(
+                where=text("place of the largest difference"),
+                reader=text("program"), file=text("file"),
+                why_not=text("why it was not compared"), bodies=count("bodies"),
+                masses=count("masses"), loops=count("loops"),
+                difference=number("largest difference"),
+            )
+        ),
+        taken=text("assumptions", "line"),
+    ),
+}  # fmt: skip

@@ -1,0 +1,98 @@
+"""What ``--json`` of cross-checks, ``study`` and ``report compare`` holds."""
+
+from collections.abc import Mapping
+
+from forcefit.results.of_assembly import POSE, SOLUTION
+from forcefit.results.quantities import count, flag, number, text
+from forcefit.results.records import Content, Each, Either, Listed, Record, record
+
+_SIDE = record(
+    "platform_screw energy", links=Each("wrench"), joints=Each("wrench"),
+    energy_between_ends_=number("energy of weights between the ends", "J"),
+    closure_gap_=number("largest closure error"),
+    free_motions_held_=flag("free motions held"), seconds_="seconds",
+)  # fmt: skip
+_SCALE = record("scale", vjm=_SIDE, exact_vjm=_SIDE, multibody=_SIDE, difference=_SIDE)
+_CHECK = record("value tolerance verdict passed", uncertainty=number("uncertainty", ""))
+_POSE_CHECK = record(
+    "robot status load gravity slope verdict passed reason?", pose=POSE,
+    links=text("model of the links"), scales=Listed(_SCALE),
+    added_scales=Listed(_SCALE), clearances=text("clearances"),
+    slopes_=Each(number("slope")), limits_=Each(number("limit")),
+    unexplained_=Each(number("share without an explanation")),
+    optimality_gaps_=number("optimality gap", "1", "scale"),
+    relative_energy_differences_=Each(number("difference", "1", "scale")),
+    checks=Each(_CHECK),
+    smallest_changes_noticed=Listed(
+        record("name value", kind=text("kind"), relative=number("relative change"),
+               check=text("check that notices it"), unproved=flag("unproved"))
+    ),
+)  # fmt: skip
+_BY_METHOD = Each(number("value"))
+CROSSCHECK = Either((
+    _POSE_CHECK,
+    record("robot? status reason passed", pose_=POSE),
+    record(
+        "robot load tolerance passed", pose=POSE, links=text("model of the links"),
+        compliance=Each("compliance"), difference=_BY_METHOD, uncertainty=_BY_METHOD,
+        undecided_joints=text("joints not decided", "joint"),
+        moved=Each(number("displacement", "rad, m", "screw")),
+        stable=Each(flag("stable")),
+        another_equilibrium=flag("another equilibrium"),
+    ),
+    record(
+        "passed", reached=count("poses reached"),
+        poses=Listed(Record(
+            {**_POSE_CHECK.content, "asked": POSE},
+            frozenset(_POSE_CHECK.content), closed=False,
+        )),
+    ),
+))  # fmt: skip
+_COST = record(
+    "reason?", rotation_="rotation", position_="position",
+    energy_=number("relative energy"), matters_=flag("above a limit"),
+    pieces_=count("pieces that leave less"),
+)  # fmt: skip
+_LIMITS = record("position", energy=number("relative energy"))
+_SPREAD = record(median=number("median", ""), largest=number("largest", ""), at=POSE)
+_PART = Either((number("relative difference"), _SPREAD))
+_PLATFORM_COST = record(
+    "reason?", compliance_=Each(_PART), by_link_=Each(_PART),
+    without_shape_=text("links without a shape", "link"),
+    mesh_error_=number("estimated error of the meshes"),
+)  # fmt: skip
+_VALIDITY = Either((
+    record("robot", pose=POSE, limits=_LIMITS, costs=Each(_COST),
+           platform=_PLATFORM_COST),
+    record(
+        "robot", reached=count("poses reached"), limits=_LIMITS,
+        costs=Each(
+            record(known=count("poses"), matters=count("poses above a limit"),
+                   position=_SPREAD, rotation=_SPREAD, energy=_SPREAD,
+                   reasons=Each(count("poses")))
+        ),
+        platform=_PLATFORM_COST,
+        poses=Listed(record("status reason?", asked=POSE, costs_=Each(_COST),
+                            platform_=_PLATFORM_COST)),
+    ),
+))  # fmt: skip
+_ANY = Either((number("number", ""), text("text"), flag("truth value")))
+_CHANGE = record(
+    place=text("key", "level"), before=_ANY, after=_ANY,
+    relative=number("relative change"),
+)  # fmt: skip
+VALIDATION: Mapping[str, Content] = {
+    "validation crosscheck": CROSSCHECK,
+    "validation validity": _VALIDITY,
+    "report compare": record(
+        compared=text("files", "file"), same=count("equal values"),
+        changes=Listed(_CHANGE), only_in_one=Listed(_CHANGE),
+    ),
+    "study": Record(
+        record("passed", program=text("program"), title=text("title"),
+               errors=text("errors"), links=text("stiffness of the links"),
+               verdicts=Each(text("verdict")), unchecked=Each(text("reason")),
+               solution=SOLUTION).content,
+        closed=False,
+    ),
+}  # fmt: skip

@@ -1,0 +1,461 @@
+"""The table of quantities: words, unit, symbol, meaning and dimensions of every result.
+
+A quantity has one name in Python, JSON, NetCDF files and tables.  ``--json`` outputs
+are composed of these names in :mod:`forcefit.results.outputs`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+Kind = Literal["number", "integer", "string", "boolean"]
+# labels of the dimensions that many quantities share
+LABELS: dict[str, tuple[str, ...]] = {
+    "screw": ("RX", "RY", "RZ", "TX", "TY", "TZ"),
+    "wrench_component": ("MX", "MY", "MZ", "FX", "FY", "FZ"),
+    "bound": ("lower", "upper"),
+    "axis": ("x", "y", "z"),
+    "bounds": ("value", "lower", "upper"),
+}
+_SCREW, _WRENCH = ("screw",), ("wrench_component",)
+_MATRIX = ("screw", "wrench_component")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One quantity of the results.
+
+    Attributes:
+        words: its name in reports and text, without article.
+        unit: SI; ``"1"`` for a pure number, ``"rad, m"`` of a screw's two halves, empty
+            where the result states it.
+        dims: its dimensions; those of :data:`LABELS` have a fixed length.
+        meaning: what exactly it is, where the words do not say it.
+        symbol: in the paper, where it has one.
+        kind: of its values.
+        shown: display unit of text, where it is not SI.
+        digits: significant digits of text.
+    """
+
+    words: str
+    unit: str = "1"
+    dims: tuple[str, ...] = ()
+    meaning: str = ""
+    symbol: str = ""
+    kind: Kind = "number"
+    shown: str = ""
+    digits: int = 4
+
+    @property
+    def display_unit(self) -> str:
+        """Unit in which text states it."""
+        return self.shown or self.unit
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Attributes of its variable in a NetCDF file."""
+        return {"units": self.unit, "long_name": self.meaning or self.words}
+
+
+def number(words: str, unit: str = "1", *dims: str) -> Quantity:
+    """A number, or numbers over some dimensions."""
+    return Quantity(words, unit, dims)
+
+
+def text(words: str, *dims: str, meaning: str = "") -> Quantity:
+    """A text, or texts over some dimensions."""
+    return Quantity(words, dims=dims, meaning=meaning, kind="string")
+
+
+def count(words: str, *dims: str, meaning: str = "") -> Quantity:
+    """An integer, or integers over some dimensions."""
+    return Quantity(words, dims=dims, meaning=meaning, kind="integer")
+
+
+def flag(words: str, *dims: str) -> Quantity:
+    """A truth value, or truth values over some dimensions."""
+    return Quantity(words, dims=dims, kind="boolean")
+
+
+QUANTITIES: Mapping[str, Quantity] = {
+    # robot, posture, load
+    "robot": text("robot"),
+    "status": text("status", meaning="ok, or why there is no valid answer"),
+    "reason": text("reason", meaning="explanation where the status is not ok"),
+    "remarks": text("note", "remark"),
+    "pose": Quantity("pose", "m, rad", meaning="nominal, of the platform, base axes"),
+    "rx": Quantity("rotation vector x", "rad"),
+    "ry": Quantity("rotation vector y", "rad"),
+    "rz": Quantity("rotation vector z", "rad"),
+    "tx": Quantity("position x", "m"),
+    "ty": Quantity("position y", "m"),
+    "tz": Quantity("position z", "m"),
+    "joint_coordinate": Quantity(
+        "joint coordinate", "rad or m", ("joint",), "nominal, of every joint, also "
+        "where the status is not ok", "q",
+    ),
+    "nominal_mismatch": Quantity(
+        "nominal closure error", meaning="largest closure error of the nominal robot, "
+        "rad or m, that rounded files leave",
+    ),
+    "state": text("state", meaning="in which the stiffness is taken"),
+    "load": Quantity(
+        "load", "N m, N", _WRENCH, "on the platform at its origin, base axes", "w"
+    ),
+    "gravity": Quantity("gravity", "m/s^2", ("axis",), "base axes", "g"),
+    "freedoms": count("degrees of freedom", meaning="drives free"),
+    "platform_freedoms": count("degrees of freedom of the platform"),
+    "freedoms_drives_locked": count("degrees of freedom with locked drives"),
+    "platform_freedoms_drives_locked": count(
+        "degrees of freedom of the platform with locked drives"
+    ),
+    "redundant_constraints": count("redundant constraints, drives locked"),
+    "drives": count("drives"),
+    "locked_freedoms": count("degrees of freedom with locked drives"),
+    "overconstraint": count("redundant closure equations"),
+    "smallest_singular_value": Quantity("smallest singular value of the constraints"),
+    "point": Quantity("point", "m", ("axis",), "at which it is read, platform axes"),
+    "direction": Quantity("direction", dims=_SCREW, meaning="unit screw, base axes"),
+    "near_singularity": text(
+        "singularity near by", meaning="singularities near by, with the joints that "
+        "show them",
+    ),
+    "singular_distance": Quantity(
+        "distance from singularity", dims=("kind",),
+        meaning="0 at a singularity of the kind, at most 1",
+    ),
+    "condition": Quantity(
+        "condition number", meaning="condition of the map from drives to platform"
+    ),
+    # forced assembly, problems (21), (22) and (27)
+    "assemblable": flag("assembles by clearance alone, compliant joints rigid"),
+    "assemblable_free": flag("assembles by clearance alone, compliant joints free"),
+    "margin": Quantity(
+        "zone margin, compliant joints rigid", meaning="factor on all clearances at "
+        "which it just assembles, compliant joints rigid", symbol="lambda",
+    ),
+    "margin_free": Quantity(
+        "zone margin, compliant joints free", meaning="factor on all clearances at "
+        "which it just assembles, compliant joints free about their own axis",
+        symbol="lambda",
+    ),
+    "margin_bound": Quantity(
+        "bound of the margin, rigid", meaning="certified: the margin is at least this"
+    ),
+    "margin_free_bound": Quantity(
+        "bound of the margin, free", meaning="certified: the margin is at least this"
+    ),
+    "energy": Quantity(
+        "assembly energy", "J", meaning="least elastic energy that closes it, eq. (22)",
+        symbol="E", digits=6,
+    ),
+    "potential": Quantity(
+        "potential", "J", meaning="elastic energy minus the work of the loads",
+    ),
+    "energy_without_clearance": Quantity(
+        "energy without clearances", "J",
+        meaning="least energy of closing if no joint had clearance",
+    ),
+    "platform_screw": Quantity(
+        "platform error", "rad, m", _SCREW,
+        "pose error at the platform's origin, base axes", "x", shown="mrad, mm"
+    ),
+    "reading": Quantity(
+        "reading", "rad, m", _SCREW, "what a measuring device reads at this pose",
+        shown="mrad, mm"
+    ),
+    "clearance": Quantity(
+        "clearance", "rad, m", _SCREW, "displacement within the clearance, and small "
+        "motions of passive joints", "delta c", shown="mrad, mm"
+    ),
+    "link": Quantity(
+        "deformation of the link", "rad, m", _SCREW, "at the frame in its axes", "e",
+        shown="mrad, mm"
+    ),
+    "joint": Quantity(
+        "deformation of the joint", "rad, m", _SCREW, "at the frame in its axes",
+        shown="mrad, mm"
+    ),
+    "geometric_error": Quantity(
+        "geometric error", "rad, m", _SCREW, "at the frame in its axes", "delta l",
+        shown="mrad, mm"
+    ),
+    "wrench": Quantity(
+        "wrench", "N m, N", _WRENCH,
+        "exerted by the outer part on the inner, at the frame in its axes", "w",
+    ),
+    "joint_wrench": Quantity(
+        "wrench through the joint", "N m, N", _WRENCH,
+        "exerted by the outer part on the inner, at the frame in its axes",
+    ),
+    "start_wrench": Quantity(
+        "wrench at the start of the link", "N m, N", _WRENCH,
+        "of a link under its own weight, at the frame in its axes",
+    ),
+    "closure_wrench": Quantity(
+        "wrench of the closure", "N m, N", _WRENCH,
+        "exerted by the second chain on the first, at the platform's origin, base axes",
+    ),
+    "frames": text("frames", "frame"),
+    "closure_residual": Quantity(
+        "closure residual", meaning="largest closure error, rad or reference lengths"
+    ),
+    "reference_length": Quantity("reference length", "m"),
+    "clearance_excess": Quantity(
+        "clearance excess", meaning="largest relative excess of a clearance"
+    ),
+    "duality_gap": Quantity(
+        "duality gap", "J", meaning="certified: energy is at most this too high"
+    ),
+    "relative_gap": Quantity("relative duality gap"),
+    "screw_rotation": Quantity("platform rotation known to", "rad", shown="mrad"),
+    "screw_translation": Quantity("platform translation known to", "m", shown="um"),
+    "screw_rotation_open": Quantity(
+        "undetermined rotation", "rad",
+        meaning="rotation that clearances leave open at the same energy", shown="mrad"
+    ),
+    "screw_translation_open": Quantity(
+        "undetermined translation", "m",
+        meaning="translation that clearances leave open at the same energy", shown="um"
+    ),
+    "screw_rotation_error": Quantity(
+        "determined rotation known to", "rad",
+        meaning="certified, without the undetermined rotation", shown="mrad"
+    ),
+    "screw_translation_error": Quantity(
+        "determined translation known to", "m",
+        meaning="certified, without the undetermined translation", shown="um"
+    ),
+    "stationarity": Quantity("residual of equilibrium", meaning="relative"),
+    "iterations": count("iterations"),
+    "method": text("method", meaning="numerical method that found the result"),
+    "free": count("free motions eliminated"),
+    "elastic": count("elastic constraints"),
+    "rigid": count("rigid constraints"),
+    "redundant": count("redundant constraints"),
+    "assumption": text("assumption of problem (27)"),
+    "rotation_error": Quantity(
+        "largest rotation of the platform", "rad", ("bound",),
+        "certified bounds of the largest rotation error, eq. (27)", shown="mrad"
+    ),
+    "translation_error": Quantity(
+        "largest translation of the platform", "m", ("bound",),
+        "certified bounds of the largest translation error, eq. (27)", shown="mm"
+    ),
+    "rotation_error_clearance": Quantity(
+        "largest rotation by clearances alone", "rad", ("bound",),
+        "certified bounds of the largest rotation error, eq. (27), frozen, without "
+        "geometric errors", shown="mrad"
+    ),
+    "translation_error_clearance": Quantity(
+        "largest translation by clearances alone", "m", ("bound",),
+        "certified bounds of the largest translation error, eq. (27), frozen, without "
+        "geometric errors", shown="mm"
+    ),
+    "rotation_screw": Quantity(
+        "platform error of largest rotation", "rad, m", _SCREW,
+        "attains the lower bound of the rotation", shown="mrad, mm"
+    ),
+    "translation_screw": Quantity(
+        "platform error of largest translation", "rad, m", _SCREW,
+        "attains the lower bound of the translation", shown="mrad, mm"
+    ),
+    "cuts": count("cutting planes"),
+    "linearisation_rotation": Quantity(
+        "linearisation error, rotation", "rad",
+        meaning="size of the platform's rotation, linear minus exact", shown="mrad"
+    ),
+    "linearisation_translation": Quantity(
+        "linearisation error, translation", "m",
+        meaning="size of the platform's translation, linear minus exact", shown="um"
+    ),
+    "linearisation_energy": Quantity(
+        "linearisation error, relative energy",
+        meaning="energy, linear minus exact, relative to the exact one", shown="%"
+    ),
+    "relative_energy": Quantity("relative energy", shown="%"),
+    "stress": Quantity(
+        "von Mises stress", "Pa", meaning="largest von Mises stress in the link",
+        shown="MPa"
+    ),
+    "stress_error": Quantity(
+        "estimated relative error of the stress", meaning="by the mesh; a beam's "
+        "formulas have 0, links with an inner edge without a fillet infinity",
+    ),
+    "safety": Quantity("safety", meaning="yield strength over the largest stress"),
+    "rotation": Quantity(
+        "platform rotation", "rad", meaning="size of the platform's rotation error",
+        shown="mrad",
+    ),
+    "translation": Quantity(
+        "platform translation", "m", meaning="size of the platform's translation error",
+        shown="um"
+    ),
+    "rotation_lower": Quantity(
+        "bound of the rotation", "rad",
+        meaning="certified: the largest rotation error is at least this", shown="mrad"
+    ),
+    "translation_lower": Quantity(
+        "bound of the translation", "m",
+        meaning="certified: the largest translation error is at least this", shown="um"
+    ),
+    "position": Quantity("position error", "m", shown="um"),
+    "normalised": Quantity("normalised error", meaning="error over the stated noise"),
+    "force": Quantity("largest force", "N", meaning="largest force through any body"),
+    "moment": Quantity(
+        "largest moment", "N m", meaning="largest moment through any body"
+    ),
+    # stiffness of links and of the platform
+    "compliance": Quantity(
+        "compliance", "rad/(N m) .. m/N", _MATRIX,
+        "of the platform at its origin, base axes", "C",
+    ),
+    "stiffness": Quantity(
+        "stiffness", "N m/rad .. N/m", ("wrench_component", "screw"),
+        "null where a free motion makes it zero or a constraint infinite", "K_C",
+    ),
+    "axis_stiffness": Quantity(
+        "stiffness along an axis", "N m/rad, N/m", _WRENCH,
+        "along each axis, the others free",
+    ),
+    "free_motions": Quantity(
+        "free motions", "rad, m", ("motion", "screw"), "unit screws nothing resists"
+    ),
+    "rigid_wrenches": Quantity(
+        "rigid wrenches", "N m, N", ("direction", "wrench_component"),
+        "unit wrenches that deform nothing",
+    ),
+    "characteristic_length": Quantity("characteristic length", "m"),
+    "eigen_stiffness": Quantity(
+        "eigenstiffness", "N/m", ("eigen",),
+        "softest first, angles multiplied by the longest body",
+    ),
+    "stiffness_condition": Quantity(
+        "condition of the stiffness", meaning="stiffest over softest eigenstiffness"
+    ),
+    "pitch": Quantity("pitch", "m/rad"),
+    "screw": Quantity("screw", "rad, m", _SCREW),
+    "centre": Quantity("centre of stiffness", "m", ("axis",)),
+    "share": Quantity(
+        "share of a part", dims=("part", "wrench_component"),
+        meaning="of every link and joint in the compliance along each axis",
+    ),
+    "frequency": Quantity(
+        "natural frequency", "Hz", ("mode",),
+        "lowest first, drives held, without load and gravity",
+    ),
+    "idle_motions": count("free motions that leave the platform at rest"),
+    "von_mises": Quantity("largest von Mises stress", "Pa", shown="MPa"),
+    "tip": Quantity("tip", "m", ("axis",), "where the stiffness is read"),
+    "base": Quantity("base", "m", ("axis",)),
+    "length": Quantity("length", "m"),
+    "slenderness": Quantity("slenderness L / r"),
+    "relative_error_estimate": Quantity(
+        "estimated relative error", meaning="largest entry, scaled by sqrt(K_ii K_jj)"
+    ),
+    "relative_errors": Quantity(
+        "estimated relative errors", dims=("row", "column"),
+        meaning="scaled by sqrt(K_ii K_jj)",
+    ),
+    "stiffness_error": Quantity(
+        "estimated error of the stiffness", "N m/rad .. N/m", ("row", "column")
+    ),
+    "difference": Quantity(
+        "difference", dims=("row", "column"),
+        meaning="finite elements minus beam, scaled by sqrt(K_ii K_jj) of the beam",
+    ),
+    "mass": Quantity("mass", "kg"),
+    "center_of_mass": Quantity("centre of mass", "m", ("axis",)),
+    "inertia": Quantity(
+        "inertia", "kg m^2", ("row", "column"), "at the centre of mass"
+    ),
+    "volume": Quantity("volume", "m^3"),
+    "area": Quantity("area", "m^2"),
+    "seconds": Quantity("time", "s"),
+    "nodes": count("nodes"),
+    "elements": count("elements"),
+    "unknowns": count("unknowns"),
+    "meshes": count("meshes"),
+    # random errors and tolerances
+    "draws": count("draws"),
+    "assembled": count("draws that assemble"),
+    "seed": count("seed"),
+    "confidence": Quantity("confidence of all intervals"),
+    "probability": Quantity("probability"),
+    "lower": Quantity("lower bound of the interval"),
+    "upper": Quantity("upper bound of the interval"),
+    "undecided": count("undecided draws"),
+    "limit": Quantity("limit", ""),
+    "unit": text("unit"),
+    "contact_length": Quantity("contact length", "m"),
+    "free_motion": Quantity(
+        "free motion", "rad, m", _SCREW,
+        "of the platform, that nothing resists: unit screws, else NaN",
+    ),
+    "clearance_mixed": Quantity(
+        "clearance mixed", meaning="1 where the random walk of the clearances mixed"
+    ),
+    "yield": Quantity("yield"),
+    "price": Quantity("price of the tolerances"),
+    "tolerance": Quantity("tolerance", "rad or m"),
+    "first_index": Quantity(
+        "first-order Sobol index", dims=("bounds",),
+        meaning="share of the variance that a group explains alone",
+    ),
+    "total_index": Quantity(
+        "total Sobol index", dims=("bounds",),
+        meaning="share of the variance that involves a group",
+    ),
+    "failed_share": Quantity(
+        "share left out", meaning="base draws left out, for a draw compared has no "
+        "answer",
+    ),
+    "part": Quantity(
+        "deviation of the platform", "rad, m", _SCREW,
+        "deviation of the platform's screw that involves a group, by component",
+    ),
+    "gain": Quantity(
+        "slope of the platform", "rad or m for each rad or m", _SCREW,
+        "exact slope of the platform's screw with the errors; NaN if rad and m",
+    ),
+    "rank": count("possible ranks", "bound"),
+    "postures": count("postures"),
+    "grid": text("grid"),
+    # measured data and comparisons
+    "campaign": text("campaign"),
+    "rows": count("rows"),
+    "verdict": text("verdict"),
+    "passed": flag("passed"),
+    "crosscheck": text("cross-check"),
+    "worst_clearance": text("certified worst case"),
+    "before": Quantity("before", ""),
+    "after": Quantity("after", ""),
+    "std": Quantity("standard deviation", ""),
+    "value": Quantity("value", ""),
+    "name": text("name"),
+    "names": text("names", "name"),
+    "where": text("frames", "frame"),
+    "registration": text("registration"),
+    "reference_point": Quantity("reference point", "m", ("axis",), "platform axes"),
+    "not_measured": text("components not measured", "component"),
+    "beyond_learned_range": text("rows outside the learned range", "row"),
+    "rms": Quantity("root mean square"),
+    "scatter": Quantity("scatter about the declared robot", "m", shown="um"),
+    "left_out": text("left out", "row"),
+    "slope": Quantity("slope of the difference with the scale"),
+    "scale": Quantity("scale of errors and loads"),
+    "accuracy": Quantity("accuracy", "m", shown="um"),
+    "repeatability": Quantity("repeatability", "m", shown="um"),
+}  # fmt: skip
+
+
+def in_words(key: str) -> str:
+    """A key of the results in words; itself, spaced, where the table lacks it."""
+    return QUANTITIES[key].words if key in QUANTITIES else key.replace("_", " ")
+
+
+def unit_of(key: str) -> str:
+    """SI unit of a key's numbers; empty for pure, mixed and unknown ones."""
+    unit = QUANTITIES[key].unit if key in QUANTITIES else ""
+    mixed = unit == "1" or "," in unit or ".." in unit or " or " in unit
+    return "" if mixed else unit

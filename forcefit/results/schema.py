@@ -1,0 +1,98 @@
+"""JSON Schema (draft 2020-12) of outputs and input files, from their records.
+
+In outputs null may be in the place of everything but truth values: of a number that is
+not finite, and of a result that a failed computation lacks.
+"""
+
+from typing import Any
+
+from forcefit.results.quantities import LABELS, QUANTITIES, Quantity
+from forcefit.results.records import (
+    Content,
+    Each,
+    Either,
+    Listed,
+    Record,
+    Words,
+)
+
+DRAFT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def schema_of(content: Content, title: str = "", file: bool = False) -> dict[str, Any]:
+    """The schema of a record.
+
+    Args:
+        content: usually a record.
+        title: of the schema.
+        file: whether of an input file, in TOML, which has no null.
+
+    Returns:
+        Plain values.
+    """
+    schema = _schema(content)
+    return {"$schema": DRAFT, "title": title} | (
+        _without_null(schema) if file else schema
+    )
+
+
+def _without_null(schema: Any) -> Any:
+    """A schema that allows no null."""
+    if isinstance(schema, list):
+        return [_without_null(one) for one in schema]
+    if not isinstance(schema, dict):
+        return schema
+    plain = {key: _without_null(one) for key, one in schema.items()}
+    if isinstance(schema.get("type"), list):
+        plain["type"] = schema["type"][0]
+    return plain
+
+
+def _schema(content: Content) -> dict[str, Any]:
+    """The schema of any content."""
+    match content:
+        case str():
+            return _schema(QUANTITIES[content])
+        case Quantity():
+            return _described(_array(content, content.dims), content)
+        case Words(words):
+            return {"enum": list(words)}
+        case Each(inner):
+            return {"type": ["object", "null"], "additionalProperties": _schema(inner)}
+        case Listed(inner):
+            return {"type": ["array", "null"], "items": _schema(inner)}
+        case Either(contents):
+            return {"anyOf": [_schema(one) for one in contents]}
+        case Record():
+            return _object(content)
+
+
+def _object(content: Record) -> dict[str, Any]:
+    """The schema of an object whose keys are known."""
+    one: dict[str, Any] = {
+        "type": ["object", "null"],
+        "properties": {key: _schema(inner) for key, inner in content.content.items()},
+    }
+    required = [key for key in content.content if key not in content.optional]
+    return (
+        one
+        | ({"required": required} if required else {})
+        | ({"additionalProperties": False} if content.closed else {})
+    )
+
+
+def _array(one: Quantity, dims: tuple[str, ...]) -> dict[str, Any]:
+    """Values over some dimensions."""
+    if not dims:
+        return {"type": one.kind if one.kind == "boolean" else [one.kind, "null"]}
+    length = len(LABELS.get(dims[0], ()))
+    size = {"minItems": length, "maxItems": length} if length else {}
+    whole = ["array", "null"] if dims == one.dims else "array"
+    return {"type": whole, "items": _array(one, dims[1:]), **size}
+
+
+def _described(schema: dict[str, Any], one: Quantity) -> dict[str, Any]:
+    """A schema with the words, meaning and unit of a quantity."""
+    words = f"{one.words}: {one.meaning}" if one.meaning else one.words
+    unit = "" if one.unit in {"", "1"} or one.kind != "number" else f" [{one.unit}]"
+    return schema | {"description": words + unit}

@@ -1,0 +1,69 @@
+"""Help texts: options in groups."""
+
+import re
+
+import pytest
+import typer
+
+from forcefit.commands import app as command
+from forcefit.commands.help import GROUPS
+
+
+def leaves(group, words=()):
+    """Every command with the words that call it."""
+    for name, inner in getattr(group, "commands", {}).items():
+        yield from leaves(inner, (*words, name))
+    if not hasattr(group, "commands"):
+        yield words, group
+
+
+COMMANDS = dict(leaves(typer.main.get_command(command.app)))
+
+
+def titles_of_options(out):
+    """The titles of a help text that list each long option."""
+    titles, title = {}, None
+    for line in out.splitlines():
+        if re.fullmatch(r"\S.*:", line):
+            title = line[:-1]
+        elif title and (option := re.match(r"  (?:-\w, )?(--[\w-]+)", line)):
+            titles.setdefault(option[1], []).append(title)
+    return titles
+
+
+@pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
+def test_help_lists_every_option_once_under_a_group(run, words):
+    _, out, _ = run(*words, "--help")
+    found = titles_of_options(out)
+    declared = {max(p.opts, key=len) for p in COMMANDS[words].params
+                if p.param_type_name == "option"}  # fmt: skip
+    assert set(found) == declared | {"--help"}
+    assert all(len(titles) == 1 for titles in found.values())
+    assert {one[0] for one in found.values()} <= {"What", *GROUPS}
+
+
+@pytest.mark.parametrize(
+    ("words", "option", "title"),
+    [
+        ("assembly error", "--assumption", "What"),
+        ("assembly error", "--pose", "Where"),
+        ("assembly error", "--tolerance-rotation", "How sure"),
+        ("assembly error", "--json", "Output"),
+        ("assembly sweep", "--workers", "Run"),
+        ("stiffness fea", "--tip", "Where"),
+        ("stiffness fea", "--accuracy", "How sure"),
+        ("validation diagnose", "--save", "Output"),
+    ],
+)
+def test_help_lists_an_option_where_users_look_for_it(run, words, option, title):
+    _, out, _ = run(*words.split(), "--help")
+    assert titles_of_options(out)[option] == [title]
+
+
+def test_every_name_in_a_group_is_an_option_of_some_command():
+    """A name that is no option any more goes from the table too."""
+    declared = {
+        name for one in COMMANDS.values() for p in one.params for name in p.opts
+    }
+    grouped = {f"--{name}" for names in GROUPS.values() for name in names.split()}
+    assert grouped <= declared | {"--help"}

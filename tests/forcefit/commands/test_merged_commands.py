@@ -1,0 +1,91 @@
+"""Commands that answer several questions: what goes together, and what is refused."""
+
+import json
+
+import numpy as np
+import pytest
+
+CURVE = """
+[[piece]]
+end = [0.4, 0.0, 0.0]
+section = { radius = 0.02 }
+"""
+MATERIAL = ["--young", "6e10", "--poisson", "0.3"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["assembly", "solve", "five_bar", "--quantities", "margni"],
+         '--quantities: found "margni"; did you mean "margin"'),
+        (["assembly", "solve", "five_bar", "--quantities", "margin", "--load", "fx=1"],
+         "--load: found with --quantities margin"),
+        (["assembly", "solve", "five_bar", "--quantities", "margin", "--state",
+          "exact"], "--state: found with --quantities margin"),
+        (["assembly", "solve", "five_bar", "--state", "nominal"],
+         "--state: found 'nominal'"),
+        (["assembly", "plot", "a.nc"], "plot: expected --figure, --csv or both"),
+        (["assembly", "plot", "a.nc", "--csv", "a.csv", "--kind", "tornado"],
+         "--kind: found without --figure, expected both"),
+        (["assembly", "plot", "a.nc", "--figure", "a.png", "--rows", "kind"],
+         "--rows: found without --csv, expected both"),
+        (["stiffness", "beam", *MATERIAL, "--radius", "0.1"],
+         "--length: missing; expected [m], or a FILE"),
+        (["stiffness", "beam", "c.toml", *MATERIAL, "--radius", "0.1"],
+         "c.toml: a curve's file has all lengths, sections and axes"),
+        (["stiffness", "beam", "c.toml", *MATERIAL, "--along", "x"],
+         "c.toml: a curve's file has all lengths"),
+        (["stiffness", "fea", "s.stl", *MATERIAL, "--tip", "z=1"],
+         "--base: missing; expected an interface"),
+        (["stiffness", "fea", "s.stl", *MATERIAL, "--base", "z=1"],
+         "--tip: missing; expected an interface"),
+        (["stiffness", "compare", *MATERIAL, "--radius", "0.1"],
+         "SURFACE: missing; expected one, or a section and --ratios"),
+        (["stiffness", "compare", "s.stl", *MATERIAL, "--ratios", "5,10"],
+         "SURFACE: found with --ratios, whose bars have none"),
+        (["stiffness", "compare", *MATERIAL, "--ratios", "5,10", "--tip", "z=1"],
+         "--tip: found with --ratios, whose bars have none"),
+        (["stiffness", "library", "read", "l", "--at", "length=1", "--to", "csv"],
+         "library read: found --at and --to, expected one"),
+        (["stiffness", "library", "read", "l", "--key", "a"],
+         "--key: found without --to, expected both"),
+        (["stiffness", "library", "read", "l", "--family", "a"],
+         "--family: found without --at, expected both"),
+        (["stiffness", "library", "read", "l", "--to", "csv", "--json", "x.json"],
+         "--json: found with --to csv, expected one of the two"),
+    ],
+)  # fmt: skip
+def test_options_that_do_not_go_together_are_one_message(
+    run, tmp_path, monkeypatch, words, message
+):
+    monkeypatch.chdir(tmp_path)
+    status, out, err = run(*words)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_straight_curve_of_a_file_is_the_beam_of_the_options(run, tmp_path):
+    (tmp_path / "c.toml").write_text(CURVE)
+    by_file = run("stiffness", "beam", tmp_path / "c.toml", *MATERIAL, "--json", "-")
+    options = ["--length", "0.4", "--radius", "0.02"]
+    by_options = run("stiffness", "beam", *options, *MATERIAL, "--json", "-")
+    one, other = (
+        np.array(json.loads(out)["compliance"]) for _, out, _ in (by_file, by_options)
+    )
+    scale = np.sqrt(np.diag(other))
+    np.testing.assert_allclose(one / np.outer(scale, scale),
+                               other / np.outer(scale, scale), atol=1e-9)  # fmt: skip
+
+
+def test_margins_alone_are_those_of_the_whole_solution(run):
+    _, whole, _ = run("assembly", "solve", "irsbot2", "--json", "-")
+    status, margins, _ = run(
+        "assembly", "solve", "irsbot2", "--quantities", "margin,margin_free", "--json",
+        "-",
+    )  # fmt: skip
+    found, expected = json.loads(margins)["zone"], json.loads(whole)["zone"]
+    assert status == 0
+    assert set(json.loads(margins)) == {"robot", "zone"}
+    assert found["margin"] == expected["margin"]
+    assert found["margin_free"] == expected["margin_free"]

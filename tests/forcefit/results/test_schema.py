@@ -1,0 +1,127 @@
+"""JSON Schemas of files and results, against files, readers and another validator.
+
+Results themselves are compared in every test that asks for JSON (``conftest.py``).
+"""
+
+import copy
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from assembly.files.robot_file import robot_of, write_robot
+from assembly.robots import BUILT_IN
+from forcefit.inputs.table import BadInput, Table
+from forcefit.results.outputs import OUTPUTS
+from forcefit.results.schema import schema_of
+
+ROOT = Path(__file__).parents[3]
+ARM = {
+    "platform": "tip",
+    "frame": [
+        {"name": "drive", "parent": "base", "joint": "revolute", "actuated": True,
+         "clearance": {"radial": 1e-5}, "joint_stiffness": [1e6] * 6},
+        {"name": "tip", "parent": "drive", "translation": [0.1, 0, 0],
+         "link": {"beam": {"radius": 0.01}, "young": 2e11, "poisson": 0.3}},
+    ],
+}  # fmt: skip
+# one fault each: its place and what is put there
+FAULTS = {
+    "key of the file": (("plattform",), "tip"),
+    "key of a frame": (("frame", 0, "axis"), [0, 0, 1]),
+    "kind of joint": (("frame", 0, "joint"), "universal"),
+    "kind of clearance": (("frame", 0, "clearance", "axail"), 1e-5),
+    "text for a number": (("frame", 0, "clearance", "radial"), "10 um"),
+    "length of a vector": (("frame", 1, "translation"), [0.1, 0]),
+    "number for a truth value": (("frame", 0, "actuated"), 1),
+    "key of a section": (("frame", 1, "link", "beam", "diameter"), 0.02),
+    "kind of effect": (("effect",), [{"name": "self_wieght"}]),
+    "frames of a closure": (("closure",), [{"frames": "tip"}]),
+}
+
+
+@pytest.fixture(scope="module")
+def validator():
+    """Schema of a robot file or a campaign, as the command prints it."""
+    from io import StringIO
+    from unittest.mock import patch
+
+    from forcefit.commands.schema import schema
+
+    def of(name):
+        with patch("sys.stdout", new=StringIO()) as printed:
+            schema([name])
+        return Draft202012Validator(json.loads(printed.getvalue()))
+
+    return of
+
+
+def test_schemas_are_valid_by_the_draft_they_name():
+    for content in OUTPUTS.values():
+        Draft202012Validator.check_schema(schema_of(content))
+
+
+def test_robot_files_of_the_repository_follow_the_schema(validator):
+    robot, checked = validator("robot"), 0
+    for path in ROOT.glob("[!.]*/**/*.toml"):
+        table = tomllib.loads(path.read_text())
+        if {"platform", "frame"} <= {*table}:
+            assert not [*robot.iter_errors(table)], path
+            checked += 1
+    assert checked > 10
+
+
+def test_campaigns_of_the_repository_follow_the_schema(validator):
+    campaign, checked = validator("campaign"), 0
+    for path in ROOT.glob("[!.]*/**/campaign.toml"):
+        assert not [*campaign.iter_errors(tomllib.loads(path.read_text()))], path
+        checked += 1
+    assert checked > 5
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_robot_files_that_are_written_follow_the_schema(name, tmp_path, validator):
+    write_robot(BUILT_IN[name](), tmp_path / "robot.toml")
+    table = tomllib.loads((tmp_path / "robot.toml").read_text())
+    assert not [*validator("robot").iter_errors(table)]
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_schema_and_reader_refuse_the_same_fault(fault, validator):
+    table = copy.deepcopy(ARM)
+    robot_of(Table(copy.deepcopy(table), "robot.toml", ""), "arm")
+    assert not [*validator("robot").iter_errors(table)]
+    (*places, key), value = FAULTS[fault]
+    inner = table
+    for place in places:
+        inner = inner[place]
+    inner[key] = value
+    assert [*validator("robot").iter_errors(table)]
+    with pytest.raises(BadInput):
+        robot_of(Table(table, "robot.toml", ""), "arm")
+
+
+def test_names_are_listed_and_an_unknown_one_is_refused_with_the_nearest(run):
+    assert run("schema")[1].split("\n")[:3] == ["robot", "campaign", "assembly solve"]
+    assert run("schema", "assembly", "sovle")[::2] == (
+        2, 'forcefit: schema: no "assembly sovle"; did you mean "assembly solve"?\n'
+    )  # fmt: skip
+    described = json.loads(run("schema", "assembly", "error")[1])["properties"]
+    assert described["energy"]["description"].endswith("[J]")
+
+
+def test_every_command_with_json_has_a_schema():
+    import typer.main
+
+    from forcefit.commands.app import app
+
+    def commands(group, above=()):
+        for name, command in group.commands.items():
+            if hasattr(command, "commands"):
+                yield from commands(command, (*above, name))
+            elif not command.hidden and any(p.name == "json" for p in command.params):
+                yield " ".join((*above, name))
+
+    assert {*commands(typer.main.get_command(app))} == {*OUTPUTS}

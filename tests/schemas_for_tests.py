@@ -1,0 +1,36 @@
+"""Every result that a test asks for as JSON is compared with its schema."""
+
+import json
+from functools import cache
+from pathlib import Path
+
+from jsonschema import Draft202012Validator
+
+from forcefit.results.outputs import OUTPUTS
+from forcefit.results.schema import schema_of
+
+
+@cache
+def validator(name: str) -> Draft202012Validator:
+    """Validator of one command's output."""
+    return Draft202012Validator(schema_of(OUTPUTS[name]))
+
+
+def check_schema(words: tuple[str, ...], out: str) -> None:
+    """Compare what a command wrote as JSON with its schema.
+
+    Args:
+        words: after ``forcefit``.
+        out: its standard output.
+    """
+    if "--json" not in words:
+        return
+    target = words[words.index("--json") + 1]
+    if not (out if target == "-" else Path(target).is_file()):
+        return  # refused
+    content = json.loads(out if target == "-" else Path(target).read_text())
+    name = next(n for n in OUTPUTS if words[: len(n.split())] == tuple(n.split()))
+    if "--diagnose" in words:  # a campaign made and diagnosed
+        name = "validation diagnose"
+    errors = list(validator(name).iter_errors(content))
+    assert not errors, f"{name}: {errors[0].json_path}: {errors[0].message[:300]}"
