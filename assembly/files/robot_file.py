@@ -2,12 +2,15 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.drawing.frames import robot_of_drawing
+from assembly.files.drawing_file import is_drawing, read_drawing
 from assembly.files.effect_file import effect_tables, with_effects
 from assembly.files.joint_file import read_clearance, read_joint_stiffness
 from assembly.files.link_file import link_table, read_link
@@ -101,11 +104,37 @@ def declared_robot(root: Table, name: str) -> Robot:
     if not isinstance(description, str):
         fault = f"found {describe(description)}, expected a string"
         raise root.bad("description", fault)
-    platform = root.text("platform", expected="the name of a frame")
-    tables = root.tables("frame"), root.tables("closure")
-    effects = root.tables("effect")
+    version = root.get("format", 1)
+    if isinstance(version, bool) or version not in (1, 2):
+        raise root.bad("format", f"found {describe(version)}, expected 1 | 2")
     ranges = _learned_range(root)
     point, diagnosis = _reference_point(root), _diagnosis(root)
+    effects = root.tables("effect")
+    robot = (_drawn if is_drawing(root) else _framed)(root, name, description)
+    robot = replace(
+        robot, learned_range=ranges, reference_point=point, diagnosis=diagnosis
+    )
+    return with_effects(robot, effects)
+
+
+def _drawn(root: Table, name: str, description: str) -> Robot:
+    """Return the robot of a file of bodies and joints."""
+    drawing = read_drawing(root, name, description)
+    root.finish()
+    try:
+        robot = robot_of_drawing(drawing)
+    except BadInput as error:
+        raise BadInput(f"{root.file}: {error}") from None
+    if len(robot.frames) > MOST_FRAMES:
+        fault = f"found joints and bodies that make {len(robot.frames)} frames"
+        raise root.bad("", f"{fault}, expected at most {MOST_FRAMES}")
+    return robot
+
+
+def _framed(root: Table, name: str, description: str) -> Robot:
+    """Return the robot of a file of frames and closures."""
+    platform = root.text("platform", expected="the name of a frame")
+    tables = root.tables("frame"), root.tables("closure")
     root.finish()
     if not 0 < len(tables[0]) <= MOST_FRAMES:
         fault = f"found {len(tables[0])}" if tables[0] else "missing"
@@ -115,15 +144,13 @@ def declared_robot(root: Table, name: str) -> Robot:
     closures = tuple(_closure(table, names) for table in tables[1])
     _check_known(root, "platform", platform, names)
     try:
-        remarks = _remarks(tables[0])
         robot = Robot(
-            name, platform, frames, closures, description, learned_range=ranges,
-            reference_point=point, diagnosis=diagnosis, remarks=remarks,
-        )  # fmt: skip
+            name, platform, frames, closures, description, remarks=_remarks(tables[0])
+        )
         _check_meeting_frames(robot)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
-    return with_effects(robot, effects)
+    return robot
 
 
 def _learned_range(root: Table) -> dict[str, tuple[float, float]]:

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from assembly.model.placed_frames import PlacedFrame, place_frames
 from assembly.model.robot import BeamLink, Clearance, Frame, Robot
-from assembly.robots.placing import PlacedFrame, pin, place_frames
+from assembly.robots.placing import pin
 from assembly.robots.planar import PlanarLeg, arm_angle, in_plane, two_arms
 
 

@@ -21,8 +21,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.model.placed_frames import PlacedFrame, place_frames
 from assembly.model.robot import BASE, BeamLink, Clearance, Frame, Robot
-from assembly.robots.placing import PlacedFrame, drive_stiffness, pin, place_frames
+from assembly.robots.placing import drive_stiffness, pin
 from assembly.robots.planar import direction, in_plane
 
 

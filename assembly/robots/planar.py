@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.model.placed_frames import PlacedFrame
 from assembly.model.robot import BeamLink, Clearance, Frame
-from assembly.robots.placing import PlacedFrame, at, drive_stiffness, pin
+from assembly.robots.placing import at, drive_stiffness, pin
 from forcefit.inputs.table import BadInput
 
 

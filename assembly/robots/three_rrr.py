@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.model.placed_frames import PlacedFrame, place_frames
 from assembly.model.robot import BeamLink, Clearance, Frame, Robot
-from assembly.robots.placing import PlacedFrame, pin, place_frames
+from assembly.robots.placing import pin
 from assembly.robots.planar import (
     PlanarLeg,
     arm_angle,

@@ -14,6 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from assembly.files.drawing_file import is_drawing
 from assembly.files.robot_file import declared_robot, robot_of, robot_table
 from assembly.files.solved_links import solve_links
 from assembly.model.robot import Robot
@@ -158,7 +159,12 @@ def load_design(name: str | Path) -> Design:
     robot = load_robot(name, links=False)
     if str(name) in BUILT_IN or Path(name).suffix.lower() in OTHERS:
         return design_of(robot)
-    return Design(read_toml(Path(name)).content, str(name), robot.name)
+    table = read_toml(Path(name))
+    if is_drawing(
+        table
+    ):  # its bodies have copies; the frames are each a number's place
+        return Design(robot_table(robot), str(name), robot.name)
+    return Design(table.content, str(name), robot.name)
 
 
 def unit_of(path: str) -> str:

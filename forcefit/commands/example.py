@@ -37,6 +37,11 @@ EXAMPLES = {
         'forcefit assembly tolerances irsbot2 --grid "tx=-0.2:0.2:0.2,tz=-0.5" '
         "--plan examples/tolerance_allocation/mostly.toml",
     ),
+    "drawn": _Example(
+        "robots as drawn: a 3-UPU, a Tricept and an Agile Eye",
+        ("examples/drawn",),
+        "forcefit assembly solve examples/drawn/tricept.toml --load fx=100",
+    ),
     "campaign": _Example(
         "measurements of an arm whose model lacks an effect",
         ("examples/campaign",),

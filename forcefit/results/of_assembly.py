@@ -32,7 +32,9 @@ SOLUTION = record(
     "nominal_mismatch remarks load gravity reading? method?", _POSTURE, _SOLVED,
     joints=Each(number("joint coordinate", "rad or m")),
     mobility=record(
-        "freedoms locked_freedoms overconstraint smallest_singular_value"
+        "freedoms platform_freedoms freedoms_drives_locked "
+        "platform_freedoms_drives_locked redundant_constraints drives "
+        "locked_freedoms overconstraint smallest_singular_value"
     ),
     zone_=ZONE,
     certificate_=record(

@@ -104,6 +104,13 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "gravity": Quantity("gravity", "m/s^2", ("axis",), "base axes", "g"),
     "freedoms": count("degrees of freedom", meaning="drives free"),
+    "platform_freedoms": count("degrees of freedom of the platform"),
+    "freedoms_drives_locked": count("degrees of freedom with locked drives"),
+    "platform_freedoms_drives_locked": count(
+        "degrees of freedom of the platform with locked drives"
+    ),
+    "redundant_constraints": count("redundant constraints, drives locked"),
+    "drives": count("drives"),
     "locked_freedoms": count("degrees of freedom with locked drives"),
     "overconstraint": count("redundant closure equations"),
     "smallest_singular_value": Quantity(

@@ -181,6 +181,26 @@ def curve_compliance(
     )
 
 
+def curve_mass(pieces: Sequence[Piece], density: float) -> tuple[float, NDArray]:
+    """Mass and centre of a beam along a curve.
+
+    Args:
+        pieces: base to tip.
+        density: [kg/m^3].
+
+    Returns:
+        [kg], and (3,) [m] in the axes the pieces are given in.
+    """
+    mass, moment = 0.0, np.zeros(3)
+    for piece in pieces:
+        for x, weight in zip(_POINTS, _WEIGHTS, strict=True):
+            t = (x + 1) / 2
+            line = density * piece.section(t).area * np.linalg.norm(piece.tangent(t))
+            mass += weight / 2 * line
+            moment += weight / 2 * line * piece.place(t)
+    return float(mass), moment / mass
+
+
 def curve_length(pieces: Sequence[Piece]) -> float:
     """Return the length of a beam along its curve.
 

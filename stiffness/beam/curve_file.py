@@ -1,6 +1,6 @@
 """Beams along a curve from a file: straight pieces, tapers, arcs."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -36,12 +36,30 @@ def read_curve(path: Path | str, nu: float) -> list[Piece]:
     table.finish()
     if not tables:
         raise table.bad("piece", "missing; expected at least one [[piece]]")
+    start = np.zeros(3)
+    if tables[0].has("start"):
+        start = tables[0].array("start", (3,), "m", largest=_LARGEST)
+    return read_pieces(tables, start, nu)
+
+
+def read_pieces(tables: Sequence[Table], start: NDArray, nu: float) -> list[Piece]:
+    """The pieces of a beam from their tables.
+
+    Args:
+        tables: at least one; the keys are those of :func:`read_curve`.
+        start: (3,) [m] where the first one begins.
+        nu: [-] Poisson's ratio, for the shear factors.
+
+    Returns:
+        The pieces, base to tip.
+
+    Raises:
+        BadInput: a name or a value is not proper.
+    """
     pieces: list[Piece] = []
     section: dict[str, float] | None = None
-    for number, part in enumerate(tables):
-        start = pieces[-1].place(1.0) if pieces else np.zeros(3)
-        if number == 0 and part.has("start"):
-            start = part.array("start", (3,), "m", largest=_LARGEST)
+    for part in tables:
+        start = pieces[-1].place(1.0) if pieces else start
         section = _section(part, "section") if part.has("section") else section
         if section is None:
             raise part.bad("section", "missing; the first piece needs one")

@@ -1,0 +1,209 @@
+"""The robot of frames and closures that a drawing describes.
+
+A joint is a frame of its name, or one for each of its freedoms (``joint.first``).  A
+body is a fixed frame of its name if it has a mass or a link, is the platform, or is
+where a loop closes.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.drawing.drawing import Drawing, DrawnBody, DrawnJoint
+from assembly.drawing.links import link_at_tip
+from assembly.drawing.parts import joint_axes, parts_of
+from assembly.drawing.tree import ROOT, Node, Step, steps_of
+from assembly.model.placed_frames import PlacedFrame, place_frames
+from assembly.model.robot import BASE, Frame, Robot
+from forcefit.inputs.table import quoted
+from stiffness.screws import transform
+
+
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    """Names and places of frames.
+
+    Attributes:
+        drawing: the bodies and joints.
+        joints: of it, by name.
+        bodies: of it, by name.
+        own: names of the frames that bodies have, by node.
+        carriers: name of the frame that carries what is on a node.
+    """
+
+    drawing: Drawing
+    joints: Mapping[str, DrawnJoint]
+    bodies: Mapping[str, DrawnBody]
+    own: Mapping[Node, str]
+    carriers: Mapping[Node, str]
+
+
+def robot_of_drawing(drawing: Drawing) -> Robot:
+    """The robot of a drawing, its closures holding at home.
+
+    Args:
+        drawing: of bodies and joints.
+
+    Returns:
+        The robot; its remarks name the joints after which the loops close.
+
+    Raises:
+        BadInput: no joint leads to a body, the two ends of a link coincide, or a link
+            from a library would be passed from its tip.
+    """
+    steps = steps_of(drawing)
+    plan = _plan(drawing, steps)
+    placed: list[PlacedFrame] = []
+    closures = []
+    for step in steps:
+        placed += _frames_of(plan, step)
+        if step.closes:
+            placed += _ends(plan, step)
+            closures.append((placed[-1][0].name, _seat(plan, step)))
+    remarks = (*_cuts(steps), *_inertias(drawing), *drawing.remarks)
+    return Robot(
+        drawing.name, drawing.platform, place_frames(placed), tuple(closures),
+        drawing.description, remarks=remarks,
+    )  # fmt: skip
+
+
+def _cuts(steps: list[Step]) -> tuple[str, ...]:
+    """A remark on the joints after which loops close."""
+    closing = [step for step in steps if step.closes]
+    names = [f"{quoted(s.edge.item.name)} (at {quoted(s.end[0])})" for s in closing]
+    return (f"loops close after {', '.join(names)}",) if names else ()
+
+
+def _inertias(drawing: Drawing) -> tuple[str, ...]:
+    """A remark on moments of inertia, which no frame holds."""
+    names = [quoted(body.name) for body in drawing.bodies if body.inertia.any()]
+    return (f"moments of inertia are not used: {', '.join(names)}",) if names else ()
+
+
+def _plan(drawing: Drawing, steps: list[Step]) -> _Plan:
+    """Names of the frames, the users' where no joint has them."""
+    joints = {joint.name: joint for joint in drawing.joints}
+    bodies = {body.name: body for body in drawing.bodies}
+    taken = {part.name for joint in drawing.joints for part in parts_of(joint)}
+    met = {step.end for step in steps if step.closes} - {ROOT}
+    massive = {(body.name, True) for body in drawing.bodies if body.mass}
+    linked = {s.end for s in steps if _is_body(drawing, s)}
+    own: dict[Node, str] = {}
+    for node in [(drawing.platform, True), *sorted(met | massive | linked)]:
+        name = node[0] if node[1] else f"{node[0]}.near"
+        if node not in own:
+            own[node] = _free_name(name, taken)
+            taken.add(own[node])
+    carriers = {ROOT: BASE}
+    for step in steps:
+        if not step.closes:
+            carriers[step.end] = own.get(step.end) or _last_name(step)
+    return _Plan(drawing, joints, bodies, own, carriers)
+
+
+def _free_name(name: str, taken: set[str]) -> str:
+    """The name, with an addition where a joint has it already."""
+    while name in taken:
+        name += ".body"
+    return name
+
+
+def _is_body(drawing: Drawing, step: Step) -> bool:
+    """Whether the frame of a link is that of its body as well."""
+    body = step.edge.item
+    if isinstance(body, DrawnJoint) or step.closes or step.reverse:
+        return False
+    return body.name != drawing.platform or _tip(body) is None
+
+
+def _tip(body: DrawnBody) -> str | None:
+    """Name of the joint at the end of a body's link, None for the platform's point."""
+    return body.ends[1] if body.ends else None
+
+
+def _last_name(step: Step) -> str:
+    """Name of the last frame of an edge."""
+    item = step.edge.item
+    if isinstance(item, DrawnJoint):
+        return parts_of(item, step.reverse)[-1].name
+    return f"{item.name}.link"
+
+
+def _frames_of(plan: _Plan, step: Step) -> list[PlacedFrame]:
+    """Frames of an edge, and of the body that it leads to."""
+    item, carrier = step.edge.item, plan.carriers[step.start]
+    placed: list[PlacedFrame] = []
+    if isinstance(item, DrawnJoint):
+        for part in parts_of(item, step.reverse):
+            numbers = part.numbers
+            frame = Frame(
+                part.name, carrier, joint=part.kind, actuated=item.actuated,
+                position=part.position, limits=item.limits,
+                clearance=numbers.clearance, joint_stiffness=numbers.stiffness,
+                geometric_error=numbers.error, tolerance=numbers.tolerance,
+            )  # fmt: skip
+            placed.append((frame, part.pose))
+            carrier = part.name
+    else:
+        is_body = _is_body(plan.drawing, step)
+        name = plan.own[step.end] if is_body else f"{item.name}.link"
+        base, tip = (_end_pose(plan, item, k) for k in (step.reverse, not step.reverse))
+        link = link_at_tip(item, base, tip, step.reverse)
+        mass = _mass(item, tip) if is_body else {}
+        placed.append((Frame(name, carrier, link=link, **mass), tip))
+        carrier = name
+    if not step.closes and step.end in plan.own and plan.own[step.end] != carrier:
+        placed.append(_body_frame(plan, step.end, carrier))
+    return placed
+
+
+def _mass(body: DrawnBody, pose: NDArray) -> dict:
+    """The keys of a frame for the mass of a body."""
+    centre = pose[:3, :3].T @ (body.centre - pose[:3, 3])
+    return {"mass": body.mass, "centre_of_mass": centre} if body.mass else {}
+
+
+def _end_pose(plan: _Plan, body: DrawnBody, tip: bool) -> NDArray:
+    """(4, 4) of a link's end at home: the joint's axes, or the platform's."""
+    name = body.ends[tip] if body.ends else None
+    if name is None:
+        return transform(plan.drawing.platform_at, np.eye(3))
+    return joint_axes(plan.joints[name])
+
+
+def _pose(plan: _Plan, node: Node) -> NDArray:
+    """(4, 4) of a body's own frame at home."""
+    name, far = node
+    body = plan.bodies[name]
+    if name == plan.drawing.platform and far:
+        return transform(plan.drawing.platform_at, np.eye(3))
+    if body.ends:
+        return _end_pose(plan, body, far)
+    joint = next(j for j in plan.joints.values() if name in (j.first, j.second))
+    return transform(body.centre if body.mass else joint.at, body.axes)
+
+
+def _body_frame(plan: _Plan, node: Node, carrier: str) -> PlacedFrame:
+    """The fixed frame of a body, with its mass."""
+    pose = _pose(plan, node)
+    mass = _mass(plan.bodies[node[0]], pose) if node[1] else {}
+    return Frame(plan.own[node], carrier, **mass), pose
+
+
+def _ends(plan: _Plan, step: Step) -> list[PlacedFrame]:
+    """The frame that must meet a body's, and a frame of the base to be met."""
+    name = step.edge.item.name
+    end = Frame(f"{name}.end", _last_name(step))
+    if step.end != ROOT:
+        return [(end, _pose(plan, step.end))]
+    item = step.edge.item
+    assert isinstance(item, DrawnJoint)
+    pose = transform(item.at, np.eye(3))
+    return [(Frame(_seat(plan, step)), pose), (end, pose)]
+
+
+def _seat(plan: _Plan, step: Step) -> str:
+    """Name of the frame at which a loop closes."""
+    return plan.own.get(step.end) or f"{step.edge.item.name}.{BASE}"

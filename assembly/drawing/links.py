@@ -1,0 +1,75 @@
+"""Links of drawn bodies, in the axes of the frame at their tip."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.drawing.drawing import DrawnBody, turned_link
+from assembly.model.robot import BeamLink, LibraryLink, Link, MatrixLink, MeshLink
+from forcefit.inputs.table import BadInput, quoted
+from stiffness.screws import screw_map
+
+_SAME_POINT = 1e-9  # [m] two points nearer than this are one
+_PARALLEL = 1e-6  # sine of the angle below which an axis gives no direction across
+
+
+def link_at_tip(
+    body: DrawnBody, base: NDArray, tip: NDArray, reverse: bool = False
+) -> Link | None:
+    """The link of a drawn body as the frame at its tip holds it.
+
+    Args:
+        body: with a link.
+        base: (4, 4) of the end nearer to the robot's base, at home.
+        tip: (4, 4) of the other, in whose axes the link is read.
+        reverse: ``tip`` is the end from which the body's link begins.
+
+    Returns:
+        The link, its directions in the tip's axes; beams with length and axis.
+
+    Raises:
+        BadInput: the two ends coincide, or a library's link is reversed.
+    """
+    link, R = body.link, tip[:3, :3]
+    place = f"body {quoted(body.name)}.link"
+    if isinstance(link, MatrixLink):
+        return _reversed_matrix(link, base, tip) if reverse else link
+    if isinstance(link, LibraryLink):
+        if reverse:
+            raise BadInput(
+                f"{place}.library: found that the tree of the robot passes it from "
+                '"to" to "from"; expected joints that lead from the base to "from"'
+            )
+        return link
+    span = tip[:3, 3] - base[:3, 3]
+    length = float(np.linalg.norm(span))
+    if isinstance(link, BeamLink | MeshLink):
+        given = link.axis
+        if given is None and length < _SAME_POINT:
+            raise BadInput(f"{place}: found no distance between its two joints")
+        along = np.array(given) * (-1 if reverse else 1) if given else span / length
+        x, y, z = along.tolist()
+        link = replace(link, axis=(x, y, z))
+    if isinstance(link, BeamLink):
+        up = link.up or _default_up(body, np.array(link.axis))
+        link = replace(link, up=up, length=link.length or length)
+    if isinstance(link, MeshLink) and reverse:
+        link = replace(link, base=link.tip, tip=link.base)
+    return turned_link(link, R.T)
+
+
+def _default_up(body: DrawnBody, along: NDArray) -> tuple[float, float, float]:
+    """The z axis of the copy of the leg; its x axis for a beam along that z."""
+    x, _, z = body.axes.T
+    unit = along / np.linalg.norm(along)
+    a, b, c = (x if np.linalg.norm(np.cross(unit, z)) < _PARALLEL else z).tolist()
+    return a, b, c
+
+
+def _reversed_matrix(link: MatrixLink, base: NDArray, tip: NDArray) -> MatrixLink:
+    """A stiffness read at the end called base, read at the one called tip."""
+    turn = base[:3, :3].T @ tip[:3, :3]
+    M = screw_map(base[:3, :3].T @ (tip[:3, 3] - base[:3, 3]), turn)
+    K = M.T @ link.stiffness @ M
+    return MatrixLink((K + K.T) / 2)

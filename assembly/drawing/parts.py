@@ -1,0 +1,166 @@
+"""A joint as frames of one freedom each, all at the same point."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.drawing.drawing import FREE_ROWS, DrawnJoint, JointNumbers
+from stiffness.screws import transform
+
+_FLIP = np.diag([1.0, -1.0, -1.0])  # half a turn about x
+_FLIP_SCREW = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One frame of a joint.
+
+    Attributes:
+        name: of the frame.
+        kind: ``"fixed"``, ``"revolute"`` or ``"prismatic"``, about or along own z.
+        pose: (4, 4) at home before its motion, seen from the base.
+        position: [rad or m] coordinate at home.
+        numbers: error, clearance and stiffness of this frame.
+    """
+
+    name: str
+    kind: str
+    pose: NDArray
+    position: float
+    numbers: JointNumbers
+
+
+def parts_of(joint: DrawnJoint, reverse: bool = False) -> list[Part]:
+    """The frames of a joint, from its first body to its second.
+
+    Args:
+        joint: of any type.
+        reverse: from its second body to its first: axes and signs are such that the
+            coordinates, the errors and the springs are the same.
+
+    Returns:
+        At least one; each error, clearance and spring is on one of them.
+    """
+    parts = [
+        _part(joint, *row, numbers)
+        for row, numbers in zip(_motions(joint), _shares(joint), strict=True)
+    ]
+    return [_reversed(part) for part in reversed(parts)] if reverse else parts
+
+
+def joint_axes(joint: DrawnJoint) -> NDArray:
+    """(4, 4) point and axes of a joint, base axes at home: z = axis, x = across."""
+    return _axes(joint.at, joint.axis, joint.across)
+
+
+def _axes(at: NDArray, z: NDArray, x: NDArray) -> NDArray:
+    """(4, 4) frame at a point; x is at right angles to z."""
+    return transform(at, np.column_stack([x, np.cross(z, x), z]))
+
+
+def _motions(joint: DrawnJoint) -> list[tuple[str, str, NDArray, NDArray]]:
+    """Suffix, kind, z and x of each part, from the first body to the second."""
+    z, x, second = joint.axis, joint.across, joint.axis2
+    y = np.cross(z, x)
+    if joint.kind == "cylindrical":
+        return [("turn", "revolute", z, x), ("slide", "prismatic", z, x)]
+    if joint.kind == "universal":
+        return [
+            ("first", "revolute", z, x),
+            ("second", "revolute", second, _across(z, second)),
+        ]
+    if joint.kind == "spherical":
+        return [
+            ("first", "revolute", z, x),
+            ("second", "revolute", x, y),
+            ("third", "revolute", y, z),
+        ]
+    if joint.kind == "planar":
+        return [
+            ("slide_x", "prismatic", x, y),
+            ("slide_y", "prismatic", y, z),
+            ("turn", "revolute", z, x),
+        ]
+    return [("", joint.kind, z, x)]
+
+
+def _across(vector: NDArray, axis: NDArray) -> NDArray:
+    """(3,) unit vector along the part of a vector at right angles to an axis."""
+    rest = vector - (vector @ axis) * axis
+    return rest / np.linalg.norm(rest)
+
+
+def _shares(joint: DrawnJoint) -> list[JointNumbers]:
+    """Numbers of each part: one of them carries those of the joint."""
+    own = joint.numbers[0]
+    if joint.kind == "universal":
+        return [joint.numbers[0], joint.numbers[-1]]
+    if joint.kind == "cylindrical":
+        return [own, JointNumbers()]
+    if joint.kind == "spherical":
+        return [own, JointNumbers(), JointNumbers()]
+    if joint.kind == "planar":
+        # the error places the plane, before the sliding; the contact is of the turn
+        placed = JointNumbers(error=_from_axes(own.error), tolerance=_size(own))
+        contact = replace(own, error=np.zeros(6), tolerance=None)
+        return [placed, JointNumbers(), contact]
+    return [own]
+
+
+# of a planar joint's first frame, whose z is the joint's x and whose x is its y
+_TO_SLIDE = np.array([1, 2, 0, 4, 5, 3])
+
+
+def _from_axes(screw: NDArray) -> NDArray:
+    """(6,) a screw in a planar joint's axes, in those of its first frame."""
+    return screw[_TO_SLIDE]
+
+
+def _size(numbers: JointNumbers) -> NDArray | None:
+    """(6,) the tolerance likewise, which has no sign."""
+    return None if numbers.tolerance is None else numbers.tolerance[_TO_SLIDE]
+
+
+def _part(
+    joint: DrawnJoint, suffix: str, kind: str, z: NDArray, x: NDArray,
+    numbers: JointNumbers,
+) -> Part:  # fmt: skip
+    """One part, its coordinate at home that of the joint if it is alone."""
+    name = f"{joint.name}.{suffix}" if suffix else joint.name
+    position = 0.0 if suffix else joint.position
+    if len(FREE_ROWS[joint.kind]) > 1 and joint.kind != "universal":
+        numbers = replace(numbers, stiffness=_held(numbers.stiffness, kind))
+    return Part(name, kind, _axes(joint.at, z, x), position, numbers)
+
+
+def _held(K: NDArray | None, kind: str) -> NDArray | None:
+    """K_B of the part that carries it: motions of the other parts are rigid there."""
+    if K is None:
+        return None
+    K = K.copy()
+    own = 5 if kind == "prismatic" else 2
+    for row in range(6):
+        if row != own and K[row, row] == 0.0:
+            K[row, row] = np.inf
+    return K
+
+
+def _reversed(part: Part) -> Part:
+    """The part as its second body carries its first, z turned round."""
+    own = part.numbers
+    K = own.stiffness
+    numbers = JointNumbers(
+        clearance=own.clearance,
+        stiffness=None if K is None else _flipped(K),
+        error=-_FLIP_SCREW * own.error,
+        tolerance=own.tolerance,
+    )
+    pose = part.pose @ transform(np.zeros(3), _FLIP)
+    return replace(part, pose=pose, numbers=numbers)
+
+
+def _flipped(K: NDArray) -> NDArray:
+    """(6, 6) K_B in axes turned by half a turn about x."""
+    signs = np.outer(_FLIP_SCREW, _FLIP_SCREW)
+    return np.where(np.isinf(K), K, np.where(np.isinf(K), 0.0, K) * signs)

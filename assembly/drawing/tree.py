@@ -1,0 +1,147 @@
+"""The spanning tree of a drawing, and the edges that close its loops.
+
+Nodes are rigid bodies.  An elastic body is two of them, one at each end of its link:
+``(name, False)`` at the end from which the link begins, which holds only the joint
+there, and ``(name, True)``, which holds all else.  Edges are joints and links.
+"""
+
+import heapq
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from assembly.drawing.drawing import Drawing, DrawnBody, DrawnJoint
+from assembly.model.robot import BASE
+from forcefit.inputs.table import BadInput, quoted
+
+Node = tuple[str, bool]
+ROOT: Node = (BASE, True)
+
+
+@dataclass(frozen=True, eq=False)
+class Edge:
+    """A joint, or the link of an elastic body.
+
+    Attributes:
+        item: which of the two.
+        first: node where it begins: of a joint the first body.
+        second: node where it ends.
+    """
+
+    item: DrawnJoint | DrawnBody
+    first: Node
+    second: Node
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """An edge as the tree passes it.
+
+    Attributes:
+        edge: the edge.
+        reverse: whether it is passed from its second node to its first.
+        closes: whether it ends at a node that the tree reaches in another way.
+    """
+
+    edge: Edge
+    reverse: bool
+    closes: bool
+
+    @property
+    def start(self) -> Node:
+        """The node nearer to the base."""
+        return self.edge.second if self.reverse else self.edge.first
+
+    @property
+    def end(self) -> Node:
+        """The node that it leads to."""
+        return self.edge.first if self.reverse else self.edge.second
+
+
+def steps_of(drawing: Drawing) -> list[Step]:
+    """Every edge of a drawing, in the order in which frames are made.
+
+    Edges are passed from their first body to the second wherever a path from the base
+    does so; of such paths the shortest is the tree's.
+
+    Args:
+        drawing: any.
+
+    Returns:
+        Branch by branch; those that close a loop follow the branch of their first body.
+
+    Raises:
+        BadInput: no joint leads from the base to a body.
+    """
+    edges = _edges(drawing)
+    around: dict[Node, list[Edge]] = {ROOT: []}
+    for edge in edges:
+        for node in (edge.first, edge.second):
+            around.setdefault(node, []).append(edge)
+    entered = _entered(around)
+    for body in drawing.bodies:
+        if (body.name, True) not in entered:
+            raise BadInput(
+                f"body {quoted(body.name)}: found no joint that connects it with "
+                f'"{BASE}", expected one'
+            )
+    order: list[Step] = []
+    waiting = [ROOT]
+    while waiting:
+        node = waiting.pop()
+        steps = [s for e in around[node] if (s := _step(e, node, entered))]
+        if node != ROOT:
+            order.append(Step(entered[node], entered[node].second != node, False))
+        order += [step for step in steps if step.closes]
+        waiting += [step.end for step in reversed(steps) if not step.closes]
+    return order
+
+
+def _step(edge: Edge, node: Node, entered: Mapping[Node, Edge]) -> Step | None:
+    """The edge as it is passed from a node; None where it is passed from the other."""
+    reverse = edge.second == node
+    if entered.get(edge.first if reverse else edge.second) is edge:
+        return Step(edge, reverse, False)
+    if entered.get(node) is edge or reverse:
+        return None
+    return Step(edge, False, True)
+
+
+def _edges(drawing: Drawing) -> list[Edge]:
+    """Joints in the order of the file, and links after the joint they begin at."""
+    bodies = {body.name: body for body in drawing.bodies}
+
+    def node(name: str, joint: DrawnJoint) -> Node:
+        body = bodies.get(name)
+        ends = body.ends if body else None
+        return name, ends is None or ends[0] != joint.name
+
+    edges = []
+    for joint in drawing.joints:
+        edges.append(Edge(joint, node(joint.first, joint), node(joint.second, joint)))
+        for name in (joint.first, joint.second):
+            body = bodies.get(name)
+            if body and body.ends and body.ends[0] == joint.name:
+                edges.append(Edge(body, (name, False), (name, True)))
+    return edges
+
+
+def _entered(around: Mapping[Node, list[Edge]]) -> dict[Node, Edge]:
+    """The edge by which the tree reaches each node: fewest against their direction."""
+    entered: dict[Node, Edge] = {}
+    reached: set[Node] = set()
+    count = 0  # of edges put in, which keeps the order of the file among equals
+    waiting: list[tuple[int, int, int, Node, Edge | None]] = [(0, 0, 0, ROOT, None)]
+    while waiting:
+        against, length, _, node, by = heapq.heappop(waiting)
+        if node in reached:
+            continue
+        reached.add(node)
+        if by is not None:
+            entered[node] = by
+        for edge in around[node]:
+            reverse = edge.second == node
+            count += 1
+            steps = length + isinstance(edge.item, DrawnJoint)
+            end = edge.first if reverse else edge.second
+            heapq.heappush(waiting, (against + reverse, steps, count, end, edge))
+    return entered

@@ -1,0 +1,169 @@
+"""Robot files of ``format = 2``: bodies and joints by points and axes at home.
+
+The keys are those of ``docs/drawn_robots.md``.
+"""
+
+import copy
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from assembly.drawing.drawing import (
+    Drawing,
+    DrawnJoint,
+    turned_joint,
+)
+from assembly.files.drawn_body import (
+    LONGEST_NAME,
+    Copy,
+    link_remarks,
+    place_of,
+    read_bodies,
+    with_ends,
+)
+from assembly.files.drawn_joint import read_drawn_joint
+from assembly.files.written_units import without_units
+from assembly.model.largest import LARGEST_LENGTH
+from assembly.model.robot import BASE
+from forcefit.inputs.table import Table, describe, nearest, quoted
+from stiffness.screws import rotation_matrix, transform
+
+MOST_COPIES = 200  # of a leg
+
+
+def is_drawing(root: Table) -> bool:
+    """Whether a robot file is one of bodies and joints."""
+    given = set(root.content)
+    named = {"body", "joint", "leg"} & given and "frame" not in given
+    return root.content.get("format") == 2 or bool(named)
+
+
+def read_drawing(root: Table, name: str, description: str) -> Drawing:
+    """The bodies and joints of a robot file.
+
+    Args:
+        root: its root table; keys of other parts of the file are left to the caller.
+        name: of the robot.
+        description: of it.
+
+    Returns:
+        The drawing, legs copied, all names those of the whole robot.
+
+    Raises:
+        BadInput: a rule of the format is broken.
+    """
+    root.content = copy.deepcopy(root.content)  # texts with units become numbers
+    if root.get("format", 2) == 1:
+        raise root.bad("format", "found 1 in a file of bodies and joints, expected 2")
+    platform = root.text("platform", expected="the name of a body")
+    without_units(root, "platform_at", "length")
+    at = root.array("platform_at", (3,), "m", largest=LARGEST_LENGTH)
+    copies = list(_copies(root))
+    found = [(body, copied) for copied in copies for body in read_bodies(copied)]
+    names = [body.name for body, _ in found]
+    _check_distinct(root, "body", [BASE, *names])
+    joints = [joint for copied in copies for joint in _joints(copied, names)]
+    _check_distinct(root, "joint", [BASE, *(joint.name for joint in joints)])
+    if platform not in names:
+        hint = nearest(platform, names)
+        fault = f"found {quoted(platform)}, expected the name of a body{hint}"
+        raise root.bad("platform", fault)
+    bodies = [
+        with_ends(body, copied, joints, at if body.name == platform else None)
+        for body, copied in found
+    ]
+    remarks = link_remarks(bodies, joints, copies)
+    return Drawing(
+        name, platform, at, tuple(bodies), tuple(joints), description, remarks
+    )
+
+
+def _copies(root: Table) -> Iterator[Copy]:
+    """Copies of the legs, and the robot's own bodies, in the order of the file."""
+    order = [key for key in root.content if key in {"leg", "body", "joint"}]
+    own = Copy(root, "", np.eye(4))
+    legs = root.tables("leg")
+    for kind in dict.fromkeys("leg" if key == "leg" else "own" for key in order):
+        if kind == "own":
+            yield own
+            continue
+        names: list[str] = []
+        for leg in legs:
+            name = leg.text("name", longest=LONGEST_NAME)
+            leg.place = f"leg {quoted(name)}"
+            if name in names:
+                raise leg.bad("name", "found it twice, expected different names")
+            names.append(name)
+            yield from _repeated(leg, name)
+
+
+def _repeated(leg: Table, name: str) -> Iterator[Copy]:
+    """The copies of one leg; the first is the leg as written."""
+    if not leg.has("repeat"):
+        yield Copy(leg, f"{name}.", np.eye(4))
+        return
+    table = leg.table("repeat")
+    count = table.integer("count", least=1)
+    if count > MOST_COPIES:
+        raise table.bad("count", f"found {count}, expected at most {MOST_COPIES}")
+    about = table.array("about", (3,), "direction", largest=LARGEST_LENGTH)
+    size = float(np.linalg.norm(about))
+    if size < 1e-12:
+        raise table.bad("about", "found no direction, expected 3 numbers, not all 0")
+    without_units(table, "at", "length")
+    at = table.array("at", (3,), "m", np.zeros(3), largest=LARGEST_LENGTH)
+    table.finish()
+    for k in range(count):
+        R = rotation_matrix(about / size * (2 * np.pi * k / count))
+        yield Copy(leg, f"{name}{k + 1}.", transform(at - R @ at, R))
+
+
+def _joints(copied: Copy, names: list[str]) -> Iterator[DrawnJoint]:
+    """The joints of a copy, between bodies of it or of the whole robot."""
+
+    def find(name: str) -> str | None:
+        inner = copied.prefix + name
+        return inner if inner in names else name if name in [BASE, *names] else None
+
+    for table in copied.table.tables("joint"):
+        name = table.text("name", longest=LONGEST_NAME)
+        table.place = place_of(copied.table, "joint", name)
+        first, second = _between(table, find, names)
+        joint = read_drawn_joint(table, copied.prefix + name, first, second)
+        yield turned_joint(joint, copied.T)
+    if copied.prefix:
+        copied.table.finish()
+
+
+def _between(
+    table: Table, find: Callable[[str], str | None], names: list[str]
+) -> list[str]:
+    """Full names of the two bodies of a joint."""
+    value = table.require("between", 'two names of bodies, or "base"')
+    proper = isinstance(value, list) and all(isinstance(v, str) for v in value)
+    if not proper or len(value) != 2:
+        raise table.bad(
+            "between", f"found {describe(value)}, expected two names of bodies"
+        )
+    found = []
+    for name in value:
+        full = find(name)
+        if full is None:
+            short = [n.rpartition(".")[2] for n in names]
+            hint = nearest(name, [*dict.fromkeys([*names, *short]), BASE])
+            fault = f'found {quoted(name)}, expected a body or "{BASE}"{hint}'
+            raise table.bad("between", fault)
+        found.append(full)
+    if found[0] == found[1]:
+        raise table.bad("between", f"found {quoted(value[0])} twice, expected two")
+    return found
+
+
+def _check_distinct(root: Table, kind: str, names: list[str]) -> None:
+    """Refuse a name that two have."""
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            fault = f"found {quoted(name)} twice, expected different names"
+            raise root.bad(kind, fault)
+        seen.add(name)

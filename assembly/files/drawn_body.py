@@ -1,0 +1,177 @@
+"""Bodies of robot files of ``format = 2``, and the joints between which links are."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.drawing.drawing import DrawnBody, DrawnJoint, turned_body
+from assembly.drawing.parts import joint_axes
+from assembly.files.drawn_link import Curve, curve_link, read_drawn_link
+from assembly.files.written_units import without_units
+from assembly.model.largest import LARGEST_LENGTH
+from assembly.model.robot import BASE
+from forcefit.inputs.table import Table, nearest, quoted
+from stiffness.screws import transform
+
+LONGEST_NAME = 200  # characters
+
+
+@dataclass(frozen=True, eq=False)
+class Copy:
+    """A leg's copy, or the robot's own bodies and joints.
+
+    Attributes:
+        table: where they are written.
+        prefix: of their names, such as ``"leg1."``.
+        T: (4, 4) by which points and axes of the table are moved.
+    """
+
+    table: Table
+    prefix: str
+    T: NDArray
+
+
+def read_bodies(copied: Copy) -> Iterator[DrawnBody]:
+    """The bodies of a copy, their links' ends still to be found."""
+    for table in copied.table.tables("body"):
+        name = table.text("name", longest=LONGEST_NAME)
+        table.place = place_of(copied.table, "body", name)
+        if name == BASE:
+            raise table.bad(
+                "name", f'found "{BASE}", which stands still; expected another'
+            )
+        without_units(table, "centre", "length")
+        link = read_drawn_link(table)
+        body = DrawnBody(
+            copied.prefix + name,
+            mass=table.number("mass", "kg", 0.0, least=0.0, largest=1e40),
+            centre=table.array(
+                "centre", (3,), "m", np.zeros(3), largest=LARGEST_LENGTH
+            ),
+            inertia=_inertia(table),
+            link=None if isinstance(link, Curve) else link,
+        )
+        for key in ("from", "to"):
+            if table.has(key) and link is None:
+                raise table.bad(key, 'found one without "link", expected both')
+        table.finish()
+        yield turned_body(body, copied.T)
+
+
+def place_of(owner: Table, kind: str, name: str) -> str:
+    """Place of a body or a joint in messages."""
+    return f"{owner.place + '.' if owner.place else ''}{kind} {quoted(name)}"
+
+
+def _inertia(table: Table) -> NDArray:
+    """(3, 3) [kg m^2] of Ixx, Iyy, Izz, Ixy, Ixz, Iyz, the last three products."""
+    if not table.has("inertia"):
+        return np.zeros((3, 3))
+    xx, yy, zz, xy, xz, yz = table.array("inertia", (6,), "kg m^2", largest=1e40)
+    J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    least, middle, most = np.linalg.eigvalsh(J)
+    rounding = 1e-6 * max(most, 0.0)
+    if least < -rounding or most > least + middle + rounding:
+        raise table.bad(
+            "inertia",
+            f"found principal moments {least:.4g}, {middle:.4g}, {most:.4g}; expected "
+            "none negative, and none larger than the sum of the other two",
+        )
+    return J
+
+
+def with_ends(
+    body: DrawnBody, copied: Copy, joints: list[DrawnJoint], point: NDArray | None
+) -> DrawnBody:
+    """The body with the joints between which its link is.
+
+    Args:
+        body: as read.
+        copied: where it is written.
+        joints: of the whole robot.
+        point: (3,) [m] the platform's point if the body is the platform.
+
+    Returns:
+        The body; a beam along a curve is a stiffness and a mass.
+
+    Raises:
+        BadInput: there are no such joints, or the curve does not lead from one to
+            the other.
+    """
+    table = next(
+        t for t in copied.table.tables("body")
+        if copied.prefix + t.content["name"] == body.name
+    )  # fmt: skip
+    table.place = place_of(copied.table, "body", table.content["name"])
+    link = read_drawn_link(table)
+    if link is None:
+        return body
+    here = {j.name: j for j in joints if body.name in (j.first, j.second)}
+    first, second = _ends(table, copied.prefix, list(here), point is not None)
+    body = replace(body, ends=(first, second))
+    if not isinstance(link, Curve):
+        return body
+    back = np.linalg.inv(copied.T)
+    start = (back @ [*here[first].at, 1.0])[:3]
+    if second is None:
+        assert point is not None
+        end = transform(point, np.eye(3))
+    else:
+        end = joint_axes(here[second])
+    matrix, mass, centre = curve_link(link, start, back @ end)
+    centre = (copied.T @ [*centre, 1.0])[:3]
+    total = body.mass + mass
+    if mass:
+        centre = (body.mass * body.centre + mass * centre) / total
+        body = replace(body, mass=total, centre=centre)
+    return replace(body, link=matrix)
+
+
+def _ends(
+    table: Table, prefix: str, here: list[str], platform: bool
+) -> tuple[str, str | None]:
+    """Full names of the joints at the two ends of a link."""
+    given = [_end(table, key, prefix, here) for key in ("from", "to")]
+    left = [name for name in here if name not in given]
+    first = given[0] or (left.pop(0) if left else None)
+    second = given[1] or (left[0] if left else None)
+    if first is None or (second is None and not platform):
+        fault = f"found {len(here)} joint of the body" if here else "found no joint"
+        raise table.bad("link", f"{fault}, expected two, between which the link is")
+    if first == second:
+        raise table.bad("to", f"found {quoted(first)} at both ends, expected two")
+    return first, second
+
+
+def _end(table: Table, key: str, prefix: str, here: list[str]) -> str | None:
+    """Full name of the joint at one end of a link, None if not given."""
+    if not table.has(key):
+        return None
+    name = table.text(key, expected="the name of a joint")
+    for full in (prefix + name, name):
+        if full in here:
+            return full
+    short = [n.removeprefix(prefix) for n in here]
+    fault = f"found {quoted(name)}, expected a joint of this body"
+    raise table.bad(key, fault + nearest(name, short))
+
+
+def link_remarks(
+    bodies: list[DrawnBody], joints: list[DrawnJoint], copies: list[Copy]
+) -> tuple[str, ...]:
+    """The ends of links that no key says, of bodies with more than two joints."""
+    stated = {
+        copied.prefix + table.content["name"]
+        for copied in copies
+        for table in copied.table.tables("body")
+        if {"from", "to"} & set(table.content)
+    }
+    texts = []
+    for body in bodies:
+        count = sum(body.name in (j.first, j.second) for j in joints)
+        if body.ends and count > 2 and body.name not in stated:
+            ends = " to ".join(quoted(end) for end in body.ends if end)
+            texts.append(f"{quoted(body.name)} {ends}")
+    return (f"links from first to second joint: {', '.join(texts)}",) if texts else ()

@@ -1,0 +1,212 @@
+"""A joint of a robot file of ``format = 2``: type, axes, drive, error and contact."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.drawing.drawing import FREE_ROWS, DrawnJoint, JointNumbers, perpendicular
+from assembly.files.joint_file import read_clearance, read_joint_stiffness
+from assembly.files.written_units import SCREW, without_units
+from assembly.model.largest import LARGEST, LARGEST_LENGTH
+from assembly.model.robot import Clearance
+from forcefit.inputs.table import Table
+
+_PARALLEL = 1e-3  # sine of the angle between two axes below which they are parallel
+_KEYS = ("clearance", "joint_stiffness", "geometric_error", "tolerance")
+_BOUNDS = {"tilt": (0, 1), "spin": (2,), "radial": (3, 4), "axial": (5,)}
+_ROWS = ("RX", "RY", "RZ", "TX", "TY", "TZ")
+
+
+def read_drawn_joint(table: Table, name: str, first: str, second: str) -> DrawnJoint:
+    """One joint of a file.
+
+    Args:
+        table: of the joint.
+        name: of the joint in the whole robot.
+        first: name of its first body.
+        second: name of its second.
+
+    Returns:
+        The joint as it is written, its leg not yet copied.
+
+    Raises:
+        BadInput: a rule of the format is broken.
+    """
+    kind = table.choice("type", (*FREE_ROWS, "helical"))
+    if kind == "helical":
+        raise table.bad("type", 'found "helical", which is not supported yet')
+    axis, across, axis2 = _axes(table, kind)
+    without_units(table, "at", "length")
+    actuated = table.boolean("actuated", False)
+    one = kind in {"revolute", "prismatic"}
+    dimension, unit = ("angle", "rad") if kind == "revolute" else ("length", "m")
+    for key in ("position", "limits"):
+        without_units(table, key, dimension)
+    given = [k for k in ("position", "limits", "drive_stiffness") if table.has(k)]
+    if not one and (actuated or given):
+        key = "actuated" if actuated else given[0]
+        fault = f'found one on a {kind} joint, expected "revolute" or "prismatic"'
+        raise table.bad(key, fault)
+    if "drive_stiffness" in given and not actuated:
+        raise table.bad("drive_stiffness", "found one without actuated = true")
+    joint = DrawnJoint(
+        name, kind, first, second,
+        at=table.array("at", (3,), "m", largest=LARGEST_LENGTH),
+        axis=axis, across=across, axis2=axis2, actuated=actuated,
+        position=table.number("position", unit, 0.0, largest=LARGEST_LENGTH),
+        limits=_limits(table, unit),
+        numbers=_numbers(table, kind, actuated),
+    )  # fmt: skip
+    table.finish()
+    return joint
+
+
+def _axes(table: Table, kind: str) -> tuple[NDArray, NDArray, NDArray]:
+    """Unit vectors of the axis, of x at right angles to it, and of the second axis."""
+    needs = kind not in {"fixed", "spherical"}
+    axis = _direction(table, "axis", needs)
+    axis = np.array([0.0, 0.0, 1.0]) if axis is None else axis
+    axis2 = _direction(table, "axis2", kind == "universal")
+    if axis2 is None:
+        across = perpendicular(axis)
+        return axis, across, across
+    if np.linalg.norm(np.cross(axis, axis2)) < _PARALLEL:
+        raise table.bad("axis2", 'found it parallel to "axis", expected an angle')
+    return axis, perpendicular(axis, axis2), axis2
+
+
+def _direction(table: Table, key: str, needed: bool) -> NDArray | None:
+    """(3,) unit vector, None if absent and not needed."""
+    if not needed and not table.has(key):
+        return None
+    without_units(table, key, "length")
+    vector = table.array(key, (3,), "direction", largest=LARGEST_LENGTH)
+    size = float(np.linalg.norm(vector))
+    if size < 1e-12:
+        raise table.bad(key, "found no direction, expected 3 numbers, not all 0")
+    return np.asarray(vector / size)
+
+
+def _limits(table: Table, unit: str) -> tuple[float, float] | None:
+    """Least and largest coordinate, None if not given."""
+    if not table.has("limits"):
+        return None
+    least, most = table.array("limits", (2,), unit, largest=LARGEST_LENGTH)
+    if not least < most:
+        fault = f"found [{least:g}, {most:g}], expected the smaller one first"
+        raise table.bad("limits", fault)
+    return float(least), float(most)
+
+
+def _numbers(table: Table, kind: str, actuated: bool) -> tuple[JointNumbers, ...]:
+    """Error, clearance and stiffness; of a universal joint for each bearing."""
+    if kind != "universal":
+        return (_one(table, kind, actuated),)
+    bearings = []
+    for which in (0, 1):
+        content = {k: _bearing(table, k, which) for k in _KEYS if table.has(k)}
+        place = f"{table.place}, {('first', 'second')[which]} bearing"
+        bearings.append(_one(Table(content, table.file, place), "revolute", False))
+    return tuple(bearings)
+
+
+def _bearing(table: Table, key: str, which: int) -> Any:
+    """The value of one bearing: of ``[first, second]``, or the one given for both."""
+    value = table.content[key]
+    pair = isinstance(value, list) and len(value) == 2
+    return value[which] if pair else value
+
+
+def _one(table: Table, kind: str, actuated: bool) -> JointNumbers:
+    """Numbers of one joint or bearing."""
+    for key in ("geometric_error", "tolerance"):
+        without_units(table, key, SCREW)
+    zero = np.zeros(6)
+    error = table.array("geometric_error", (6,), "rad, m", zero, largest=LARGEST_LENGTH)
+    return JointNumbers(
+        clearance=_clearance(table, kind),
+        stiffness=_stiffness(table, kind, actuated),
+        error=error,
+        tolerance=_tolerance(table),
+    )
+
+
+def _tolerance(table: Table) -> NDArray | None:
+    """(6,) standard deviations, None if not given."""
+    if not table.has("tolerance"):
+        return None
+    sigma = table.array("tolerance", (6,), "rad, m", largest=LARGEST_LENGTH)
+    if sigma.min() < 0:
+        fault = f"found {sigma.min():g} in it, expected 6 numbers >= 0 [rad, m]"
+        raise table.bad("tolerance", fault)
+    return sigma
+
+
+def _clearance(table: Table, kind: str) -> Clearance | None:
+    """The bounds; none along the free motions of a joint of several freedoms."""
+    content = table.content.get("clearance")
+    if isinstance(content, dict):
+        inner = Table(content, table.file, f"{table.place}.clearance")
+        for key in _BOUNDS:
+            angle = key in {"tilt", "spin"}
+            without_units(inner, key, "angle" if angle else "length")
+    found = read_clearance(table)
+    free = FREE_ROWS[kind]
+    for key, rows in _BOUNDS.items():
+        if len(free) > 1 and found and getattr(found, key) is not None:
+            if set(rows) & set(free):
+                fault = f"found a bound of a free motion of a {kind} joint"
+                raise table.bad(f"clearance.{key}", f"{fault}, expected none")
+    return found
+
+
+def _stiffness(table: Table, kind: str, actuated: bool) -> NDArray | None:
+    """(6, 6) K_B with the drive's stiffness, 0 along free motions; None if rigid."""
+    free = FREE_ROWS[kind]
+    if len(free) > 1:
+        return _several_free(table, kind)
+    own = free[0] if free else None
+    K = read_joint_stiffness(table, None if actuated else own)
+    if not table.has("drive_stiffness") or own is None:
+        return K
+    drive = table.number(
+        "drive_stiffness", "N/m or N m/rad", above=0.0, largest=LARGEST
+    )
+    K = np.diag(np.full(6, np.inf)) if K is None else K
+    if np.isfinite(K[own, own]):
+        fault = f"found {K[own, own]:g} as number {own + 1} of joint_stiffness too"
+        raise table.bad("drive_stiffness", f"{fault}, expected inf there")
+    K[own, own] = drive
+    return K
+
+
+def _several_free(table: Table, kind: str) -> NDArray | None:
+    """(6, 6) K_B of a joint of several freedoms, 0 along each of them."""
+    if not table.has("joint_stiffness"):
+        return None
+    free = list(FREE_ROWS[kind])
+    value = copy_rows(table.content["joint_stiffness"])
+    if isinstance(value, list) and len(value) == 6:
+        for row in free:
+            entries = value[row] if isinstance(value[row], list) else [value[row]]
+            if any(entry != 0 for entry in entries):
+                name = f"number {row + 1} ({_ROWS[row]})"
+                fault = f"found a stiffness as {name}, along a free motion"
+                raise table.bad("joint_stiffness", f"{fault}; expected 0 there")
+            if isinstance(value[row], list):
+                value[row][row] = np.inf
+            else:
+                value[row] = np.inf
+    content = {"joint_stiffness": value}
+    K = read_joint_stiffness(Table(content, table.file, table.place))
+    if K is not None:
+        K[free, free] = 0.0
+    return K
+
+
+def copy_rows(value: Any) -> Any:
+    """A list with its lists copied; any other value."""
+    if not isinstance(value, list):
+        return value
+    return [list(row) if isinstance(row, list) else row for row in value]

@@ -1,0 +1,113 @@
+"""Links of bodies in files of ``format = 2``: units, and beams along a curve."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.files.link_file import read_link
+from assembly.files.written_units import without_units
+from assembly.model.largest import LARGEST
+from assembly.model.robot import Link, MatrixLink
+from forcefit.inputs.table import BadInput, Table, describe
+from stiffness.beam.curve import curve_compliance, curve_mass
+from stiffness.beam.curve_file import read_pieces
+
+_LENGTHS = ("radius", "inner_radius", "width", "height", "length", "wall", "web",
+            "flange")  # fmt: skip
+_CURVE = ("curve", "young", "poisson", "density", "theory")
+_GAP = 1e-6  # [1] of the beam's reach by which it may miss the joint at its end
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A beam along a curve, by its table.
+
+    Attributes:
+        table: of the link; its keys are checked when the joints' points are known.
+    """
+
+    table: Table
+
+
+def read_drawn_link(body: Table) -> Link | Curve | None:
+    """The link of a body.
+
+    Args:
+        body: its table, whose texts with units become numbers.
+
+    Returns:
+        The link as a robot file has it, directions in base axes at home; a curve, or
+        None for a rigid body.
+
+    Raises:
+        BadInput: a rule of the format is broken.
+    """
+    link = body.content.get("link")
+    if not isinstance(link, dict) or "curve" not in link:
+        if isinstance(link, dict) and isinstance(link.get("beam"), dict):
+            _plain_lengths(link["beam"], body, "link.beam")
+        return read_link(body)
+    table = body.table("link")
+    for key in table.content:
+        if key not in _CURVE:
+            names = " | ".join(f'"{name}"' for name in _CURVE[1:])
+            raise table.bad(key, f'found it with "curve", expected only {names}')
+    return Curve(table)
+
+
+def _plain_lengths(content: dict[str, Any], body: Table, place: str) -> None:
+    """Lengths of a section as numbers."""
+    inner = Table(content, body.file, f"{body.place}.{place}")
+    for key in _LENGTHS:
+        without_units(inner, key, "length")
+
+
+def curve_link(
+    curve: Curve, start: NDArray, tip: NDArray
+) -> tuple[MatrixLink, float, NDArray]:
+    """Stiffness and mass of a beam along a curve between two joints.
+
+    Args:
+        curve: as read.
+        start: (3,) [m] point of the joint at which it begins, axes of the file.
+        tip: (4, 4) point and axes of the joint at its end, axes of the file.
+
+    Returns:
+        The stiffness at the tip in its axes, [kg] and (3,) [m] centre of the beam; no
+        mass without a density.
+
+    Raises:
+        BadInput: a piece or a material is not proper, or the curve ends elsewhere.
+    """
+    table = curve.table
+    young = table.number("young", "Pa", above=0.0, largest=LARGEST)
+    poisson = table.number("poisson", "-", above=-1.0, below=0.5)
+    theory = table.choice("theory", ("timoshenko", "euler"), "timoshenko")
+    tables = table.tables("curve")
+    if not tables:
+        raise table.bad("curve", f"found {describe([])}, expected at least one piece")
+    for part in tables:
+        without_units(part, "end", "length")
+        without_units(part, "center", "length")
+        without_units(part, "turn", "angle")
+        for key in ("section", "tip_section"):
+            if isinstance(part.content.get(key), dict):
+                _plain_lengths(part.content[key], part, key)
+    pieces = read_pieces(tables, start, poisson)
+    gap = float(np.linalg.norm(pieces[-1].place(1.0) - tip[:3, 3]))
+    if gap > _GAP * float(np.linalg.norm(tip[:3, 3] - start)):
+        fault = f"found that it ends {gap:.3g} m from the joint at its end"
+        raise table.bad("curve", f"{fault}, expected it there")
+    try:
+        C = curve_compliance(pieces, young, poisson, theory=theory)
+    except BadInput as error:
+        raise table.bad("curve", str(error)) from None
+    turn = np.kron(np.eye(2), tip[:3, :3])
+    K = np.linalg.inv(turn.T @ C @ turn)
+    mass, centre = 0.0, np.zeros(3)
+    if table.has("density"):
+        density = table.number("density", "kg/m^3", above=0.0, largest=LARGEST)
+        mass, centre = curve_mass(pieces, density)
+    return MatrixLink((K + K.T) / 2), mass, centre

@@ -1,0 +1,60 @@
+"""Lengths and angles of a file, given as numbers or as texts with a unit."""
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from forcefit.inputs.table import BadInput, Table, describe
+
+UNITS = {  # of each dimension, in m or rad
+    "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
+    "angle": {"rad": 1.0, "mrad": 1e-3, "deg": 0.017453292519943295},
+}
+SCREW = ("angle",) * 3 + ("length",) * 3
+_TEXT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-z]+)\s*")
+
+
+def without_units(table: Table, key: str, dimension: str | Sequence[str]) -> None:
+    """Replace texts such as ``"200 mm"`` in a value by numbers in m or rad.
+
+    Args:
+        table: where the value is; its content is changed.
+        key: of the value, which may be absent, a number, a text, or lists of them.
+        dimension: ``"length"`` or ``"angle"``; or one for each entry of a list.
+
+    Raises:
+        BadInput: a text is no number with a unit of that dimension.
+    """
+    if key in table.content:
+        table.content[key] = _plain(table, key, table.content[key], dimension)
+
+
+def _plain(table: Table, key: str, value: Any, dimension: str | Sequence[str]) -> Any:
+    """The value with numbers in place of texts."""
+    if isinstance(value, list):
+        if isinstance(dimension, str) or len(dimension) != len(value):
+            dimension = [dimension if isinstance(dimension, str) else "length"] * len(
+                value
+            )
+        pairs = zip(value, dimension, strict=True)
+        return [_plain(table, key, inner, kind) for inner, kind in pairs]
+    if isinstance(value, str) and isinstance(dimension, str):
+        return _number(table, key, value, dimension)
+    return value
+
+
+def _number(table: Table, key: str, text: str, dimension: str) -> float:
+    """The number that a text states."""
+    match = _TEXT.fullmatch(text)
+    factor = UNITS[dimension].get(match.group(2)) if match else None
+    if match is None or factor is None:
+        raise _wrong(table, key, text, dimension)
+    return float(match.group(1)) * factor
+
+
+def _wrong(table: Table, key: str, text: str, dimension: str) -> BadInput:
+    """The error for a text that is none."""
+    units = " ".join(UNITS[dimension])
+    example = '"200 mm"' if dimension == "length" else '"30 deg"'
+    fault = f"found {describe(text)}, expected a number, or a text with a unit"
+    return table.bad(key, f"{fault} such as {example} ({units})")

@@ -1,0 +1,40 @@
+"""Frames given by their home poses in base axes."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.model.frame import BASE, Frame
+from stiffness.screws import rotation_matrix, rotation_vector, transform
+
+PlacedFrame = tuple[Frame, NDArray]  # a frame and its (4, 4) home pose
+
+
+def place_frames(placed: Iterable[PlacedFrame]) -> tuple[Frame, ...]:
+    """Return the frames with the translation and rotation of their home poses.
+
+    Args:
+        placed: frames, parents first.  Each has its (4, 4) home pose in base axes
+            without its own joint's motion, with every other joint at its ``position``.
+
+    Returns:
+        The same frames, relative to their parents.
+    """
+    after = {BASE: np.eye(4)}
+    frames = []
+    for frame, T in placed:
+        step = np.linalg.inv(after[frame.parent]) @ T
+        turn = rotation_vector(step[:3, :3])
+        frames.append(replace(frame, translation=step[:3, 3], rotation=turn))
+        after[frame.name] = T @ _own_motion(frame)
+    return tuple(frames)
+
+
+def _own_motion(frame: Frame) -> NDArray:
+    """Return (4, 4) motion of the joint at its home position, about or along z."""
+    along = np.array([0.0, 0.0, frame.position])
+    if frame.joint == "prismatic":
+        return transform(along, np.eye(3))
+    return transform(np.zeros(3), rotation_matrix(along))

@@ -1,0 +1,79 @@
+"""The example files of drawn robots: short, and with numbers that are known."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from assembly.exchange.convert import convert
+from assembly.exchange.robot_files import load_robot
+from assembly.kinematics.mobility import mobility
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from assembly.sweeps.parameters import load_design
+
+DRAWN = Path(__file__).parents[3] / "examples" / "drawn"
+# lines at most; freedoms, of the platform, with drives locked, redundant constraints
+EXAMPLES = {
+    "three_upu": (60, (3, 3, 0, 0)),
+    "tricept": (45, (3, 3, 0, 0)),
+    "agile_eye": (60, (3, 3, 0, 6)),
+}
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_examples_are_short(name):
+    most = EXAMPLES[name][0]
+    assert len((DRAWN / f"{name}.toml").read_text().splitlines()) <= most
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_examples_have_the_mobility_of_the_literature(name):
+    found = mobility(home_posture(load_robot(DRAWN / f"{name}.toml")))
+    assert (
+        found.freedoms, found.platform_freedoms, found.freedoms_drives_locked,
+        found.redundant_constraints,
+    ) == EXAMPLES[name][1]  # fmt: skip
+
+
+def test_the_tricept_is_as_stiff_along_z_as_its_drives():
+    """3 k cos^2 of a leg's inclination; the central tube slides along z."""
+    robot = load_robot(DRAWN / "tricept.toml")
+    K = platform_stiffness(home_posture(robot)).stiffness
+    assert K[5, 5] == pytest.approx(3 * 1.5e8 * 81 / 85, rel=1e-12)
+
+
+def test_the_tricept_turns_only_as_its_tube_does():
+    """Its flange is at right angles to the line from the cross."""
+    robot = load_robot(DRAWN / "tricept.toml")
+    at = place_robot(robot, {"tx": 0.1, "ty": -0.05, "tz": -0.9}).platform
+    along = at[:3, 3] / np.linalg.norm(at[:3, 3])
+    assert at[:3, 2] == pytest.approx(-along, abs=1e-9)
+
+
+def test_the_agile_eye_turns_about_its_centre():
+    robot = load_robot(DRAWN / "agile_eye.toml")
+    at = place_robot(robot, joints={"leg1.drive": 0.2, "leg3.drive": -0.1})
+    assert at.platform[:3, 3] == pytest.approx([0, 0, 0], abs=1e-12)
+    assert np.linalg.norm(list(at.pose().values())[3:]) > 0.1
+
+
+@pytest.mark.parametrize("ending", ["toml", "xml", "urdf"])
+def test_drawn_robots_convert_to_other_files(ending, tmp_path):
+    """What is written is read again, and its bodies compared."""
+    found = convert(DRAWN / "three_upu.toml", tmp_path / f"upu.{ending}")
+    assert found.difference < 1e-12
+    back = load_robot(tmp_path / f"upu.{ending}")
+    expected = home_posture(load_robot(DRAWN / "three_upu.toml")).platform
+    assert np.abs(home_posture(back).platform[:3, 3] - expected[:3, 3]).max() < 1e-12
+
+
+def test_numbers_of_a_drawn_robot_can_be_varied():
+    """Those of its frames, in every leg at once: k along z of a 3-UPU is 3 k cos^2."""
+    design = load_design(DRAWN / "three_upu.toml")
+    values = {"slide.joint_stiffness.tz": 1e3}
+    names = design.find("rod.link.beam.radius")
+    assert names == [f"leg{k}.rod.link.beam.radius" for k in (1, 2, 3)]
+    robot = design.robot({path: 1e3 for path in design.find(next(iter(values)))})
+    K = platform_stiffness(home_posture(robot)).stiffness
+    assert K[5, 5] == pytest.approx(3e3 * 45**2 / (45**2 + 16**2), rel=1e-3)

@@ -1,0 +1,185 @@
+"""Free motions of the joint types, and joints passed against their direction."""
+
+import numpy as np
+import pytest
+
+from assembly.drawing.drawing import (
+    Drawing,
+    DrawnBody,
+    DrawnJoint,
+    JointNumbers,
+    perpendicular,
+    unit,
+)
+from assembly.drawing.frames import robot_of_drawing
+from assembly.kinematics.mobility import mobility
+from assembly.kinematics.nominal import mobile, motion_screws
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.linear.closure import linearise
+from assembly.linear.energy import solve_assembly
+from assembly.model.link_kinds import MatrixLink
+from assembly.model.robot import BASE, Clearance
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from stiffness.screws import screw_map
+
+AT, AXIS, AXIS2 = (
+    np.array([0.1, -0.2, 0.3]),
+    unit([1.0, 2.0, 2.0]),
+    unit([2.0, 1.0, -1]),
+)
+# free screws at the joint's point in its axes, of the page on joints (1.1)
+RX, RY, RZ, TX, TY, TZ = np.eye(6)
+FREE = {
+    "fixed": [], "revolute": [RZ], "prismatic": [TZ], "cylindrical": [RZ, TZ],
+    "spherical": [RX, RY, RZ], "planar": [RZ, TX, TY],
+}  # fmt: skip
+
+
+def joint(kind, first="base", second="table", name="j", at=AT, **more):
+    across = perpendicular(AXIS, AXIS2)
+    return DrawnJoint(name, kind, first, second, at, AXIS, across, AXIS2, **more)
+
+
+def robot(*joints, bodies=("table",), platform="table", links=None):
+    drawn = tuple(DrawnBody(name, **(links or {}).get(name, {})) for name in bodies)
+    at = np.array([0.4, 0.1, 0.2])
+    return robot_of_drawing(Drawing("drawn", platform, at, drawn, tuple(joints)))
+
+
+def axes():
+    across = perpendicular(AXIS, AXIS2)
+    return np.column_stack([across, np.cross(AXIS, across), AXIS])
+
+
+@pytest.mark.parametrize("kind", [*FREE, "universal"])
+def test_a_joint_leaves_its_free_screws(kind):
+    """The screws of its frames span those of the table, at the base's origin."""
+    drawn = robot(joint(kind))
+    screws = motion_screws(drawn, home_posture(drawn).transforms)[mobile(drawn)]
+    if kind == "universal":
+        expected = [[*axis, *np.cross(AT, axis)] for axis in (AXIS, AXIS2)]
+    else:
+        expected = [screw_map(AT, axes()) @ screw for screw in FREE[kind]]
+    count = len(expected)
+    assert mobility(home_posture(drawn)).platform_freedoms == count
+    both = np.array([*screws, *expected]).reshape(-1, 6)
+    values = np.linalg.svd(both, compute_uv=False) if count else np.zeros(1)
+    assert (values > 1e-12).sum() == count == len(screws)
+
+
+@pytest.mark.parametrize(("kind", "step"), [
+    ("revolute", [*(0.3 * AXIS)]), ("prismatic", [*(0.3 * AXIS)]),
+])  # fmt: skip
+@pytest.mark.parametrize("reverse", [False, True])
+def test_a_coordinate_moves_the_second_body_along_the_axis(kind, step, reverse):
+    """Relative to the first; so it does from the second body to the first."""
+    ends = ("table", "base") if reverse else ("base", "table")
+    drawn = robot(joint(kind, *ends, actuated=True, position=0.2))
+    moved = place_robot(drawn, joints={"j": 0.5}).pose()
+    sign = -1 if reverse else 1
+    if kind == "prismatic":
+        at = np.array([0.4, 0.1, 0.2]) + sign * np.array(step)
+        expected = [*at, 0, 0, 0]
+        assert list(moved.values()) == pytest.approx(expected, abs=1e-14)
+    else:
+        rotation = [moved[key] for key in ("rx", "ry", "rz")]
+        assert rotation == pytest.approx(sign * np.array(step), abs=1e-14)
+
+
+def numbers(rng, free):
+    """Error, clearance and a full stiffness, zero along the free motion."""
+    root = rng.normal(size=(6, 6))
+    K = (root @ root.T + 6 * np.eye(6)) * 1e5
+    K[free] = K[:, free] = 0.0
+    play = Clearance(radial=1e-5, tilt=1e-4)
+    return JointNumbers(play, K, rng.normal(size=6) * 1e-4)
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_a_joint_written_the_other_way_is_the_same(kind):
+    """Bodies exchanged, z turned round: rows y and z of its numbers change sign."""
+    rng = np.random.default_rng(5)
+    given = numbers(rng, 2 if kind == "revolute" else 5)
+    signs = np.array([1, -1, -1, 1, -1, -1])
+    other = JointNumbers(
+        given.clearance, given.stiffness * np.outer(signs, signs), -signs * given.error
+    )
+    here = joint(kind, numbers=(given,))
+    across = here.across
+    there = DrawnJoint("j", kind, "table", "base", AT, -AXIS, across, across,
+                       numbers=(other,))  # fmt: skip
+    point = np.array([0.7, 0.3, 0.1])
+    held = joint("spherical", name="ball", at=point)
+    # no path leads from the base in the direction of these two
+    back = joint("spherical", "table", "base", "ball", point)
+    robots = robot(here, held), robot(there, back)
+    assert robots[1].frame("j").parent == BASE
+    found = [solve_assembly(home_posture(one)) for one in robots]
+    assert found[0].energy > 1e-6
+    assert found[1].energy == pytest.approx(found[0].energy, rel=1e-12)
+    np.testing.assert_allclose(
+        found[1].platform_screw, found[0].platform_screw, rtol=0, atol=1e-15
+    )
+
+
+@pytest.mark.parametrize("kind", FREE)
+def test_an_error_of_a_joint_is_in_its_axes(kind):
+    """Whatever frames it is made of: the screw moves the table as the joint's does."""
+    error = np.array([1e-4, -2e-4, 3e-4, 1e-5, -2e-5, 3e-5])
+    drawn = robot(
+        joint(kind, numbers=(JointNumbers(error=error, tolerance=2 * abs(error)),))
+    )
+    at = home_posture(drawn)
+    found = linearise(at).platform @ drawn.errors.ravel()
+    expected = screw_map(AT - at.platform[:3, 3], axes()) @ error
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-18)
+    sizes = [f.tolerance for f in drawn.frames if f.tolerance is not None]
+    assert [sorted(size) for size in sizes] == [sorted(2 * abs(error))]
+
+
+def test_an_error_of_a_bearing_is_in_its_axes():
+    """Of a cross: z is the bearing's axis, x the part of the other one across it."""
+    errors = np.diag(np.arange(1, 7) * 1e-5)[[0, 5]]
+    both = tuple(JointNumbers(error=error) for error in errors)
+    drawn = robot(joint("universal", numbers=both))
+    at = home_posture(drawn)
+    found = linearise(at).platform @ drawn.errors.ravel()
+    expected = np.zeros(6)
+    for z, x, error in ((AXIS, AXIS2, errors[0]), (AXIS2, AXIS, errors[1])):
+        across = perpendicular(z, x)
+        turn = np.column_stack([across, np.cross(z, across), z])
+        expected += screw_map(AT - at.platform[:3, 3], turn) @ error
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-18)
+
+
+@pytest.mark.parametrize("kind", ["spherical", "cylindrical", "planar"])
+def test_springs_of_a_joint_act_once(kind):
+    """A table held by one joint with springs, and drives in its free motions' place."""
+    K = np.array([2e3, 3e3, 5e3, 2e6, 3e6, 5e6])
+    free = {"spherical": [0, 1, 2], "cylindrical": [2, 5], "planar": [2, 3, 4]}[kind]
+    K[free] = 0.0
+    drawn = robot(joint(kind, numbers=(JointNumbers(stiffness=np.diag(K)),)))
+    found = platform_stiffness(home_posture(drawn))
+    M = screw_map(AT - home_posture(drawn).platform[:3, 3], axes())
+    stiff = np.linalg.inv(M).T @ np.diag(K) @ np.linalg.inv(M)
+    size = np.sqrt(np.diag(stiff))
+    assert np.abs((found.stiffness - stiff) / np.outer(size, size)).max() < 1e-12
+
+
+def test_a_link_is_the_same_from_either_end():
+    """A stiffness read at one joint, and the same link read at the other."""
+    rng = np.random.default_rng(3)
+    root = rng.normal(size=(6, 6))
+    K = (root @ root.T + 6 * np.eye(6)) * 1e5
+    far = np.array([0.5, 0.1, -0.2])
+    M = screw_map(axes().T @ (AT - far), np.eye(3))
+    links = [(K, ("a", "b")), (M.T @ K @ M, ("b", "a"))]
+    ends = (joint("revolute", "base", "rod", "a", actuated=True),
+            joint("revolute", "rod", "table", "b", far, actuated=True))  # fmt: skip
+    found = []
+    for stiffness, between in links:
+        link = {"rod": {"link": MatrixLink(stiffness), "ends": between}}
+        drawn = robot(*ends, bodies=("rod", "table"), links=link)
+        found.append(platform_stiffness(home_posture(drawn)).stiffness)
+    size = np.sqrt(np.diag(found[0]))
+    assert np.abs((found[1] - found[0]) / np.outer(size, size)).max() < 1e-12

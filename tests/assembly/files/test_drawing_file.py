@@ -1,0 +1,525 @@
+"""Files of bodies and joints: what they mean, and what is refused in one line."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from assembly.exchange.robot_files import load_robot
+from assembly.files.robot_file import read_robot
+from assembly.kinematics.mobility import mobility
+from assembly.kinematics.posture import home_posture
+from assembly.model.link_kinds import BeamLink
+from assembly.model.robot import BASE
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.inputs.table import BadInput
+
+CASES = Path(__file__).parents[4] / "shared" / "cases" / "robots_drawn"
+TSAI = """
+format = 2
+name = "tsai"
+platform = "platform"
+platform_at = [0, 0, "450 mm"]
+
+[[body]]
+name = "platform"
+mass = 3.0
+centre = [0, 0, "450 mm"]
+inertia = [0.01, 0.01, 0.02, 0, 0, 0]
+
+[[leg]]
+name = "leg"
+repeat = { count = 3, about = [0, 0, 1] }
+
+[[leg.body]]
+name = "tube"
+[[leg.body]]
+name = "rod"
+link = { beam = { radius = "15 mm" }, young = 2.1e11, poisson = 0.3, density = 7800 }
+
+[[leg.joint]]
+name = "lower"
+type = "universal"
+between = ["base", "tube"]
+at = ["240 mm", 0, 0]
+axis = [0, 1, 0]
+axis2 = [-45, 0, -16]
+
+[[leg.joint]]
+name = "slide"
+type = "prismatic"
+between = ["tube", "rod"]
+at = ["240 mm", 0, 0]
+axis = [-16, 0, 45]
+actuated = true
+drive_stiffness = 2e7
+
+[[leg.joint]]
+name = "upper"
+type = "universal"
+between = ["rod", "platform"]
+at = ["80 mm", 0, "450 mm"]
+axis = [-45, 0, -16]
+axis2 = [0, 1, 0]
+"""
+
+
+@pytest.fixture
+def read(tmp_path):
+    """The robot of a text."""
+
+    def robot(text):
+        path = tmp_path / "drawn.toml"
+        path.write_text(text)
+        return read_robot(path)
+
+    return robot
+
+
+def test_the_stiffness_of_tsais_robot_is_that_of_another_program(read):
+    """K_C of a model of bodies' twists, printed to 6 digits."""
+    found = platform_stiffness(home_posture(read(TSAI))).stiffness
+    expected = np.diag([162410, 162410, 35817, 3.16338e6, 3.16338e6, 5.00457e7])
+    expected[0, 4] = expected[4, 0] = -711761
+    expected[1, 3] = expected[3, 1] = 711761
+    size = np.sqrt(np.diag(expected))
+    assert np.abs((found - expected) / np.outer(size, size)).max() < 1e-5
+
+
+def test_tsais_robot_moves_as_another_program_counts(read):
+    found = mobility(home_posture(read(TSAI)))
+    assert (found.freedoms, found.platform_freedoms) == (3, 3)
+    assert found.freedoms_drives_locked == found.platform_freedoms_drives_locked == 0
+    assert (found.redundant_constraints, found.drives) == (0, 3)
+
+
+def test_the_example_file_loads():
+    path = CASES / "tsai.toml"
+    if not path.exists():
+        pytest.skip(f"{path} is not here")
+    assert home_posture(load_robot(path)).mismatch < 1e-14
+
+
+def test_names_of_the_user_are_those_of_frames(read):
+    robot = read(TSAI)
+    leg = ["lower.first", "lower.second", "slide", "rod", "upper.first", "upper.second"]
+    names = [f"leg{k}.{name}" for k in (1, 2, 3) for name in leg]
+    ends = ["leg2.upper.end", "leg3.upper.end"]
+    assert {frame.name for frame in robot.frames} == {*names, *ends, "platform"}
+    assert robot.platform == "platform"
+
+
+def test_remarks_name_the_joints_after_which_loops_close(read):
+    cut, inertia = read(TSAI).remarks
+    assert cut == (
+        'loops close after "leg2.upper" (at "platform"), "leg3.upper" (at "platform")'
+    )
+    assert inertia == 'moments of inertia are not used: "platform"'
+
+
+def test_a_remark_says_between_which_of_many_joints_a_link_is(read):
+    """Of the platform, which has one in each leg; none where a key says it."""
+    link = "link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }"
+    text = TSAI.replace("mass = 3.0", f"mass = 3.0\n{link}")
+    remark = 'links from first to second joint: "platform" "leg1.upper" to "leg2.upper"'
+    assert remark in read(text).remarks
+    text = text.replace(link, f'{link}\nfrom = "leg1.upper"\nto = "leg2.upper"')
+    assert remark not in read(text).remarks
+
+
+def test_the_first_copy_of_a_leg_is_the_leg_as_written(read):
+    robot = read(TSAI)
+    home = home_posture(robot).transforms
+    first, second = (home[robot.index(f"leg{k}.slide"), :3, 3] for k in (1, 2))
+    assert first == pytest.approx([0.24, 0, 0], abs=1e-15)
+    assert second == pytest.approx([-0.12, 0.12 * np.sqrt(3), 0], abs=1e-15)
+
+
+def test_a_leg_may_be_repeated_about_an_axis_through_a_point(read):
+    """Two legs, half a turn about the line x = 0.3: the second at 0.6 - 0.24."""
+    repeat = '{ count = 2, about = [0, 0, 2], at = ["300 mm", 0, 0] }'
+    text = re.sub(r"repeat = .*", f"repeat = {repeat}", TSAI)
+    text = text.replace(
+        'platform_at = [0, 0, "450 mm"]', "platform_at = [0.3, 0, 0.45]"
+    )
+    robot = read(text)
+    home = home_posture(robot).transforms
+    slide = home[robot.index("leg2.slide"), :3, 3]
+    assert slide == pytest.approx([0.36, 0, 0], abs=1e-15)
+
+
+def test_masses_of_a_leg_are_copied_with_it(read):
+    """Half a turn about the line x = 0.3, y = 0.1: (x, y) to (0.6 - x, 0.2 - y)."""
+    repeat = "{ count = 2, about = [0, 0, 1], at = [0.3, 0.1, 0] }"
+    text = ARC.replace("{ count = 1, about = [0, 0, 1] }", repeat)
+    text = text.replace(
+        'name = "arc"', 'name = "arc"\nmass = 0.4\ncentre = [0.1, 0.2, 0.3]'
+    )
+    text = text.replace('between = ["arc", "hand"]', 'between = ["arc", "end"]')
+    text = text.replace("[[leg.joint]]", '[[leg.body]]\nname = "end"\n[[leg.joint]]', 1)
+    text = text.replace('[[body]]\nname = "hand"\n', "")
+    robot = read(text.replace('platform = "hand"', 'platform = "leg1.end"'))
+    centres = []
+    for k in (1, 2):
+        frame = robot.frame(f"leg{k}.arc")
+        T = home_posture(robot).transforms[robot.index(frame.name)]
+        centres.append(T[:3, :3] @ frame.centre_of_mass + T[:3, 3])
+        assert frame.mass == pytest.approx(0.4 + 7800 * np.pi**2 / 20 * 0.005**2)
+    x, y, z = centres[0]
+    assert centres[1] == pytest.approx([0.6 - x, 0.2 - y, z], abs=1e-14)
+    assert z == pytest.approx(0.3 * 0.4 / robot.frame("leg1.arc").mass)
+
+
+def test_errors_may_have_units(read):
+    """The first three are angles, the last three lengths."""
+    written = '["1 mrad", "1 deg", 2, "1 mm", "1 um", "1 in"]'
+    text = ARM.replace("position = 0.5", f"geometric_error = {written}")
+    expected = [1e-3, np.pi / 180, 2, 1e-3, 1e-6, 0.0254]
+    assert read(text).frame("turn").geometric_error == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("written", "metres"), [
+    ('"240 mm"', 0.24), ('"24e4 um"', 0.24), ('"0.24 m"', 0.24), ('"240mm"', 0.24),
+    ('"10 in"', 0.254), ("0.24", 0.24),
+])  # fmt: skip
+def test_lengths_may_have_units(written, metres, read):
+    robot = read(TSAI.replace('at = ["240 mm", 0, 0]', f"at = [{written}, 0, 0]"))
+    assert robot.frames[0].translation == pytest.approx([metres, 0, 0], abs=1e-16)
+
+
+def test_angles_may_have_units(read):
+    text = ARM.replace("position = 0.5", 'position = "0.4 rad"')
+    assert read(text).frame("turn").position == 0.4
+    text = ARM.replace("position = 0.5", 'position = "30 deg"')
+    assert read(text).frame("turn").position == pytest.approx(np.pi / 6, rel=1e-15)
+    text = ARM.replace("tilt = 2e-4", 'tilt = "0.2 mrad"')
+    assert read(text).frame("turn").clearance.tilt == pytest.approx(2e-4, rel=1e-15)
+
+
+ARM = """
+format = 2
+platform = "hand"
+platform_at = [0.6, 0, 0]
+
+[[body]]
+name = "arm"
+link = { beam = { width = "20 mm", height = "30 mm" }, young = 7e10, poisson = 0.3 }
+[[body]]
+name = "hand"
+mass = 2.0
+centre = [0.6, 0, 0.1]
+
+[[joint]]
+name = "turn"
+type = "revolute"
+between = ["base", "arm"]
+at = [0.1, 0, 0]
+axis = [0, 0, 1]
+actuated = true
+position = 0.5
+drive_stiffness = 1e4
+clearance = { radial = "20 um", tilt = 2e-4 }
+[[joint]]
+name = "bolts"
+type = "fixed"
+between = ["arm", "hand"]
+at = [0.6, 0, 0]
+"""
+
+
+def test_a_drawn_arm_has_its_frames_at_home(read):
+    """The drive's spring, the link from joint to joint, and the mass of the hand."""
+    robot = read(ARM)
+    turn, arm, hand = (robot.frame(name) for name in ("turn", "arm", "hand"))
+    assert np.diag(turn.joint_stiffness).tolist() == [*[np.inf] * 2, 1e4, *[np.inf] * 3]
+    assert isinstance(arm.link, BeamLink)
+    assert arm.link.length == pytest.approx(0.5, rel=1e-15)
+    assert (hand.mass, turn.parent) == (2.0, BASE)
+    assert home_posture(robot).platform[:3, 3] == pytest.approx([0.6, 0, 0])
+
+
+@pytest.mark.parametrize(("up", "soft"), [("", "TY"), (", up = [0, 1, 0]", "TZ")])
+def test_the_height_of_a_beam_is_along_the_bases_z(up, soft, read):
+    """A cantilever deflects by F L^3 / 3 E I: less where it is higher."""
+    text = ARM.replace('height = "30 mm"', f'height = "30 mm", theory = "euler"{up}')
+    text = text.replace("drive_stiffness = 1e4\n", "")
+    C = platform_stiffness(home_posture(read(text))).compliance
+    I = {"TY": 0.03 * 0.02**3 / 12, "TZ": 0.02 * 0.03**3 / 12}  # bending along y and z
+    if soft == "TZ":
+        I = {"TY": I["TZ"], "TZ": I["TY"]}
+    for k, key in ((4, "TY"), (5, "TZ")):
+        assert C[k, k] == pytest.approx(0.5**3 / (3 * 7e10 * I[key]), rel=1e-12)
+
+
+ARC = """
+format = 2
+platform = "hand"
+platform_at = [0, "100 mm", 0]
+
+[[leg]]
+name = "leg"
+repeat = { count = 1, about = [0, 0, 1] }
+[[leg.body]]
+name = "arc"
+[leg.body.link]
+young = 2.1e11
+poisson = 0.3
+density = 7800
+[[leg.body.link.curve]]
+center = [0, 0, 0]
+turn = [0, 0, "90 deg"]
+section = { radius = "5 mm" }
+[[leg.joint]]
+name = "foot"
+type = "fixed"
+between = ["base", "arc"]
+at = ["100 mm", 0, 0]
+[[leg.joint]]
+name = "wrist"
+type = "fixed"
+between = ["arc", "hand"]
+at = [0, "100 mm", 0]
+axis = [1, 2, 3]
+
+[[body]]
+name = "hand"
+"""
+
+
+def test_an_arc_of_a_quarter_turn_has_the_deflection_of_castigliano(read):
+    """Out of its plane: F r^3 (pi/4 / EI + (3 pi/4 - 2) / GJ) and the shear of F r."""
+    C = platform_stiffness(home_posture(read(ARC))).compliance
+    r, rho, E, nu = 0.1, 0.005, 2.1e11, 0.3
+    G, area, I = E / 2.6, np.pi * rho**2, np.pi * rho**4 / 4
+    bending = r**3 * (np.pi / 4 / (E * I) + (3 * np.pi / 4 - 2) / (G * 2 * I))
+    shear = np.pi / 2 * r / (G * area * 6 * (1 + nu) / (7 + 6 * nu))
+    assert C[5, 5] == pytest.approx(bending + shear, rel=1e-10)
+
+
+def test_an_arc_has_the_mass_and_the_centre_of_a_quarter_circle(read):
+    robot = read(ARC)
+    arc = robot.frame("leg1.arc")
+    mass = 7800 * np.pi * 0.005**2 * np.pi / 2 * 0.1
+    T = home_posture(robot).transforms[robot.index("leg1.arc")]
+    centre = T[:3, :3] @ arc.centre_of_mass + T[:3, 3]
+    assert arc.mass == pytest.approx(mass, rel=1e-12)
+    assert centre == pytest.approx([0.2 / np.pi, 0.2 / np.pi, 0], abs=1e-14)
+
+
+def test_copies_of_an_arc_are_turned_with_their_leg(read):
+    """Two arcs side by side hold the hand in the middle twice as stiffly."""
+    one = read(ARC)
+    text = ARC.replace("count = 1, about = [0, 0, 1]", "count = 2, about = [0, 1, 0]")
+    two = read(text)
+    K, both = (platform_stiffness(home_posture(r)).stiffness for r in (one, two))
+    turned = np.diag([-1, 1, -1, -1, 1, -1])  # half a turn about y
+    expected = K + turned @ K @ turned
+    size = np.sqrt(np.diag(expected))
+    assert np.abs((both - expected) / np.outer(size, size)).max() < 1e-10
+
+
+@pytest.mark.parametrize(("old", "new", "message"), [
+    ('"90 deg"]', '"80 deg"]', "link.curve: found that it ends 0.0174 m"),
+    ('section = {', 'sektion = {', "section"),
+    ("poisson = 0.3", "poisson = 0.3\nbeam = { radius = 0.1 }", "link.beam: found it "),
+])  # fmt: skip
+def test_a_mistake_in_a_curve_is_one_line(old, new, message, read):
+    with pytest.raises(BadInput) as caught:
+        read(ARC.replace(old, new))
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+# rows of the free motions, and bounds that limit others
+SEVERAL = {
+    "cylindrical": ([2, 5], {"radial", "tilt"}),
+    "spherical": ([0, 1, 2], {"radial", "axial"}),
+    "planar": ([2, 3, 4], {"axial", "tilt"}),
+}
+STIFF = [2e3, 3e3, 5e3, 2e6, 3e6, 5e6]
+
+
+def held_by(kind, keys):
+    """A hand on one joint of several freedoms, with more keys."""
+    text = ARM.replace('type = "fixed"', f'type = "{kind}"\naxis = [0, 0, 1]\n{keys}')
+    return text.replace("drive_stiffness = 1e4\n", "")
+
+
+@pytest.mark.parametrize("full", [False, True], ids=["diagonal", "rows"])
+@pytest.mark.parametrize("kind", SEVERAL)
+def test_springs_of_a_joint_of_several_freedoms_are_across_them(kind, full, read):
+    """Zero along the free motions; a number there is refused."""
+    free = SEVERAL[kind][0]
+    K = [0.0 if row in free else value for row, value in enumerate(STIFF)]
+    values = np.diag(K).tolist() if full else K
+    robot = read(held_by(kind, f"joint_stiffness = {values}"))
+    stiff = np.zeros(6)
+    for frame in robot.frames:
+        if frame.name.startswith("bolts") and frame.joint_stiffness is not None:
+            stiff = np.diag(frame.joint_stiffness)
+    soft = [row for row in range(6) if row not in free]
+    assert stiff[soft].tolist() == [STIFF[row] for row in soft]
+    assert mobility(home_posture(robot)).freedoms == 1 + len(free)
+    for row in free:
+        wrong = [STIFF[k] if k == row else value for k, value in enumerate(K)]
+        values = np.diag(wrong).tolist() if full else wrong
+        with pytest.raises(BadInput, match=r"found a stiffness as number \d .*along a"):
+            read(held_by(kind, f"joint_stiffness = {values}"))
+
+
+@pytest.mark.parametrize("bound", ["radial", "axial", "tilt", "spin"])
+@pytest.mark.parametrize("kind", SEVERAL)
+def test_bounds_of_a_joint_of_several_freedoms_are_across_them(kind, bound, read):
+    text = held_by(kind, f"clearance = {{ {bound} = 1e-5 }}")
+    if bound in SEVERAL[kind][1]:
+        frames = [f for f in read(text).frames if f.name.startswith("bolts")]
+        bounds = [getattr(f.clearance, bound) for f in frames if f.clearance]
+        assert bounds == [1e-5]
+    else:
+        with pytest.raises(
+            BadInput, match=rf"clearance\.{bound}: found a bound of a f"
+        ):
+            read(text)
+
+
+def test_a_link_of_a_platform_with_one_joint_ends_at_its_point(read):
+    """A cantilever: its point deflects by F L^3 / 3 E I."""
+    text = ARM[: ARM.index('[[joint]]\nname = "bolts"')].replace('"hand"', '"arm"', 1)
+    text = text.replace(
+        '[[body]]\nname = "hand"\nmass = 2.0\ncentre = [0.6, 0, 0.1]', ""
+    )
+    text = text.replace("drive_stiffness = 1e4\n", "")
+    text = text.replace('height = "30 mm"', 'height = "30 mm", theory = "euler"')
+    C = platform_stiffness(home_posture(read(text))).compliance
+    I = 0.02 * 0.03**3 / 12
+    assert C[5, 5] == pytest.approx(0.5**3 / (3 * 7e10 * I), rel=1e-12)
+
+
+def test_a_rod_may_have_no_inertia_about_itself(read):
+    text = TSAI.replace("inertia = [0.01, 0.01, 0.02,", "inertia = [0, 0.01, 0.01,")
+    assert "moments of inertia" in read(text).remarks[1]
+
+
+def test_coordinates_of_passive_joints_are_zero_at_home(read):
+    assert np.abs(home_posture(read(TSAI)).coordinates).max() < 1e-12
+
+
+def test_a_file_of_bodies_needs_no_format_key(read):
+    assert read(TSAI.replace("format = 2\n", "")).platform == "platform"
+
+
+def test_a_bound_along_free_motions_of_a_ball_is_refused(read):
+    text = TSAI.replace('type = "universal"', 'type = "spherical"')
+    text = text.replace("axis2 = [0, 1, 0]", "clearance = { tilt = 1e-4 }")
+    with pytest.raises(BadInput, match=r"clearance\.tilt: found a bound of a free "):
+        read(text)
+
+
+def test_a_universal_joint_has_numbers_for_each_bearing(read):
+    """One table for both, or a pair."""
+    both = "axis2 = [0, 1, 0]\nclearance = { radial = 1e-5, tilt = 1e-4 }"
+    pair = "axis2 = [0, 1, 0]\nclearance = [{ radial = 1e-5 }, { axial = 2e-5 }]"
+    for text, expected in ((both, (1e-5, None)), (pair, (None, 2e-5))):
+        robot = read(TSAI.replace("axis2 = [0, 1, 0]", text))
+        first = robot.frame("leg1.upper.first").clearance
+        second = robot.frame("leg1.upper.second").clearance
+        assert first.radial == 1e-5
+        assert (second.radial, second.axial) == expected
+
+
+REFUSED = {
+    "format": ("format = 2", "format = 3", "format: found 3, expected 1 | 2"),
+    "format of frames": (
+        "format = 2", "format = 1",
+        "format: found 1 in a file of bodies and joints, expected 2"),
+    "a frame": (
+        "[[leg]]", '[[frame]]\nname = "tip"\n[[leg]]', 'unknown key "frame"'),
+    "unknown body": (
+        'between = ["tube", "rod"]', 'between = ["tube", "rud"]',
+        'leg "leg".joint "slide".between: found "rud", expected a body or "base"; did '
+        'you mean "rod"?'),
+    "unknown type": (
+        'type = "prismatic"', 'type = "prismatc"',
+        'leg "leg".joint "slide".type: found \'prismatc\', expected "fixed" | "revol'),
+    "helical": (
+        'type = "prismatic"', 'type = "helical"',
+        'leg "leg".joint "slide".type: found "helical", which is not supported yet'),
+    "unknown key": (
+        "drive_stiffness", "drive_stifness",
+        'leg "leg".joint "slide": unknown key "drive_stifness"; did you mean '),
+    "unknown key of a leg": (
+        'name = "leg"', 'name = "leg"\nrepeats = 3',
+        'leg "leg": unknown key "repeats"; did you mean "repeat"?'),
+    "unknown key of a body": (
+        "mass = 3.0", "weight = 3.0", 'body "platform": unknown key "weight"'),
+    "parallel axes": (
+        "axis2 = [0, 1, 0]", "axis2 = [-45, 1e-3, -16]",
+        'leg "leg".joint "upper".axis2: found it parallel to "axis", expected an '),
+    "missing second axis": (
+        "axis2 = [0, 1, 0]", "",
+        'leg "leg".joint "upper".axis2: missing; expected 3 finite numbers'),
+    "no direction": (
+        "axis = [-16, 0, 45]", "axis = [0, 0, 0]",
+        'leg "leg".joint "slide".axis: found no direction, expected 3 numbers, '),
+    "a body without joints": (
+        '[[leg]]', '[[body]]\nname = "lost"\n[[leg]]',
+        'body "lost": found no joint that connects it with "base", expected one'),
+    "two bodies of a name": (
+        '[[leg]]', '[[body]]\nname = "platform"\n[[leg]]',
+        'body: found "platform" twice, expected different names'),
+    "two joints of a name": (
+        'name = "upper"', 'name = "slide"',
+        'joint: found "leg1.slide" twice, expected different names'),
+    "base": (
+        'name = "tube"', 'name = "base"',
+        'leg "leg".body "base".name: found "base", which stands still; '),
+    "a body with itself": (
+        'between = ["tube", "rod"]', 'between = ["rod", "rod"]',
+        'leg "leg".joint "slide".between: found "rod" twice, expected two'),
+    "platform": (
+        'platform = "platform"', 'platform = "platfrom"',
+        'platform: found "platfrom", expected the name of a body; did you mean '),
+    "unit of another dimension": (
+        '"80 mm"', '"80 deg"',
+        'leg "leg".joint "upper".at: found \'80 deg\', expected a number, or a text '
+        'with a unit such as "200 mm" (m mm um in)'),
+    "unknown unit": (
+        '"80 mm"', '"80 furlong"', "found '80 furlong', expected a number"),
+    "drive of a universal joint": (
+        "axis2 = [0, 1, 0]", "axis2 = [0, 1, 0]\nactuated = true",
+        'leg "leg".joint "upper".actuated: found one on a universal joint, expected '),
+    "stiffness of a passive drive": (
+        "actuated = true", "",
+        'leg "leg".joint "slide".drive_stiffness: found one without actuated = true'),
+    "inertia of no body": (
+        "inertia = [0.01, 0.01, 0.02,", "inertia = [0.01, 0.01, 0.03,",
+        'body "platform".inertia: found principal moments 0.01, 0.01, 0.03; expected '),
+    "negative tolerance": (
+        "drive_stiffness = 2e7", "tolerance = [0, 0, 0, -1e-5, 0, 0]",
+        'leg "leg".joint "slide".tolerance: found -1e-05 in it, expected 6 numbers >='),
+    "one body": (
+        'between = ["tube", "rod"]', 'between = ["tube"]',
+        'leg "leg".joint "slide".between: found [\'tube\'], expected two names'),
+    "end of a link": (
+        'name = "rod"', 'name = "rod"\nto = "lower"',
+        'leg "leg".body "rod".to: found "lower", expected a joint of this body'),
+    "copies": (
+        "count = 3", "count = 0",
+        'leg "leg".repeat.count: found 0, expected a whole number >= 1'),
+    "not a number": (
+        'at = ["80 mm", 0, "450 mm"]', 'at = ["80 mm", nan, "450 mm"]',
+        'leg "leg".joint "upper".at: found nan as number 2'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_mistake_in_a_drawing_is_one_line(case, read):
+    old, new, message = REFUSED[case]
+    assert old in TSAI
+    with pytest.raises(BadInput) as caught:
+        read(TSAI.replace(old, new))
+    text = str(caught.value)
+    assert "\n" not in text
+    assert message in text
+    assert "drawn.toml" in text
