@@ -1,13 +1,22 @@
 """What a robot file holds, for editors: the keys that its reader knows."""
 
+from assembly.drawing.drawing import FREE_ROWS
 from assembly.effects import LIBRARY
 from assembly.effects.forms import FORMS
 from assembly.effects.functions import FORMULA
 from assembly.files.function_file import FUNCTION
 from assembly.model.function import KINDS
 from assembly.model.robot import JOINTS
-from forcefit.results.quantities import flag, number, text
-from forcefit.results.records import Anything, Each, Either, Listed, Words, record
+from forcefit.results.quantities import count, flag, number, text
+from forcefit.results.records import (
+    Anything,
+    Each,
+    Either,
+    Listed,
+    WithUnits,
+    Words,
+    record,
+)
 from stiffness.surface.surface import UNITS
 
 _DIRECTION = number("direction", "1", "axis")
@@ -81,13 +90,52 @@ _EFFECT = record(
     variables_=text("variables", "variable"), form_=Words((*FORMS, FORMULA)),
     formula_=text("formula"), std_=_NUMBERS,
 )  # fmt: skip
-ROBOT_FILE = record(
+_COMMON = record(
     name_=text("name of the robot"), description_=text("description"),
-    platform=text("name of the platform's frame"), frame=Listed(_FRAME),
-    closure_=Listed(record(frames=text("two frames that meet", "frame"))),
     effect_=Listed(_EFFECT),
     learned_range_=Each(number("least and largest value", "", "bound")),
-    reference_point_="reference_point",
-    diagnosis_=Each(Anything()),
+    reference_point_="reference_point", diagnosis_=Each(Anything()),
     covariance_=text("file of the covariance"),
 )  # fmt: skip
+_OF_FRAMES = record(
+    "", _COMMON, format_=Words((1,)), platform=text("name of the platform's frame"),
+    frame=Listed(_FRAME),
+    closure_=Listed(record(frames=text("two frames that meet", "frame"))),
+)  # fmt: skip
+# of a universal joint one for each of its two bearings
+_OF_JOINT = record(**{
+    f"{key}_": Either((_FRAME.content[key], Listed(_FRAME.content[key])))
+    for key in ("clearance", "joint_stiffness", "geometric_error", "tolerance")
+})  # fmt: skip
+_PIECE = record(
+    end_=_POINT, center_=_POINT,
+    turn_=number("rotation vector of an arc", "rad", "axis"),
+    up_=_DIRECTION, section_=_BEAM, tip_section_=_BEAM,
+)  # fmt: skip
+_BODY = record(
+    name=text("name"), mass_=number("mass in addition to the link's", "kg"),
+    centre_=_POINT,
+    inertia_=number("Ixx, Iyy, Izz, Ixy, Ixz, Iyz at the centre", "kg m^2", "moment"),
+    link_=record(
+        "", _LINK, curve_=Listed(_PIECE), theory_=Words(("timoshenko", "euler"))
+    ),
+    up_=_DIRECTION, from_=text("joint at which the link begins"),
+    to_=text("joint at which the link ends"),
+)  # fmt: skip
+_JOINT = record(
+    "", _OF_JOINT, name=text("name"), type=Words((*FREE_ROWS,)),
+    between=text("two bodies", "body"), at=_POINT, axis_=_DIRECTION, axis2_=_DIRECTION,
+    actuated_=flag("actuated"), position_=number("coordinate at home", "rad or m"),
+    limits_=number("least and largest coordinate", "rad or m", "bound"),
+    drive_stiffness_=number("stiffness of the drive", "N m/rad or N/m"),
+)  # fmt: skip
+_LEG = record(
+    name=text("name"),
+    repeat_=record(count=count("copies"), about=_DIRECTION, at_=_POINT),
+    body_=Listed(_BODY), joint_=Listed(_JOINT),
+)  # fmt: skip
+_OF_BODIES = record(
+    "", _COMMON, format_=Words((2,)), platform=text("name of the platform's body"),
+    platform_at_=_POINT, body_=Listed(_BODY), leg_=Listed(_LEG), joint_=Listed(_JOINT),
+)  # fmt: skip
+ROBOT_FILE = Either((_OF_FRAMES, WithUnits(_OF_BODIES)))

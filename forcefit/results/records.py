@@ -7,7 +7,15 @@ from typing import Union
 from forcefit.results.quantities import QUANTITIES, Quantity
 
 Content = Union[
-    str, Quantity, "Record", "Each", "Listed", "Either", "Words", "Anything"
+    str,
+    Quantity,
+    "Record",
+    "Each",
+    "Listed",
+    "Either",
+    "Words",
+    "Anything",
+    "WithUnits",
 ]
 
 
@@ -51,12 +59,19 @@ class Either:
 class Words:
     """One of several words."""
 
-    words: tuple[str, ...]
+    words: tuple[str | int, ...]
 
 
 @dataclass(frozen=True)
 class Anything:
     """Any content."""
+
+
+@dataclass(frozen=True)
+class WithUnits:
+    """A content whose numbers may be texts with a unit."""
+
+    content: Content
 
 
 def record(names: str = "", /, *merged: Record, **content: Content) -> Record:

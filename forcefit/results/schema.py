@@ -14,6 +14,7 @@ from forcefit.results.records import (
     Either,
     Listed,
     Record,
+    WithUnits,
     Words,
 )
 
@@ -66,8 +67,24 @@ def _schema(content: Content) -> dict[str, Any]:
             return {"anyOf": [_schema(one) for one in contents]}
         case Anything():
             return {}
+        case WithUnits(inner):
+            return _with_texts(_schema(inner))
         case Record():
             return _object(content)
+
+
+def _with_texts(schema: Any) -> Any:
+    """Return a schema that allows a text for each number."""
+    if isinstance(schema, list):
+        return [_with_texts(one) for one in schema]
+    if not isinstance(schema, dict):
+        return schema
+    changed = {key: _with_texts(one) for key, one in schema.items()}
+    if schema.get("type") == ["number", "null"]:
+        kinds = [{"type": ["number", "null"]}, {"type": ["string", "null"]}]
+        changed = {**changed, "anyOf": kinds}
+        del changed["type"]
+    return changed
 
 
 def _object(content: Record) -> dict[str, Any]:
