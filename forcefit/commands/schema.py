@@ -23,11 +23,12 @@ def schema(
     """
     from assembly.files.robot_schema import ROBOT_FILE
     from forcefit.results.outputs import OUTPUTS
+    from forcefit.results.records import Content
     from forcefit.results.schema import schema_of
     from validation.campaign.campaign_schema import CAMPAIGN_FILE
 
-    files = {"robot": ROBOT_FILE, "campaign": CAMPAIGN_FILE}
-    known = {**files, **OUTPUTS}
+    files: dict[str, Content] = {"robot": ROBOT_FILE, "campaign": CAMPAIGN_FILE}
+    known: dict[str, Content] = {**files, **OUTPUTS}
     if not name:
         print("\n".join(known))
         return

@@ -67,7 +67,7 @@ def test_robot_files_of_the_repository_follow_the_schema(validator):
     robot, checked = validator("robot"), 0
     for path in ROOT.glob("[!.]*/**/*.toml"):
         table = tomllib.loads(path.read_text())
-        if {"platform", "frame"} <= {*table}:
+        if "platform" in table and {"frame", "leg", "joint"} & {*table}:
             assert not [*robot.iter_errors(table)], path
             checked += 1
     assert checked > 10
