@@ -8,15 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from assembly.model.placed_frames import PlacedFrame, place_frames
 from assembly.model.robot import Frame, Robot
-from assembly.robots.placing import (
-    PlacedFrame,
-    at,
-    ball_joint,
-    cardan_joint,
-    drive_stiffness,
-    place_frames,
-)
+from assembly.robots.placing import at, ball_joint, cardan_joint, drive_stiffness
 from examples.campaign_folder import from_command_line, write_campaign
 
 NAME = "hangprinter"
