@@ -75,7 +75,7 @@ def test_combined_effect_predicts_the_same_reading_as_both_in_turn(name, standin
 
 
 def test_every_additive_effect_has_a_combination_case():
-    """Clearances add and contact laws cannot; finite motions have no number."""
+    """Clearances add up, contact laws cannot, finite motions have no parameter."""
     others = {"joint_clearance", "contact_stiffening", "geometric_stiffening"}
     assert IN_TURN.keys() | others == LIBRARY.keys()
 
@@ -95,7 +95,7 @@ def test_different_effects_are_combined_without_change():
 
 
 def test_effects_with_different_exponents_or_time_constants_cannot_be_combined():
-    """Springs in series whose laws differ in their exponents; two time constants."""
+    """Series springs with laws of different exponents; two time constants."""
     law = {"a.coefficient": 1e7, "a.exponent": 1.5}
     slow, slower = ({"a": 1e-5, "a.time_constant": t} for t in (60.0, 90.0))
     with pytest.raises(ValueError, match="no single delay"):

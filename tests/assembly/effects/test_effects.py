@@ -246,7 +246,7 @@ def test_drift_with_a_vanishing_time_constant_is_a_step():
 
 
 def test_every_effect_of_the_library_is_tested_in_this_file():
-    """The list above is the library's: a new effect needs a test of its own."""
+    """A new effect in the library needs a test in this file."""
     source = Path(__file__).read_text(encoding="utf-8")
     assert [name for name in LIBRARY if f'"{name}"' not in source] == []
 
@@ -346,7 +346,7 @@ def test_base_effects_act_on_a_foundation_frame_below_all_others(robot, new):
 
 
 def test_friction_needs_an_elastic_joint_and_slip_a_joint_without_clearance():
-    """A spring of their own, however soft; no clearance but a spin that is declared."""
+    """Friction: a joint spring of any stiffness. Slip: no clearance except spin."""
     own = np.diag([np.inf, np.inf, 0.4, np.inf, np.inf, np.inf])
     robot = Robot("chain", "tip", (
         Frame("soft", joint="revolute", actuated=True, joint_stiffness=own),

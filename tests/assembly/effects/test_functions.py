@@ -105,7 +105,7 @@ def three_rrr(load):
 
 @pytest.mark.parametrize("exact", [False, True])
 def test_compliance_in_a_closed_chain_equals_a_joint_spring(exact):
-    """Newton's method on the laws against springs that the solver knows."""
+    """Newton's method for the function, against a spring of the robot."""
     there = replace(three_rrr([0, 0, 5, 40, -30, 0]), exact=exact)
     robot = there.robot
     names = [f.name for f in robot.frames if f.actuated]

@@ -67,7 +67,7 @@ def test_session_functions_deform_only_rows_of_their_session():
 
 
 def test_reversal_of_a_wrench_scales_with_the_absolute_moment():
-    """A reversal of a wrench: direction times |M|, whichever way M acts."""
+    """The deformation is the direction times |M|, for either sign of M."""
     q = [0.0, 0.5, 0.2]
     rows = campaign_of(np.arange(3.0), q=q, approach=1.0)
     side = np.array([1, 1, -1])

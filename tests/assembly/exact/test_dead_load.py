@@ -215,7 +215,7 @@ def test_exact_solution_with_weight_equals_the_multibody_simulation(gravity):
 
 
 def test_frame_wrench_is_the_sum_of_all_loads_beyond_the_frame():
-    """Moments and forces at points, summed up the tree; joints hold no own body."""
+    """Forces and moments summed along the tree; joints omit their own body."""
     rng = np.random.default_rng(4)
     robot = with_bodies(random_robot(rng, legs=2), rng)
     posture = home_posture(robot)

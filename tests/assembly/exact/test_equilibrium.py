@@ -60,7 +60,7 @@ def test_imbalance_of_a_spring_is_its_relative_unbalanced_moment(share):
 def test_imbalance_of_two_closed_springs_is_their_mean_unbalanced_force(size, small):
     """Springs of 1 N/m, stretched by 3 and -1 m: the closure carries 2 N, 1 N remains.
 
-    Relative to the 2 and the spring's own 1, and to a billionth of a metre's force.
+    The imbalance is relative to both forces and to the force of 1e-9 m.
     """
     spring = only(3, 1.0)
     posture = home_posture(Robot("pair", "one", (
@@ -122,7 +122,7 @@ def test_fully_pressed_clearances_leave_no_tangent_space():
 
 
 def test_contact_force_equals_the_energy_slope_by_the_clearance():
-    """Of a closed chain: force times clearance is -c dE/dc, by central differences."""
+    """In a closed chain, force times clearance is -c dE/dc, by central differences."""
     clearance, step = 5e-3, 1e-6
     low, here, high = (
         solve_exact(two_bars(0.06, Clearance(radial=c)))

@@ -82,7 +82,7 @@ def test_two_bars_close_by_the_law_of_cosines(longer):
 
 
 def test_linearisation_error_is_the_linear_minus_the_exact_solution():
-    """The linear model keeps the triangle's slopes at home; differences of 1e-6."""
+    """The linear model uses the triangle's slopes at home; differences of 1e-6."""
     longer, step = 0.06, 1e-6
     slopes = (triangle(B + step) - triangle(B - step)) / (2 * step)
     energy = (np.array([K_ONE, K_TWO]) @ (slopes * longer) ** 2) / 2
@@ -120,7 +120,7 @@ def test_passive_joint_stops_exactly_at_its_bound(longer, bound):
     """The bar deforms until the pin is within its bound.
 
     The second bound is beyond what the linear model turns the pin by, 0.352 rad, and
-    met only by finite motions, 0.497 rad.
+    reached only by finite motions, 0.497 rad.
     """
     free = solve_exact(two_bars(longer, stretch=True))
 
@@ -146,7 +146,7 @@ def pin_gap(one, two, longer):
 
 @pytest.mark.parametrize("longer", [0.02, 0.06])
 def test_pin_with_clearance_rests_on_its_rim_at_least_energy(longer):
-    """Least k turn^2 / 2 with the ends no farther apart than the clearance."""
+    """Least k turn^2 / 2 with the ends at most one clearance apart."""
     clearance = 5e-3
 
     def balance(z):
@@ -175,7 +175,7 @@ def test_pin_with_clearance_rests_on_its_rim_at_least_energy(longer):
 
 
 def test_error_within_the_clearance_stores_no_energy():
-    """4 mm too long, 5 mm of clearance: closed without energy."""
+    """The bar is 4 mm too long, the clearance is 5 mm."""
     answer = solve_exact(two_bars(4e-3, Clearance(radial=5e-3)))
     assert energy_of(answer.placement) < 1e-12  # [J], of 0.04 J without clearance
     assert answer.energy == 0.0  # 1e-31 J is rounding
@@ -231,7 +231,7 @@ def test_pendulum_under_a_dead_load_rests_at_its_moment_balance(force, side):
 
 
 def test_moment_turns_a_pendulum_by_moment_over_stiffness():
-    """k a = M, by the definition of the moment's work, at 0.8 rad too."""
+    """k a = M, by the definition of the moment's work, also at 0.8 rad."""
     answer = solve_exact(pendulum(10.0, 0.5), [0, 0, 8.0, 0, 0, 0])
     assert answer.joint_screws[0, 2] == pytest.approx(0.8, rel=1e-12)
     assert answer.platform_screw[:3] == pytest.approx([0, 0, 0.8], abs=1e-12)
@@ -280,7 +280,7 @@ def test_too_few_steps_raise_not_converged_with_both_residuals(monkeypatch):
 
 @pytest.mark.parametrize("case", CASES)
 def test_exact_solution_of_the_paper_robot_converges_at_full_errors(case):
-    """Easy points, flat valleys of clearance, the rim of the workspace."""
+    """Points in the middle, in flat valleys of clearance, at the workspace's rim."""
     places = [(0, -0.5), (-0.525, -0.1), (0.35, -0.075), (-0.6, 0), (0.025, -0.6)]
     poses = np.full((len(places), 6), np.nan)
     poses[:, [0, 2]] = places

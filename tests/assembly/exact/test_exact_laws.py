@@ -29,7 +29,7 @@ CASES = {case["name"]: case for case in NUMBERS["cases"]}
 
 @pytest.mark.parametrize("case", CASES)
 def test_linear_model_error_falls_with_the_square_of_the_errors(case):
-    """Differences of the pose fall as s^2, of the relative energy as s: halves of s."""
+    """The pose differs by s^2, the relative energy by s, for errors scaled by s."""
     robot = without_clearance(irsbot2_with(CASES[case]))
     posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.45})
     turns, shifts, energies = [], [], []
@@ -69,7 +69,7 @@ def test_spring_wrenches_equal_the_wrenches_of_the_closures():
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 5])
 def test_energy_slope_by_an_error_equals_the_wrench(seed):
-    """dE / d(delta l) = -force: the first body longer, against solving again."""
+    """dE / d(delta l) = -force for the first body, by differences of solutions."""
     rng = np.random.default_rng(seed)
     robot, step = random_robot(rng, legs=3), 1e-6
     answer = solve_exact(home_posture(robot))
@@ -113,7 +113,7 @@ def test_platform_displacement_equals_the_potential_slope_by_the_load(
 ):
     """Castigliano, also where symmetry leaves clearances unloaded that touch.
 
-    They carry forces of rounding, and may move within it for ever.
+    They carry forces of the size of rounding, and may move without end.
     """
     posture = home_posture(load_robot(name))
     unit, step = np.eye(6)[component], 1e-3
@@ -143,7 +143,7 @@ def loaded_arm(pieces=1):
 
 
 def test_beam_in_pieces_bends_from_its_displaced_position():
-    """Small bending of links that are turned by 0.02 rad: in pieces as in one."""
+    """Links turned by 0.02 rad bend a little: equal in pieces and as one."""
     whole, cut = loaded_arm(), loaded_arm(pieces=2)
     assert len(cut.placement.transforms) > len(whole.placement.transforms)
     for name in ("link_screws", "wrenches"):
@@ -155,7 +155,7 @@ def test_beam_in_pieces_bends_from_its_displaced_position():
 
 
 def test_start_from_a_nearby_solution_gives_the_same_equilibrium():
-    """Another load a hundredth larger; the solution of another robot is no start."""
+    """The load is 1 % larger; the solution of another robot is not used as a start."""
     posture = loaded_arm().posture
     load = np.array([1.0, -2.0, 0.5, 20.0, 30.0, -40.0])
     before = solve_exact(posture, load)
@@ -170,8 +170,8 @@ def test_start_from_a_nearby_solution_gives_the_same_equilibrium():
 
 
 @pytest.mark.parametrize("point", [(0.2, 0.0, 0.0), (-0.1, 0.3, 0.0)])
-def test_a_force_at_a_point_of_the_platform_turns_with_it(point):
-    """k a = r x F with r = L + point, turned by a; and so starts the linear model."""
+def test_force_at_a_platform_point_moves_with_the_platform(point):
+    """k a = r x F with r = L + point, turned by a; also in the linear start."""
     k, L, force = 10.0, 0.5, np.array([4.0, 9.0])
     posture = pendulum(k, L)
     x, y = L + point[0], point[1]
@@ -213,8 +213,8 @@ def test_solution_text_states_load_energy_and_certificate():
 def test_exact_solution_balances_loads_from_nanonewtons_to_newtons(pieces, radius):
     """The beam is linear: displacements are proportional to loads down to nanonewtons.
 
-    What a step gains is then far below the rounding of the load's work, and it is
-    taken all the same.
+    The energy change of a step is then below the rounding of the load's work, and
+    the step is accepted nevertheless.
     """
     link = BeamLink({"radius": radius}, 7e10, 0.3, pieces=pieces)
     arm = Frame("arm", translation=[0.5, 0.1, 0.2], rotation=[0, 0, 0.4], link=link)

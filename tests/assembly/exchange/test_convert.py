@@ -42,7 +42,7 @@ def test_loops_of_the_generator_default_type_are_converted_to_points(tmp_path):
 
 @pytest.mark.slow
 def test_kangaroo_closes_with_the_points_of_its_later_loop_file(tmp_path):
-    """There loops 3, 4 and 5 are 6d and all others 3d (kangaroo_like_2legs)."""
+    """In that file (kangaroo_like_2legs) loops 3, 4 and 5 are 6d, all others 3d."""
     points = [f"closedloop{i}_A" for i in (0, 2, 6, 7, 8, 9, 10, 11)]
     answer = convert(example("kangaroo_like"), tmp_path / "robot.toml", points=points)
     assert answer.taken == ()
@@ -114,7 +114,7 @@ QUICK = {"hexapod": "urdf", "delta": "xml", "orthoglide": "", "irsbot2": ""}
 def test_built_in_robots_keep_their_frames_after_conversion_and_back(
     name, ending, tmp_path
 ):
-    """Drives, platform, and every frame of the same name, at home and elsewhere."""
+    """Drives, platform, and every frame by its name, in the home pose and elsewhere."""
     there, back = tmp_path / f"robot.{ending}", tmp_path / "back.toml"
     assert convert(name, there).difference < 1e-12
     assert convert(there, back).difference < 1e-12
@@ -144,7 +144,7 @@ def weight_on_the_ground(robot):
 
 @pytest.mark.parametrize("ending", ["urdf", "xml"])
 def test_masses_are_equal_after_conversion_and_back(ending, tmp_path):
-    """Beams of a density return as masses: the same weight at the same place."""
+    """Beams with a density become masses: the same weight at the same place."""
     there, back = tmp_path / f"robot.{ending}", tmp_path / "back.toml"
     convert("arm6", there)
     convert(there, back)

@@ -198,10 +198,10 @@ def test_included_files_are_read_and_missing_or_recursive_ones_refused(tmp_path)
         read_mjcf(path)
 
 
-def test_free_body_has_six_freedoms_also_in_a_turned_home_pose(run, tmp_path):
+def test_free_body_turned_at_home_closes_with_one_freedom(run, tmp_path):
     """A loop turns it by 90 degrees about y, where three serial turns are singular.
 
-    A slide and a weld leave one freedom, and the weld holds no more than it must.
+    A slide and a weld leave one freedom without overconstraint.
     """
     path = file_of(tmp_path, """<worldbody><body name="p">[M]<freejoint/>
         <site name="s"/></body><body name="l">[M]<joint name="d" type="slide"/>
@@ -283,7 +283,7 @@ def test_coupled_joints_follow_polynomials_also_in_chains(tmp_path):
 
 
 def test_driven_joint_of_a_coupled_pair_becomes_the_leader(tmp_path):
-    """The driven joint of a coupled pair is the one to be commanded."""
+    """A command is given to the driven joint, and the other one follows."""
     path = file_of(tmp_path, """<compiler angle="radian"/><worldbody><body name="A">[M]
         <joint name="a"/><body name="B">[M]<joint name="b"/></body></body></worldbody>
         <equality><joint joint1="b" joint2="a" polycoef="0.1 2 0 0 0"/></equality>

@@ -23,7 +23,7 @@ def test_writing_an_unsupported_file_ending_is_refused(tmp_path):
     ("name", "text"), [("arm.urdf", "<robot/>"), ("arm.toml", "# mine\nname = 'arm'\n")]
 )
 def test_write_robot_refuses_to_overwrite_an_existing_user_file(tmp_path, name, text):
-    """It may hold comments, which a robot does not."""
+    """The file may contain comments, which a robot cannot store."""
     (tmp_path / name).write_text(text)
     with pytest.raises(BadInput, match="not overwritten"):
         ff.write_robot(BUILT_IN["arm6"](), tmp_path / name)
@@ -32,7 +32,7 @@ def test_write_robot_refuses_to_overwrite_an_existing_user_file(tmp_path, name, 
 
 
 def test_command_with_a_urdf_gives_the_result_of_the_converted_file(run, tmp_path):
-    """The same answer as of the robot file that it is converted to."""
+    """Mobility and zone margin are equal."""
     source = example("5bar_linkage")
     ff.convert(source, tmp_path / "robot.toml")
     answers = []

@@ -69,7 +69,7 @@ def test_unchanged_robot_files_close_at_home(name, write_file):
 
 @pytest.mark.parametrize("name", SEEDS)
 def test_damaged_robot_file_is_read_or_refused_with_one_line(name, write_file):
-    """Changed values, keys, tables, lines, bytes; the same hundred in every run."""
+    """Changed values, keys, tables, lines or bytes; the same hundred in every run."""
     for seed in range(100):
         path = write_file(SEEDS[name])
         change_file(path, Random(f"{name} {seed}"))

@@ -45,7 +45,7 @@ def digests(level):
 @x86_64
 @pytest.mark.parametrize("level", LEVELS)
 def test_every_instruction_level_gives_bit_identical_results(level):
-    """Products and sums are rounded one by one, in the same order on every machine.
+    """Products and sums are rounded one by one, in the same order on every processor.
 
     Energies with loads and without, margins, pose errors, compliances, draws and where
     clearances then are, tracks and cones, of more points than there are lanes; one

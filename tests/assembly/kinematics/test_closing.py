@@ -140,7 +140,7 @@ def parallelograms(digits, error=0.0):
 
 
 def test_closure_gap_from_six_digit_rounding_is_accepted_and_reported():
-    """Rounding leaves up to 5e-7 m per number; below 1e-6 it is dropped."""
+    """Rounding leaves up to 5e-7 m per number; a gap below 1e-6 m is accepted."""
     posture = home_posture(parallelograms(digits=6))
     assert 1e-9 < posture.mismatch < 1e-6
     assert home_posture(parallelograms(digits=15)).mismatch < 1e-12

@@ -171,7 +171,7 @@ def test_spherical_wrist_reaches_the_requested_rotation_vector():
     assert rotation_vector(one.platform[:3, :3])[1] == pytest.approx(0.9, abs=EXACT)
 
 
-def test_a_target_half_a_turn_away_is_reached():
+def test_target_half_a_turn_away_is_reached():
     """All components are given; the rotation vector changes its sign at half a turn."""
     robot = Robot("disc", "hand", (frame("q", **driven(0.1)), frame("hand", "q")))
     posture = place_robot(robot, pose={"rx": 0.0, "ry": 0.0, "rz": math.pi})

@@ -98,7 +98,7 @@ def test_five_bar_distal_arms_in_line_are_a_parallel_singularity():
 def test_arms_in_line_are_a_serial_singularity_with_the_drive_named():
     """B_11 = d.(k x a) = 0 where the left arms are one line, 180 mm long.
 
-    A length e short of that, the arms are bent by an angle that goes with sqrt(e).
+    If they are shorter by e, they are bent by an angle proportional to sqrt(e).
     """
     robot = load_robot("five_bar")
     found = []
@@ -138,7 +138,7 @@ def test_four_bar_distances_equal_the_speed_of_its_closed_form(angle):
 
 
 def test_orthoglide_is_isotropic_at_home():
-    """Chablat, Wenger (2003): its Jacobian is the unit matrix there, tan = 1."""
+    """Chablat, Wenger (2003): its Jacobian is the identity there, tan = 1."""
     robot = load_robot("orthoglide")
     found = find_singularities(robot, home_posture(robot).transforms[None])
     assert found.condition[0] == pytest.approx(1.0, abs=1e-9)

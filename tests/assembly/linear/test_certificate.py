@@ -23,7 +23,7 @@ from tests.robots_for_tests import (
 
 @pytest.mark.parametrize("kappa", [0.0, 0.05, 0.1, 1.0])
 def test_least_energy_is_certified_over_half_of_the_workspace(kappa):
-    """Errors of 0.05 and 0.1 are near the edge of the zone: little energy is left."""
+    """Errors times 0.05 and 0.1 are near the edge of the zone, with little energy."""
     robot, postures = irsbot2_over(
         np.arange(-0.65, 0.651, 0.15), np.arange(-0.75, 0.001, 0.15)
     )

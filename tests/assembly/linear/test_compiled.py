@@ -57,7 +57,7 @@ def test_stiff_spring_in_series_with_a_soft_one_keeps_its_energy():
 
 
 def test_falsified_solution_is_not_certified(grid):
-    """Springs 1.5e-8 too long, multipliers 2e-4 too small or not a number."""
+    """Springs are 1.5e-8 too long, or multipliers 2e-4 too small or NaN."""
     robot, postures = grid
     T = postures[0].transforms[None].copy()
     good = assemble_at(robot, T)
@@ -78,7 +78,7 @@ def test_falsified_solution_is_not_certified(grid):
         ((2, 6, 3, 4), None, r"transforms of shape \(2, 6, 3, 4\)"),
     ],
 )
-def test_wrong_shapes_are_refused(shape, errors, message):
+def test_transforms_or_errors_of_a_wrong_shape_are_refused(shape, errors, message):
     robot = coaxial_beams(np.zeros(6))
     given = None if errors is None else np.zeros(errors)
     with pytest.raises(ValueError, match=message):

@@ -33,7 +33,7 @@ def assert_overlap(batch, i, one, uncertain=2e-7, width=1e-6):
 
 @pytest.mark.parametrize("assumption", ASSUMPTIONS)
 def test_compiled_brackets_overlap_those_of_the_reference_method(assumption, rng):
-    """At another point of the platform, with and without bounds of passive joints."""
+    """At a platform offset, with and without motion limits of passive joints."""
     homes = [home_posture(make()) for make in BUILT_IN.values()]
     for seed in range(12):
         draw = np.random.default_rng(seed)

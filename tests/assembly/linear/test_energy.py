@@ -155,7 +155,7 @@ def test_serial_arm_displacement_equals_its_errors_to_first_order():
     assert np.allclose(screw[3:], moved[:3, 3] - T[1, :3, 3], rtol=0, atol=1e-11)
 
 
-def test_a_rigid_open_closure_cannot_be_assembled():
+def test_rigid_open_closure_cannot_be_assembled():
     robot = planar_four_bar()
     rigid = replace(robot, frames=tuple(replace(f, link=None) for f in robot.frames))
     errors = np.zeros((6, 6))
@@ -164,7 +164,7 @@ def test_a_rigid_open_closure_cannot_be_assembled():
         solve_assembly(home_posture(rigid.with_errors(errors)))
 
 
-def test_a_load_along_a_free_motion_has_no_equilibrium():
+def test_load_along_a_free_motion_has_no_equilibrium():
     frames = (Frame("slide", joint="prismatic"), Frame("tip", "slide"))
     robot = Robot("slider", "tip", frames)
     with pytest.raises(FreeMotion, match="the load drives a motion"):
@@ -293,8 +293,8 @@ def test_energy_of_random_robots_equals_the_printed_problem_in_cvxpy(
 
 
 @pytest.mark.parametrize("turned", [1, -1])
-def test_a_closure_out_of_reach_is_infeasible(turned):
-    """H u reaches 5 over the disc and 2 over the interval: 7, and not 7 + 1e-6."""
+def test_closure_out_of_reach_is_infeasible(turned):
+    """H u reaches 5 over the disc and 2 over the interval, together at most 7."""
     H = np.array([[3.0, 4.0, 2.0]])
     problem = np.zeros((1, 3)), np.ones(1), np.zeros(3), H
     group = np.array([0, 0, 1])

@@ -109,7 +109,7 @@ def test_pose_error_includes_the_motion_limit_of_a_passive_joint(spin):
 def test_tool_point_on_a_bearing_axis_has_a_bounded_translation_error():
     """On the axis, h above the bearing: radial + h tilt, and axial; by hand.
 
-    Off the axis the point runs round without bound.
+    Off the axis the translation error is infinite.
     """
     clearance = Clearance(radial=1e-5, axial=2e-5, tilt=3e-4)
     hub = Frame("hub", joint="revolute", clearance=clearance)

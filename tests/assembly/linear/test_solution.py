@@ -34,7 +34,7 @@ def rigid_pins(gaps):
 
 
 def test_displacements_by_load_and_gravity_add_up_for_each_posture(rng):
-    """Linear in the loads where nothing has clearance: superposition, row by row."""
+    """Without clearance displacements are linear in the loads of each posture."""
     home = home_posture(coaxial_beams(np.zeros(6), (K, 3 * K)))
     load, gravity = rng.normal(size=(4, 6)), rng.normal(size=(4, 3))
     both = solve_assembly([home] * 4, load, gravity=gravity)
@@ -46,7 +46,7 @@ def test_displacements_by_load_and_gravity_add_up_for_each_posture(rng):
 
 
 def test_points_are_selected_by_mask_slice_and_repeated_indices():
-    """By hand: K (gap - 1e-4)^2 / 2 beyond the clearance."""
+    """The energy is K (gap - 1e-4)^2 / 2 beyond the clearance, by hand."""
     gaps = np.array([0.5e-4, 2e-4, 3e-4, 1.5e-4])
     home, errors = pins(gaps)
     many = solve_assembly(home, errors=errors)

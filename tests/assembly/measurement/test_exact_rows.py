@@ -42,7 +42,7 @@ def loaded_rows(name, rng, laws=()):
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_exact_rows_together_equal_single_exact_solutions(name, rng):
-    """Both converge to 1e-12; nominal closures are rounded at 1e-12 at worst."""
+    """Both converge to 1e-12; nominal closures are rounded to 1e-12 at worst."""
     here = loaded_rows(name, rng)
     screws, found = solve_rows(here, np.zeros((len(here), 0)))
     assert found.all()

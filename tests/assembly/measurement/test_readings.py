@@ -34,7 +34,7 @@ def rows():
 @pytest.mark.parametrize("own_targets", [False, True])
 @pytest.mark.parametrize("by_row", [False, True])
 def test_reading_equals_the_rigid_body_transform(rows, own_targets, by_row, rng):
-    """A device turned by 1 rad reads where a point of a turned platform is."""
+    """A device turned by 1 rad reads the position of a point of a turned platform."""
     count = (ROWS,) if by_row else ()
     base, tool = rng.normal(size=(*count, 6)), rng.normal(size=(*count, 3))
     target = rng.normal(size=(ROWS, 3)) if own_targets else None

@@ -152,7 +152,7 @@ def test_sweeps_and_draws_include_the_stress_of_the_link_weight():
 
 
 def test_sweep_stress_and_safety_equal_those_of_single_solutions():
-    """The same stress as one solve at a time, away from zero energy."""
+    """Compared at points whose energy is not zero."""
     robot = load_robot("irsbot2")
     errors = np.zeros_like(robot.errors)
     errors[robot.index("leg1.link_a"), 3] = 1e-3

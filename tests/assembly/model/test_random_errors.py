@@ -20,7 +20,7 @@ def test_frame_name_without_a_leg_selects_every_leg(robot):
         frames_named(robot, ["link_q"])
 
 
-def test_sizes_lie_between_their_limits_and_repeat_with_the_seed(robot):
+def test_random_errors_lie_between_their_limits_and_repeat_with_the_seed(robot):
     least, most = np.arange(1.0, 7), np.arange(2.0, 8)
     draw = ErrorDraw(("leg1.tip", "leg2.tip"), tuple(least), tuple(most), 5, "signed")
     one, other = draw_errors(robot, draw), draw_errors(robot, draw)

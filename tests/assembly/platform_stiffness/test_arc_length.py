@@ -19,7 +19,7 @@ def arch_force(height, half=1.0, rise=0.1, k=1e5):
 
 
 def test_path_of_a_shallow_arch_equals_its_closed_form_past_limit_points():
-    """Up to the limit point, back through the flat arch, and down again."""
+    """The path rises to the limit point, passes the flat arch, and falls again."""
     limit = arch_force(np.linspace(0, 0.1, 100_001)).max()
     curve = follow_load(shallow_arch(), FY, 0.0, -1.5 * limit)
     heights = 0.1 + curve.deflection
@@ -35,7 +35,7 @@ def test_path_of_a_shallow_arch_equals_its_closed_form_past_limit_points():
 
 
 def test_column_on_a_torsion_spring_has_a_branch_point_at_k_over_l():
-    """A straight rigid bar stays an equilibrium; from k / L on it could also buckle."""
+    """A straight rigid bar stays in equilibrium; from k / L on it can also buckle."""
     K = np.diag([np.inf, np.inf, 50.0, np.inf, np.inf, np.inf])
     hinge = Frame("hinge", joint="revolute", joint_stiffness=K)
     bar = Frame("bar", "hinge", [0.4, 0, 0])

@@ -64,8 +64,8 @@ def test_curve_crosses_the_clearance_and_then_follows_the_spring(state):
 def test_contact_forced_by_an_error_opens_at_its_preload():
     """A closure pressed on its stop by k (e - c) opens at that load.
 
-    Two springs k hold the tip; the one behind the stop lets go when the other carries
-    all: at 2 k (e - c) / 2 on each.
+    Two springs k hold the tip; the contact opens when the other spring carries the
+    whole load, 2 k (e - c) / 2.
     """
     c, e, k = 1e-4, 3e-4, 1e5
     K = np.diag([1e3, 1e3, 1e3, 1e5, 1e5, k])

@@ -96,8 +96,8 @@ def test_picture_shows_the_error_body_and_states_its_size():
 
 @pytest.mark.parametrize("count", [50, 200, 1000])
 def test_even_directions_are_evenly_spaced_on_the_sphere(count):
-    """One in the middle of each slice of one area; none much nearer to another
-    than in the densest packing, sqrt(8 pi / (sqrt(3) n)) apart."""
+    """Each is in the middle of a slice of equal area; the least distance is near that
+    of the densest packing, sqrt(8 pi / (sqrt(3) n))."""
     directions = even_directions(count)
     middles = np.linspace(1, -1, 2 * count + 1)[1::2]
     np.testing.assert_allclose(directions[:, 2], middles, atol=1e-12)

@@ -21,7 +21,7 @@ SAID = "singular posture: first order decides nothing; finite motions: 0 J"
 
 
 def test_solution_at_a_singular_posture_gives_the_energy_of_finite_motions():
-    """The modes that meet there let errors be taken up without force."""
+    """In first order, modes that meet there take up errors without force."""
     results = solution_of(home_posture(three_upu(seed=1)))
     assert results["energy"] > 1e-4
     assert results["status"] == "singular"

@@ -65,7 +65,7 @@ def test_bars_of_the_share_chart_sum_to_100_percent_per_direction():
 
 
 def test_contact_compliance_equals_differences_of_the_least_energy_solution():
-    """Central differences of (22), the load pressing clearances of two legs."""
+    """Central differences of (22); the load presses clearances of two legs."""
     posture = place_robot(load_robot("irsbot2"), {"tx": 0.1, "tz": -0.5})
     load, step = np.array([0, 0, 0, 20.0, 50.0, -100.0]), np.eye(6)[5]
     ahead, back = (

@@ -43,7 +43,7 @@ def test_picture_shows_links_bodies_and_the_exaggeration():
 
 @pytest.mark.parametrize("name", ["delta", "hexapod", "orthoglide", "arm6"])
 def test_picture_fits_the_whole_robot_into_the_window(name):
-    """Nothing is drawn at the edges; and it fills more than half of the window."""
+    """Nothing is drawn at the edges, and it fills more than half of the window."""
     answer = solve_assembly(home_posture(load_robot(name)))
     plotter = robot_plotter(answer, exaggeration=1)
     plotter.remove_actor("caption")

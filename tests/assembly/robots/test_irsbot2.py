@@ -74,7 +74,7 @@ def test_irsbot2_has_two_freedoms_and_overconstraint_eight(robot):
 
 @pytest.mark.parametrize(("case", "point"), CASES)
 def test_energy_pose_and_wrenches_equal_the_reference(case, point):
-    """The reference stops at a gap of 1e-9 J or so; ours is certified below that."""
+    """The reference has a gap of about 1e-9 J; our certificate is below that."""
     robot = irsbot2_with(case)
     answer = solve_assembly(
         place_robot(robot, pose={"tx": point["x"], "tz": point["z"]})
@@ -137,7 +137,7 @@ def test_link_wrenches_on_the_unloaded_platform_sum_to_zero():
 
 
 def test_euler_and_timoshenko_links_store_the_same_energy():
-    """The distal links carry no shear; the reference shows 2e-11."""
+    """The distal links carry no shear; the reference differs by 2e-11."""
     case = NUMBERS["cases"][0]
     energies = []
     for theory in ("euler", "timoshenko"):

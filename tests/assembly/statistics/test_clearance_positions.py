@@ -64,7 +64,7 @@ def test_uniform_positions_in_a_cut_disc_equal_rejection_sampling():
 def test_uniform_clearance_mixes_near_the_edge_of_the_zone(thin):
     """Row u0 - thin u2 = 1 with |u2| <= 1 leaves the disc's cap 1 - thin <= u0; two
     sides stay free.  A walk with steps alike in all directions would take 1 / thin^2 of
-    them.  The density of u0 is as the width of the cap, sqrt(1 - u0^2).
+    them.  The density of u0 is proportional to the cap's width, sqrt(1 - u0^2).
     """
     u = walked(
         [[1, 0, -thin, 0, 0]], [0, 2, 3, 4, 5], start=[1 - thin / 2, 0, -0.5, 0.9, -0.9]
@@ -99,7 +99,7 @@ def test_platform_between_two_pins_is_uniform_over_their_common_range():
     """Along z a pin of 2 mm on one side and of 1 mm on the other, errors 0.5 mm apart.
 
     The platform, on the first, moves from -2 to 2 mm, and on the second from 0.5 - 1 to
-    0.5 + 1: what both let is -0.5 to 1.5, not even about the least clearances.
+    0.5 + 1: the common range is -0.5 to 1.5, not symmetric about the solution.
     """
     shift = [0.0, 0.0, 0.0, 0.0, 0.0, 5e-4]
     steel = MatrixLink(np.eye(6) * 1e6)

@@ -34,7 +34,7 @@ def test_farthest_positions_in_discs_and_intervals_equal_closed_forms(size, rng)
 
 
 def test_farthest_positions_keep_the_equations_of_their_start():
-    """u0 - u1 stays 0.5: along both the first ends at 1, the second at a half."""
+    """u0 - u1 stays 0.5: the first ends at 1, and hence the second at 0.5."""
     row = np.array([[1.0, -1.0, 0.0]]) / np.sqrt(2)
     start = np.array([[0.25, -0.25, 0.3], [0.25, -0.25, 0.3]])
     found = moved([[1, 1, 0.5], [-1, -2, -0.5]], [0, 1, 2, 3], row, positions=start)

@@ -86,7 +86,7 @@ def test_present_errors_text_states_the_five_largest_errors_and_the_posture():
 
 
 def test_present_errors_within_clearance_have_zero_energy_and_rigid_parts_nan():
-    """Rigid parts too far apart have a margin and no energy."""
+    """Rigid parts too far apart have a margin and an energy of NaN."""
     within = present_errors([bars(PLAY, {"one": 0.5 * PLAY})], "rigid")
     assert within["energy_there"] == pytest.approx(0.0, abs=1e-12)
     assert within["assemblable_share"] == 1.0

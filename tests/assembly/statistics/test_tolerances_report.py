@@ -50,7 +50,7 @@ def shown(tolerances, costs, most=(0.1, 0.1), cost="reciprocal"):
 
 @pytest.mark.parametrize("loosest", [1e-2, 0.1, 10.0])
 def test_advice_on_tightening_does_not_depend_on_inactive_bounds(loosest):
-    """Prices are 1 / 1e-3 and 1 / 1e-4: the length has 10 of 11 parts of the price."""
+    """Prices are 1 / 1e-3 and 1 / 1e-4; the second, the length, has 10 of 11 parts."""
     page = shown([1e-3, 1e-4], [1.0, 1.0], (loosest, 0.1))
     answer, note = tiles(page)["Tolerance to tighten"]
     assert (answer, note[:4]) == ("length", "91\u00a0%")

@@ -126,7 +126,7 @@ def test_worst_clearance_adds_nothing_if_a_load_takes_up_all_clearance():
 @pytest.mark.parametrize("key", ["rotation", "translation"])
 @pytest.mark.parametrize("share", [0.05, 0.2, 0.6])
 def test_slopes_of_the_largest_pose_error_equal_central_differences(key, share, rng):
-    """Along random directions, inside the zone and outside it.
+    """Steps in random directions, inside the zone and outside it.
 
     Where the farthest point jumps to another corner there is a kink: 3 of 4 steps
     must agree, all within a tenth.

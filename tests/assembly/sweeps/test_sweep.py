@@ -96,7 +96,7 @@ def test_sweep_with_an_assumption_stores_pose_error_bounds():
     assert np.isnan(data.rotation_error.sel(tz=-0.9, method="nearest")).all()
 
 
-def test_maps_need_two_axes(data):
+def test_map_of_a_single_axis_is_refused(data):
     with pytest.raises(ValueError, match="two axes, this one has 1"):
         map_figure(data.isel(tx=[0]))
 
