@@ -1,4 +1,4 @@
-"""Answers are those that are stored, see ``answers_for_tests.py``."""
+"""Results equal the stored ones, see ``answers_for_tests.py``."""
 
 import json
 
@@ -16,7 +16,7 @@ LONG = ("tube",)
     "name",
     [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in QUESTIONS],
 )
-def test_answers_are_those_stored(name):
+def test_results_equal_the_stored_ones(name):
     assert not unlike_those_stored(name)
 
 

@@ -1,4 +1,4 @@
-"""Every code block of the documentation's pages is run; tutorials have their own test.
+"""Every code block of the documentation pages is run; tutorials have their own test.
 
 Of each command line the options exist; of each page, in an empty folder with the files
 it speaks of, the commands run and the Python runs.  Options in brackets are given.
@@ -71,14 +71,14 @@ def parsed(words):
 
 
 @pytest.mark.parametrize("name", sorted(PAGES))
-def test_the_commands_of_a_page_exist_with_their_options(name, tmp_path, monkeypatch):
+def test_commands_of_a_page_have_valid_options(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for words in commands_of(PAGES[name]):
         parsed(words)
 
 
 def test_every_block_of_a_page_states_its_language():
-    """A block without one would not be run."""
+    """A block without a language would not be run."""
     for page in PAGES.values():
         text = page.read_text(encoding="utf-8")
         fences = re.findall(r"^```.*$", text, re.M)
@@ -113,7 +113,7 @@ translation = [0.3, 0, 0]
 """
 
 
-def test_every_table_of_a_page_is_toml():
+def test_toml_blocks_of_a_page_are_valid():
     for page in PAGES.values():
         for language, _, text in blocks(page):
             if language == "toml":
@@ -254,7 +254,7 @@ STAGE = {
 @pytest.mark.slow
 @pytest.mark.exudyn
 @pytest.mark.parametrize("name", sorted(set(PAGES) - OTHERS))
-def test_the_commands_of_a_page_run(name, tmp_path, monkeypatch, run):
+def test_commands_of_a_page_run(name, tmp_path, monkeypatch, run):
     commands = list(commands_of(PAGES[name]))
     if not commands:
         pytest.skip("the page has no commands")
@@ -280,8 +280,10 @@ def titled(name, folder):
 
 
 @pytest.mark.parametrize("name", sorted(set(PAGES) - {"README"}))  # has its own
-def test_the_python_of_a_page_runs(name, tmp_path, monkeypatch, capsys):
-    """One session a page; what it is said to print is what it prints."""
+def test_python_blocks_of_a_page_print_the_documented_output(
+    name, tmp_path, monkeypatch, capsys
+):
+    """All blocks of a page share one session."""
     monkeypatch.chdir(tmp_path)
     titled(name, tmp_path)
     session, printed = {}, None

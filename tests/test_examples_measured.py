@@ -1,4 +1,4 @@
-"""Worked examples on measured data; those that need the data skip, and say so.
+"""Worked examples on measured data; tests are skipped where the data are missing.
 
 The expected numbers come from the data's own README, found by others with other
 programs, or from robots whose errors the tests put in themselves.
@@ -40,7 +40,7 @@ def needs(name):
     return pytest.mark.skipif(not folder.is_dir(), reason=f"{folder}: no such folder")
 
 
-def test_data_that_are_nowhere_are_fetched_with_their_checksums(tmp_path, monkeypatch):
+def test_missing_data_are_downloaded_with_their_checksums(tmp_path, monkeypatch):
     asked = {}
 
     def retrieve(url, known_hash, fname, path):
@@ -59,7 +59,7 @@ def test_data_that_are_nowhere_are_fetched_with_their_checksums(tmp_path, monkey
     assert len(asked) == 3
 
 
-def test_without_pooch_one_line_says_what_to_do(tmp_path, monkeypatch):
+def test_missing_data_without_pooch_are_refused_with_the_remedy(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pooch", None)  # importing it fails
     monkeypatch.delenv("FORCEFIT_DATA", raising=False)
     monkeypatch.setattr(campaign_folder, "DATA", tmp_path)
@@ -67,20 +67,20 @@ def test_without_pooch_one_line_says_what_to_do(tmp_path, monkeypatch):
         data_folder("ipa_ur10")
 
 
-def test_base_pose_is_found_from_positions(rng):
-    """Kabsch's answer for exact data is exact."""
+def test_base_pose_of_exact_positions_is_recovered(rng):
+    """Kabsch's algorithm is exact for exact data."""
     turn = Rotation.random(9, rng=rng).as_matrix()
     T = transform(rng.normal(size=(9, 3)), turn)
     base = transform([1.0, 2.0, 3.0], Rotation.random(rng=rng).as_matrix())
     np.testing.assert_allclose(base_pose(T, base @ T), base, atol=1e-13)
 
 
-def test_last_direction_outlasts_a_rest():
+def test_last_direction_is_kept_during_a_rest():
     q = np.array([0.0, 0.0, 0.2, 0.2, 0.2001, -0.5, -0.5])
     assert last_direction(q).tolist() == [0, 0, 1, 1, 1, -1, -1]
 
 
-def test_line_lengths_are_the_robots_own_inverse_kinematics(rng):
+def test_cable_lengths_equal_the_inverse_kinematics_of_the_robot(rng):
     """The study's norms against the closure solver of 28 frames."""
     robot = cable_robot()
     points = rng.uniform([-0.7, -0.7, 0.0], [0.6, 0.7, 1.4], (8, 3))
@@ -101,8 +101,8 @@ def spread(height):
 
 
 @needs("voron_frame_expansion")
-def test_voron_reproduces_the_bars(tmp_path):
-    """80 and 43 um on run a, as its README's quick look found."""
+def test_voron_example_reproduces_the_published_spreads(tmp_path):
+    """80 and 43 um in run a, as stated in the README of the data."""
     a = read_campaign(convert_voron(tmp_path)["run_a"])
     height, warm = a.measured[:, 5], a.covariates["temperature"]
     declared = -0.530 * 23.4e-6 * warm
@@ -110,14 +110,14 @@ def test_voron_reproduces_the_bars(tmp_path):
     np.testing.assert_allclose(found * 1e6, [80, 43], rtol=0.01)
 
 
-def test_hangprinter_is_read(tmp_path):
-    """41 samples lie beside its converter, under their licence."""
+def test_hangprinter_data_have_41_samples(tmp_path):
+    """The samples are stored with their converter, under their licence."""
     assert len(read_campaign(convert_hangprinter(tmp_path))) == 41
 
 
 @needs("hilti_trailblazer")
-def test_hilti_from_urdf(tmp_path):
-    """Its masses are summed by hand; 444 points as its README says."""
+def test_hilti_robot_from_urdf_has_the_known_mass_and_points(tmp_path):
+    """Its masses are summed by hand; 444 points as stated in its README."""
     flat = read_campaign(convert_hilti(tmp_path)["flat"])
     assert len(flat) == 444
     total = sum(frame.mass for frame in flat.robot.frames)
@@ -127,14 +127,14 @@ def test_hilti_from_urdf(tmp_path):
 
 @pytest.mark.slow
 @needs("ipa_ur10")
-def test_both_series_of_the_ur10_are_read(tmp_path):
-    """As many poses as their README counts."""
+def test_ur10_series_have_the_known_numbers_of_poses(tmp_path):
+    """The numbers of poses are those of their README."""
     folders = convert_ipa(tmp_path)
     counts = {name: len(read_campaign(folder)) for name, folder in folders.items()}
     assert counts == {"A": 11911, "B": 1495}
 
 
-def test_ur10_is_the_published_one():
+def test_ur10_flange_equals_the_denavit_hartenberg_product():
     """The robot file's flange against a product of matrices written out here."""
     folder = Path(ipa_ur10.__path__[0])
     robot = read_robot(folder / "ur10.toml")
@@ -170,7 +170,7 @@ def serial_table(path, q, length=0.031):
 
 
 @pytest.mark.parametrize("q", [0.0, 35.0])
-def test_a_table_of_the_ur5_becomes_a_campaign(q, tmp_path):
+def test_ur5_table_is_converted_to_a_campaign(q, tmp_path):
     folder = convert_serial(serial_table(tmp_path / "a.csv", q), tmp_path / "out")
     campaign = read_campaign(folder)
     assert campaign.ids == ("m0",)
@@ -179,7 +179,7 @@ def test_a_table_of_the_ur5_becomes_a_campaign(q, tmp_path):
         convert_serial(serial_table(tmp_path / "b.csv", 0.0, 0.041), tmp_path / "b")
 
 
-def test_a_table_is_found_by_path_or_by_name(tmp_path):
+def test_serial_robot_table_is_found_by_path_or_by_name(tmp_path):
     (tmp_path / "serial_robots").mkdir()
     named = serial_table(tmp_path / "serial_robots" / "a.csv", 0.0)
     assert find_serial(named) == find_serial(Path("a.csv"), tmp_path) == named
@@ -188,7 +188,7 @@ def test_a_table_is_found_by_path_or_by_name(tmp_path):
 
 
 @needs("serial_robots")
-def test_targets_of_both_robots_are_where_their_angles_lead(tmp_path):
+def test_targets_of_serial_robots_equal_their_forward_kinematics(tmp_path):
     """The converter refuses targets that are 0.1 mm off."""
     for path in data_folder("serial_robots").glob("*.csv"):
         campaign = read_campaign(convert_serial(path, tmp_path / path.stem))
@@ -217,7 +217,7 @@ def reached_by_the_file(path):
 
 
 @needs("serial_robots")
-def test_deviation_of_a_campaign_leads_to_what_the_tracker_wrote(tmp_path):
+def test_target_plus_deviation_equals_the_tracker_position(tmp_path):
     for path in data_folder("serial_robots").glob("*.csv"):
         campaign = read_campaign(convert_serial(path, tmp_path / path.stem))
         target, reached = reached_by_the_file(path)
@@ -226,8 +226,8 @@ def test_deviation_of_a_campaign_leads_to_what_the_tracker_wrote(tmp_path):
 
 
 @needs("serial_robots")
-def test_commands_of_compensate_as_read_bring_the_arm_nearer_its_targets(tmp_path):
-    """Of the readings only where the tracker stands is corrected: a rigid motion.
+def test_compensate_as_read_halves_the_deviation_of_the_arm(tmp_path):
+    """Only the position of the tracker is corrected in the readings: a rigid motion.
 
     Deviations change little over a few mm, so an arm sent to c instead of its target
     is read at c + deviation.  With the sign reversed the error would double.

@@ -1,4 +1,4 @@
-"""Damaged files and words: every command works, or says why not in one line.
+"""Damaged files and words: every command works, or prints one line with the reason.
 
 Thousands, of every command: ``python benchmarks/fuzz.py``.
 """
@@ -40,7 +40,7 @@ def sound_files(tmp_path, monkeypatch):
         signal.signal(number, handler)
 
 
-def test_damaged_inputs_end_in_one_line_and_leave_nothing(sound_files):
+def test_damaged_inputs_are_refused_in_one_line_and_leave_no_file(sound_files):
     commands = [
         (weight, command) for weight, command in [*COMMANDS, *FOREIGN, *MACHINES]
         if command.startswith(QUICK)

@@ -1,4 +1,4 @@
-"""Imports keep the contracts of pyproject.toml, and stay light at run time."""
+"""Imports follow the contracts of pyproject.toml, and heavy imports are deferred."""
 
 import os
 import re
@@ -113,7 +113,7 @@ def test_every_import_of_the_project_is_allowed():
 
 
 def test_every_forbidden_import_is_reported(tmp_path):
-    """A copy of the sources breaks each contract, in one run."""
+    """A copy of the sources violates each contract, in one run."""
     for package in PACKAGES:
         only = shutil.ignore_patterns("*.so", "*.cpp", "*.h", "__pycache__")
         shutil.copytree(ROOT / package, tmp_path / package, ignore=only)
@@ -136,17 +136,17 @@ def test_every_forbidden_import_is_reported(tmp_path):
 
 
 @pytest.mark.parametrize("folder", PACKAGES)
-def test_every_package_tells_type_checkers_that_it_has_types(folder):
+def test_every_package_has_a_py_typed_file(folder):
     assert (ROOT / folder / "py.typed").is_file()
 
 
 @pytest.mark.parametrize("module", PACKAGES)
-def test_nothing_heavy_is_imported_before_it_is_needed(module):
+def test_module_imports_no_heavy_package(module):
     assert loaded(module, ROOT) == []
 
 
 @pytest.mark.slow
-def test_nothing_heavy_is_imported_with_all_files_at_once():
+def test_importing_all_modules_imports_no_heavy_package():
     files = [path for folder in PACKAGES for path in (ROOT / folder).rglob("*.py")]
     names = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in files]
     modules = sorted(name.removesuffix(".__init__") for name in names)
@@ -166,8 +166,8 @@ def test_nothing_heavy_is_imported_with_all_files_at_once():
          "assembly solve irsbot2 --pose tx=0.1,tz=-0.5", FOR_MANY),
     ],
 )  # fmt: skip
-def test_a_command_imports_only_what_it_uses(words, left_out):
-    """What makes a command wait; benchmarks/startup.py has the times.
+def test_command_imports_only_the_packages_that_it_uses(words, left_out):
+    """Imports decide the start-up time; benchmarks/startup.py measures it.
 
     Several in one process: what none of them is to import, none has.
     """
@@ -185,7 +185,7 @@ for words in {words.split(";")}:
     assert sorted(unwanted & in_memory(code, ROOT)) == []
 
 
-def test_a_heavy_import_is_found(tmp_path):
+def test_heavy_import_is_detected(tmp_path):
     (tmp_path / "feather.py").write_text("import json\n")
     (tmp_path / "anvil.py").write_text("import matplotlib\n")
     assert loaded("feather", tmp_path) == []

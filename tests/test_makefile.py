@@ -1,4 +1,4 @@
-"""The environment that `make` sets up belongs to the Python that is named."""
+"""The environment that `make` sets up uses the Python that is named."""
 
 import os
 import shutil
@@ -30,25 +30,25 @@ def commands(folder, *stamps):
 
 
 @pytest.mark.parametrize("stamp", ["ready", "ready-3.9", "unfinished"])
-def test_an_environment_of_another_python_is_made_anew(tmp_path, stamp):
+def test_environment_of_another_python_is_created_again(tmp_path, stamp):
     assert f"{sys.executable} -m venv --clear .venv" in commands(tmp_path, stamp)
 
 
-def test_the_environment_of_the_same_python_is_kept(tmp_path):
+def test_environment_of_the_same_python_is_kept(tmp_path):
     found = commands(tmp_path, f"empty-{OWN}", f"ready-{OWN}")
     assert "venv --clear" not in found
     assert "pip install" not in found
     assert "pytest" in found
 
 
-def test_the_package_is_built_again_where_its_sources_are_newer(tmp_path):
+def test_package_is_built_again_if_its_sources_are_newer(tmp_path):
     found = commands(tmp_path, f"empty-{OWN}")
     assert "venv --clear" not in found
     assert "pip install" in found
 
 
 @pytest.mark.skipif(shutil.which("sh") is None, reason="no shell")
-def test_the_newest_python_is_one_that_pyproject_names_and_runs():
+def test_newest_python_is_listed_in_pyproject_and_runs():
     found = subprocess.run(
         ["sh", ".ci/newest_python"], capture_output=True, text=True, cwd=ROOT,
         check=True,

@@ -1,4 +1,4 @@
-"""The map in the docs leads to functions and chapters that are there."""
+"""The map in the docs names existing functions and all packages."""
 
 import re
 from importlib import import_module
@@ -20,7 +20,7 @@ def test_every_function_on_the_map_exists():
         assert callable(getattr(import_module(module), function)), name
 
 
-def test_every_chapter_is_on_the_map():
+def test_every_package_folder_is_on_the_map():
     chapters = [
         f"{package}/{layer}"
         for contract in CONTRACTS
@@ -50,14 +50,14 @@ def test_every_public_name_is_in_the_reference():
         assert name not in dir(ff)
 
 
-def test_every_page_is_in_the_site():
-    """What the site does without is left out on purpose."""
+def test_every_docs_page_is_in_the_site():
+    """Pages missing in mkdocs.yml would not be published."""
     listed = (DOCS.parent / "mkdocs.yml").read_text("utf-8")
     pages = {path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md")}
     assert {page for page in pages if f": {page}\n" not in listed} == set()
 
 
-def test_the_public_names_are_all_there_and_nothing_else():
+def test_dir_of_the_package_lists_exactly_the_public_names():
     assert set(dir(ff)) == set(ff.__all__)
     for name in dir(ff):
         assert getattr(ff, name) is not None

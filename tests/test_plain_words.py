@@ -1,4 +1,4 @@
-"""The check of private words in sources and pages finds them and nothing else."""
+"""The check of private words finds them in sources and pages, and no other words."""
 
 import runpy
 from pathlib import Path
@@ -12,31 +12,31 @@ def found(text, *names):
     return list(CHECK["find_words"](text, WORDS, names))
 
 
-def test_words_are_found_with_line_and_replacement():
+def test_private_words_are_found_with_line_and_replacement():
     text = "one\n# Gizmo of a side\n    # row\n"
     assert found(text) == [
         (2, "gizmo", "candidate model"), (2, "side row", "held-out"),
     ]  # fmt: skip
 
 
-def test_parts_of_longer_names_are_not_found():
+def test_parts_of_longer_names_are_ignored():
     assert found("higizmo = gizmo_of(rows)") == []
 
 
-def test_names_of_public_formats_are_not_found():
+def test_names_of_public_formats_are_ignored():
     assert found('row["gizmo"], a gizmo', '"gizmo"') == [(1, "gizmo", WORDS["gizmo"])]
 
 
-def test_sections_of_a_word_list_are_read_without_comments():
+def test_word_list_sections_are_read_without_comments():
     text = "# a\n[one]  # b\nx -> y\n\n[two]\nu v -> w\n"
     assert CHECK["read_list"](text) == {"one": {"x": "y"}, "two": {"u v": "w"}}
 
 
-def test_comments_and_docstrings_are_found_on_their_lines():
+def test_comments_and_docstrings_keep_their_lines():
     source = '"""Title."""\n\nx = "text"  # note\n\n\ndef f():\n    """Do."""\n'
     expected = '"""Title."""\n\n# note\n\n\n\n"""Do."""'
     assert CHECK["comments"](source) == expected
 
 
-def test_comments_of_cpp_are_found_on_their_lines():
+def test_cpp_comments_keep_their_lines():
     assert CHECK["comments"]("int x;  // note\nint y;", python=False) == " note\n"

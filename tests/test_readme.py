@@ -1,4 +1,4 @@
-"""The README's example and equation map are true."""
+"""The README's example runs, and its equation map and links are valid."""
 
 import re
 import subprocess
@@ -17,7 +17,7 @@ def python_example():
     return code
 
 
-def test_the_python_example_runs_and_is_short():
+def test_readme_python_example_runs_within_20_lines():
     code = python_example()
     assert len(code.strip().splitlines()) <= 20
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True,
@@ -40,12 +40,12 @@ def test_every_module_of_the_equation_map_exists():
         assert (ROOT / (name.replace(".", "/") + ".py")).is_file(), name
 
 
-def test_every_link_of_the_readme_leads_somewhere():
+def test_every_relative_link_of_the_readme_exists():
     for target in re.findall(r"\]\(([^)#]+)\)", README):
         assert (ROOT / target).exists(), target
 
 
-def test_the_command_is_also_a_module():
+def test_python_m_forcefit_prints_the_version():
     assert "`python -m forcefit`" in README
     run = [sys.executable, "-m", "forcefit", "--version"]
     done = subprocess.run(run, capture_output=True, text=True, check=True)
@@ -53,7 +53,7 @@ def test_the_command_is_also_a_module():
 
 
 @pytest.mark.parametrize("command", ["make study", "make test"])
-def test_the_two_commands_are_targets(command):
+def test_readme_make_commands_are_makefile_targets(command):
     assert command in README
     target = command.split()[1]
     assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text(), flags=re.M)

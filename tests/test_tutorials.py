@@ -1,4 +1,4 @@
-"""The tutorials run as they stand: files written, commands run, outputs as printed.
+"""Tutorials run as written: files, commands, and printed output.
 
 Of a page, in its order: a block with a title is a file; ``sh`` is run; ``output`` are
 lines of which each begins or is part of a line the commands before it printed;
@@ -62,14 +62,14 @@ def follow(page, folder):
     return ran, compared
 
 
-def test_there_are_four_tutorials():
+def test_tutorials_folder_has_the_four_known_tutorials():
     assert TUTORIALS == ["cad_link", "own_robot", "tolerances", "tracker"]
 
 
 @pytest.mark.slow
 @pytest.mark.exudyn
 @pytest.mark.parametrize("name", TUTORIALS)
-def test_a_tutorial_runs_as_it_stands(tmp_path, name):
+def test_tutorial_runs_with_the_printed_output(tmp_path, name):
     ran, compared = follow(DOCS / "tutorials" / f"{name}.md", tmp_path)
     assert ran > 2
     assert compared > 0
@@ -77,15 +77,15 @@ def test_a_tutorial_runs_as_it_stands(tmp_path, name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FOLLOWED)
-def test_a_page_runs_as_it_stands(tmp_path, name):
+def test_page_runs_with_the_printed_output(tmp_path, name):
     ran, compared = follow(DOCS / f"{name}.md", tmp_path)
     assert ran > 5
     assert compared > 1
 
 
 @pytest.mark.slow
-def test_the_measuring_protocol_s_files_are_a_campaign(tmp_path):
-    """Its last block names a campaign that is still to be measured."""
+def test_files_of_the_measuring_protocol_are_a_valid_campaign(tmp_path):
+    """The last block of the page names a campaign that is still to be measured."""
     page = (DOCS / "measuring_protocol.md").read_text(encoding="utf-8")
     own, mark, _ = page.partition("Then, with the whole session")
     assert mark

@@ -1,4 +1,4 @@
-"""The version that a build is given, by the rules of pyproject.toml."""
+"""The version of a build, by the rules of pyproject.toml."""
 
 import os
 import shutil
@@ -53,16 +53,16 @@ def repository(tree):
     return tree
 
 
-def test_a_tree_without_git_has_the_next_version(tree):
+def test_tree_without_git_has_the_next_development_version(tree):
     assert version(tree) == f"{NEXT}.dev0"
 
 
-def test_an_sdist_has_the_version_that_is_written_in_it(tree):
+def test_sdist_has_the_version_of_its_pkg_info(tree):
     (tree / "PKG-INFO").write_text("Metadata-Version: 2.2\nVersion: 0.2.0.dev7+gabc\n")
     assert version(tree) == "0.2.0.dev7+gabc"
 
 
-def test_commits_before_the_first_tag_are_counted(repository, tmp_path):
+def test_version_before_the_first_tag_counts_the_commits(repository, tmp_path):
     name = git(repository, "rev-parse", "HEAD")
     found = version(repository)
     assert found.startswith(f"{NEXT}.dev3+g")
@@ -72,7 +72,7 @@ def test_commits_before_the_first_tag_are_counted(repository, tmp_path):
     assert version(shallow).startswith(f"{NEXT}.dev1+g")
 
 
-def test_a_tag_is_the_version_and_commits_after_it_lead_to_the_next(repository):
+def test_tag_is_the_version_and_later_commits_have_the_next_one(repository):
     git(repository, "tag", "v7.2.0")
     assert version(repository) == "7.2.0"
     git(repository, "commit", "-q", "--allow-empty", "-m", "after")

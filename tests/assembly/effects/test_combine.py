@@ -1,4 +1,4 @@
-"""A declared effect and a difference found for it combine to one effect."""
+"""A declared effect and a fitted difference combine into one effect."""
 
 import numpy as np
 import pytest
@@ -65,7 +65,7 @@ def standing():
 
 
 @pytest.mark.parametrize("name", IN_TURN)
-def test_both_together_read_as_one_after_the_other(name, standing):
+def test_combined_effect_predicts_the_same_reading_as_both_in_turn(name, standing):
     declared, found = ({name: values} for values in IN_TURN[name])
     in_turn = predict(apply_effects(apply_effects(standing, declared), found)).deviation
     once = predict(apply_effects(standing, combined(declared, found))).deviation
@@ -74,19 +74,19 @@ def test_both_together_read_as_one_after_the_other(name, standing):
     np.testing.assert_allclose(once, in_turn, rtol=0, atol=1e-9 * change + 1e-13)
 
 
-def test_no_effect_with_numbers_is_left_out():
-    """Clearances add and contact laws cannot; finite motions have no number."""
+def test_every_additive_effect_has_a_combination_case():
+    """Clearances add up, contact laws cannot, finite motions have no parameter."""
     others = {"joint_clearance", "contact_stiffening", "geometric_stiffening"}
     assert IN_TURN.keys() | others == LIBRARY.keys()
 
 
-def test_clearances_add():
+def test_combined_joint_clearances_are_their_sums():
     declared, found = {"a.radial": 1e-5}, {"a.radial": 2e-5, "a.tilt": 1e-4}
     both = combined({"joint_clearance": declared}, {"joint_clearance": found})
     assert both["joint_clearance"] == pytest.approx({"a.radial": 3e-5, "a.tilt": 1e-4})
 
 
-def test_other_effects_stay_as_they_are():
+def test_different_effects_are_combined_without_change():
     declared = {"drift": {"amplitude.tz": 1e-5, "time_constant": 60.0}}
     found = {"encoder_offset": {"a": 1e-4}}
     assert combined(declared, found) == declared | found
@@ -94,8 +94,8 @@ def test_other_effects_stay_as_they_are():
     assert combined({}, found) == found
 
 
-def test_what_is_no_single_effect_is_refused():
-    """Springs in series whose laws differ in their exponents; two time constants."""
+def test_effects_with_different_exponents_or_time_constants_cannot_be_combined():
+    """Series springs with laws of different exponents; two time constants."""
     law = {"a.coefficient": 1e7, "a.exponent": 1.5}
     slow, slower = ({"a": 1e-5, "a.time_constant": t} for t in (60.0, 90.0))
     with pytest.raises(ValueError, match="no single delay"):

@@ -49,7 +49,7 @@ def change(conditions, name, values):
     return (with_effect.deviation - predict(conditions).deviation)[0]
 
 
-def test_a_beam_sags_under_its_own_weight():
+def test_self_weight_deflects_a_cantilever_as_in_closed_form():
     """q L^4 / 8 E I and q L^3 / 6 E I of a cantilever."""
     q = RHO * AREA * G
     seen = change(here(arm()), "self_weight", {"g.z": -G})
@@ -57,8 +57,8 @@ def test_a_beam_sags_under_its_own_weight():
     assert seen == pytest.approx(expected, rel=1e-12, abs=1e-18)
 
 
-def test_a_mass_at_the_tip_sags():
-    """m g L^3 / 3 E I, beside the beam's own."""
+def test_tip_mass_deflects_the_beam_as_in_closed_form():
+    """m g L^3 / 3 E I, in addition to the beam's own deflection."""
     heavy = arm()
     tip = replace(heavy.frames[1], mass=3.0)
     heavy = replace(heavy, frames=(heavy.frames[0], tip))
@@ -67,7 +67,7 @@ def test_a_mass_at_the_tip_sags():
     assert (both - own)[4] == pytest.approx(-3.0 * G * L**3 / (3 * E * I), rel=1e-12)
 
 
-def test_a_beam_lengthens_with_temperature():
+def test_thermal_expansion_lengthens_the_beam_along_its_axis():
     seen = change(
         here(arm(), temperature=12.0, q=0.4), "thermal_expansion", {"tip": 23e-6}
     )
@@ -75,7 +75,7 @@ def test_a_beam_lengthens_with_temperature():
     assert seen == pytest.approx([0, 0, 0, dL * cos(0.4), dL * sin(0.4), 0], abs=1e-18)
 
 
-def test_an_elastic_drive_turns_by_moment_over_stiffness():
+def test_drive_compliance_turns_the_drive_by_moment_over_stiffness():
     F = 30.0
     seen = change(
         here(arm(rigid=True), (0, 0, 0, 0, F, 0)), "drive_compliance", {"drive": K}
@@ -83,7 +83,7 @@ def test_an_elastic_drive_turns_by_moment_over_stiffness():
     assert seen == pytest.approx([0, 0, F * L / K, 0, F * L**2 / K, 0], rel=1e-6)
 
 
-def test_a_foundation_yields_to_the_force_and_its_moment_about_the_base():
+def test_base_compliance_deflects_by_the_force_and_its_moment():
     F = 50.0
     stiff = {"stiffness.ry": 2e5, "stiffness.tz": 1e6}
     seen = change(here(arm(), (0, 0, 0, 0, 0, F)), "base_compliance", stiff)
@@ -92,26 +92,26 @@ def test_a_foundation_yields_to_the_force_and_its_moment_about_the_base():
     assert seen == pytest.approx(expected, rel=1e-6, abs=1e-12)
 
 
-def test_an_encoder_offset_turns_the_arm():
+def test_encoder_offset_turns_the_arm_by_that_angle():
     seen = change(here(arm(), q=0.7), "encoder_offset", {"drive": 1e-5})
     expected = [0, 0, 1e-5, -1e-5 * L * sin(0.7), 1e-5 * L * cos(0.7), 0]
     assert seen == pytest.approx(expected, rel=1e-4, abs=1e-10)
 
 
-def test_an_eccentric_encoder_errs_once_a_turn():
+def test_encoder_eccentricity_adds_a_sine_of_one_period_per_turn():
     values = {"drive.amplitude": 2e-5, "drive.phase": 0.9}
     for q in (-1.2, 0.0, 2.0):
         seen = change(here(arm(), q=q), "encoder_eccentricity", values)
         assert seen[2] == pytest.approx(2e-5 * sin(q + 0.9), rel=1e-9, abs=1e-18)
 
 
-def test_a_longer_link_is_longer():
+def test_link_length_change_moves_the_tip_by_that_length():
     seen = change(here(arm()), "link_length", {"tip": 1e-4})
     assert seen == pytest.approx([0, 0, 0, 1e-4, 0, 0], abs=1e-18)
 
 
 @pytest.mark.parametrize("frame", ["drive", "tip"])
-def test_a_body_without_a_beam_grows_along_the_line_between_its_joints(frame):
+def test_body_without_a_beam_expands_along_the_line_between_its_joints(frame):
     """A drive 0.3 m above the base, and a bar to the tip at 0.4 rad."""
     robot = arm(rigid=True)
     first = replace(robot.frames[0], translation=np.array([0, 0, 0.3]))
@@ -125,7 +125,7 @@ def test_a_body_without_a_beam_grows_along_the_line_between_its_joints(frame):
     assert longer == pytest.approx([0, 0, 0, *(1e-4 * unit)], abs=1e-18)
 
 
-def test_a_body_lengthens_later_than_the_sensor_warms():
+def test_delayed_expansion_lags_the_temperature_with_its_time_constant():
     """Behind a ramp r t the body is at r (t - T + T exp(-t/T))."""
     time, late = np.array([0.0, 50.0, 80.0, 300.0]), 100.0
     rows = together([place_robot(arm(), joints={"drive": 0.0})] * 4)
@@ -138,8 +138,8 @@ def test_a_body_lengthens_later_than_the_sensor_warms():
     assert seen == pytest.approx(20e-6 * L * kelvin, rel=1e-12)
 
 
-def test_a_device_measures_all_lengths_too_long():
-    """From its own origin, which stands at (-1, 0, 0) and is turned by 90 degrees."""
+def test_device_scale_multiplies_positions_from_the_device_origin():
+    """The device's origin is at (-1, 0, 0), and its axes are turned by 90 degrees."""
     there = here(arm(), q=0.4)
     seen = change(there, "device_scale", {"factor": 1.001})
     at = np.array([L * cos(0.4), L * sin(0.4), 0])
@@ -149,7 +149,7 @@ def test_a_device_measures_all_lengths_too_long():
     assert seen[3:] == pytest.approx(1e-3 * np.array([-at[1], 1 + at[0], 0]), abs=1e-12)
 
 
-def test_a_heavier_body_sags_more():
+def test_body_mass_effect_deflects_the_beam_as_in_closed_form():
     """m g L^3/3 E I of a mass at the tip; a moment along x bends by m c g L^2/2 E I."""
     there = replace(here(arm()), gravity=np.array([[0, 0, -G]]))
     seen = change(there, "body_mass", {"tip.mass": 3.0})
@@ -158,7 +158,7 @@ def test_a_heavier_body_sags_more():
     assert seen[5] == pytest.approx(-0.2 * G * L**2 / (2 * E * I), rel=1e-6)
 
 
-def test_registration_turns_and_shifts_finitely():
+def test_registration_applies_a_finite_rotation_and_translation():
     """p' = R p + t for the device's frame, and the tool moves with the platform."""
     b, t = 0.3, np.array([0.01, -0.02, 0.03])
     values = {"base.rz": b, "base.tx": t[0], "base.ty": t[1], "base.tz": t[2]}
@@ -171,14 +171,14 @@ def test_registration_turns_and_shifts_finitely():
     assert tool[3:] == pytest.approx([1e-3 * cos(0.5), 1e-3 * sin(0.5), 0], abs=1e-15)
 
 
-def test_a_softer_modulus_bends_more():
+def test_modulus_scale_divides_the_bending_deflection():
     F, factor = 20.0, 0.8
     seen = change(here(arm(), (0, 0, 0, 0, F, 0)), "modulus_scale", {"tip": factor})
     bent = F * L**3 / (3 * E * I)
     assert seen[4] == pytest.approx(bent * (1 / factor - 1), rel=1e-6)
 
 
-def test_clearance_rests_where_the_load_pushes():
+def test_joint_clearance_is_taken_up_in_the_direction_of_the_load():
     """A disc of radius c and a cone of angle t, in the direction of the load."""
     values = {"drive.radial": 2e-5, "drive.axial": 1e-5, "drive.tilt": 3e-5}
     # force along y and z at the tip: moment (0, -Fz L, Fy L) at the drive
@@ -189,14 +189,14 @@ def test_clearance_rests_where_the_load_pushes():
     assert seen == pytest.approx(expected, rel=1e-6, abs=1e-9)
 
 
-def test_clearance_without_load_is_said_to_be_open():
+def test_clearance_without_load_leaves_the_row_undetermined():
     values = {"joint_clearance": {"drive.radial": 2e-5}}
     found = predict(apply_effects(here(arm(rigid=True)), values))
     assert found.undetermined.all()
     assert found.deviation == pytest.approx(0.0, abs=1e-18)
 
 
-def test_friction_holds_an_elastic_drive_back():
+def test_friction_turns_an_elastic_drive_against_the_approach_direction():
     for approach in (-1.0, 1.0):
         seen = change(
             here(arm(K), approach=approach), "friction_hysteresis", {"drive": 2.0}
@@ -205,7 +205,7 @@ def test_friction_holds_an_elastic_drive_back():
 
 
 @pytest.mark.parametrize("exponent", [1.5, 2.0, 3.0])
-def test_a_contact_deflects_by_its_law(exponent):
+def test_contact_stiffening_deflects_by_its_power_law(exponent):
     F, c = -25.0, 1e7
     values = {"drive.coefficient": c, "drive.exponent": exponent}
     seen = change(
@@ -214,7 +214,7 @@ def test_a_contact_deflects_by_its_law(exponent):
     assert seen[2] == pytest.approx(-((abs(F) * L / c) ** (1 / exponent)), rel=1e-9)
 
 
-def test_the_load_is_not_the_one_recorded():
+def test_load_gain_scales_and_offsets_the_recorded_load():
     F = 20.0
     values = {"factor": 1.1, "offset.fz": 5.0}
     seen = change(here(arm(), (0, 0, 0, 0, F, 0)), "load_gain", values)
@@ -222,7 +222,7 @@ def test_the_load_is_not_the_one_recorded():
     assert seen[4:] == pytest.approx([0.1 * F * give, 5.0 * give], rel=1e-4)
 
 
-def test_tension_stiffens_a_hinged_rod():
+def test_geometric_stiffening_of_a_hinged_rod_equals_its_balance_equation():
     """k a = F L cos a - P L sin a for a rigid rod on a torsion spring."""
     P, F = 4e4, 200.0
     seen = change(
@@ -232,21 +232,21 @@ def test_tension_stiffens_a_hinged_rod():
     assert seen[2] == pytest.approx(a - F * L / K, rel=1e-9)
 
 
-def test_a_reading_drifts_and_settles():
+def test_drift_approaches_its_amplitude_exponentially():
     values = {"amplitude.tx": 1e-5, "amplitude.ry": 2e-5, "time_constant": 100.0}
     seen = change(here(arm(), time=50.0), "drift", values)
     part = 1 - exp(-0.5)
     assert seen == pytest.approx([0, 2e-5 * part, 0, 1e-5 * part, 0, 0], abs=1e-18)
 
 
-def test_a_drift_that_takes_no_time_is_a_step():
+def test_drift_with_a_vanishing_time_constant_is_a_step():
     values = {"amplitude.tx": 1e-5, "time_constant": 1e-307}
     seen = change(here(arm(), time=50.0), "drift", values)
     assert seen == pytest.approx([0, 0, 0, 1e-5, 0, 0], abs=1e-18)
 
 
-def test_no_effect_is_left_without_a_closed_form():
-    """The list above is the library's: a new effect needs a test of its own."""
+def test_every_effect_of_the_library_is_tested_in_this_file():
+    """A new effect in the library needs a test in this file."""
     source = Path(__file__).read_text(encoding="utf-8")
     assert [name for name in LIBRARY if f'"{name}"' not in source] == []
 
@@ -285,7 +285,7 @@ def parallel():
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_all_rows_at_once_agree_with_the_cone_solver(name, parallel):
+def test_effects_of_all_rows_together_equal_the_cone_solver(name, parallel):
     there = apply_effects(parallel, {name: CASES[name]})
     fast = predict(there).deviation
     slow = read(
@@ -298,8 +298,8 @@ def test_all_rows_at_once_agree_with_the_cone_solver(name, parallel):
 
 @pytest.mark.parametrize("robot", ["arm6", "irsbot2", "delta"])
 @pytest.mark.parametrize("name", LIBRARY)
-def test_a_search_starts_and_may_go_as_far_as_is_plausible(name, robot):
-    """Where the search starts, and where it may go: a plausible size up or down."""
+def test_search_ranges_contain_their_starts_and_span_the_unknown_scale(name, robot):
+    """Start values and bounds: the range extends at least one plausible size."""
     for unknown in LIBRARY[name].unknowns(load_robot(robot)):
         assert unknown.scale > 0
         starts = unknown.scan or (unknown.start,)
@@ -330,7 +330,7 @@ def standing(**foot):
         (load_robot("arm6"), True),
     ],
 )
-def test_what_moves_the_base_moves_a_frame_below_all_others(robot, new):
+def test_base_effects_act_on_a_foundation_frame_below_all_others(robot, new):
     given = as_declared(place_robot(robot), np.zeros(6))
     found = on_foundation(given)
     assert len(found.robot.frames) == len(robot.frames) + new
@@ -345,8 +345,8 @@ def test_what_moves_the_base_moves_a_frame_below_all_others(robot, new):
     assert found.transforms[:, int(new) :] == pytest.approx(given.transforms)
 
 
-def test_which_joints_may_have_friction_and_which_slip():
-    """A spring of their own, however soft; no clearance but a spin that is declared."""
+def test_friction_needs_an_elastic_joint_and_slip_a_joint_without_clearance():
+    """Friction: a joint spring of any stiffness. Slip: no clearance except spin."""
     own = np.diag([np.inf, np.inf, 0.4, np.inf, np.inf, np.inf])
     robot = Robot("chain", "tip", (
         Frame("soft", joint="revolute", actuated=True, joint_stiffness=own),

@@ -1,4 +1,4 @@
-"""Columns of forms against other programs and against what they are made of."""
+"""Columns of function forms against SciPy, NumPy and their definitions."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ def columns(form, names, inputs=(X,), **shapes):
     return FORMS[form].basis(names, list(inputs), shapes)
 
 
-def test_powers_and_waves_of_two_variables():
+def test_powers_and_waves_of_two_variables_equal_numpy():
     assert columns("powers", ["0", "3"]) == pytest.approx(np.array([X**0, X**3]).T)
     found = columns("powers", ["1.2"], (X, Y))[:, 0]
     assert found == pytest.approx(X * Y**2)
@@ -25,7 +25,7 @@ def test_powers_and_waves_of_two_variables():
     assert found == pytest.approx(np.cos(3 * 2 * np.pi * X / 0.4))
 
 
-def test_a_spline_goes_through_its_values_as_scipys_does():
+def test_natural_spline_equals_scipy():
     values = np.array([1.0, -2.0, 0.5, 3.0, 2.5])
     knots = np.linspace(-1.0, 1.5, 5)
     names = [str(k) for k in range(1, 6)]
@@ -34,7 +34,7 @@ def test_a_spline_goes_through_its_values_as_scipys_does():
     assert found == pytest.approx(expected, rel=1e-12)
 
 
-def test_a_spline_of_two_variables_is_the_product():
+def test_spline_of_two_variables_is_the_product_of_two_splines():
     names = [f"{j}.{k}" for j in (1, 2, 3) for k in (1, 2)]
     ends = {"first.1": -1.0, "last.1": 1.0, "first.2": -1.0, "last.2": 1.0}
     found = FORMS["spline"].basis(names, [X, Y], ends)
@@ -46,14 +46,14 @@ def test_a_spline_of_two_variables_is_the_product():
     assert set(shape_names(FORMS["spline"], 2)) == set(ends)
 
 
-def test_a_spline_of_two_knots_is_a_line_and_ends_level():
+def test_spline_of_two_knots_is_linear_and_constant_beyond_them():
     x = np.array([-1.0, 0.0, 0.25, 1.0, 3.0])
     hats = natural_spline(np.array([0.0, 1.0]), x)
     right = np.clip(x, 0.0, 1.0)
     np.testing.assert_allclose(hats, np.column_stack([1 - right, right]), atol=1e-15)
 
 
-def test_roughness_is_the_integral_of_squared_curvature():
+def test_spline_roughness_equals_the_integral_of_squared_curvature():
     values = np.array([1.0, -2.0, 0.5, 3.0, 2.5, 0.0])
     spline = CubicSpline(np.arange(6), values, bc_type="natural")
     pieces = [quad(lambda x: spline(x, 2) ** 2, k, k + 1)[0] for k in range(5)]
@@ -72,7 +72,7 @@ def test_roughness_is_the_integral_of_squared_curvature():
     ("reversal", 2, ["1"], ["1.1"]),
     ("step", 1, ["size"], []),
 ])  # fmt: skip
-def test_names_of_columns_are_whole_numbers_within_their_range(
+def test_column_names_must_be_whole_numbers_within_their_range(
     form, count, known, unknown
 ):
     found = {name: FORMS[form].is_column(name, count) for name in known + unknown}
@@ -80,12 +80,12 @@ def test_names_of_columns_are_whole_numbers_within_their_range(
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
-def test_fewer_than_three_knots_are_not_rough(count):
+def test_spline_of_fewer_than_three_knots_has_zero_roughness(count):
     """A natural spline through two values is a line."""
     assert np.array_equal(roughness(count), np.zeros((count, count)))
 
 
-def test_a_knee_has_one_slope_up_to_a_load_and_another_beyond_it():
+def test_knee_changes_its_slope_at_the_given_load():
     """A spring of 2 rad/(N m) up to 3 N m, of 0.5 beyond; and a jump of 0.1."""
     load = np.array([-5.0, -3.0, -1.0, 0.0, 2.0, 7.0])
     found = FORMS["knee"].basis(["below", "above"], [load], {"at": 3.0})
@@ -94,7 +94,7 @@ def test_a_knee_has_one_slope_up_to_a_load_and_another_beyond_it():
     assert 0.1 * jump[:, 0] == pytest.approx([-0.1, -0.1, -0.1, 0, 0.1, 0.1])
 
 
-def test_waves_of_a_screw_come_again_each_lead():
+def test_reversal_waves_repeat_after_each_screw_lead():
     side, x = np.array([1.0, -1.0, 1.0]), np.array([0.0, 0.0025, 0.0125])
     found = FORMS["reversal_waves"].basis(["1.sine"], [side, x], {"period": 0.01})
     assert found[:, 0] == pytest.approx([0, -1, 1])

@@ -1,4 +1,4 @@
-"""Formulas: their values against Python's own, their units by hand, nothing is run."""
+"""Formulas: values against Python's eval, units by hand, refusal of other code."""
 
 import math
 
@@ -21,7 +21,7 @@ M, N, S = {"m": 1}, {"N": 1}, {"s": 1}
     "a*sin(3*q) + b", "-q**2/(1 + abs(q))", "exp(-q/b)*cos(pi*q) - sqrt(a)", "2",
     "tanh(a*q)*sign(q) + log(b)", "a**q", "atan(q) - tan(q/4)", "+a",
 ])  # fmt: skip
-def test_a_formula_has_the_value_that_python_gives_it(text):
+def test_formula_value_equals_python_eval(text):
     known = {"q": 0.7, "a": 1.3, "b": 2.5}
     names = {n: getattr(math, n) for n in ("sin", "cos", "tan", "exp", "log", "tanh",
              "sqrt", "pi", "atan")}  # fmt: skip
@@ -37,7 +37,7 @@ def test_a_formula_has_the_value_that_python_gives_it(text):
     "q := 1", "f(q)", "1e999*q", "(" * 90 + "q" + ")" * 90, "-" * 90 + "q", "q" * 600,
     "q; q", "1j", "a and b", "q % 2", "q // 2",
 ])  # fmt: skip
-def test_what_is_no_formula_is_refused(text):
+def test_text_that_is_not_a_formula_is_refused(text):
     if text == "sin":  # a name like any other, which is not declared
         assert names_in(parse_formula(text)) == ["sin"]
     elif text.startswith("(("):  # brackets alone are no depth
@@ -56,7 +56,9 @@ def test_what_is_no_formula_is_refused(text):
     ("1e-4*sin(q)", {"q": {}}, M, {}),
     ("a*b*t", {"t": S}, {}, {"a": "1/s", "b": "1"}),
 ])  # fmt: skip
-def test_units_of_parameters_follow(text, variables, result, units):
+def test_parameter_units_follow_from_variables_and_result(
+    text, variables, result, units
+):
     found = parameter_units(parse_formula(text), variables, result)
     assert {name: unit_text(unit) for name, unit in found.items()} == units
 
@@ -66,14 +68,14 @@ def test_units_of_parameters_follow(text, variables, result, units):
     ("a*t + a", {"t": S}, {}), ("2**t", {"t": S}, {}), ("t**q", {"t": S, "q": {}}, M),
     ("exp(2*t)", {"t": S}, {}),
 ])  # fmt: skip
-def test_units_that_clash_are_refused(text, variables, result):
+def test_formula_with_inconsistent_units_is_refused(text, variables, result):
     with pytest.raises(BadInput, match="units clash"):
         parameter_units(parse_formula(text), variables, result)
 
 
 @pytest.mark.parametrize("around", ["-{}", "+{}", "abs({})", "(a+{})", "({}*a)"])
-def test_fifty_operations_one_in_the_other_are_a_formula_and_no_more(around):
-    """As the message says, whichever operations they are, on whichever side."""
+def test_formula_nested_deeper_than_fifty_operations_is_refused(around):
+    """Each kind of operation, nested on either side."""
     text = "q"
     for _ in range(50):
         text = around.format(text)
@@ -82,13 +84,13 @@ def test_fifty_operations_one_in_the_other_are_a_formula_and_no_more(around):
         parse_formula(around.format(text))
 
 
-def test_five_hundred_characters_are_a_formula_and_no_more():
+def test_formula_longer_than_500_characters_is_refused():
     parse_formula("q" * 500)
     with pytest.raises(BadInput, match="found 501 characters"):
         parse_formula("q" * 501)
 
 
-def test_units_of_powers_add_up_and_cancel():
+def test_exponents_of_units_add_up_across_powers():
     """(a t)^2 sqrt(b t) / t is a length: a and b share it, one of them is a number."""
     tree = parse_formula("(a*t)**2*t**0.5*sqrt(b)/t")
     found = parameter_units(tree, {"t": S}, M)

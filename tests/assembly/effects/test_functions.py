@@ -1,4 +1,4 @@
-"""Functions against closed forms on an arm, and against springs in their place."""
+"""Functions in robot files against closed forms of an arm and equivalent springs."""
 
 from dataclasses import replace
 from math import cos, exp, sin
@@ -37,14 +37,14 @@ def turned(angle, q):
 
 
 @pytest.mark.parametrize("q", [-0.8, 0.0, 0.7])
-def test_waves_of_a_joint_turn_the_arm(q):
+def test_joint_waves_turn_the_arm_by_their_sum(q):
     waves = at_drive({"1.sine": 2e-5, "3.cosine": -1e-5}, "waves")
     angle = 2e-5 * sin(q) - 1e-5 * cos(3 * q)
     found = seen(here(RIGID, q=q), waves)[0]
     assert found == pytest.approx(turned(angle, q), rel=1e-4, abs=1e-9)
 
 
-def test_a_formula_is_what_it_says():
+def test_formula_effect_turns_the_drive_by_its_value():
     formula = at_drive(
         {"a": 1e-5, "b": 2e-6, "n": 2.0}, "formula", formula="a*sin(3*q)**n - b/2"
     )
@@ -52,7 +52,7 @@ def test_a_formula_is_what_it_says():
     assert seen(here(RIGID, q=0.3), formula)[0][2] == pytest.approx(angle, rel=1e-9)
 
 
-def test_a_screw_of_the_base_carries_the_robot():
+def test_base_functions_turn_and_shift_the_whole_robot():
     """A turned base swings the tip about the base's origin; a shifted one shifts it."""
     turn = Function("base", ("ry",), ("cov.tilt",), "powers", {"1": 1.0})
     shift = Function("base", ("tx",), ("temperature",), "powers", {"1": 1e-6})
@@ -62,7 +62,7 @@ def test_a_screw_of_the_base_carries_the_robot():
     assert seen(there, turn, shift)[0] == pytest.approx(expected, rel=1e-4, abs=1e-9)
 
 
-def test_functions_of_the_load_and_the_reading():
+def test_load_and_reading_functions_change_the_load_and_the_reading():
     load = Function("load", ("fy",), ("load.fy",), "powers", {"1": 0.1})
     read = Function("reading", ("tz",), ("position.x",), "powers", {"2": 1e-5})
     there = here(arm(), (0, 0, 0, 0, 20, 0), q=0.4)
@@ -74,7 +74,7 @@ def test_functions_of_the_load_and_the_reading():
     assert seen(there, load, read)[0] == pytest.approx(expected, rel=1e-9, abs=1e-18)
 
 
-def test_a_compliance_is_a_spring_at_its_place():
+def test_compliance_function_equals_an_elastic_drive():
     """M / k of an elastic drive, softer where the angle is larger."""
     soft = at_drive({"0": 1e-5, "2": 3e-5}, kind="compliance")
     F, q = 30.0, 0.7
@@ -90,7 +90,7 @@ def test_a_compliance_is_a_spring_at_its_place():
     assert one.energy == pytest.approx(assemble_row(sprung, 0).energy, rel=1e-9)
 
 
-def test_a_wrench_bends_its_joint_by_its_square():
+def test_function_of_a_wrench_turns_the_joint_by_the_square_of_the_moment():
     square = at_drive({"2": 1e-7}, variables=("wrench.drive.mz",))
     F, q = 30.0, 0.5
     there = here(RIGID, (0, 0, 0, 0, F, 0), q=q)
@@ -104,8 +104,8 @@ def three_rrr(load):
 
 
 @pytest.mark.parametrize("exact", [False, True])
-def test_a_compliance_in_a_closed_chain_is_a_spring_there(exact):
-    """Newton's method on the laws against springs that the solver knows."""
+def test_compliance_in_a_closed_chain_equals_a_joint_spring(exact):
+    """Newton's method for the function, against a spring of the robot."""
     there = replace(three_rrr([0, 0, 5, 40, -30, 0]), exact=exact)
     robot = there.robot
     names = [f.name for f in robot.frames if f.actuated]
@@ -121,8 +121,8 @@ def test_a_compliance_in_a_closed_chain_is_a_spring_there(exact):
     assert np.abs(spring - predict(there).deviation).max() > 1e-5
 
 
-def test_a_closed_chain_is_at_rest_under_a_law_that_bends():
-    """e = g(w) at the wrench that the answer itself has: checked on the answer."""
+def test_nonlinear_law_in_a_closed_chain_holds_at_the_solved_wrench():
+    """e = g(w), where w is the joint wrench of the same solution."""
     there = three_rrr([0, 0, 5, 40, -30, 0])
     name = next(f.name for f in there.robot.frames if f.actuated)
     law = Function(
@@ -149,7 +149,7 @@ def campaign_of(times, **columns):
     return with_history(as_declared(rows, covariates=known | {"session": session}))
 
 
-def test_a_lag_settles_exponentially():
+def test_lag_function_approaches_its_gain_exponentially():
     """A step of 10 K at time 0: gain 10 (1 - exp(-t / tau))."""
     t = np.array([0.0, 50.0, 200.0, 700.0])
     rows = campaign_of(t, temperature=10.0)
@@ -159,7 +159,7 @@ def test_a_lag_settles_exponentially():
     )
 
 
-def test_rows_set_aside_are_remembered():
+def test_selected_rows_keep_the_history_of_all_rows():
     t = np.linspace(0, 900, 10)
     rows = campaign_of(t, temperature=5 * np.sin(t / 200), q=np.sin(t / 100))
     lag = at_drive({"time_constant": 100.0}, "lag", ("cov.temperature",))
@@ -170,7 +170,7 @@ def test_rows_set_aside_are_remembered():
         assert some == pytest.approx(whole[[7, 2, 4]], rel=1e-12)
 
 
-def test_a_reversal_follows_the_row_before():
+def test_reversal_sign_follows_the_motion_since_the_previous_row():
     q = [0.0, 0.5, 0.5, 0.2, 0.9]
     rows = campaign_of(np.arange(5.0), q=q, approach=-1.0)
     back = at_drive({"0": 1e-5, "1": 1e-5}, "reversal", ("q.drive", "q.drive"))
@@ -179,7 +179,7 @@ def test_a_reversal_follows_the_row_before():
     assert seen(rows, back)[:, 2] == pytest.approx(expected, rel=1e-9)
 
 
-def test_what_slips_follows_its_drive_by_a_depth():
+def test_slip_function_follows_the_drive_within_its_depth():
     q = [0.0, 0.5, 0.5, 0.2, 0.9]
     rows = campaign_of(np.arange(5.0), q=q, approach=-1.0)
     slack = at_drive({"size": 1e-5, "depth": 0.5}, "slip", ("q.drive",))
@@ -187,7 +187,7 @@ def test_what_slips_follows_its_drive_by_a_depth():
     assert seen(rows, slack)[:, 2] == pytest.approx(expected, rel=1e-9, abs=1e-15)
 
 
-def test_backlash_may_vary_around_a_turn():
+def test_reversal_waves_vary_the_backlash_around_a_turn():
     q = [0.0, 0.5, 0.5, 0.2, 0.9]
     rows = campaign_of(np.arange(5.0), q=q, approach=-1.0)
     side = np.array([-1, 1, 1, -1, 1])
@@ -199,7 +199,7 @@ def test_backlash_may_vary_around_a_turn():
     assert seen(rows, scaled)[:, 2] == pytest.approx(expected, rel=1e-9)
 
 
-def test_a_session_has_its_own_effects():
+def test_session_effects_act_only_on_rows_of_their_session():
     rows = campaign_of(np.zeros(3), session=np.array(["a", "b", "a"]))
     own = at_drive({"0": 1e-5}, session="a")
     assert seen(rows, own)[:, 2] == pytest.approx([1e-5, 0, 1e-5], abs=1e-15)
@@ -210,7 +210,7 @@ def test_a_session_has_its_own_effects():
     assert found[:, 5] == pytest.approx([0, 1e-4, 0], abs=1e-15)
 
 
-def test_what_settles_by_itself_and_what_jumps():
+def test_creep_step_and_slow_wave_follow_their_formulas():
     t = np.array([0.0, 100.0, 300.0])
     rows = campaign_of(t)
     creep = at_drive({"gain": 1e-5, "time_constant": 150.0}, "creep", ("time",))

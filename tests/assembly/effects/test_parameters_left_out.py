@@ -1,4 +1,4 @@
-"""Effects with some parameters left out, and public parameters of fitted ones."""
+"""Effects with omitted parameters, and published parameters of fitted effects."""
 
 from dataclasses import replace
 from math import atan2, cos, hypot, sin
@@ -24,7 +24,7 @@ def public(name, values, robot=None):
     return LIBRARY[name].public(robot or arm(), values)
 
 
-def test_a_contact_of_unknown_exponent_is_hertzs():
+def test_contact_without_an_exponent_uses_the_hertz_exponent():
     F, c = 25.0, 1e7
     load = (0, 0, 0, 0, F, 0)
     seen = change(
@@ -34,7 +34,7 @@ def test_a_contact_of_unknown_exponent_is_hertzs():
 
 
 @pytest.mark.parametrize("exponent", [None, 2.0])
-def test_a_contacts_coefficient_is_what_gives_so_much_under_one_newton_metre(exponent):
+def test_fitted_contact_deflection_becomes_the_coefficient_at_1_newton_metre(exponent):
     give, n = 1e-4, exponent or 1.5
     values = {"drive.give": give}
     if exponent:
@@ -45,7 +45,7 @@ def test_a_contacts_coefficient_is_what_gives_so_much_under_one_newton_metre(exp
     assert public("contact_stiffening", {"drive.give": 0.0}) == {}
 
 
-def test_an_encoders_amplitude_and_phase():
+def test_encoder_sine_and_cosine_become_amplitude_and_phase():
     """s sin q + c cos q = a sin(q + p)."""
     for values in ({"drive.sine": 2e-5, "drive.cosine": 3e-5}, {"drive.sine": -2e-5},
                    {"drive.cosine": 3e-5}):  # fmt: skip
@@ -58,7 +58,7 @@ def test_an_encoders_amplitude_and_phase():
         assert wave == pytest.approx(s * sin(q) + c * cos(q), rel=1e-12)
 
 
-def test_an_eccentric_encoder_without_a_phase_is_right_at_zero():
+def test_encoder_eccentricity_without_a_phase_is_zero_at_zero_angle():
     for q in (0.0, 0.9):
         seen = change(
             here(arm(), q=q), "encoder_eccentricity", {"drive.amplitude": 1e-5}
@@ -66,14 +66,14 @@ def test_an_eccentric_encoder_without_a_phase_is_right_at_zero():
         assert seen[2] == pytest.approx(1e-5 * sin(q), rel=1e-9, abs=1e-18)
 
 
-def test_a_joint_that_was_not_approached_knows_no_friction():
+def test_friction_is_zero_without_an_approach_direction():
     values = {"drive": 2.0}
     for approach, part in ((0.0, 0.0), (0.5, -0.5)):
         seen = change(here(arm(K), approach=approach), "friction_hysteresis", values)
         assert seen[2] == pytest.approx(part * 2.0 / K, rel=1e-9, abs=1e-18)
 
 
-def test_two_feet_need_a_foundation_though_the_first_would_do():
+def test_robot_with_two_base_frames_gets_a_foundation_frame():
     robot = standing()
     both = replace(robot, frames=(*robot.frames, Frame("other")))
     found = on_foundation(as_declared(place_robot(both), np.zeros(6))).robot
@@ -85,7 +85,7 @@ def test_two_feet_need_a_foundation_though_the_first_would_do():
                                                FOUNDATION]  # fmt: skip
 
 
-def test_a_foundation_has_a_name_of_its_own():
+def test_second_foundation_gets_a_different_name():
     once = with_foundation(load_robot("arm6"), {})
     twice = with_foundation(once, {"stiffness.tz": 1e6})
     assert [f.name for f in twice.frames[:2]] == [FOUNDATION + "_", FOUNDATION]
@@ -93,7 +93,7 @@ def test_a_foundation_has_a_name_of_its_own():
     assert np.isinf(np.diag(twice.frames[0].joint_stiffness)[:5]).all()
 
 
-def test_clearance_adds_to_what_is_declared():
+def test_joint_clearance_effect_adds_to_the_declared_clearance():
     robot = arm(rigid=True)
     drive = replace(robot.frames[0], clearance=Clearance(axial=2e-5))
     robot = replace(robot, frames=(drive, robot.frames[1]))
@@ -106,7 +106,7 @@ def test_clearance_adds_to_what_is_declared():
     assert public("joint_clearance", fitted) == {"drive.radial": 2e-9}
 
 
-def test_a_factor_on_the_modulus_from_how_much_softer():
+def test_fitted_softening_becomes_a_factor_on_the_modulus():
     assert public("modulus_scale", {"tip.softer": 0.25}) == {"tip": 0.8}
     assert public("modulus_scale", {"tip.softer": -0.5}) == {"tip": 2.0}
 
@@ -119,7 +119,7 @@ def test_a_factor_on_the_modulus_from_how_much_softer():
     ("powers", ("time",), ["time"]),
     ("powers", ("q.drive",), []),
 ])  # fmt: skip
-def test_covariates_that_functions_need(form, variables, needed):
+def test_functions_name_the_covariates_of_their_sessions(form, variables, needed):
     function = Function("drive", ("rz",), variables, form, {"1": 0.0})
     robot = replace(arm(), functions=(function,))
     assert list(covariates_of(robot, [])) == needed
@@ -128,7 +128,7 @@ def test_covariates_that_functions_need(form, variables, needed):
     assert list(covariates_of(in_one, ["b", "a"])) == needed
 
 
-def test_finite_motions_belong_to_the_exact_model():
+def test_geometric_stiffening_without_finite_motions_is_refused():
     robot = replace(arm(K), effects={"geometric_stiffening": {}})
     check_covariates(robot, {}, finite=True)
     with pytest.raises(BadInput, match="asks for finite motions"):

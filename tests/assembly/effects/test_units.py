@@ -23,7 +23,7 @@ SLIDES = Robot("slides", "tip", (Frame("drive", joint="prismatic", actuated=True
     (RIGID, "approach", {}), (RIGID, "cov.temperature", {"K": 1}),
     (RIGID, "cov.speed", {"[speed]": 1}),
 ])  # fmt: skip
-def test_units_of_variables(robot, name, unit):
+def test_variables_have_the_documented_units(robot, name, unit):
     assert variable_unit(robot, name) == unit
 
 
@@ -124,7 +124,7 @@ EFFECTS = {  # by effect and parameter: of an arm that turns, of one that slides
 
 
 @pytest.mark.parametrize(("effect", "name"), EFFECTS)
-def test_units_are_those_of_what_is_moved(effect, name):
+def test_effect_units_depend_on_the_kind_of_joint(effect, name):
     unit = LIBRARY[effect].unit
     assert (unit(arm(), name), unit(SLIDES, name)) == EFFECTS[effect, name]
 
@@ -133,7 +133,7 @@ def test_units_are_those_of_what_is_moved(effect, name):
     ("drive_compliance", "{}.compliance", "{}"),
     ("base_compliance", "compliance.{}", "stiffness.{}"),
 ])  # fmt: skip
-def test_a_stiffness_is_one_over_its_compliance_and_none_if_rigid(
+def test_fitted_compliance_becomes_a_stiffness_and_zero_is_left_out(
     effect, before, after
 ):
     found = {"rx": 2e-6, "tz": 1e-8, "rz": 0.0}
@@ -143,8 +143,8 @@ def test_a_stiffness_is_one_over_its_compliance_and_none_if_rigid(
     assert public == pytest.approx(expected)
 
 
-def test_where_an_effect_can_act():
-    """Both drives, those that turn; beams, of which one has a body of its own."""
+def test_effects_name_the_frames_on_which_they_can_act():
+    """All drives, revolute drives only, or beams; one beam has a body of its own."""
     beam = arm().frames[1].link
     robot = Robot("both", "tip", (
         Frame("turn", joint="revolute", actuated=True), Frame("bar", "turn",

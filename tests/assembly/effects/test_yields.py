@@ -1,4 +1,4 @@
-"""Places that deform by a law of their own wrench, or of another place's wrench."""
+"""Functions that deform a frame by its own wrench or by another frame's wrench."""
 
 from dataclasses import replace
 from math import cos
@@ -26,15 +26,15 @@ def loaded(q):
 
 
 @pytest.mark.parametrize("place", ["base", "drive"])
-def test_what_the_base_carries_turns_the_drive(place):
-    """The moment about z is the same in both: the drive stands at the base's origin."""
+def test_function_of_the_base_moment_turns_the_drive(place):
+    """The base's origin is the drive's, so both carry the same moment about z."""
     law = at_drive({"2": 1e-7}, variables=(f"wrench.{place}.mz",))
     turn = 1e-7 * (F * L * cos(0.5)) ** 2
     found = seen(loaded(0.5), law)[0]
     assert found == pytest.approx(turned(turn, 0.5), rel=1e-4, abs=1e-9)
 
 
-def test_each_component_of_a_wrench_is_its_own():
+def test_function_uses_the_named_component_of_the_wrench():
     """The force F along y at the tip is Fy in the drive, its moment F L about z."""
     turns = {"fy": F, "mz": F * L, "fx": 0.0, "fz": 0.0, "mx": 0.0, "my": 0.0}
     for component, wrench in turns.items():
@@ -43,8 +43,8 @@ def test_each_component_of_a_wrench_is_its_own():
         assert seen(loaded(0.0), law)[0] == pytest.approx(expected, rel=1e-4, abs=1e-9)
 
 
-def test_a_compliance_that_grows_with_its_moment():
-    """(c + d M) M, no spring."""
+def test_compliance_linear_in_the_moment_turns_by_its_closed_form():
+    """The turn is (c + d M) M."""
     soft = at_drive(
         {"0": 1e-5, "1": 2e-7}, variables=("wrench.drive.mz",), kind="compliance"
     )
@@ -54,7 +54,7 @@ def test_a_compliance_that_grows_with_its_moment():
     assert found == pytest.approx(turned(turn, 0.3), rel=1e-3, abs=1e-8)
 
 
-def test_a_place_gives_in_its_session_alone():
+def test_session_functions_deform_only_rows_of_their_session():
     rows = campaign_of(np.zeros(3), session=np.array(["a", "b", "a"]))
     rows = replace(rows, load=np.tile([0, 0, 0, 0, F, 0], (3, 1)))
     for kind, parameters, variables in (
@@ -66,8 +66,8 @@ def test_a_place_gives_in_its_session_alone():
         assert seen(rows, own)[:, 2] == pytest.approx([turn, 0, turn], rel=1e-6)
 
 
-def test_friction_grows_with_the_size_of_a_moment():
-    """A reversal of a wrench: direction times |M|, whichever way M acts."""
+def test_reversal_of_a_wrench_scales_with_the_absolute_moment():
+    """The deformation is the direction times |M|, for either sign of M."""
     q = [0.0, 0.5, 0.2]
     rows = campaign_of(np.arange(3.0), q=q, approach=1.0)
     side = np.array([1, 1, -1])
@@ -77,7 +77,7 @@ def test_friction_grows_with_the_size_of_a_moment():
         assert seen(there, back)[:, 2] == pytest.approx(side * 4e-6, rel=1e-6)
 
 
-def test_a_function_of_two_components_has_numbers_of_its_own_for_each():
+def test_function_of_two_components_has_separate_parameters():
     both = Function(
         "drive", ("rz", "tx"), ("q.drive",), "powers", {"rz.0": 1e-5, "tx.0": 2e-5}
     )
@@ -85,7 +85,7 @@ def test_a_function_of_two_components_has_numbers_of_its_own_for_each():
     assert found == pytest.approx([0, 0, 1e-5, 2e-5, 1e-5 * L, 0], rel=1e-4, abs=1e-9)
 
 
-def test_a_matrix_twice_as_stiff_bends_half():
+def test_modulus_scale_multiplies_a_stiffness_matrix():
     tip = replace(RIGID.frames[1], link=MatrixLink(np.diag([1e4] * 3 + [1e6] * 3)))
     there = here(replace(RIGID, frames=(RIGID.frames[0], tip)), (0, 0, 0, 0, F, 0))
     link = apply_effects(there, {"modulus_scale": {"tip": 2.0}}).robot.frames[1].link

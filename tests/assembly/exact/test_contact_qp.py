@@ -1,4 +1,4 @@
-"""Least quadratic energies within cones: what holds at a minimum, to rounding."""
+"""Least quadratic energies within cones: conditions that hold at a minimum."""
 
 import numpy as np
 import pytest
@@ -62,7 +62,7 @@ def unbalanced(p, step):
 
 @given(seeds, st.integers(0, 2))
 @settings(max_examples=15, deadline=None)
-def test_a_convex_step_is_that_of_a_general_solver(seed, rows):
+def test_convex_clearance_step_has_the_least_energy_of_scipy_slsqp(seed, rows):
     p = problem(np.random.default_rng(seed), rows)
     step = clearance_step(p, near=False)
     assert unbalanced(p, step) < 1e-5
@@ -71,7 +71,7 @@ def test_a_convex_step_is_that_of_a_general_solver(seed, rows):
 
 
 @pytest.mark.parametrize("near", [True, False])
-def test_rows_that_no_clearance_within_the_cones_closes_have_no_step(near):
+def test_unreachable_rows_have_no_clearance_step(near):
     rng = np.random.default_rng(2)
     p = problem(rng, 1)
     far = ClearanceProblem(p.S, p.s, p.start, GROUP, p.rows, p.right + 50.0)
@@ -79,8 +79,8 @@ def test_rows_that_no_clearance_within_the_cones_closes_have_no_step(near):
 
 
 @pytest.mark.parametrize("units", [1e-9, 1.0, 1e6])
-def test_curvature_that_is_negative_inside_leads_to_a_bound(units):
-    """-v^2 about the middle of an interval, pushed: to the end it is pushed to."""
+def test_negative_curvature_leads_to_the_bound_on_the_side_of_the_force(units):
+    """Energy -v^2 about the middle of an interval, and a small force to one side."""
     group = np.array([0])
     p = ClearanceProblem(
         -units * np.eye(1), np.array([-1e-3 * units]), np.zeros(1), group,

@@ -54,7 +54,7 @@ def on_a_hinge(stiffness, *frames):
 
 
 @pytest.mark.parametrize("stiffness", [3.0, 30.0])
-def test_a_mass_on_an_arm_hangs_where_its_hinge_lets_it(stiffness):
+def test_arm_with_a_mass_rests_at_its_moment_balance(stiffness):
     """k a + m g (x cos a - y sin a) = 0 for a mass at (x, y) from the hinge."""
     arm = Frame("arm", "hinge", [0.4, 0, 0], mass=2.0, centre_of_mass=[0.1, 0.2, 0])
     x, y, weight = 0.5, 0.2, 2.0 * G
@@ -72,7 +72,7 @@ def test_a_mass_on_an_arm_hangs_where_its_hinge_lets_it(stiffness):
     assert answer.joint_wrenches[0, 2] == pytest.approx(stiffness * angle, rel=1e-9)
 
 
-def test_a_beams_weight_acts_at_its_middle():
+def test_beam_weight_acts_at_the_middle_of_the_beam():
     """k a + W L/2 cos a = 0 for a beam that hardly bends."""
     beam = BeamLink({"radius": 0.02}, 1e16, 0.3, density=8000.0)
     posture = on_a_hinge(5.0, Frame("tip", "hinge", [0.6, 0, 0], link=beam))
@@ -83,8 +83,8 @@ def test_a_beams_weight_acts_at_its_middle():
     assert answer.joint_screws[0, 2] == pytest.approx(angle, abs=1e-8)
 
 
-def test_a_straight_beam_off_its_place_has_its_weight_at_its_own_middle():
-    """From its erring end back along its erring axis by half of its length."""
+def test_weight_of_a_displaced_beam_acts_at_the_displaced_middle():
+    """The middle is half a length behind the displaced end, along its axis."""
     beam = BeamLink({"radius": 0.02}, 1e16, 0.3, density=8000.0)
     turn, off = 0.3, np.array([0.01, 0.05])
     tip = Frame("tip", "hinge", [0.6, 0, 0], link=beam,
@@ -99,7 +99,7 @@ def test_a_straight_beam_off_its_place_has_its_weight_at_its_own_middle():
     assert found * np.sqrt(5.0) == pytest.approx([-weight * x], rel=1e-9)
 
 
-def test_a_couple_is_two_dead_forces():
+def test_couple_on_a_body_balances_as_two_dead_forces():
     """k a = m cos a: the work of a couple m is m sin a."""
     posture = on_a_hinge(10.0, Frame("arm", "hinge", [0.5, 0, 0]))
     angle = brentq(lambda a: 10.0 * a - 9.0 * np.cos(a), 0.0, 1.5)
@@ -109,7 +109,7 @@ def test_a_couple_is_two_dead_forces():
     assert answer.joint_screws[0, 2] == pytest.approx(angle, abs=1e-9)
 
 
-def test_a_force_on_the_platforms_body_is_the_platforms_load():
+def test_force_on_the_platform_body_equals_a_platform_load():
     posture = on_a_hinge(10.0, Frame("arm", "hinge", [0.5, 0, 0]))
     force = [0, 0, 0, 3.0, -20.0, 0]
     one = solve_exact(posture, force)
@@ -120,7 +120,7 @@ def test_a_force_on_the_platforms_body_is_the_platforms_load():
     assert one.potential == pytest.approx(other.potential, rel=1e-12)
 
 
-def test_the_base_carries_all_weight_where_it_hangs():
+def test_base_reactions_balance_the_whole_weight():
     """Forces and moments of a closed loop on its base, in the deformed posture."""
     rng = np.random.default_rng(3)
     robot = with_bodies(random_robot(rng, legs=3), rng)
@@ -143,7 +143,7 @@ def test_the_base_carries_all_weight_where_it_hangs():
     assert balance == pytest.approx(total, rel=1e-8, abs=1e-8 * np.abs(total).max())
 
 
-def test_the_linear_model_is_the_limit_of_small_weights():
+def test_linear_model_error_falls_with_the_square_of_the_weight():
     """Linear minus exact falls with the square of the weight and the errors."""
     robot = heavy(irsbot2_with(NUMBERS["cases"][0]), np.random.default_rng(1))
     tight = (replace(frame, clearance=None) for frame in robot.frames)
@@ -156,7 +156,7 @@ def test_the_linear_model_is_the_limit_of_small_weights():
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 5])
-def test_turning_robot_and_gravity_together_turns_the_answer(seed):
+def test_rotating_robot_and_gravity_together_rotates_the_solution(seed):
     rng = np.random.default_rng(seed)
     robot = heavy(random_robot(rng, legs=2), rng)
     R = rotation_matrix(rng.normal(size=3))
@@ -187,7 +187,7 @@ def test_a_start_under_other_loads_is_refused():
 
 @pytest.mark.exudyn
 @pytest.mark.parametrize("gravity", [[0, 0, -9.81], [300.0, -200.0, -500.0]])
-def test_the_simulation_agrees_about_weight_at_full_errors(gravity):
+def test_exact_solution_with_weight_equals_the_multibody_simulation(gravity):
     """Bodies of a kilogram or two off their frames' origins, links as springs, at 60 g
     too.  Poses agree as without weight, see ``test_exact``.  The energy alone is not
     least under a load: it differs by the weight's work on what the poses differ.
@@ -214,8 +214,8 @@ def test_the_simulation_agrees_about_weight_at_full_errors(gravity):
     assert other.energy == pytest.approx(answer.energy, abs=1e-8 * weight)
 
 
-def test_what_a_frame_holds_is_all_that_hangs_on_it():
-    """Moments and forces at points, summed up the tree; joints hold no own body."""
+def test_frame_wrench_is_the_sum_of_all_loads_beyond_the_frame():
+    """Forces and moments summed along the tree; joints omit their own body."""
     rng = np.random.default_rng(4)
     robot = with_bodies(random_robot(rng, legs=2), rng)
     posture = home_posture(robot)
@@ -243,8 +243,8 @@ def test_what_a_frame_holds_is_all_that_hangs_on_it():
 
 
 @pytest.mark.parametrize("point", [(0.0, 0.0, 0.0), (0.1, -0.2, 0.05)])
-def test_loads_of_many_conditions_are_those_of_each(point):
-    """Weights with the errors of each row, loads and gravity of each."""
+def test_loads_of_many_rows_equal_those_of_each_row(point):
+    """Each row has its own errors, load and gravity."""
     rng = np.random.default_rng(3)
     robot = heavy(random_robot(rng, legs=2), rng)
     rows = 3

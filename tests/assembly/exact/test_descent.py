@@ -32,7 +32,7 @@ def expansion(seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_an_expansion_has_the_potentials_slope_and_the_lagrangians_curvature(seed):
+def test_expansion_derivatives_equal_central_differences(seed):
     """Central differences of 1e-5; multipliers and basis are held."""
     local, h = expansion(seed)
     model, x, step = local.placement.model, local.placement.x, 1e-5
@@ -49,8 +49,8 @@ def test_an_expansion_has_the_potentials_slope_and_the_lagrangians_curvature(see
     assert np.abs(local.hessian @ h - bend).max() < 1e-6 * np.abs(bend).max()
 
 
-def test_closures_that_no_clearance_within_its_bounds_closes_have_no_step():
-    """A gap of 1 mm, rigid but for a clearance of 0.1 mm."""
+def test_gap_larger_than_the_clearance_raises_not_converged():
+    """A gap of 1 mm between rigid parts with a clearance of 0.1 mm."""
     frames = (
         Frame("one", clearance=Clearance(axial=1e-4)), Frame("tip", "one"),
         Frame("two", geometric_error=[0, 0, 0, 0, 0, 1e-3]), Frame("end", "two"),
@@ -63,8 +63,8 @@ def test_closures_that_no_clearance_within_its_bounds_closes_have_no_step():
         advance(local, 1.0, 0.0, False)
 
 
-def test_a_start_without_any_step_downhill_is_said_to_be_one(monkeypatch):
-    """Where no attempt is allowed, with how far it is open."""
+def test_missing_descent_step_is_reported_with_the_open_distance(monkeypatch):
+    """No attempt is allowed, so that no step can be found."""
     monkeypatch.setattr(descent, "_ATTEMPTS", 0)
     local, _ = expansion(0)
     with pytest.raises(NotConverged) as caught:

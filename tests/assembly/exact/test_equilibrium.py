@@ -1,4 +1,4 @@
-"""What holds at an equilibrium, and by how much where it does not: closed forms."""
+"""Conditions of an equilibrium, and their residuals elsewhere: closed forms."""
 
 import numpy as np
 import pytest
@@ -47,7 +47,7 @@ def two_slides(link=None):
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.9, 1.0, 2.0])
-def test_a_spring_lacks_the_part_of_its_moment_that_a_load_does_not_balance(share):
+def test_imbalance_of_a_spring_is_its_relative_unbalanced_moment(share):
     """|y - w| of |y - w| + w for a moment w = m / sqrt(k) of the scaled unknown y."""
     k, m = 10.0, 3.0
     y = share * m / np.sqrt(k)
@@ -57,12 +57,10 @@ def test_a_spring_lacks_the_part_of_its_moment_that_a_load_does_not_balance(shar
 
 
 @pytest.mark.parametrize(("size", "small"), [(1.0, 0.0), (1e-10, 1e-9)])
-def test_two_springs_lack_the_mean_of_what_they_pull_beside_what_closes_them(
-    size, small
-):
-    """Of 1 N/m each, pulling 3 and -1: the closure carries 2, and 1 is left over.
+def test_imbalance_of_two_closed_springs_is_their_mean_unbalanced_force(size, small):
+    """Springs of 1 N/m, stretched by 3 and -1 m: the closure carries 2 N, 1 N remains.
 
-    Relative to the 2 and the spring's own 1, and to a billionth of a metre's force.
+    The imbalance is relative to both forces and to the force of 1e-9 m.
     """
     spring = only(3, 1.0)
     posture = home_posture(Robot("pair", "one", (
@@ -91,15 +89,15 @@ def test_two_springs_lack_the_mean_of_what_they_pull_beside_what_closes_them(
         (0.3, 0.0, 0.0),
     ],
 )
-def test_a_clearance_lacks_what_no_bound_holds(at_share, force, expected):
+def test_imbalance_of_a_clearance_is_the_force_that_no_bound_carries(
+    at_share, force, expected
+):
     local = at(pin(axial=C), [at_share], [0, 0, 0, 0, 0, force])
     assert imbalance(local) == pytest.approx(expected, rel=1e-6, abs=1e-12)
 
 
 @pytest.mark.parametrize("F", [1.0, 300.0])
-def test_a_pin_that_is_pressed_against_its_rim_is_a_pendulum_of_its_clearances_length(
-    F,
-):
+def test_pressed_pin_has_the_curvature_of_a_pendulum_of_clearance_length(F):
     """-F c cos a: F c^2 / c per squared length along the rim, and nothing normal."""
     local = at(pin(radial=C), [0.6, 0.8], [0, 0, 0, 0.6 * F, 0.8 * F, 0])
     active, force = active_clearances(local)
@@ -116,15 +114,15 @@ def test_a_pin_that_is_pressed_against_its_rim_is_a_pendulum_of_its_clearances_l
     assert active_clearances(away)[1].tolist() == [0.0]
 
 
-def test_where_all_clearances_are_pressed_nothing_moves():
+def test_fully_pressed_clearances_leave_no_tangent_space():
     local = at(two_slides(), [1.0, 1.0], [0, 0, 0, 4.0, 0, 3.0])
     assert active_clearances(local)[1] == pytest.approx([3 * C, 4 * C], rel=1e-12)
     assert tangent_space(local)[0].shape == (2, 0)
     assert least_curvature(local) == np.inf
 
 
-def test_a_bound_presses_with_the_energy_that_a_larger_clearance_would_save():
-    """Of a closed chain: force times clearance is -c dE/dc, by central differences."""
+def test_contact_force_equals_the_energy_slope_by_the_clearance():
+    """In a closed chain, force times clearance is -c dE/dc, by central differences."""
     clearance, step = 5e-3, 1e-6
     low, here, high = (
         solve_exact(two_bars(0.06, Clearance(radial=c)))

@@ -67,8 +67,8 @@ def pendulum(stiffness, length):
 
 
 @pytest.mark.parametrize("longer", [1e-4, 0.05, 0.12])
-def test_two_bars_close_like_a_triangle(longer):
-    """The turns by the law of cosines; up to 0.4 rad."""
+def test_two_bars_close_by_the_law_of_cosines(longer):
+    """Both turns equal those of the triangle; up to 0.4 rad."""
     one, two = triangle(B + longer)
     answer = solve_exact(two_bars(longer))
     assert abs(one) > 0.2 or longer < 0.1
@@ -81,8 +81,8 @@ def test_two_bars_close_like_a_triangle(longer):
     assert np.abs(answer.platform_screw[:3] - turned).max() < 1e-12
 
 
-def test_the_linearisation_error_is_linear_minus_exact():
-    """The linear model keeps the triangle's slopes at home; differences of 1e-6."""
+def test_linearisation_error_is_the_linear_minus_the_exact_solution():
+    """The linear model uses the triangle's slopes at home; differences of 1e-6."""
     longer, step = 0.06, 1e-6
     slopes = (triangle(B + step) - triangle(B - step)) / (2 * step)
     energy = (np.array([K_ONE, K_TWO]) @ (slopes * longer) ** 2) / 2
@@ -102,7 +102,7 @@ def bar_force(e, longer):
 
 
 @pytest.mark.parametrize("longer", [0.05, 0.12])
-def test_a_stretching_bar_shares_the_energy(longer):
+def test_elastic_bar_takes_its_share_of_the_energy(longer):
     """One scalar equation; differences of 1e-6 leave 1e-10 of the force."""
     e = brentq(bar_force, -longer, longer, args=(longer,), xtol=1e-15)
     one, two = triangle(B + longer + e)
@@ -116,11 +116,11 @@ def test_a_stretching_bar_shares_the_energy(longer):
 
 
 @pytest.mark.parametrize(("longer", "bound"), [(0.12, 0.1), (-0.1, 0.4)])
-def test_a_bound_on_a_passive_joint_is_met_exactly(longer, bound):
-    """The bar gives way until the pin turns no more than it may.
+def test_passive_joint_stops_exactly_at_its_bound(longer, bound):
+    """The bar deforms until the pin is within its bound.
 
     The second bound is beyond what the linear model turns the pin by, 0.352 rad, and
-    met only by finite motions, 0.497 rad.
+    reached only by finite motions, 0.497 rad.
     """
     free = solve_exact(two_bars(longer, stretch=True))
 
@@ -145,8 +145,8 @@ def pin_gap(one, two, longer):
 
 
 @pytest.mark.parametrize("longer", [0.02, 0.06])
-def test_a_pin_with_clearance_presses_on_its_rim(longer):
-    """Least k turn^2 / 2 with the ends no farther apart than the clearance."""
+def test_pin_with_clearance_rests_on_its_rim_at_least_energy(longer):
+    """Least k turn^2 / 2 with the ends at most one clearance apart."""
     clearance = 5e-3
 
     def balance(z):
@@ -174,8 +174,8 @@ def test_a_pin_with_clearance_presses_on_its_rim(longer):
     )
 
 
-def test_within_the_clearance_nothing_is_forced():
-    """4 mm too long, 5 mm of clearance: closed without energy."""
+def test_error_within_the_clearance_stores_no_energy():
+    """The bar is 4 mm too long, the clearance is 5 mm."""
     answer = solve_exact(two_bars(4e-3, Clearance(radial=5e-3)))
     assert energy_of(answer.placement) < 1e-12  # [J], of 0.04 J without clearance
     assert answer.energy == 0.0  # 1e-31 J is rounding
@@ -183,8 +183,8 @@ def test_within_the_clearance_nothing_is_forced():
     assert answer.clearance_excess() == 0.0
 
 
-def test_closures_that_only_clearance_can_shut():
-    """Axes 0.1 rad apart are met by 0.1 rad of tilt, however far the bars turn."""
+def test_tilt_clearance_closes_axes_that_are_not_parallel():
+    """Axes 0.1 rad apart need 0.1 rad of tilt, for any turn of the bars."""
     posture = two_bars(0.06, Clearance(tilt=0.2))
     errors = posture.robot.errors.copy()
     errors[4, 0] = 0.1  # about bar two, which no spring and no pin can undo
@@ -194,8 +194,8 @@ def test_closures_that_only_clearance_can_shut():
     assert answer.closure_residual() < 1e-12
 
 
-def test_a_load_passes_through_clearance_alone():
-    """Rigid: far may move by 0.2 mm, near then by 0.5 + 0.2 mm, 5 N go through far."""
+def test_load_passes_through_pressed_clearances_of_rigid_parts():
+    """Clearance far moves by 0.2 mm, near by 0.5 + 0.2 mm; 5 N pass through far."""
     frames = (
         Frame("near", clearance=Clearance(axial=1e-3)),
         Frame("tip", "near", [0.1, 0, 0], [0.5, 0.2, -0.3]),
@@ -212,7 +212,7 @@ def test_a_load_passes_through_clearance_alone():
 
 
 @pytest.mark.parametrize(("force", "side"), [(30.0, 1.0), (10.0, -8.0), (0.0, 25.0)])
-def test_a_dead_load_bends_a_pendulum(force, side):
+def test_pendulum_under_a_dead_load_rests_at_its_moment_balance(force, side):
     """k a = L (P sin a + F cos a); with k = 10 and P L = 15 it buckles to 1.5 rad."""
     stiffness, length = 10.0, 0.5
 
@@ -230,14 +230,14 @@ def test_a_dead_load_bends_a_pendulum(force, side):
     assert answer.least_curvature == pytest.approx(curvature, rel=1e-7)
 
 
-def test_a_moment_does_the_work_moment_times_angle():
-    """k a = M, by the definition of the moment's work, at 0.8 rad too."""
+def test_moment_turns_a_pendulum_by_moment_over_stiffness():
+    """k a = M, by the definition of the moment's work, also at 0.8 rad."""
     answer = solve_exact(pendulum(10.0, 0.5), [0, 0, 8.0, 0, 0, 0])
     assert answer.joint_screws[0, 2] == pytest.approx(0.8, rel=1e-12)
     assert answer.platform_screw[:3] == pytest.approx([0, 0, 0.8], abs=1e-12)
 
 
-def test_an_unstable_equilibrium_is_recognised():
+def test_unstable_equilibrium_has_negative_least_curvature():
     """Upright under P L = 15 N m with k = 10 N m/rad: curvature k - P L = -5."""
     answer = solve_exact(pendulum(10.0, 0.5), [0, 0, 0, -30.0, 0, 0])
     assert answer.joint_screws[0, 2] == 0.0
@@ -262,7 +262,7 @@ def test_a_start_of_another_problem_is_refused(load):
         solve_exact(posture, load, start)
 
 
-def test_too_few_steps_are_said_to_be_too_few(monkeypatch):
+def test_too_few_steps_raise_not_converged_with_both_residuals(monkeypatch):
     monkeypatch.setattr(exact, "_STEPS", 1)
     posture = place_robot(irsbot2_with(CASES["literal"]), pose={"tz": -0.5})
     message = (
@@ -279,8 +279,8 @@ def test_too_few_steps_are_said_to_be_too_few(monkeypatch):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_the_paper_robot_converges_at_full_errors(case):
-    """Easy points, flat valleys of clearance, the rim of the workspace."""
+def test_exact_solution_of_the_paper_robot_converges_at_full_errors(case):
+    """Points in the middle, in flat valleys of clearance, at the workspace's rim."""
     places = [(0, -0.5), (-0.525, -0.1), (0.35, -0.075), (-0.6, 0), (0.025, -0.6)]
     poses = np.full((len(places), 6), np.nan)
     poses[:, [0, 2]] = places
@@ -297,7 +297,7 @@ def test_the_paper_robot_converges_at_full_errors(case):
 @pytest.mark.exudyn
 @pytest.mark.parametrize("place", [(0, -0.5), (-0.15, -0.6)])
 @pytest.mark.parametrize("case", CASES)
-def test_the_simulation_agrees_at_full_errors(case, place):
+def test_exact_solution_equals_the_multibody_simulation_at_full_errors(case, place):
     """Without clearances, links as springs: 1e-8 m and 1e-9 of the energy.
 
     The simulation applies K s half-way between a spring's ends, which is its energy's
@@ -328,8 +328,8 @@ def test_the_simulation_agrees_at_full_errors(case, place):
 @pytest.mark.slow
 @pytest.mark.exudyn
 @pytest.mark.parametrize("case", CASES)
-def test_the_simulation_agrees_with_clearances_at_full_errors(case):
-    """Its contacts yield by what twice their energy corrects to first order."""
+def test_exact_solution_with_clearances_equals_the_multibody_simulation(case):
+    """Contacts of the simulation deform; twice their energy is added (first order)."""
     from validation.multibody.simulation import simulate_assembly
 
     robot = irsbot2_with(CASES[case])

@@ -1,4 +1,4 @@
-"""Laws of the exact equilibrium: limits, invariance, balance of wrenches."""
+"""Properties of the exact equilibrium: limits, invariance, balance of wrenches."""
 
 import re
 from dataclasses import replace
@@ -29,8 +29,8 @@ CASES = {case["name"]: case for case in NUMBERS["cases"]}
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_the_linear_model_is_the_limit_of_small_errors(case):
-    """Differences of the pose fall as s^2, of the relative energy as s: halves of s."""
+def test_linear_model_error_falls_with_the_square_of_the_errors(case):
+    """The pose differs by s^2, the relative energy by s, for errors scaled by s."""
     robot = without_clearance(irsbot2_with(CASES[case]))
     posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.45})
     turns, shifts, energies = [], [], []
@@ -45,7 +45,7 @@ def test_the_linear_model_is_the_limit_of_small_errors(case):
         assert np.abs(found - slope).max() < 0.05
 
 
-def test_springs_carry_what_the_closures_transmit():
+def test_spring_wrenches_equal_the_wrenches_of_the_closures():
     """K s is the wrench that works on the screw itself: K s = J(-s)^T w.
 
     w is read where the spring ends; the tests' beams are turned by 0.2 rad there, the
@@ -69,8 +69,8 @@ def test_springs_carry_what_the_closures_transmit():
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 5])
-def test_energy_falls_with_errors_as_the_wrenches_say(seed):
-    """dE / d(delta l) = -force: the first body longer, against solving again."""
+def test_energy_slope_by_an_error_equals_the_wrench(seed):
+    """dE / d(delta l) = -force for the first body, by differences of solutions."""
     rng = np.random.default_rng(seed)
     robot, step = random_robot(rng, legs=3), 1e-6
     answer = solve_exact(home_posture(robot))
@@ -90,8 +90,8 @@ def test_energy_falls_with_errors_as_the_wrenches_say(seed):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_slowly_curved_valleys_are_followed_to_their_end(seed):
-    """Rods of a Delta spin by radians under a load, for 1e-6 of the energy."""
+def test_exact_solution_converges_along_flat_energy_valleys(seed):
+    """Rods of a Delta spin by radians under a load; the energy changes by 1e-6."""
     rng = np.random.default_rng(seed)
     robot = delta()
     errors = 1e-4 * rng.uniform(-1, 1, robot.errors.shape)
@@ -109,12 +109,12 @@ def test_slowly_curved_valleys_are_followed_to_their_end(seed):
         ("five_bar", 0, 0.01),
     ],
 )  # fmt: skip
-def test_a_load_along_one_axis_moves_by_the_slope_of_the_potential(
+def test_platform_displacement_equals_the_potential_slope_by_the_load(
     name, component, value
 ):
     """Castigliano, also where symmetry leaves clearances unloaded that touch.
 
-    They carry forces of rounding, and may move within it for ever.
+    They carry forces of the size of rounding, and may move without end.
     """
     posture = home_posture(load_robot(name))
     unit, step = np.eye(6)[component], 1e-3
@@ -143,8 +143,8 @@ def loaded_arm(pieces=1):
     return solve_exact(posture, [1.0, -2.0, 0.5, 20.0, 30.0, -40.0])
 
 
-def test_a_cut_beam_bends_from_where_its_error_puts_it():
-    """Small bending of links that are turned by 0.02 rad: in pieces as in one."""
+def test_beam_in_pieces_bends_from_its_displaced_position():
+    """Links turned by 0.02 rad bend a little: equal in pieces and as one."""
     whole, cut = loaded_arm(), loaded_arm(pieces=2)
     assert len(cut.placement.transforms) > len(whole.placement.transforms)
     for name in ("link_screws", "wrenches"):
@@ -155,8 +155,8 @@ def test_a_cut_beam_bends_from_where_its_error_puts_it():
             assert other[:, part] == pytest.approx(one[:, part], abs=2e-2 * size)
 
 
-def test_a_solution_nearby_leads_to_the_same_equilibrium():
-    """Another load a hundredth larger; the solution of another robot is no start."""
+def test_start_from_a_nearby_solution_gives_the_same_equilibrium():
+    """The load is 1 % larger; the solution of another robot is not used as a start."""
     posture = loaded_arm().posture
     load = np.array([1.0, -2.0, 0.5, 20.0, 30.0, -40.0])
     before = solve_exact(posture, load)
@@ -171,8 +171,8 @@ def test_a_solution_nearby_leads_to_the_same_equilibrium():
 
 
 @pytest.mark.parametrize("point", [(0.2, 0.0, 0.0), (-0.1, 0.3, 0.0)])
-def test_a_force_at_a_point_of_the_platform_turns_with_it(point):
-    """k a = r x F with r = L + point, turned by a; and so starts the linear model."""
+def test_force_at_a_platform_point_moves_with_the_platform(point):
+    """k a = r x F with r = L + point, turned by a; also in the linear start."""
     k, L, force = 10.0, 0.5, np.array([4.0, 9.0])
     posture = pendulum(k, L)
     x, y = L + point[0], point[1]
@@ -197,7 +197,7 @@ def test_a_force_at_a_point_of_the_platform_turns_with_it(point):
     assert given.platform_screw == pytest.approx(answer.platform_screw, rel=1e-12)
 
 
-def test_an_answer_shows_its_load_its_energy_and_how_good_it_is():
+def test_solution_text_states_load_energy_and_certificate():
     text = repr(solve_exact(pendulum(10.0, 0.5), [0, 0, 2.0, 0, 0, 0]))
     assert text.startswith("ExactAssembly of bar\n")
     lines = dict(re.split(r"  +", line.strip()) for line in text.splitlines()[1:])
@@ -211,11 +211,11 @@ def test_an_answer_shows_its_load_its_energy_and_how_good_it_is():
 
 @pytest.mark.parametrize("pieces", [1, 3, 5])
 @pytest.mark.parametrize("radius", [0.01, 0.03])
-def test_a_load_of_any_size_is_in_balance_whatever_it_acts_on(pieces, radius):
-    """From newtons down to nanonewtons the pose is as the load: the beam is linear.
+def test_exact_solution_balances_loads_from_nanonewtons_to_newtons(pieces, radius):
+    """The beam is linear: displacements are proportional to loads down to nanonewtons.
 
-    What a step gains is then far below the rounding of the load's work, and it is
-    taken all the same.
+    The energy change of a step is then below the rounding of the load's work, and
+    the step is accepted nevertheless.
     """
     link = BeamLink({"radius": radius}, 7e10, 0.3, pieces=pieces)
     arm = Frame("arm", translation=[0.5, 0.1, 0.2], rotation=[0, 0, 0.4], link=link)
@@ -235,15 +235,15 @@ def test_a_load_of_any_size_is_in_balance_whatever_it_acts_on(pieces, radius):
                 )
 
 
-def test_robot_without_errors_stays_where_it_is():
+def test_robot_without_errors_has_zero_displacement_and_energy():
     robot = hexapod()
     answer = solve_exact(home_posture(robot.with_errors(0 * robot.errors)))
     assert answer.energy == 0.0
     assert np.abs(answer.platform_screw).max() < 1e-12
 
 
-def test_closures_open_by_rounding_of_a_file_store_no_energy():
-    """Cranks of six digits, open by up to 1e-6 m, are as closed as they can be."""
+def test_closures_open_by_file_rounding_store_no_energy():
+    """Crank lengths of six digits leave the closures open by up to 1e-6 m."""
     posture = home_posture(parallelograms(digits=6))
     assert posture.mismatch > 1e-9
     assert solve_exact(posture).energy == 0.0

@@ -1,4 +1,4 @@
-"""Every solver by numpy and Clarabel alone, and its answer names the method."""
+"""Solvers with the reference method, which uses NumPy and Clarabel only."""
 
 from dataclasses import replace
 
@@ -86,7 +86,7 @@ def nothing_compiled(monkeypatch):
 
 
 @pytest.mark.parametrize("question", QUESTIONS)
-def test_reference_calls_nothing_compiled(question, nothing_compiled):
+def test_reference_method_calls_no_compiled_function(question, nothing_compiled):
     ask, posture = QUESTIONS[question], beams()
     compiled = ask(posture, "compiled")
     nothing_compiled()
@@ -94,8 +94,8 @@ def test_reference_calls_nothing_compiled(question, nothing_compiled):
     assert np.all(ask(posture, "reference").method == "reference")
 
 
-def test_compiled_answers_of_these_robots_need_what_is_refused(nothing_compiled):
-    """Else the test above would say nothing."""
+def test_compiled_method_calls_the_functions_that_the_fixture_forbids(nothing_compiled):
+    """Without this the test above could pass without a check."""
     posture = beams()
     nothing_compiled()
     for question in ("energy", "margin", "exact", "deflection, finite"):
@@ -104,13 +104,13 @@ def test_compiled_answers_of_these_robots_need_what_is_refused(nothing_compiled)
 
 
 @pytest.mark.parametrize("question", QUESTIONS)
-def test_another_word_is_refused(question):
+def test_unknown_method_name_is_refused(question):
     with pytest.raises(ValueError, match="is 'numpy', expected 'compiled' or 'ref"):
         QUESTIONS[question](beams(), "numpy")
 
 
 @pytest.mark.parametrize("start", ["start", "near"])
-def test_reference_does_not_start_from_a_compiled_answer(start):
+def test_reference_method_refuses_a_compiled_start(start):
     posture = beams()
     compiled, reference = (
         {
@@ -126,8 +126,8 @@ def test_reference_does_not_start_from_a_compiled_answer(start):
 
 
 @pytest.mark.parametrize("name", sorted(BUILT_IN))
-def test_both_methods_end_at_equilibria(name):
-    """Closed, within the cones, and in balance; of one energy if they are the same."""
+def test_both_methods_satisfy_the_equilibrium_conditions(name):
+    """Closed, within the cones and in balance; the energies are equal."""
     posture = home_posture(BUILT_IN[name]())
     one, other = (solve_exact(posture, LOAD, method=method) for method in METHODS)
     for found in (one, other):
@@ -140,7 +140,7 @@ def test_both_methods_end_at_equilibria(name):
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_both_methods_follow_a_load_through_a_contact(state):
+def test_both_methods_give_the_same_deflection_curve_through_contact(state):
     one, other = (
         deflection_curve(beams(), 4, LOADS, state=state, method=method)
         for method in METHODS

@@ -35,8 +35,8 @@ def moved_unknowns(posture, rng, size):
 
 
 @pytest.mark.parametrize("size", [1e-7, 1e-2, 0.5, 1.5])
-def test_motions_are_exponentials_of_screws(rng, size):
-    """Against the matrix exponential; rounding only."""
+def test_finite_motion_equals_the_matrix_exponential_of_its_screw(rng, size):
+    """Equal to SciPy's matrix exponential up to rounding."""
     s = size * rng.normal(size=6)
     generator = np.zeros((4, 4))
     x, y, z = s[:3]
@@ -48,7 +48,7 @@ def test_motions_are_exponentials_of_screws(rng, size):
 
 
 @pytest.mark.parametrize("size", [1e-4, 0.1, 1.0])
-def test_the_jacobian_is_the_mean_of_the_motions_met_on_the_way(rng, size):
+def test_left_jacobian_equals_its_power_series(rng, size):
     """J = integral of Ad(exp(t s)), the series of ad^n / (n + 1)!."""
     s = size * rng.normal(size=6)
     J, term = np.eye(6), np.eye(6)
@@ -59,8 +59,8 @@ def test_the_jacobian_is_the_mean_of_the_motions_met_on_the_way(rng, size):
 
 
 @pytest.mark.parametrize("size", [0.02, 0.3, 1.5, 3.0])
-def test_second_derivative_of_the_exponential(rng, size):
-    """By the product's own expansion, whatever the turn; differences leave 1e-8.
+def test_second_form_equals_differences_of_the_exponential(rng, size):
+    """By the product's expansion, for any turn; central differences leave 1e-8.
 
     log(exp(s + h) exp(-s)) = J h + D(h, h) / 2 + O(h^3): the even part is D.
     """
@@ -83,7 +83,7 @@ def test_second_derivative_of_the_exponential(rng, size):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_without_motion_the_closures_are_the_linear_ones(seed):
+def test_closure_rows_without_motion_equal_the_linear_rows(seed):
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, legs=3)
     posture = home_posture(robot.with_errors(0 * robot.errors))
@@ -97,7 +97,7 @@ def test_without_motion_the_closures_are_the_linear_ones(seed):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_first_derivatives_of_closures_and_platform(seed):
+def test_closure_and_platform_rows_equal_central_differences(seed):
     """Central differences of 1e-5: error 1e-10 of third derivatives of order 1."""
     rng = np.random.default_rng(seed)
     model, x, h = moved_unknowns(home_posture(random_robot(rng, legs=3)), rng, 0.05)

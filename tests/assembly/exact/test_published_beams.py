@@ -67,8 +67,8 @@ def tip_moved(posture, load):
     return solve_exact(posture, load).platform_screw[3:]
 
 
-def test_for_small_motions_a_beam_in_pieces_is_the_whole_beam():
-    """Beams end to end are one beam: the same stiffness, and every share its own."""
+def test_beam_in_pieces_equals_the_whole_beam_for_small_motions():
+    """The stiffness and the share of each link are equal."""
     robot = load_robot("delta")
     links = {f.name: replace(f.link, pieces=3) for f in robot.frames if f.link}
     cut = place_robot(robot.with_links(links), {"tx": 0.1})
@@ -85,8 +85,8 @@ def test_for_small_motions_a_beam_in_pieces_is_the_whole_beam():
 
 
 @pytest.mark.parametrize("force", PRINCETON)
-def test_the_princeton_beam_bends_as_ansys_beams_do(force):
-    """8 pieces: to 1.5 % (the twist's share), 0.3 % across; a linear beam 9 and 20 %.
+def test_princeton_beam_deflection_equals_published_ansys_beams(force):
+    """8 pieces: to 1.5 % along, 0.3 % across; a linear beam is off by 9 and 20 %.
 
     The published solids differ from the published beams by up to 2.7 % across and 4 %
     along the height, so that no beam can be within 1 % of both.
@@ -114,8 +114,8 @@ SOLID = {
 
 
 @pytest.mark.slow
-def test_a_root_that_cannot_warp_makes_the_princeton_beam_a_solid():
-    """8 pieces: 0.6 %; without it 1.5 % along the height, where twist counts most."""
+def test_princeton_beam_with_a_root_that_cannot_warp_equals_the_solid():
+    """8 pieces: to 0.6 %; with free warping 1.5 % along the height."""
     root = root_link()
     for (force, degrees), solid in SOLID.items():
         moved = in_pieces(force, np.radians(degrees), root)
@@ -144,7 +144,7 @@ def curved_cantilever(chords, pieces):
 ACROSS = [0, 0, 0, 0, 0, 600.0]  # lb
 
 
-def test_a_curved_cantilever_leaves_its_plane_as_published():
+def test_curved_cantilever_out_of_plane_deflection_equals_literature():
     """Published values differ among themselves by 1 %: Bathe and Bolourchi, kynema.
 
     The error falls with the square of the chords.
@@ -158,8 +158,8 @@ def test_a_curved_cantilever_leaves_its_plane_as_published():
 
 
 @pytest.mark.exudyn
-def test_a_curved_cantilever_bends_as_geometrically_exact_beams():
-    """The same chords in Exudyn, 4 elements each; pieces of ours extrapolated, 1e-4."""
+def test_curved_cantilever_deflection_equals_geometrically_exact_beams():
+    """The same chords in Exudyn, 4 elements each; our pieces extrapolated: to 1e-4."""
     simulated = simulate_assembly(curved_cantilever(8, 1), load=ACROSS)
     tips = [tip_moved(curved_cantilever(8, n), ACROSS) for n in (2, 4)]
     tip = (4 * tips[1] - tips[0]) / 3
@@ -182,8 +182,8 @@ def twisted_beam(count):
     return home_posture(Robot("twisted", frames[-1].name, tuple(frames)))
 
 
-def test_a_twisted_beam_bends_as_published():
-    """Six digits once extrapolated; the published solid is 0.2 to 0.6 % off both."""
+def test_twisted_beam_deflection_equals_literature():
+    """Six digits after extrapolation; the published solid is 0.2 to 0.6 % off."""
     load = [0, 0, 0, 0, 0, -4e6]
     tips = [tip_moved(twisted_beam(n), load) for n in (8, 16, 32)]
     rate = np.linalg.norm(tips[0] - tips[1]) / np.linalg.norm(tips[1] - tips[2])
@@ -213,14 +213,14 @@ def composite_beam(count):
     return home_posture(Robot("composite", frames[-1].name, frames))
 
 
-def test_a_composite_beam_bends_and_twists_as_published():
-    """150 lb across; six digits once extrapolated."""
+def test_composite_beam_deflection_equals_literature():
+    """A force of 150 lb across; six digits after extrapolation."""
     tips = [tip_moved(composite_beam(n), [0, 0, 0, 0, 0, 150.0]) for n in (16, 32)]
     published = [-9.02726627566e-2, -6.47488486259e-2, 1.22973648292]
     np.testing.assert_allclose((4 * tips[1] - tips[0]) / 3, published, rtol=1e-6)
 
 
-def test_a_plane_cantilever_bends_as_published():
+def test_plane_cantilever_deflection_equals_literature():
     """ux 0.15097, uy 0.71057 m; the error falls with the square of the pieces.
 
     Stiff across its plane, as the published model has no other; left soft there, this
@@ -242,7 +242,7 @@ def test_a_plane_cantilever_bends_as_published():
 
 
 @pytest.mark.parametrize("angle", [1.0, 3.0])
-def test_a_moment_rolls_a_beam_up_to_a_circle(angle):
+def test_beam_under_an_end_moment_bends_to_a_circular_arc(angle):
     """Tip at (L sin a / a, L (1 - cos a) / a), a = M L / EI; half of a turn and less.
 
     The moment's work m . theta is its own in a plane, up to a turn of pi.
@@ -261,7 +261,7 @@ def test_a_moment_rolls_a_beam_up_to_a_circle(angle):
 
 
 @pytest.mark.parametrize("pieces", [4, 8, 16])
-def test_a_column_in_pieces_buckles_at_euler_s_load(pieces):
+def test_column_in_pieces_buckles_at_the_euler_load(pieces):
     """pi^2 EI / 4 L^2 of a clamped column; least eigenvalue of K through zero there.
 
     Pieces buckle earlier by pi^2 / 24 n^2: half of it as rigid bars on springs do,
@@ -314,10 +314,10 @@ def bauchau(pieces):
 @pytest.mark.parametrize(
     ("pieces", "in_plane", "across"), [(1, 7e-3, 5e-3), (16, 1e-4, 1e-3)]
 )
-def test_a_four_bar_with_a_tilted_hinge_is_forced_together_as_published(
+def test_four_bar_with_a_tilted_hinge_has_the_published_deflections(
     pieces, in_plane, across
 ):
-    """16 pieces: 1e-4 in the plane, 0.1 % across it; one spring a bar beside them."""
+    """16 pieces: 1e-4 in the plane, 0.1 % across; one spring per bar for comparison."""
     robot = bauchau(pieces)
     for angle, *published in BAUCHAU:
         posture = place_robot(robot, joints={"crank": -angle})
@@ -330,8 +330,8 @@ def test_a_four_bar_with_a_tilted_hinge_is_forced_together_as_published(
 
 @pytest.mark.exudyn
 @pytest.mark.parametrize("row", BAUCHAU)
-def test_the_cross_check_forces_that_four_bar_together_as_published(row):
-    """Our model of it in Exudyn, 8 elements a bar: 1e-4 in the plane, 0.1 % across."""
+def test_multibody_simulation_of_that_four_bar_has_published_deflections(row):
+    """Our Exudyn model, 8 elements per bar: to 1e-4 in the plane, 0.1 % across."""
     angle, *published = row
     posture = place_robot(bauchau(1), joints={"crank": -angle})
     model = SimulationModel(links="beam", elements=8)

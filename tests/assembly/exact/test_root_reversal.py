@@ -1,4 +1,4 @@
-"""A tree's root is a choice: the robot built from its platform is the same robot."""
+"""Results do not depend on which end of the tree is its root."""
 
 from dataclasses import dataclass
 
@@ -88,7 +88,7 @@ def from_the_platform(legs):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_the_robot_built_from_its_platform_is_the_same(seed):
+def test_solution_does_not_depend_on_the_root_of_the_tree(seed):
     legs, platform = random_legs(np.random.default_rng(seed))
     one = solve_assembly(home_posture(robot_of(legs)))
     other = solve_assembly(home_posture(robot_of(from_the_platform(legs))))
@@ -139,8 +139,8 @@ def test_rotation_errors_do_not_depend_on_the_root(seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_finite_motions_depend_on_the_root_by_second_order_only(seed):
-    """An error before or after a turn is another error: it falls with its square."""
+def test_exact_energy_depends_on_the_root_by_second_order_only(seed):
+    """Errors before and after a turn differ; the difference falls with their square."""
     legs, _ = random_legs(np.random.default_rng(seed))
     off = []
     for s in (1.0, 0.5):

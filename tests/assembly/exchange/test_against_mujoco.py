@@ -1,4 +1,4 @@
-"""Forward kinematics of what is read and written, by MuJoCo."""
+"""Forward kinematics of files read and written, compared with MuJoCo."""
 
 import re
 
@@ -34,7 +34,7 @@ def largest_gap(model, mechanism, rng):
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "delta", "hexapod", "arm6"])
-def test_mujoco_reads_what_is_written(name, tmp_path, rng):
+def test_written_mjcf_has_the_same_kinematics_in_mujoco(name, tmp_path, rng):
     path = tmp_path / "robot.xml"
     convert(name, path)
     model = mujoco.MjModel.from_xml_path(str(path))
@@ -46,7 +46,7 @@ def test_mujoco_reads_what_is_written(name, tmp_path, rng):
 
 
 @pytest.mark.parametrize("name", ["cassie_like", "robot_delta", "wl16_like"])
-def test_urdfs_are_read_as_mujoco_reads_them(name, rng):
+def test_urdf_kinematics_equal_those_of_mujoco(name, rng):
     path = example(name)
     text = re.sub(r"<(visual|collision)>.*?</\1>", "", path.read_text(), flags=re.S)
     ours = '<mujoco><compiler fusestatic="false" balanceinertia="true"/></mujoco>'

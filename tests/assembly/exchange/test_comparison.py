@@ -1,4 +1,4 @@
-"""The other program's process: whatever becomes of it, the conversion goes on."""
+"""The process of the other program: the conversion continues when it fails."""
 
 import importlib.util
 
@@ -26,7 +26,7 @@ def path(tmp_path):
         ("import time; time.sleep(60)", "MuJoCo took longer than 0.5 s"),
     ],
 )
-def test_a_reader_that_ends_or_hangs_is_said_and_nothing_else(
+def test_failed_or_hanging_mujoco_process_is_reported_as_the_reason(
     worker, reason, path, monkeypatch
 ):
     pytest.importorskip("mujoco", reason="MuJoCo is not installed")
@@ -37,7 +37,7 @@ def test_a_reader_that_ends_or_hangs_is_said_and_nothing_else(
     assert answer.agrees
 
 
-def test_without_mujoco_nothing_is_compared_and_that_is_said(
+def test_conversion_without_mujoco_reports_the_missing_comparison(
     path, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
@@ -48,7 +48,7 @@ def test_without_mujoco_nothing_is_compared_and_that_is_said(
     assert line in answer.text()
 
 
-def test_a_command_whose_file_is_read_otherwise_exits_with_1(
+def test_convert_command_exits_with_1_if_mujoco_differs(
     run, path, tmp_path, monkeypatch
 ):
     other = comparison.Comparison("MuJoCo", "robot.xml", "", 1, 1, 0, 0.3, "body a")

@@ -1,4 +1,4 @@
-"""``forcefit convert``: the example robots close, the built-in ones come back."""
+"""``forcefit convert``: example robots close, built-in robots survive a round trip."""
 
 import json
 from dataclasses import replace
@@ -30,8 +30,8 @@ def test_example_robots_convert_and_close(name, tmp_path):
 
 
 @pytest.mark.slow
-def test_types_as_a_generator_writes_them_may_be_points(tmp_path):
-    """Kangaroo closes without a word more, and the answer says what was taken."""
+def test_loops_of_the_generator_default_type_are_converted_to_points(tmp_path):
+    """Kangaroo closes without options, and the result reports the assumption."""
     answer = convert(example("kangaroo_like"), tmp_path / "robot.toml")
     assert answer.open_after < 1e-9
     assert answer.difference < 1e-12
@@ -41,8 +41,8 @@ def test_types_as_a_generator_writes_them_may_be_points(tmp_path):
 
 
 @pytest.mark.slow
-def test_kangaroo_closes_with_the_points_of_its_authors_later_file(tmp_path):
-    """There loops 3, 4 and 5 are 6d and all others 3d (kangaroo_like_2legs)."""
+def test_kangaroo_closes_with_the_points_of_its_later_loop_file(tmp_path):
+    """In that file (kangaroo_like_2legs) loops 3, 4 and 5 are 6d, all others 3d."""
     points = [f"closedloop{i}_A" for i in (0, 2, 6, 7, 8, 9, 10, 11)]
     answer = convert(example("kangaroo_like"), tmp_path / "robot.toml", points=points)
     assert answer.taken == ()
@@ -74,7 +74,7 @@ def bent_loop(folder, types):
 
 
 @pytest.mark.parametrize("types", ["", "type: ['6d']\n"])
-def test_a_loop_of_a_default_type_may_be_a_point(types, tmp_path):
+def test_loop_of_a_default_type_closes_as_a_point(types, tmp_path):
     path = bent_loop(tmp_path, types)
     answer = convert(path, tmp_path / "robot.toml")
     assert answer.open_after < 1e-9
@@ -85,7 +85,7 @@ def test_a_loop_of_a_default_type_may_be_a_point(types, tmp_path):
         convert(path, tmp_path / "robot.toml", points=())
 
 
-def test_points_are_loops_of_the_file(run, tmp_path):
+def test_points_option_accepts_only_loops_of_the_file(run, tmp_path):
     path = bent_loop(tmp_path, "type: ['3d']\n")
     target = tmp_path / "robot.toml"
     status, _, error = run("convert", path, "-o", target, "--points", "gaol")
@@ -111,8 +111,10 @@ QUICK = {"hexapod": "urdf", "delta": "xml", "orthoglide": "", "irsbot2": ""}
                   else pytest.mark.slow)
      for name in BUILT_IN for ending in ("urdf", "xml")],
 )  # fmt: skip
-def test_built_in_robots_come_back(name, ending, tmp_path):
-    """Drives, platform, and every frame of the same name, at home and elsewhere."""
+def test_built_in_robots_keep_their_frames_after_conversion_and_back(
+    name, ending, tmp_path
+):
+    """Drives, platform, and every frame by its name, in the home pose and elsewhere."""
     there, back = tmp_path / f"robot.{ending}", tmp_path / "back.toml"
     assert convert(name, there).difference < 1e-12
     assert convert(there, back).difference < 1e-12
@@ -141,8 +143,8 @@ def weight_on_the_ground(robot):
 
 
 @pytest.mark.parametrize("ending", ["urdf", "xml"])
-def test_masses_come_back(ending, tmp_path):
-    """Beams of a density return as masses: the same weight at the same place."""
+def test_masses_are_equal_after_conversion_and_back(ending, tmp_path):
+    """Beams with a density become masses: the same weight at the same place."""
     there, back = tmp_path / f"robot.{ending}", tmp_path / "back.toml"
     convert("arm6", there)
     convert(there, back)
@@ -153,7 +155,7 @@ def test_masses_come_back(ending, tmp_path):
 
 
 @pytest.mark.parametrize("ending", ["urdf", "xml"])
-def test_calibrated_geometry_is_built_in(ending, tmp_path):
+def test_conversion_builds_calibrated_lengths_into_the_geometry(ending, tmp_path):
     """A four-bar with a longer crank and a longer rocker, which must close again."""
     robot = BUILT_IN["four_bar"]()
     source = tmp_path / "robot.toml"
@@ -176,7 +178,7 @@ def test_calibrated_geometry_is_built_in(ending, tmp_path):
     assert places["end_rocker"] == pytest.approx(places["end_coupler"], abs=1e-9)
 
 
-def test_errors_that_no_rigid_robot_closes_are_said(tmp_path):
+def test_errors_that_no_rigid_robot_can_close_are_reported(tmp_path):
     """The paper's robot is overconstrained: a longer link leaves its loops open."""
     robot = BUILT_IN["irsbot2"]()
     errors = np.zeros((len(robot.frames), 6))
@@ -188,7 +190,7 @@ def test_errors_that_no_rigid_robot_closes_are_said(tmp_path):
     assert any("forced assembly" in line for line in answer.left_out)
 
 
-def test_an_overlay_adds_what_a_urdf_cannot_hold(tmp_path):
+def test_overlay_adds_platform_clearances_and_links_to_a_urdf(tmp_path):
     overlay = tmp_path / "overlay.toml"
     overlay.write_text(
         'platform = "effector"\n[[frame]]\nname = "free*"\n'
@@ -216,7 +218,7 @@ def test_an_overlay_adds_what_a_urdf_cannot_hold(tmp_path):
         ('platform = "efector"\n', 'did you mean "effector"?'),
     ],
 )
-def test_wrong_overlays_are_refused(run, text, message, tmp_path):
+def test_invalid_overlay_is_refused_with_its_message(run, text, message, tmp_path):
     overlay = tmp_path / "overlay.toml"
     overlay.write_text(text)
     status, out, err = run(
@@ -229,7 +231,7 @@ def test_wrong_overlays_are_refused(run, text, message, tmp_path):
     assert not (tmp_path / "robot.toml").exists()
 
 
-def test_another_program_s_file_is_not_overwritten(run, tmp_path):
+def test_convert_refuses_to_overwrite_a_file_of_another_program(run, tmp_path):
     target = tmp_path / "robot.urdf"
     target.write_text("<robot/>")
     status, _, err = run("convert", "arm6", "-o", target)
@@ -241,8 +243,8 @@ def test_another_program_s_file_is_not_overwritten(run, tmp_path):
     assert "expected .toml or .urdf or .xml" in err
 
 
-def test_joints_of_several_freedoms_and_mimics(tmp_path):
-    """A ball is three turns, a mimic a drive of its own; what is left out is said."""
+def test_joints_of_several_freedoms_become_single_joints_and_mimics_drives(tmp_path):
+    """A ball becomes three turns, a mimic a drive; omissions are reported."""
     source = tmp_path / "robot.urdf"
     joint = (
         '<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/>{4}'
@@ -274,7 +276,7 @@ def test_joints_of_several_freedoms_and_mimics(tmp_path):
     assert R @ [0, 0, 1] == pytest.approx([-1, 0, 0], abs=1e-12)
 
 
-def test_the_command_says_what_it_did(run, tmp_path):
+def test_convert_command_reports_files_and_largest_difference(run, tmp_path):
     target = tmp_path / "robot.toml"
     status, out, _ = run("convert", "delta", "-o", tmp_path / "d.urdf", "--json", "-")
     table = json.loads(out)
@@ -288,8 +290,8 @@ def test_the_command_says_what_it_did(run, tmp_path):
 
 
 @pytest.mark.parametrize("given", ["rocker", "tip"])
-def test_a_platform_that_an_overlay_names_is_not_said_to_be_missing(given, tmp_path):
-    """A body with a frame of its own, and one that gets it because it is named."""
+def test_platform_named_by_an_overlay_is_not_reported_as_missing(given, tmp_path):
+    """A body with its own frame, and a body that gets one because it is named."""
     text = (
         '<robot name="r"><link name="a"/><link name="rocker"/><link name="tip"/>'
         '<joint name="j" type="revolute"><parent link="a"/><child link="rocker"/>'
@@ -305,7 +307,7 @@ def test_a_platform_that_an_overlay_names_is_not_said_to_be_missing(given, tmp_p
     assert "no platform is named" in convert(source, tmp_path / "robot.toml").text()
 
 
-def test_a_platform_may_have_the_name_of_its_joint(tmp_path):
+def test_platform_with_the_name_of_its_joint_is_found(tmp_path):
     """MJCF often gives both one name; only the body can be the platform."""
     source, overlay = tmp_path / "robot.xml", tmp_path / "overlay.toml"
     source.write_text(
@@ -317,8 +319,8 @@ def test_a_platform_may_have_the_name_of_its_joint(tmp_path):
     assert answer.robot.platform == "wrist.link"
 
 
-def test_file_of_thousands_of_joints_is_refused_at_once(tmp_path):
-    """As a robot file is, in seconds also for a long chain."""
+def test_file_of_more_than_2000_joints_is_refused(tmp_path):
+    """The same limit as for a robot file; a long chain is refused within seconds."""
     steps = "".join(
         f'<link name="l{i + 1}"/><joint name="j{i}" type="continuous">'
         f'<parent link="l{i}"/><child link="l{i + 1}"/></joint>'

@@ -1,4 +1,4 @@
-"""Ranges of joints: read from every format, written back, infinite ones left out."""
+"""Joint ranges: read from every format and written back; infinite ones are omitted."""
 
 from dataclasses import replace
 
@@ -39,7 +39,7 @@ def test_urdf_ranges_become_limits(tmp_path):
     assert found == {"turn": (-1.5, 2.0), "slide": (-0.1, 0.3)}
 
 
-def test_urdf_ranges_that_bind_nothing_are_none(tmp_path):
+def test_infinite_or_missing_urdf_ranges_give_no_limits(tmp_path):
     text = URDF.format(turn="", slide='lower="-1e16" upper="inf"')
     assert limits(tmp_path, "arm.urdf", text) == {"turn": None, "slide": None}
 
@@ -71,14 +71,14 @@ SDF = """<sdf version="1.9"><model name="m"><link name="a"/><link name="b">
 def test_sdf_ranges_of_a_universal_joint_become_limits_of_each_turn(
     tmp_path, kind, held
 ):
-    """From whichever side the joint is reached its coordinates are the same."""
+    """The coordinates do not depend on the side from which the joint is reached."""
     text = SDF.format(first="world", second=held, kind=kind)
     found = limits(tmp_path, "m.sdf", text)
     assert found == {"cross.first": (-0.3, 0.4), "cross.second": (-0.5, 0.6)}
 
 
 def test_springs_of_a_universal_joint_become_stiffness_about_each_axis(tmp_path):
-    """Each acts about the own z of its frame, nothing else is elastic there."""
+    """Each spring acts about the z axis of its frame; all other entries are rigid."""
     text = SDF.format(first="world", second="a", kind="universal")
     for tag, k in (("axis", 5), ("axis2", 7)):
         spring = f"<dynamics><spring_stiffness>{k}</spring_stiffness></dynamics>"
@@ -98,7 +98,7 @@ def test_springs_of_a_universal_joint_become_stiffness_about_each_axis(tmp_path)
         assert np.isinf(np.delete(stiffness, 2)).all()
 
 
-def test_posture_beyond_one_turn_of_a_universal_joint_is_told(tmp_path):
+def test_posture_beyond_a_limit_of_a_universal_joint_is_reported(tmp_path):
     text = SDF.format(first="world", second="a", kind="universal")
     (tmp_path / "m.sdf").write_text(text)
     robot = load_robot_of_any_kind(tmp_path / "m.sdf")
@@ -128,7 +128,7 @@ def test_mjcf_ranges_of_several_joints_of_a_body_become_limits(tmp_path):
 
 
 @pytest.mark.parametrize("ending", ["urdf", "xml"])
-def test_limits_come_back_from_the_file_they_are_written_to(tmp_path, ending):
+def test_limits_are_equal_after_conversion_and_back(tmp_path, ending):
     robot = load_robot("orthoglide")
     frames = tuple(
         replace(f, limits=(-0.5, -0.1)) if f.actuated else f for f in robot.frames

@@ -1,4 +1,4 @@
-"""MJCF of every kind: MuJoCo's own reader beside ours, and hand-worked numbers."""
+"""MJCF files of every kind, compared with MuJoCo and with numbers worked by hand."""
 
 import json
 from dataclasses import replace
@@ -110,8 +110,8 @@ KINDS = {
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_mujoco_reads_every_kind_alike(kind, tmp_path):
-    """Bodies, masses and how far constraints are open, in random postures."""
+def test_every_kind_of_mjcf_equals_mujoco(kind, tmp_path):
+    """Bodies, masses and closure errors are equal in random postures."""
     path = file_of(tmp_path, KINDS[kind])
     answer = compare(read_mjcf(path), path)
     assert answer.why_not == ""
@@ -121,8 +121,8 @@ def test_mujoco_reads_every_kind_alike(kind, tmp_path):
     assert answer.loops == model.neq
 
 
-def test_another_reading_is_found(tmp_path):
-    """The comparison is broken on purpose: a joint, a mass, a loop's place."""
+def test_comparison_names_the_first_difference_from_mujoco(tmp_path):
+    """The comparison is falsified on purpose: a joint, a mass, the place of a loop."""
     path = file_of(tmp_path, KINDS["welds"])
     right = read_mjcf(path)
     joint = replace(right.joints[0], axis=np.array([0.0, 1.0, 0.0]))
@@ -138,7 +138,7 @@ def test_another_reading_is_found(tmp_path):
         assert answer.where == where
 
 
-def test_another_model_is_attached_with_its_own_angles_and_names(tmp_path):
+def test_attached_model_keeps_its_angle_units_and_names(tmp_path):
     file_of(tmp_path, """<compiler angle="radian" eulerseq="zyx"/><default>
         <joint axis="1 0 0"/><default class="d"><site pos="1 1 1"/></default></default>
         <worldbody><body name="x" pos="0 0 1" euler="0.5 0 0.1"><geom size="0.1"/>
@@ -162,7 +162,7 @@ def test_another_model_is_attached_with_its_own_angles_and_names(tmp_path):
     assert drives == ["L_k", "R_k"]
 
 
-def test_copies_of_an_attached_model_keep_what_ties_it(tmp_path):
+def test_copies_of_an_attached_model_keep_their_loops_and_drives(tmp_path):
     file_of(tmp_path, """<worldbody><body name="x" pos="0 0 1"><geom size="0.1"/>
         <joint name="j"/><body name="y" pos="0 1 0"><geom size="0.1"/><joint name="k"/>
         </body></body></worldbody><equality><connect name="c" body1="y" body2="x"
@@ -181,7 +181,7 @@ def test_copies_of_an_attached_model_keep_what_ties_it(tmp_path):
     assert drives == ["p_k-0", "p_k-1"]
 
 
-def test_other_files_are_included(tmp_path):
+def test_included_files_are_read_and_missing_or_recursive_ones_refused(tmp_path):
     (tmp_path / "parts").mkdir()
     inner = '<mujocoinclude><body name="b" pos="0 1 0"><joint/><geom size="0.1"/>'
     (tmp_path / "parts" / "b.xml").write_text(f"{inner}</body></mujocoinclude>")
@@ -198,10 +198,10 @@ def test_other_files_are_included(tmp_path):
         read_mjcf(path)
 
 
-def test_a_free_body_is_free_however_it_is_turned_at_home(run, tmp_path):
-    """A loop turns it by 90 degrees about y, where three turns in a row are singular.
+def test_free_body_turned_at_home_closes_with_one_freedom(run, tmp_path):
+    """A loop turns it by 90 degrees about y, where three serial turns are singular.
 
-    A slide and a weld leave one freedom, and the weld holds no more than it must.
+    A slide and a weld leave one freedom without overconstraint.
     """
     path = file_of(tmp_path, """<worldbody><body name="p">[M]<freejoint/>
         <site name="s"/></body><body name="l">[M]<joint name="d" type="slide"/>
@@ -217,7 +217,7 @@ def test_a_free_body_is_free_however_it_is_turned_at_home(run, tmp_path):
     assert (mobility["freedoms"], mobility["overconstraint"]) == (1, 0)
 
 
-def test_a_body_that_nothing_ties_is_said_to_float(tmp_path):
+def test_unconstrained_free_joint_is_reported(tmp_path):
     text = """<worldbody><body name="p">[M]<freejoint name="f"/><body name="q">[M]
         <joint/></body></body></worldbody>"""
     answer = convert(file_of(tmp_path, text), tmp_path / "robot.toml")
@@ -225,8 +225,8 @@ def test_a_body_that_nothing_ties_is_said_to_float(tmp_path):
     assert len([f for f in answer.robot.frames if f.joint != "fixed"]) == 7
 
 
-def test_masses_are_scaled_to_their_total(tmp_path):
-    """1 and 3 kg to 10 kg; MuJoCo warns about this key, so it is not asked here."""
+def test_settotalmass_scales_all_masses(tmp_path):
+    """1 and 3 kg are scaled to 10 kg; not compared, as MuJoCo warns about this key."""
     text = """<compiler settotalmass="10"/><worldbody><body name="a">[M]<joint/>
         <body name="b"><inertial pos="0 0 1" mass="3" diaginertia="1 1 1"/><joint/>
         </body></body></worldbody>"""
@@ -234,7 +234,7 @@ def test_masses_are_scaled_to_their_total(tmp_path):
     assert [bodies[name].mass for name in "ab"] == pytest.approx([2.5, 7.5])
 
 
-def test_legs_carry_a_platform_that_nothing_else_holds(run, tmp_path):
+def test_legs_of_a_free_platform_carry_equal_shares_of_the_load(run, tmp_path):
     """Three legs 30 degrees from the vertical carry 90 N: each 30 N / cos 30.
 
     The usual way to write a parallel robot: a free body, and legs connected to it.
@@ -264,7 +264,7 @@ def test_legs_carry_a_platform_that_nothing_else_holds(run, tmp_path):
     assert np.abs(forces) == pytest.approx(3 * [30 / np.cos(np.pi / 6)], rel=1e-6)
 
 
-def test_joints_follow_by_polynomials_and_in_chains(tmp_path):
+def test_coupled_joints_follow_polynomials_also_in_chains(tmp_path):
     """b = 0.1 + 2 (a - rest) + 0.5 (a - rest)^2, c = 3 b, by hand at a = 0.7."""
     path = file_of(tmp_path, """<compiler angle="radian"/><worldbody><body name="A">[M]
         <joint name="a" ref="0.2"/><body name="B">[M]<joint name="b"/><body name="C">
@@ -282,8 +282,8 @@ def test_joints_follow_by_polynomials_and_in_chains(tmp_path):
     assert lines[0].startswith("mimic: b = 0.1 + 2 * x^1 + 0.5 * x^2, x = a - 0.2 is")
 
 
-def test_a_drive_on_a_follower_leads(tmp_path):
-    """The driven joint of a coupled pair is the one to be commanded."""
+def test_driven_joint_of_a_coupled_pair_becomes_the_leader(tmp_path):
+    """A command is given to the driven joint, and the other one follows."""
     path = file_of(tmp_path, """<compiler angle="radian"/><worldbody><body name="A">[M]
         <joint name="a"/><body name="B">[M]<joint name="b"/></body></body></worldbody>
         <equality><joint joint1="b" joint2="a" polycoef="0.1 2 0 0 0"/></equality>
@@ -295,7 +295,7 @@ def test_a_drive_on_a_follower_leads(tmp_path):
     assert robot.frame("a").position == pytest.approx(0.2, abs=1e-12)
 
 
-def test_tendons_and_their_drives_are_named(run, tmp_path):
+def test_tendons_and_their_actuators_are_reported_as_left_out(run, tmp_path):
     path = file_of(tmp_path, TWO + """<tendon><spatial name="cable"><site site="s"/>
         <site site="t"/></spatial></tendon><actuator><motor tendon="cable"/><motor
         joint="j"/></actuator><equality><tendon tendon1="cable"/><connect name="off"

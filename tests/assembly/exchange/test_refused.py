@@ -1,4 +1,4 @@
-"""Files of other programs that break a rule: each refused with one message."""
+"""Files of other programs that break a rule are each refused with one message."""
 
 import pytest
 
@@ -220,8 +220,10 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED, ids=": ".join)
-def test_a_file_of_another_program_is_refused_with_one_message(case, run, tmp_path):
-    """A table of loops stands beside a sound URDF."""
+def test_invalid_file_of_another_program_is_refused_with_one_message(
+    case, run, tmp_path
+):
+    """A table of loops is read together with a valid URDF."""
     ending, (text, message) = case[0], REFUSED[case]
     source = tmp_path / ("robot.urdf" if ending == "yaml" else f"robot.{ending}")
     source.write_text(urdf())

@@ -1,4 +1,4 @@
-"""Robots of other programs where a robot file is expected, in commands and Python."""
+"""Files of other programs in place of a robot file, in commands and Python."""
 
 import json
 
@@ -12,7 +12,7 @@ from tests.assembly.exchange.test_sdf import four_bar, pin
 from tests.examples_for_tests import example
 
 
-def test_no_file_of_another_kind_is_written(tmp_path):
+def test_writing_an_unsupported_file_ending_is_refused(tmp_path):
     for name in ("arm.sdf", "arm.txt", "arm"):
         with pytest.raises(BadInput, match=r"expected \.toml or \.urdf or \.xml"):
             ff.write_robot(BUILT_IN["arm6"](), tmp_path / name)
@@ -22,8 +22,8 @@ def test_no_file_of_another_kind_is_written(tmp_path):
 @pytest.mark.parametrize(
     ("name", "text"), [("arm.urdf", "<robot/>"), ("arm.toml", "# mine\nname = 'arm'\n")]
 )
-def test_a_file_of_the_users_own_is_not_overwritten(tmp_path, name, text):
-    """It may hold comments, which a robot does not."""
+def test_write_robot_refuses_to_overwrite_an_existing_user_file(tmp_path, name, text):
+    """The file may contain comments, which a robot cannot store."""
     (tmp_path / name).write_text(text)
     with pytest.raises(BadInput, match="not overwritten"):
         ff.write_robot(BUILT_IN["arm6"](), tmp_path / name)
@@ -31,8 +31,8 @@ def test_a_file_of_the_users_own_is_not_overwritten(tmp_path, name, text):
     assert (tmp_path / name).read_text() == text
 
 
-def test_a_command_takes_a_urdf_with_its_loops(run, tmp_path):
-    """The same answer as of the robot file that it is converted to."""
+def test_command_with_a_urdf_gives_the_result_of_the_converted_file(run, tmp_path):
+    """Mobility and zone margin are equal."""
     source = example("5bar_linkage")
     ff.convert(source, tmp_path / "robot.toml")
     answers = []
@@ -44,7 +44,7 @@ def test_a_command_takes_a_urdf_with_its_loops(run, tmp_path):
     assert answers[0]["zone"] == answers[1]["zone"]
 
 
-def test_a_command_says_what_was_taken_of_an_sdf(run, tmp_path):
+def test_command_with_an_sdf_reports_its_assumptions(run, tmp_path):
     path = tmp_path / "bar.sdf"
     path.write_text(four_bar())
     status, out, _ = run("assembly", "solve", path)
@@ -55,7 +55,7 @@ def test_a_command_says_what_was_taken_of_an_sdf(run, tmp_path):
     assert len(robot.closures) == 1
 
 
-def test_xml_by_another_ending_is_told_the_endings(run, tmp_path):
+def test_xml_with_an_unknown_ending_is_refused_with_the_valid_endings(run, tmp_path):
     path = tmp_path / "bar.mjcf"
     path.write_text("\ufeff\n<mujoco><worldbody/></mujoco>", encoding="utf-8")
     status, out, err = run("assembly", "solve", path)

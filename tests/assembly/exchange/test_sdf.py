@@ -55,7 +55,7 @@ def converted(tmp_path, text):
     return answer, read_robot(tmp_path / "robot.toml")
 
 
-def test_a_four_bar_closes_by_its_own_joints(tmp_path):
+def test_sdf_four_bar_equals_the_law_of_cosines(tmp_path):
     answer, robot = converted(tmp_path, four_bar())
     assert answer.open_before < 1e-12
     assert len(robot.closures) == 1

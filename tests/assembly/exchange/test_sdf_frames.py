@@ -1,4 +1,4 @@
-"""SDF: frames, nested models, old versions, masses by default; worked by hand."""
+"""SDF: frames, nested models, old versions, default masses; worked by hand."""
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ Z_UP = "<axis><xyz>0 0 1</xyz>{}</axis>"
         ("1.9", '<axis><xyz expressed_in="">0 0 1</xyz></axis>', [1, 0, 0]),
     ],
 )  # fmt: skip
-def test_an_axis_is_seen_from_what_its_version_says(
+def test_sdf_version_decides_the_frame_of_a_joint_axis(
     version, inside, expected, tmp_path
 ):
     text = ARM + TILTED + joint("turn", "base", "arm", inside)
@@ -56,7 +56,7 @@ def test_an_axis_is_seen_from_what_its_version_says(
     assert found == pytest.approx(expected, abs=1e-15)
 
 
-def test_poses_lead_through_models_and_frames(tmp_path):
+def test_poses_are_resolved_through_nested_models_and_frames(tmp_path):
     """A model at (1, 2, 3) turned by 90 degrees about z; inside it, 1 m on, another
     whose frame "grip" is placed, half a metre above its own origin."""
     text = """<pose degrees="true">1 2 3 0 0 90</pose>
@@ -81,8 +81,8 @@ def test_poses_lead_through_models_and_frames(tmp_path):
     assert mechanism.root == WORLD
 
 
-def test_a_model_of_another_file_keeps_its_own_version(tmp_path):
-    """A hand of version 1.4, whose axis is seen from the hand, turned by 90 degrees
+def test_included_model_keeps_its_own_sdf_version(tmp_path):
+    """A hand of version 1.4, whose axis is given in the hand, turned by 90 degrees
     about x; the same robot written out, in which the axis says so itself."""
     hand = (
         f"""<link name="palm"/>{TILTED}{joint("j", "palm", "arm", Z_UP.format(""))}"""
@@ -102,7 +102,7 @@ def test_a_model_of_another_file_keeps_its_own_version(tmp_path):
     assert poses["grip::arm"][:3, 3] == pytest.approx([0.3, 0, 1])
 
 
-def test_a_model_stands_on_a_frame_of_its_world(tmp_path):
+def test_model_pose_is_resolved_in_a_frame_of_the_world(tmp_path):
     path = tmp_path / "robot.sdf"
     path.write_text(
         f"""<sdf version="1.9"><world name="w"><frame name="table">
@@ -117,7 +117,7 @@ def test_a_model_stands_on_a_frame_of_its_world(tmp_path):
     assert poses["arm"][:3, 3] == pytest.approx([1, 0, 0.7])
 
 
-def test_static_models_of_a_world_are_left_out(tmp_path):
+def test_static_models_of_a_world_are_reported_as_left_out(tmp_path):
     path = tmp_path / "robot.sdf"
     ground = '<model name="ground"><static>true</static><link name="plane"/></model>'
     arm = joint("j", "base", "arm")
@@ -130,15 +130,15 @@ def test_static_models_of_a_world_are_left_out(tmp_path):
     assert "model of the world: 1 (ground)" in mechanism.left_out
 
 
-def test_a_joint_may_share_a_link_s_name(tmp_path):
+def test_joint_with_the_name_of_a_link_is_renamed(tmp_path):
     mechanism = model(
         tmp_path, joint("arm", "base", "arm") + ARM + '<link name="arm"/>'
     )
     assert {one.name for one in mechanism.joints} == {"fix", "arm_joint"}
 
 
-def test_joints_stand_on_frames_and_close_loops(tmp_path):
-    """Grashof's four-bar, as a parallelogram: its coupler only shifts."""
+def test_joints_between_frames_close_a_loop(tmp_path):
+    """Grashof's four-bar as a parallelogram: its coupler only translates."""
     text = (
         ARM
         + """
@@ -173,8 +173,8 @@ SHAPES = {
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_automatic_inertia_is_volume_times_density(shape, tmp_path):
-    """Of steel; and beside a sphere of 1 litre's density it is the weighted mean."""
+def test_automatic_inertia_equals_volume_times_density(shape, tmp_path):
+    """A steel shape, alone and with a sphere of 1000 kg/m^3 (weighted mean)."""
     collision = """<collision name="c"><pose>0.2 0 0 0 0 0</pose>{}<geometry>{}
         </geometry></collision>"""
     steel = collision.format("<density>7850</density>", shape)
@@ -192,8 +192,8 @@ def test_automatic_inertia_is_volume_times_density(shape, tmp_path):
     assert bodies["two"].centre[0] == pytest.approx(0.2 * mass / (mass + ball))
 
 
-def test_masses_that_are_not_written_are_the_format_s_default(tmp_path):
-    """1 kg; a mass beside auto is kept, with the centre of the shapes."""
+def test_missing_masses_have_the_default_of_the_format(tmp_path):
+    """The default is 1 kg; a mass with auto is kept, with the centre of the shapes."""
     text = (
         ARM
         + """<link name="a"><inertial><pose>0 0 1 0 0 0</pose></inertial></link>
@@ -209,7 +209,7 @@ def test_masses_that_are_not_written_are_the_format_s_default(tmp_path):
     assert any("no inertial: 1 kg" in line for line in mechanism.taken)
 
 
-def test_axes_follow_axes(tmp_path):
+def test_mimic_of_the_second_axis_of_a_universal_joint_follows_it(tmp_path):
     """k = 2 (j - 0.1) + 0.5; the second axis of a universal joint leads, at zero."""
     mimic = """<mimic joint="{}" axis="{}"><multiplier>2</multiplier><offset>0.5
         </offset><reference>0.1</reference></mimic>"""

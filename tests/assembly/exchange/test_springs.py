@@ -1,4 +1,4 @@
-"""Springs of joints: the deflection of one under a load, by hand."""
+"""Springs of joints: the deflection of one spring under a load, by hand."""
 
 import json
 
@@ -26,7 +26,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_a_spring_at_rest_at_home_gives_way_by_load_over_stiffness(name, run, tmp_path):
+def test_converted_spring_deflects_by_load_over_stiffness(name, run, tmp_path):
     """10 N along x over 2000 N/m, or 10 N m about z over 2000 N m/rad."""
     text, component = CASES[name]
     (tmp_path / name).write_text(text)
@@ -62,7 +62,7 @@ def test_a_spring_at_rest_at_home_gives_way_by_load_over_stiffness(name, run, tm
         ),
     ],
 )
-def test_a_spring_that_is_not_converted_is_named(text, line, tmp_path):
+def test_spring_that_is_not_converted_is_reported(text, line, tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(text)
     assert line in convert(path, tmp_path / "robot.toml").left_out

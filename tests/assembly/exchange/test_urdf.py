@@ -1,4 +1,4 @@
-"""URDF: XML as others write it, loops of its own, joints that follow; by hand."""
+"""URDF: variants of XML, loops in the file, joints that follow others; by hand."""
 
 import json
 
@@ -40,15 +40,17 @@ Z = '<axis xyz="0 0 1"/>'
         ("\ufeff", 'xmlns="urn:other"', ""),
     ],
 )
-def test_xml_is_taken_as_tolerant_readers_take_it(before, attributes, inside, tmp_path):
+def test_urdf_variants_that_other_readers_accept_are_read(
+    before, attributes, inside, tmp_path
+):
     path = file_of(tmp_path, joint("j", "a", "b", Z) + inside, "ab", attributes)
     path.write_text(before + path.read_text())
     assert [one.name for one in read_urdf(path).joints] == ["j"]
 
 
 @pytest.mark.parametrize("name", ["base", "base.joint", "b", "world"])
-def test_a_joint_may_have_any_name(name, tmp_path):
-    """Its frame is of that name, and "base", which stands still, of another."""
+def test_joint_named_base_gets_a_frame_of_another_name(name, tmp_path):
+    """The frame has the name of the joint, except "base", which is the fixed frame."""
     text = joint("base", "a", "b", '<origin xyz="0 0 0.1"/>' + Z)
     text += joint("base.joint", "b", "c", '<origin xyz="0 0 0.2"/>' + Z)
     text = text.replace('name="base.joint"', f'name="{name}.x"')
@@ -92,8 +94,8 @@ CLOSING = {
 
 
 @pytest.mark.parametrize("kind", CLOSING)
-def test_a_loop_of_the_file_itself_is_closed(kind, run, tmp_path):
-    """One freedom, whatever closes it; and the coupler only shifts."""
+def test_loop_in_the_urdf_closes_with_one_freedom(kind, run, tmp_path):
+    """Each kind of loop leaves one freedom, and the coupler only translates."""
     closing, redundant = CLOSING[kind]
     path = four_bar(closing, tmp_path)
     (tmp_path / "robot.yaml").write_text("closed_loop: []\nname_mot: [p]\n")
@@ -119,9 +121,7 @@ def test_a_loop_of_the_file_itself_is_closed(kind, run, tmp_path):
         ("<use_parent_model_frame>1</use_parent_model_frame>", [0, 0, 1]),
     ],
 )
-def test_an_axis_in_gazebo_is_seen_from_the_child_or_the_model(
-    flag, expected, tmp_path
-):
+def test_gazebo_joint_axis_is_given_in_the_child_or_the_model(flag, expected, tmp_path):
     """The child is turned by 90 degrees about y, which takes its z to x."""
     turned = f'<origin xyz="0 0 1" rpy="0 {np.pi / 2} 0"/>'
     text = joint("j", "a", "b", turned + Z) + joint("k", "a", "c", Z)
@@ -135,7 +135,7 @@ def test_an_axis_in_gazebo_is_seen_from_the_child_or_the_model(
     assert mechanism.loops[0].second == "b"
 
 
-def test_joints_of_drake_have_axes_of_their_own(tmp_path):
+def test_drake_joints_become_single_joints_with_their_axes(tmp_path):
     """A universal turns about x, then y; a planar slides in x and y."""
     text = joint("u", "a", "b", "", "universal", "drake:joint")
     text += joint("s", "b", "c", "", "planar", "d:joint")
@@ -147,7 +147,7 @@ def test_joints_of_drake_have_axes_of_their_own(tmp_path):
                     "w.rx": x, "w.ry": y, "w.rz": z}  # fmt: skip
 
 
-def test_an_origin_may_be_a_quaternion(tmp_path):
+def test_quaternion_origin_is_read_in_xyzw_order(tmp_path):
     """90 degrees about z, in URDF 1.2's order x y z w."""
     h = np.sqrt(0.5)
     text = joint("j", "a", "b", f'<origin xyz="1 0 0" quat_xyzw="0 0 {h} {h}"/>')
@@ -161,7 +161,7 @@ def follower(name, parent, child, leader, factor, offset):
     return joint(name, parent, child, inside)
 
 
-def test_followers_of_followers_stand_where_their_leaders_take_them(tmp_path):
+def test_chained_mimic_joints_follow_their_leaders_at_home(tmp_path):
     """z = 2 y + 0.1, y = x + 0.5, written before their leaders; x = 0.3 at home."""
     text = follower("z", "c", "d", "y", 2, 0.1) + follower("y", "b", "c", "x", 1, 0.5)
     path = file_of(tmp_path, text + joint("x", "a", "b", Z), "abcd")
@@ -175,7 +175,7 @@ def test_followers_of_followers_stand_where_their_leaders_take_them(tmp_path):
         convert(path, tmp_path / "out.toml")
 
 
-def test_followers_follow_while_a_home_is_looked_for(tmp_path):
+def test_mimic_joints_follow_during_the_search_for_a_home_pose(tmp_path):
     """A crank and a follower of minus its angle: their tips meet where x is equal.
 
     Crank 1 m about (0, 0), follower 1 m about (1, 0) at -q + offset; with offset pi
@@ -201,7 +201,7 @@ def test_followers_follow_while_a_home_is_looked_for(tmp_path):
 
 
 @pytest.mark.parametrize("axes", ["XY", "YX", "YZ", "ZY", "ZX", "XZ"])
-def test_universal_joints_of_every_order_of_axes(axes, tmp_path):
+def test_universal_joint_of_any_axis_order_becomes_two_turns(axes, tmp_path):
     path = file_of(tmp_path, joint("j", "a", "b", Z), "ab")
     (tmp_path / "robot.yaml").write_text(
         f"closed_loop: []\njoint_name: [j]\njoint_type: [UJOINT_{axes}]\n"

@@ -1,4 +1,4 @@
-"""Effects in robot files: written, read, refused, and at work in ``solve``."""
+"""Effects in robot files: written, read, refused, and applied by ``solve``."""
 
 import json
 from dataclasses import replace
@@ -35,7 +35,7 @@ def arm_with(tmp_path, *effects):
     return path
 
 
-def test_every_effect_comes_back_from_a_file_as_it_was_written(tmp_path):
+def test_every_effect_is_equal_after_writing_and_reading(tmp_path):
     plain = read_robot(arm_with(tmp_path))
     effects = {
         name: {
@@ -80,14 +80,14 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("lines", "message"), REFUSED.items())
-def test_an_effect_that_makes_no_sense_is_refused(lines, message, tmp_path):
+def test_invalid_effect_is_refused_with_its_message(lines, message, tmp_path):
     path = arm_with(tmp_path, lines)
     with pytest.raises(BadInput) as refused:
         read_robot(path)
     assert str(refused.value) == f"{path}: effect {message}"
 
 
-def test_an_unknown_effect_is_refused_with_the_nearest(tmp_path):
+def test_unknown_effect_is_refused_with_the_nearest_name(tmp_path):
     path = arm_with(tmp_path, 'name = "self_wait"')
     with pytest.raises(BadInput) as refused:
         read_robot(path)
@@ -102,7 +102,7 @@ def solved(run, *words):
     return json.loads(out)
 
 
-def test_effects_of_a_file_act_in_solve(tmp_path, run):
+def test_effects_of_a_file_change_the_result_of_solve(tmp_path, run):
     """F L / k of a second spring in series; alpha T L of a warm beam."""
     plain = arm_with(tmp_path)
     words = ("--load", "fy=10")
@@ -115,7 +115,7 @@ def test_effects_of_a_file_act_in_solve(tmp_path, run):
     assert after[3] - before[3] == pytest.approx(2e-5 * 6 * L, rel=1e-9)
 
 
-def test_drift_of_a_device_changes_the_reading_not_the_pose(tmp_path, run):
+def test_device_drift_changes_the_reading_and_not_the_pose(tmp_path, run):
     drift = 'name = "drift"\nparameters = { "amplitude.tz" = 1e-5, time_constant = 10 }'
     path = arm_with(tmp_path, drift)
     found = solved(run, path, "--under", "time=10")
@@ -123,7 +123,7 @@ def test_drift_of_a_device_changes_the_reading_not_the_pose(tmp_path, run):
     assert found["reading"][5] == pytest.approx(1e-5 * (1 - 1 / 2.718281828459045))
 
 
-def test_an_effect_asks_for_what_it_depends_on(tmp_path, run):
+def test_effect_without_its_covariate_is_refused_with_the_option(tmp_path, run):
     warm = 'name = "thermal_expansion"\nparameters = { tool = 2e-5 }'
     path = arm_with(tmp_path, warm)
     status, out, err = run("assembly", "solve", path)

@@ -1,4 +1,4 @@
-"""``[[effect]]`` named function: as the public format has it, and what is refused."""
+"""``[[effect]]`` named function: the public format, and what is refused."""
 
 import json
 from math import cos, sin
@@ -29,7 +29,7 @@ parameters = { a = 1e-4, b = 2e-5 }
 """
 
 
-def test_the_public_example_reads_and_comes_back(tmp_path):
+def test_documented_function_is_equal_after_writing_and_reading(tmp_path):
     robot = read_robot(arm_with(tmp_path, PUBLIC, FORMULA))
     assert robot.functions[0] == Function(
         "drive", ("rz",), ("q.drive",), "waves", {"1.sine": 1.2e-4, "1.cosine": -3e-5},
@@ -39,7 +39,7 @@ def test_the_public_example_reads_and_comes_back(tmp_path):
     assert read_robot(tmp_path / "again.toml").functions == robot.functions
 
 
-def test_effects_of_sessions_come_back(tmp_path):
+def test_session_effects_are_equal_after_writing_and_reading(tmp_path):
     zero = 'name = "encoder_offset"\nparameters = { drive = 1e-4 }\n'
     path = arm_with(tmp_path, zero, zero + 'session = "a"', zero + 'session = "b"')
     robot = read_robot(path)
@@ -107,7 +107,9 @@ REFUSED = {
 
 @pytest.mark.parametrize(("text", "old", "new", "message"), REFUSED.values(),
                          ids=REFUSED)  # fmt: skip
-def test_a_function_that_makes_no_sense_is_refused(text, old, new, message, tmp_path):
+def test_invalid_function_is_refused_with_one_message(
+    text, old, new, message, tmp_path
+):
     assert old in text
     path = arm_with(tmp_path, text.replace(old, new))
     with pytest.raises(BadInput) as error:
@@ -125,7 +127,7 @@ def answer(run, tmp_path, *words):
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_functions_act_in_every_state(state, tmp_path, run):
+def test_functions_act_in_linear_and_exact_solutions(state, tmp_path, run):
     path = str(arm_with(tmp_path, FORMULA))
     turn = 1e-4 * sin(0.9) + 2e-5
     screw = answer(
@@ -135,14 +137,14 @@ def test_functions_act_in_every_state(state, tmp_path, run):
     assert screw["platform_screw"] == pytest.approx(expected, rel=1e-3, abs=1e-8)
 
 
-def test_a_formula_without_a_value_is_refused_where_it_is_used(tmp_path, run):
+def test_formula_without_a_finite_value_is_refused_at_its_argument(tmp_path, run):
     path = str(arm_with(tmp_path, FORMULA.replace("sin(3*q)", "log(q)")))
     code, _, error = run("assembly", "solve", path, "--joint", "drive=-0.3")
     assert code == 2
     assert "found nan at q.drive = -0.3, expected a finite number" in error
 
 
-def test_a_session_is_asked_for_by_its_name(tmp_path, run):
+def test_unknown_session_is_refused_with_the_nearest_name(tmp_path, run):
     path = str(arm_with(tmp_path, PUBLIC))
     words = ["solve", path, "--joint", "drive=0.5"]
     there = answer(run, tmp_path, *words, "--under", "session=day2")
@@ -154,7 +156,7 @@ def test_a_session_is_asked_for_by_its_name(tmp_path, run):
     assert '--under session: found "day3"; did you mean "day2"' in error
 
 
-def test_a_variable_is_asked_for_by_the_option_that_gives_it(tmp_path, run):
+def test_missing_covariate_is_refused_with_its_option(tmp_path, run):
     humid = PUBLIC.replace('"q.drive"', '"cov.humidity"').replace('"waves"', '"powers"')
     humid = humid.replace('"1.sine" = 1.2e-4, "1.cosine" = -3e-5', '"1" = 1e-6')
     path = str(arm_with(tmp_path, humid.replace('session = "day2"', "")))

@@ -1,4 +1,4 @@
-"""Links of robot files that break a rule: each refused with one message."""
+"""Links of robot files that break a rule are each refused with one message."""
 
 import math
 
@@ -165,5 +165,5 @@ REFUSED_LINKS = {
 @pytest.mark.parametrize(
     ("old", "new", "message"), REFUSED_LINKS.values(), ids=REFUSED_LINKS
 )
-def test_a_link_is_refused_with_one_message(old, new, message, write_file):
+def test_invalid_link_is_refused_with_one_message(old, new, message, write_file):
     assert_refused(write_file, old, new, message)

@@ -18,13 +18,13 @@ def arm(parts=PARTS):
     return Robot("one", "arm", (Frame("arm", translation=[0, 0, 1], link=link),))
 
 
-def test_parts_of_a_mesh_are_written_and_read_again(tmp_path):
+def test_mesh_parts_are_equal_after_writing_and_reading(tmp_path):
     path = tmp_path / "arm.toml"
     write_robot(arm(), path)
     assert read_robot(path).frame("arm").link.parts == PARTS
 
 
-def test_a_modulus_twice_as_large_is_so_in_every_part():
+def test_modulus_scale_multiplies_the_modulus_of_every_part():
     conditions = as_declared(home_posture(arm()))
     link = MODULUS_SCALE.apply(conditions, {"arm": 2.0}).robot.frame("arm").link
     assert link.young == 1.4e11

@@ -1,4 +1,4 @@
-"""Robot files read and written: the same robot in many ways."""
+"""Robot files read and written: equivalent forms give the same robot."""
 
 import json
 import math
@@ -65,7 +65,7 @@ LOADS = {
 
 
 @pytest.mark.parametrize("change", LOADS.values(), ids=LOADS)
-def test_the_same_robot_written_by_others_is_the_same(change, write_file, tmp_path):
+def test_equivalent_file_forms_give_the_same_robot(change, write_file, tmp_path):
     expected = read_robot(write_file(FOUR_BAR))
     changed = change(FOUR_BAR)
     assert changed != FOUR_BAR
@@ -73,7 +73,7 @@ def test_the_same_robot_written_by_others_is_the_same(change, write_file, tmp_pa
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_frames_may_come_in_any_order(seed, write_file):
+def test_frame_order_does_not_change_the_robot(seed, write_file):
     head, *frames = FOUR_BAR.split("[[frame]]")
     frames[-1], closure = frames[-1].split("[[closure]]")
     mixed = np.random.default_rng(seed).permutation(len(frames))
@@ -85,7 +85,7 @@ def test_frames_may_come_in_any_order(seed, write_file):
     np.testing.assert_allclose(here.platform, there.platform, rtol=0, atol=1e-12)
 
 
-def test_dh_is_turn_shift_shift_turn(write_file):
+def test_dh_equals_the_product_of_its_four_transforms(write_file):
     """Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha), multiplied by hand."""
     text = SLIDER.replace("translation = [0.3, 0.0, 0.2]\n", "").replace(
         "rotation = [0.0, 1.5707963267948966, 0.0]",
@@ -99,7 +99,7 @@ def test_dh_is_turn_shift_shift_turn(write_file):
     np.testing.assert_allclose(T, turn_z @ turn_x, rtol=0, atol=1e-15)
 
 
-def test_a_beam_below_a_slide_runs_between_the_origins_at_home(write_file):
+def test_beam_below_a_slide_has_the_length_between_origins_at_home(write_file):
     """0.2 m of the slide and [0.3, 0, 0.2] m of the frame: 3-4-5 times 0.1."""
     link = read_robot(write_file(SLIDER)).frame("tool").link
     assert link.length == pytest.approx(0.5, rel=1e-15)
@@ -109,20 +109,20 @@ def test_a_beam_below_a_slide_runs_between_the_origins_at_home(write_file):
     assert at_zero.link.length is None
 
 
-def test_a_mesh_below_a_slide_that_is_not_at_zero_is_refused(write_file):
+def test_mesh_below_a_slide_not_at_zero_is_refused(write_file):
     path = write_file(SLIDER.replace("beam = { radius = 0.01 }", mesh()))
     with pytest.raises(BadInput, match=r'"tool"\.link\.mesh: found it below a prism'):
         read_robot(path)
 
 
-def test_a_stiffness_printed_with_seven_digits_becomes_symmetric(write_file):
+def test_stiffness_of_seven_digits_is_made_symmetric(write_file):
     K = rows({(1, 2): 0.1234567, (2, 1): 0.1234568})
     path = write_file(FOUR_BAR.replace(LINK, f"link = {{ stiffness = {K} }}"))
     K = read_robot(path).frame("coupler").link.stiffness
     np.testing.assert_array_equal(K, K.T)
 
 
-def test_paths_lead_from_the_file_that_names_them(write_file, tmp_path):
+def test_relative_paths_start_from_the_robot_file(write_file, tmp_path):
     for path, expected in [
         ("meshes/x.stl", tmp_path / "meshes/x.stl"),
         ("../x.stl", tmp_path / "../x.stl"),
@@ -134,7 +134,7 @@ def test_paths_lead_from_the_file_that_names_them(write_file, tmp_path):
         assert read_robot(file).frame("coupler").link == LibraryLink(expected, "k")
 
 
-def test_a_robot_written_elsewhere_finds_its_mesh_again(write_file, tmp_path):
+def test_robot_written_to_another_folder_refers_to_the_same_mesh(write_file, tmp_path):
     robot = read_robot(write_file(FOUR_BAR.replace(BEAM, mesh())))
     (tmp_path / "out").mkdir()
     write_robot(robot, tmp_path / "out" / "b.toml")
@@ -142,10 +142,10 @@ def test_a_robot_written_elsewhere_finds_its_mesh_again(write_file, tmp_path):
     assert again.resolve() == (tmp_path / "x.stl").resolve()
 
 
-def test_a_relative_path_is_written_as_it_leads_from_the_new_file(
+def test_relative_path_is_written_relative_to_the_new_file(
     write_file, tmp_path, monkeypatch
 ):
-    """Read from where the file lies, written one folder further down."""
+    """Read from the file's folder, written to a subfolder."""
     write_file(FOUR_BAR.replace(BEAM, mesh()))
     monkeypatch.chdir(tmp_path)
     (tmp_path / "out").mkdir()
@@ -212,8 +212,10 @@ def every_joint(rng):
 
 
 @pytest.mark.parametrize("seed", range(7))
-def test_a_robot_of_every_kind_reads_back_as_it_was_written(seed, tmp_path):
-    """A serial arm in which links meet other joints at each seed."""
+def test_every_kind_of_link_and_joint_is_equal_after_writing_and_reading(
+    seed, tmp_path
+):
+    """A serial arm; each seed combines links with other joints."""
     rng, frames, parent = np.random.default_rng(seed), [], "base"
     joints = list(every_joint(rng))
     for k, link in enumerate(every_link(rng)):
@@ -231,7 +233,7 @@ def test_a_robot_of_every_kind_reads_back_as_it_was_written(seed, tmp_path):
     assert_same_robot(read_robot(tmp_path / "robot.toml"), robot)
 
 
-def test_the_documentations_example_loads_and_closes(write_file):
+def test_documentation_example_loads_and_closes(write_file):
     text = (Path(__file__).parents[3] / "docs" / "robot_files.md").read_text("utf-8")
     robot = read_robot(write_file(text.split("```toml\n")[1].split("```")[0]))
     posture = home_posture(robot)
@@ -241,9 +243,7 @@ def test_the_documentations_example_loads_and_closes(write_file):
     assert {f.joint for f in robot.frames} == {"fixed", "revolute"}
 
 
-def test_the_documentations_bearing_turns_freely_and_yields_as_its_data_sheet_says(
-    write_file,
-):
+def test_documentation_bearing_deflects_by_its_data_sheet_stiffness(write_file):
     """Radial 1.2e8 N/m, axial 6e7 N/m: under 60 N the hub moves by F/k, worked by hand.
 
     Its clearance is taken up first; about its axis nothing resists.
@@ -264,8 +264,8 @@ def test_the_documentations_bearing_turns_freely_and_yields_as_its_data_sheet_sa
         solve_assembly(home_posture(robot), [0, 0, 1.0, 0, 0, 0])
 
 
-def test_a_dh_table_without_alpha_is_told(write_file, run, monkeypatch):
-    """By solve, in text and JSON, and by show; with alpha nothing is said."""
+def test_missing_dh_alpha_is_reported(write_file, run, monkeypatch):
+    """Reported by solve, in text and JSON, and by show; not if alpha is given."""
     text = """
 platform = "tool"
 [[frame]]
@@ -305,7 +305,7 @@ dh = { d = 0.1 }
     assert read_robot(write_file(full)).remarks == ()
 
 
-def test_a_bearing_is_written_and_read_back(tmp_path):
+def test_bearing_stiffness_is_equal_after_writing_and_reading(tmp_path):
     K = np.diag([2e4, 2e4, 0.0, 1.2e8, 1.2e8, 6e7])
     hub = Frame("hub", joint="revolute", joint_stiffness=K)
     robot = Robot("hub", "tool", (hub, Frame("tool", "hub")))

@@ -1,4 +1,4 @@
-"""Robot files that break a rule: each refused with one message."""
+"""Robot files that break a rule are each refused with one message."""
 
 import math
 import re
@@ -18,8 +18,8 @@ from tests.robot_files_for_tests import (
 )
 
 
-def test_the_sound_files_are_sound(write_file):
-    """Every row below changes one of these two, so its message is that change's."""
+def test_unchanged_example_files_are_valid(write_file):
+    """Every refused case below changes one of these two files."""
     robot = read_robot(write_file(FOUR_BAR))
     assert [f.name for f in robot.frames][:2] == ["crank", "elbow"]
     assert home_posture(robot).mismatch < 1e-12
@@ -234,7 +234,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("old", "new", "message"), REFUSED.values(), ids=REFUSED)
-def test_a_robot_file_is_refused_with_one_message(old, new, message, write_file):
+def test_invalid_robot_file_is_refused_with_one_message(old, new, message, write_file):
     assert_refused(write_file, old, new, message)
 
 
@@ -252,7 +252,9 @@ CONTENTS = {
 
 
 @pytest.mark.parametrize(("content", "message"), CONTENTS.values(), ids=CONTENTS)
-def test_a_file_that_is_no_robot_is_not_printed(content, message, write_file):
+def test_message_about_a_file_that_is_no_robot_omits_its_content(
+    content, message, write_file
+):
     path = write_file(content)
     with pytest.raises(BadInput, match=re.escape(f"{path}: {message}")) as caught:
         read_robot(path)
@@ -260,7 +262,7 @@ def test_a_file_that_is_no_robot_is_not_printed(content, message, write_file):
     assert "\n" not in str(caught.value)
 
 
-def test_a_file_that_is_not_there_or_a_folder_is_named(tmp_path):
+def test_missing_file_or_folder_is_refused_by_name(tmp_path):
     with pytest.raises(BadInput, match="none.toml: cannot be read: No such file"):
         read_robot(tmp_path / "none.toml")
     with pytest.raises(BadInput, match="cannot be read: Is a directory"):

@@ -1,4 +1,4 @@
-"""Whatever is done to a robot file: it works, or one line says why not.
+"""Damaged robot files: each is read, or refused with one line.
 
 Every command and thousands of changes: ``benchmarks/fuzz.py``.
 """
@@ -62,14 +62,14 @@ SEEDS = {"four_bar": FOUR_BAR, "serial": SERIAL, "links": LINKS}
 
 
 @pytest.mark.parametrize("name", SEEDS)
-def test_the_robots_that_are_changed_are_sound(name, write_file):
-    """Otherwise every change would stop at the same first mistake."""
+def test_unchanged_robot_files_close_at_home(name, write_file):
+    """Otherwise every change would be refused for the same first mistake."""
     assert home_posture(read_robot(write_file(SEEDS[name]))).mismatch < 1e-9
 
 
 @pytest.mark.parametrize("name", SEEDS)
-def test_a_changed_robot_file_works_or_one_line_says_why(name, write_file):
-    """Changed values, keys, tables, lines, bytes; the same hundred in every run."""
+def test_damaged_robot_file_is_read_or_refused_with_one_line(name, write_file):
+    """Changed values, keys, tables, lines or bytes; the same hundred in every run."""
     for seed in range(100):
         path = write_file(SEEDS[name])
         change_file(path, Random(f"{name} {seed}"))

@@ -1,4 +1,4 @@
-"""Links of meshes and libraries are found when a robot is loaded, and never later."""
+"""Links of meshes and libraries are solved when a robot is loaded, and never later."""
 
 import builtins
 import copy
@@ -164,8 +164,10 @@ def sealed(monkeypatch, folder):
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_a_solver_of_a_loaded_robot_sees_matrices_alone(folder, solver, sealed):
-    """The same answer as of the robot whose links are given by those matrices."""
+def test_solvers_use_only_the_stiffness_matrices_of_a_loaded_robot(
+    folder, solver, sealed
+):
+    """The result equals that of a robot whose links are given by those matrices."""
     robot = load_robot(folder / "robot.toml")
     names = [frame.name for frame in robot.frames]
     matrices = dict(zip(names, link_compliances(robot), strict=True))
@@ -181,7 +183,7 @@ def test_a_solver_of_a_loaded_robot_sees_matrices_alone(folder, solver, sealed):
 
 
 @pytest.mark.parametrize("solver", OF_A_SHAPE)
-def test_stress_and_mass_of_a_loaded_robot_need_no_file(folder, solver, sealed):
+def test_stress_and_mass_of_a_loaded_robot_read_no_file(folder, solver, sealed):
     first, again = (load_robot(folder / "robot.toml") for _ in range(2))
     expected = OF_A_SHAPE[solver](home_posture(first))
     sealed()
@@ -189,7 +191,7 @@ def test_stress_and_mass_of_a_loaded_robot_need_no_file(folder, solver, sealed):
     np.testing.assert_array_equal(found, expected)
 
 
-def test_a_modulus_found_softer_divides_the_stiffness(folder, robot, sealed):
+def test_modulus_scale_of_a_mesh_link_scales_its_compliance(folder, robot, sealed):
     """K is proportional to E; finite elements with that E agree to their rounding."""
     (folder / "half.toml").write_text(FILE.replace("6e10", "3e10", 1))
     expected = link_compliances(load_robot(folder / "half.toml"))
@@ -204,7 +206,7 @@ def test_a_modulus_found_softer_divides_the_stiffness(folder, robot, sealed):
     assert np.abs(scaled(soft - expected[row], soft)).max() < 1e-7
 
 
-def test_a_robot_as_declared_is_refused_by_solvers(folder):
+def test_solvers_refuse_links_that_are_not_solved(folder):
     robot = read_robot(folder / "robot.toml")
     for name, kind in (("elbow", "mesh"), ("wrist", "library")):
         message = rf'^frame "{name}"\.link\.{kind}: found no stiffness'
@@ -215,7 +217,7 @@ def test_a_robot_as_declared_is_refused_by_solvers(folder):
     assert solve_assembly(home_posture(robot)).energy > 0
 
 
-def test_links_that_are_not_solved_leave_the_files_alone(folder):
+def test_loading_without_links_reads_no_link_file(folder):
     (folder / "missing.toml").write_text(FILE.replace("bar.stl", "none.stl"))
     robot = load_robot(folder / "missing.toml", links=False)
     assert zone_margin(home_posture(robot)).margin > 0
@@ -232,10 +234,10 @@ def test_links_that_are_not_solved_leave_the_files_alone(folder):
          r'"elbow"\.link\.mesh: the tip interface.s centre lies at'),
     ],
 )  # fmt: skip
-def test_a_file_of_a_link_that_is_not_usable_is_refused(
+def test_unusable_link_file_is_refused_before_finite_elements(
     folder, old, new, message, monkeypatch
 ):
-    """Before any finite elements, in one line."""
+    """The message is one line."""
     monkeypatch.setattr("stiffness.fem.fea.solve_link", refuse)
     monkeypatch.setattr("assembly.files.solved_links._SOLVED", {})
     path = folder / "refused.toml"
@@ -245,7 +247,7 @@ def test_a_file_of_a_link_that_is_not_usable_is_refused(
     assert "\n" not in str(refused.value)
 
 
-def test_finite_elements_of_one_shape_run_once_and_are_told(
+def test_finite_elements_of_equal_links_run_once_and_are_logged(
     folder, caplog, tmp_path, monkeypatch
 ):
     monkeypatch.setenv("FORCEFIT_CACHE", str(tmp_path))
@@ -264,8 +266,8 @@ def test_finite_elements_of_one_shape_run_once_and_are_told(
     assert first.solution is second.solution
 
 
-def test_a_solid_of_a_step_file_is_known_by_the_whole_file(folder, monkeypatch):
-    """Its name, behind the path, is no file's."""
+def test_robot_hash_depends_on_the_content_of_a_step_file(folder, monkeypatch):
+    """The name of the solid after the path does not belong to the file name."""
     bar = shape_surface("rectangle", {"length": 0.3, "width": 0.02, "height": 0.02})
     monkeypatch.setattr("stiffness.surface.surface.read_surface", lambda *given: bar)
     (folder / "step.toml").write_text(FILE.replace("bar.stl", "bar.step#*"))
@@ -276,7 +278,7 @@ def test_a_solid_of_a_step_file_is_known_by_the_whole_file(folder, monkeypatch):
     assert len(digests) == 2
 
 
-def test_a_robot_sent_to_another_process_leaves_its_meshes_behind(robot):
+def test_pickled_robot_omits_its_meshes(robot):
     sent = pickle.dumps(robot)
     assert len(sent) < 20_000
     there = solve_links(pickle.loads(sent))

@@ -1,4 +1,4 @@
-"""Solutions of mesh links on disk: bit-identical, and only for the same question."""
+"""Stored solutions of mesh links: bit-identical, and only for the same link."""
 
 import os
 import subprocess
@@ -116,7 +116,7 @@ def assert_same(one, other):
         assert one == other
 
 
-def test_stored_solution_equals_the_solved_one_to_the_last_bit(
+def test_stored_solution_is_bit_identical_to_the_solved_one(
     surface, solved_once, cache, runs
 ):
     again = solved_link(frame(surface))
@@ -128,7 +128,7 @@ def test_stored_solution_equals_the_solved_one_to_the_last_bit(
 def test_moved_files_and_turned_meshes_are_not_solved_again(
     surface, cache, tmp_path, runs
 ):
-    """The solution is in the mesh's axes."""
+    """The solution is stored in the axes of the mesh."""
     copy = tmp_path / "other.STL"
     copy.write_bytes(surface.read_bytes())
     turned = {"up": (1.0, 0.0, 0.0), "frame_up": (0.0, 0.0, 1.0)}
@@ -150,13 +150,13 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_another_link_is_solved_and_kept_beside_the_first(surface, cache, runs, change):
+def test_changed_link_is_solved_and_stored_separately(surface, cache, runs, change):
     solved_link(frame(surface, **CHANGES[change]))
     assert len(runs) == 1
     assert len(list(cache.glob("link-*.npz"))) == 2
 
 
-def test_another_surface_accuracy_or_program_is_solved(
+def test_changed_surface_accuracy_or_program_version_is_solved_again(
     surface, cache, tmp_path, runs, monkeypatch
 ):
     other = tmp_path / "bar.stl"
@@ -187,7 +187,7 @@ def damaged(content):
 
 
 @pytest.mark.parametrize("damage", damaged(b" "))
-def test_damaged_file_is_solved_again_and_replaced(
+def test_damaged_stored_solution_is_solved_again_and_replaced(
     surface, solved_once, cache, runs, damage
 ):
     file = stored_file(cache)
@@ -204,7 +204,7 @@ def test_damaged_file_is_solved_again_and_replaced(
     ]
 
 
-def test_solution_of_another_link_under_this_name_is_not_taken(surface, cache, runs):
+def test_stored_solution_of_another_link_is_not_used(surface, cache, runs):
     file = stored_file(cache)
     solved_link(frame(surface, young=7e10))
     (other,) = set(cache.glob("link-*.npz")) - {file}
@@ -214,7 +214,7 @@ def test_solution_of_another_link_under_this_name_is_not_taken(surface, cache, r
     assert len(runs) == 2
 
 
-def test_a_folder_that_cannot_be_written_changes_no_answer(
+def test_unwritable_cache_folder_does_not_change_the_solution(
     surface, solved_once, cache, runs, monkeypatch
 ):
     def refuse(*given, **named):
@@ -230,7 +230,7 @@ def test_a_folder_that_cannot_be_written_changes_no_answer(
     assert len(runs) == 2
 
 
-def test_solutions_that_were_not_used_for_months_are_removed(surface, cache, runs):
+def test_stored_solutions_unused_for_months_are_removed(surface, cache, runs):
     file = stored_file(cache)
     months_ago = time.time() - 100 * 86_400
     mesh = cache / "mesh-of-old.npz"
@@ -269,7 +269,7 @@ def run_processes(folder, cache, count):
 
 
 @pytest.mark.slow
-def test_processes_at_once_and_later_run_finite_elements_once(
+def test_concurrent_and_later_processes_run_finite_elements_once(
     surface, tmp_path, monkeypatch
 ):
     (tmp_path / "one.toml").write_text(ROBOT)

@@ -35,7 +35,7 @@ def given():
 
 
 @pytest.mark.parametrize("rows", [("errors",), ("T", "mismatch"), ("loads",)])
-def test_one_row_of_22_serves_all_points(rows):
+def test_arrays_of_one_row_apply_to_all_points(rows):
     loads = np.full((K, 2, N, 6), 2.0)
     right, shared = given() | {"loads": loads}, given() | {"loads": loads}
     kernels.assemble_all(**right)
@@ -61,7 +61,7 @@ def read_only(array):
         lambda array: "none",
     ],
 )
-def test_a_wrong_argument_of_22_is_named(name, spoil):
+def test_wrong_array_of_assemble_all_is_refused_by_name(name, spoil):
     right = given()
     array = np.zeros((K, 2, N, 6)) if name == "loads" else right[name]
     with pytest.raises(ValueError, match=rf"^{name}: .*, expected .*of shape \("):
@@ -69,14 +69,14 @@ def test_a_wrong_argument_of_22_is_named(name, spoil):
 
 
 @pytest.mark.parametrize("name", [n for n in given() if n not in {"robot", "T"}])
-def test_an_array_of_22_with_other_points_than_the_frames_is_named(name):
+def test_array_with_a_wrong_number_of_points_is_refused_by_name(name):
     right = given()
     array = np.zeros((K, 2, N, 6)) if name == "loads" else right[name]
     with pytest.raises(ValueError, match=rf"^{name}: .* \({K - 1},.* \({K},"):
         kernels.assemble_all(**right | {name: array[:-1]})
 
 
-def test_the_message_says_what_was_found_and_what_was_expected():
+def test_message_states_found_and_expected_type_and_shape():
     wrong = given() | {"T": np.zeros((K, N, 4, 3), dtype=np.float32)}
     message = (
         f"T: float32 of shape ({K}, {N}, 4, 3), expected float64 of shape "
@@ -87,7 +87,7 @@ def test_the_message_says_what_was_found_and_what_was_expected():
 
 
 @pytest.mark.parametrize("name", ["outcome", "energy", "elastic"])
-def test_what_is_filled_must_be_writable(name):
+def test_read_only_output_array_is_refused(name):
     wrong = given()
     with pytest.raises(ValueError, match=rf"^{name}: .*read-only, expected writable"):
         kernels.assemble_all(**wrong | {name: read_only(wrong[name])})
@@ -99,7 +99,7 @@ INDEXED = ("pattern_of", "spring_frame", "spring_order", "of_joint", "group_patt
 
 @pytest.mark.parametrize("name", INDEXED)
 @pytest.mark.parametrize("index", [-1, 10**6])
-def test_an_index_that_leads_out_of_an_array_is_refused(name, index):
+def test_index_out_of_range_is_refused_with_its_position(name, index):
     structure = structure_of(ROBOT)[1]
     wrong = getattr(structure, name).copy()
     wrong[-1] = index
@@ -122,7 +122,7 @@ def test_groups_that_do_not_fit_their_rows_are_refused(name, at):
     [("parents", [[0, 1]]), ("kinds", [7]), ("pairs", [[0, 99]]), ("moves", [[99, 1]]),
      ("groups", [1]), ("fixed", [1.0])],
 )  # fmt: skip
-def test_a_wrong_array_of_a_tree_is_named(name, wrong):
+def test_wrong_array_of_a_tree_is_refused_by_name(name, wrong):
     fields = nominal._tree(ROBOT)
     kernels.Tree(**fields)
     wrong = np.array(wrong, dtype=np.asarray(fields[name]).dtype)
@@ -133,7 +133,7 @@ def test_a_wrong_array_of_a_tree_is_named(name, wrong):
 
 
 @pytest.mark.parametrize("name", ["G", "h", "d", "H", "k", "starts", "u", "y"])
-def test_a_wrong_argument_of_a_cone_programme_is_named(name, rng):
+def test_wrong_array_of_interior_point_is_refused_by_name(name, rng):
     right = {
         "G": rng.normal(size=(3, 5)), "h": np.ones(3), "d": np.ones(5),
         "H": rng.normal(size=(1, 5)), "k": np.zeros(1),
@@ -182,7 +182,7 @@ CALLS = {"farthest_points": farther, "billiard_walk": walk}
         if isinstance(value, np.ndarray)
     ],
 )
-def test_a_wrong_argument_of_others_is_named(call, name, rng):
+def test_wrong_array_of_other_kernels_is_refused_by_name(call, name, rng):
     right = CALLS[call](rng)
     getattr(kernels, call)(**right)
     with pytest.raises(ValueError, match=rf"^{name}: .*expected"):
@@ -190,8 +190,8 @@ def test_a_wrong_argument_of_others_is_named(call, name, rng):
 
 
 @pytest.mark.parametrize("random", ["rng", "datetime"])
-def test_random_numbers_are_those_of_a_bit_generator(rng, random):
-    """Nor of the capsule of something else."""
+def test_random_numbers_that_are_no_bit_generator_are_refused(rng, random):
+    """Neither a generator nor the capsule of another library is accepted."""
     given = {"rng": rng, "datetime": datetime.datetime_CAPI}
     with pytest.raises((TypeError, ValueError)):
         kernels.billiard_walk(**walk(rng) | {"random": given[random]})

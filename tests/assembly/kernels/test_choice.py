@@ -1,4 +1,4 @@
-"""Which compiled module is chosen, and that answers do not depend on it."""
+"""Choice of the compiled module, and results that do not depend on it."""
 
 import hashlib
 import os
@@ -44,8 +44,8 @@ def digests(level):
 
 @x86_64
 @pytest.mark.parametrize("level", LEVELS)
-def test_every_level_has_the_same_bits(level):
-    """Products and sums are rounded one by one, in the same order on every machine.
+def test_every_instruction_level_gives_bit_identical_results(level):
+    """Products and sums are rounded one by one, in the same order on every processor.
 
     Energies with loads and without, margins, pose errors, compliances, draws and where
     clearances then are, tracks and cones, of more points than there are lanes; one
@@ -63,7 +63,7 @@ def test_every_level_has_the_same_bits(level):
 
 @pytest.mark.skipif(not Path("/proc/cpuinfo").exists(), reason="no list of flags")
 @x86_64
-def test_the_levels_are_those_that_the_system_says_the_processor_has():
+def test_available_levels_follow_from_the_processor_flags():
     cpuinfo = Path("/proc/cpuinfo").read_text(encoding="utf-8")
     flags = next(line for line in cpuinfo.splitlines() if line.startswith("flags"))
     wanted, expected = set(), []
@@ -75,14 +75,14 @@ def test_the_levels_are_those_that_the_system_says_the_processor_has():
 
 
 @x86_64
-def test_the_highest_level_is_taken_if_none_is_named(monkeypatch):
+def test_highest_level_is_loaded_by_default(monkeypatch):
     monkeypatch.delenv("FORCEFIT_MARCH", raising=False)
     assert chosen().__name__.endswith(levels_here()[-1].replace("-", "_"))
 
 
 @x86_64
 @pytest.mark.parametrize("level", ["x86-64-v9", "native", "haswell"])
-def test_what_is_no_level_is_refused_in_one_line(level):
+def test_unknown_level_is_refused_in_one_line(level):
     words = [
         "-m",
         "forcefit",
@@ -100,7 +100,7 @@ def test_what_is_no_level_is_refused_in_one_line(level):
     )
 
 
-def test_a_level_that_the_processor_has_not_is_refused(monkeypatch):
+def test_level_above_that_of_the_processor_is_refused(monkeypatch):
     monkeypatch.setattr(choice.platform, "machine", lambda: "x86_64")
     monkeypatch.setattr(choice, "_load", lambda _: SimpleNamespace(level=lambda: 3))
     monkeypatch.setenv("FORCEFIT_MARCH", "x86-64-v4")
@@ -108,7 +108,7 @@ def test_a_level_that_the_processor_has_not_is_refused(monkeypatch):
         chosen()
 
 
-def test_a_processor_older_than_every_module_is_named(monkeypatch):
+def test_processor_below_every_level_raises_an_import_error(monkeypatch):
     monkeypatch.delenv("FORCEFIT_MARCH", raising=False)
     monkeypatch.setattr(choice.platform, "machine", lambda: "x86_64")
     monkeypatch.setattr(choice, "_load", lambda _: SimpleNamespace(level=lambda: 1))
@@ -116,7 +116,7 @@ def test_a_processor_older_than_every_module_is_named(monkeypatch):
         chosen()
 
 
-def test_there_are_no_levels_elsewhere(monkeypatch):
+def test_other_architecture_loads_the_portable_module(monkeypatch):
     monkeypatch.setattr(choice.platform, "machine", lambda: "aarch64")
     monkeypatch.setattr(choice, "_load", lambda name: name)
     monkeypatch.delenv("FORCEFIT_MARCH", raising=False)
@@ -126,14 +126,14 @@ def test_there_are_no_levels_elsewhere(monkeypatch):
         chosen()
 
 
-def test_modules_that_are_not_built_are_named(monkeypatch):
+def test_missing_module_raises_an_import_error_with_the_remedy(monkeypatch):
     monkeypatch.setattr(choice, "find_spec", lambda _: None)
     with pytest.raises(ImportError, match=r"^assembly.kernels.\w+ is not built: run `"):
         chosen()
 
 
-def test_the_module_was_made_from_the_sources_that_stand_here():
-    """One that is out of date would be tested in their place; `make` builds it."""
+def test_compiled_module_was_built_from_the_current_sources():
+    """An outdated module would be tested in place of the sources; `make` builds it."""
     folder, listed = ROOT / "assembly" / "kernels", ""
     for path in sorted(folder.rglob("*.*"), key=Path.as_posix):
         if path.suffix in {".cpp", ".h"}:

@@ -1,4 +1,4 @@
-"""Closures that do not hold: rounding, a frame's error, or preloaded drives."""
+"""Closures that do not hold: rounding, an error of one frame, or preloaded drives."""
 
 import math
 from dataclasses import replace
@@ -26,13 +26,13 @@ def bent_four_bar():
     return replace(robot, frames=frames)
 
 
-def test_message_of_an_open_closure_offers_to_make_it_an_error():
+def test_open_closure_message_offers_the_rest_option():
     with pytest.raises(BadInput, match=r"off by 0.0001 m with .*--rest NAME makes it"):
         home_posture(bent_four_bar())
 
 
-def test_rest_of_a_closure_is_the_error_of_the_frame_that_is_named():
-    """A shift across the plane of motion is the same wherever it is counted."""
+def test_closure_residual_becomes_the_error_of_the_named_frame():
+    """A shift across the plane of motion is equal in every frame."""
     for name in ("end_coupler", "rocker"):
         robot = rest_in(bent_four_bar(), name)
         error = robot.errors[robot.index(name)]
@@ -41,8 +41,8 @@ def test_rest_of_a_closure_is_the_error_of_the_frame_that_is_named():
         assert home_posture(robot).mismatch < 1e-12
 
 
-def test_energy_does_not_depend_on_the_frame_that_takes_the_rest():
-    """It is one robot, whichever of its frames is called wrong."""
+def test_energy_does_not_depend_on_the_frame_with_the_closure_residual():
+    """The robot is the same, whichever frame gets the error."""
     energies = [
         solve_assembly(home_posture(rest_in(bent_four_bar(), name))).energy
         for name in ("end_coupler", "rocker")
@@ -54,7 +54,7 @@ def test_energy_does_not_depend_on_the_frame_that_takes_the_rest():
     ("name", "message"),
     [("ankle", 'no frame "ankle"'), ("crank", "is in no loop that is open")],
 )
-def test_rest_in_a_frame_that_cannot_take_it_is_refused(name, message):
+def test_closure_residual_in_an_unsuitable_frame_is_refused(name, message):
     robot = bent_four_bar() if name == "ankle" else load_robot("four_bar")
     with pytest.raises(BadInput, match=message):
         rest_in(robot, name)
@@ -78,7 +78,7 @@ def two_slides(first=2e6, second=3e6):
 
 
 @pytest.mark.parametrize("apart", [1e-5, -3e-3])
-def test_redundant_drives_are_preloaded_by_what_does_not_fit(apart):
+def test_redundant_drives_are_preloaded_by_their_mismatch(apart):
     """Two springs in series: E = d^2 / 2 k1 k2 / (k1 + k2), at the weighted mean."""
     k = 2e6, 3e6
     robot = preloaded(two_slides(*k), {"one": 0.35, "two": 0.35 + apart})
@@ -89,12 +89,12 @@ def test_redundant_drives_are_preloaded_by_what_does_not_fit(apart):
     assert robot.remarks[-1].startswith("1 of 2 drives redundant")
 
 
-def test_redundant_drives_that_do_not_fit_are_refused_with_the_option():
+def test_mismatched_redundant_drives_are_refused_with_the_option():
     with pytest.raises(BadInput, match="1 of 2 drives redundant: with --mismatch spr"):
         place_robot(two_slides(), joints={"one": 0.3, "two": 0.32})
 
 
-def test_rigid_drive_that_does_not_fit_is_refused_by_name():
+def test_mismatched_rigid_drive_is_refused_by_name():
     robot = two_slides()
     frames = tuple(
         replace(f, joint_stiffness=None) if f.name == "two" else f for f in robot.frames
@@ -104,8 +104,8 @@ def test_rigid_drive_that_does_not_fit_is_refused_by_name():
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1e-3, 0.05, 1.0])
-def test_closure_of_a_small_robot_holds_to_a_share_of_its_size(scale):
-    """A ten-thousandth of a small robot's size is no rounding, at any size."""
+def test_closure_tolerance_is_proportional_to_the_size_of_a_small_robot(scale):
+    """A gap of 1e-4 of the robot's size exceeds rounding, at any size."""
     frames = (
         Frame("tip", translation=[scale, 0, 0]),
         Frame("post", translation=[scale, 1e-4 * scale, 0]),
@@ -139,8 +139,8 @@ def parallelograms(digits, error=0.0):
     return Robot("cranks", "tip0", tuple(frames), tuple(closures))
 
 
-def test_what_six_digits_leave_open_is_accepted_and_reported():
-    """Rounding leaves up to 5e-7 m per number; below 1e-6 it is dropped."""
+def test_closure_gap_from_six_digit_rounding_is_accepted_and_reported():
+    """Rounding leaves up to 5e-7 m per number; a gap below 1e-6 m is accepted."""
     posture = home_posture(parallelograms(digits=6))
     assert 1e-9 < posture.mismatch < 1e-6
     assert home_posture(parallelograms(digits=15)).mismatch < 1e-12
@@ -148,7 +148,7 @@ def test_what_six_digits_leave_open_is_accepted_and_reported():
     assert moved.mismatch < 1e-6
 
 
-def test_what_is_open_by_more_than_a_micrometre_is_refused_by_name():
+def test_closure_gap_above_one_micrometre_is_refused_by_name():
     with pytest.raises(BadInput, match=r'closure\[2\] \("tip2", "tip0"\)') as caught:
         home_posture(parallelograms(digits=15, error=1e-4))
     assert "expected < 1e-06" in str(caught.value)

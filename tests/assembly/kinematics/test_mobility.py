@@ -36,16 +36,16 @@ def side_by_side(*joints):
     (side_by_side("revolute", "prismatic"), (0, 0, 4)),
     (side_by_side("revolute", "fixed"), (0, 0, 5)),
 ])  # fmt: skip
-def test_freedoms_are_those_counted_by_hand(robot, counts):
-    """All, with drives locked, and equations that the others imply."""
+def test_freedoms_and_overconstraint_equal_hand_counts(robot, counts):
+    """All freedoms, freedoms with locked drives, and redundant equations."""
     found = mobility(home_posture(robot))
     assert (found.freedoms, found.locked_freedoms, found.overconstraint) == counts
 
 
 @pytest.mark.parametrize("count", [2, 3, 5])
 @pytest.mark.parametrize("joint", ["prismatic", "revolute"])
-def test_the_least_singular_value_of_parallel_joints(joint, count):
-    """Of n - 1 rows q1 - qk one, of a single row the root of two; shifts by size."""
+def test_least_singular_value_of_parallel_joints_equals_its_closed_form(joint, count):
+    """Rows q1 - qk: 1, or sqrt(2) of a single row; translations over the size."""
     robot = side_by_side(*[joint] * count)
     least = np.sqrt(2.0) if count == 2 else 1.0
     expected = least / size_of(robot) if joint == "prismatic" else least
@@ -53,6 +53,6 @@ def test_the_least_singular_value_of_parallel_joints(joint, count):
     assert found == pytest.approx(expected)
 
 
-def test_without_closures_no_singular_value_is_above_zero():
+def test_robot_without_closures_has_no_positive_singular_value():
     arm = Robot("arm", "tip", (Frame("a", **TURNING), Frame("tip", "a", [1, 0, 0])))
     assert mobility(home_posture(arm)).smallest_singular_value == 0.0

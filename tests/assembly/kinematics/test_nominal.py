@@ -27,8 +27,8 @@ EXACT = 1e-9  # closures are solved to 1e-10 of the longest body, all near 1 m h
 
 @pytest.mark.parametrize("mode", [1.0, -1.0])
 @pytest.mark.parametrize("q", [-2.0, 0.1, 1.5, 3.0, 5.0])
-def test_a_four_bar_obeys_the_law_of_cosines_in_its_own_mode(q, mode):
-    """The crank turns fully; both assembly modes exist and neither is left."""
+def test_four_bar_follows_the_law_of_cosines_in_its_assembly_mode(q, mode):
+    """The crank turns fully, and neither assembly mode is left."""
     posture = place_robot(four_bar(mode=mode), joints={"crank": q})
     coupler, _, end = four_bar_angles(q, mode)
     np.testing.assert_allclose(posture.platform[:2, 3], end, rtol=0, atol=EXACT)
@@ -37,8 +37,8 @@ def test_a_four_bar_obeys_the_law_of_cosines_in_its_own_mode(q, mode):
     assert posture.mismatch < EXACT
 
 
-def test_a_four_bar_whose_guess_is_rough_still_closes_at_home():
-    """Passive coordinates 0.05 rad off are solved, the driven one is held."""
+def test_rough_home_coordinates_are_corrected_to_close():
+    """Passive coordinates 0.05 rad off are solved; the driven one is kept."""
     posture = home_posture(four_bar(0.5))
     assert posture.coordinates[0] == 0.5
     np.testing.assert_allclose(
@@ -47,7 +47,7 @@ def test_a_four_bar_whose_guess_is_rough_still_closes_at_home():
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_order_of_frames_changes_nothing(seed):
+def test_frame_order_does_not_change_the_posture(seed):
     mixed = np.random.default_rng(seed).permutation(6)
     here = place_robot(four_bar(order=mixed), joints={"crank": 2.0})
     there = place_robot(four_bar(), joints={"crank": 2.0})
@@ -56,8 +56,8 @@ def test_the_order_of_frames_changes_nothing(seed):
     assert all(parents < np.arange(6))
 
 
-def test_a_crank_that_cannot_turn_fully_stops_where_the_triangle_is_flat():
-    """Coupler and rocker of 0.3 m: stretched when the crank's end is 0.6 m away."""
+def test_message_states_where_a_limited_crank_stops():
+    """Coupler and rocker of 0.3 m are in line when the crank's end is 0.6 m away."""
     short = 0.3
     robot = Robot(
         "short", "end",
@@ -92,7 +92,7 @@ def arm(lengths=(0.5, 0.4), angles=(0.3, 0.9)):
 
 
 @pytest.mark.parametrize("x", [0.2, 0.5, 0.85])
-def test_an_arm_reaches_a_pose_with_the_elbow_of_its_home(x):
+def test_arm_reaches_a_pose_in_the_elbow_mode_of_home(x):
     y = 0.2
     posture = place_robot(arm(), pose={"tx": x, "ty": y})
     far = (x**2 + y**2 - 0.5**2 - 0.4**2) / (2 * 0.5 * 0.4)
@@ -100,8 +100,8 @@ def test_an_arm_reaches_a_pose_with_the_elbow_of_its_home(x):
     np.testing.assert_allclose(posture.platform[:2, 3], [x, y], rtol=0, atol=EXACT)
 
 
-def test_a_pose_out_of_reach_is_refused_with_the_distance():
-    """Home is straight ahead on x; the arm ends at 0.9 m, asked for is 1.2 m."""
+def test_pose_out_of_reach_is_refused_with_the_missing_distance():
+    """The arm reaches 0.9 m, and 1.2 m is requested; home is straight ahead on x."""
     start = math.acos((0.5**2 + 0.6**2 - 0.4**2) / (2 * 0.5 * 0.6))
     bend = -math.acos((0.6**2 - 0.5**2 - 0.4**2) / (2 * 0.5 * 0.4))
     robot = arm(angles=(start, bend))
@@ -114,8 +114,8 @@ def test_a_pose_out_of_reach_is_refused_with_the_distance():
     assert "expected a configuration in which every closure holds" in text
 
 
-def test_the_angle_that_is_missing_is_that_between_two_rotations():
-    """A hinge about z asked to tilt: SciPy's angle from where it stops to the goal."""
+def test_missing_angle_equals_that_between_the_two_rotations():
+    """A hinge about z cannot tilt: SciPy's angle from its last pose to the target."""
     robot = Robot("hinge", "hand", (
         frame("a", **driven(0.3)), frame("hand", "a", (0.4, 0, 0), (0.2, -0.1, 0.3)),
     ))  # fmt: skip
@@ -132,8 +132,8 @@ def test_the_angle_that_is_missing_is_that_between_two_rotations():
     assert float(short) == pytest.approx(between.magnitude(), rel=1e-5)
 
 
-def test_components_not_given_stay_nearest_to_home():
-    """Of all elbows with the hand at x, the one nearest to home, on the way there."""
+def test_unspecified_pose_components_stay_nearest_to_home():
+    """Of all elbow angles with the hand at x, the nearest to home."""
     robot = arm()
     home = home_posture(robot)
     x = home.platform[0, 3]
@@ -151,8 +151,8 @@ def test_components_not_given_stay_nearest_to_home():
     np.testing.assert_allclose(step[:2], expected, rtol=0, atol=1e-7)
 
 
-def test_a_spherical_wrist_takes_a_rotation_vector():
-    """Three driven axes z, y, z at one point: any rotation, read back the same."""
+def test_spherical_wrist_reaches_the_requested_rotation_vector():
+    """Three driven axes z, y, z at one point reach any rotation."""
     half = math.pi / 2
     robot = Robot("wrist", "hand", (
         frame("yaw", **driven(0.2)),
@@ -171,14 +171,14 @@ def test_a_spherical_wrist_takes_a_rotation_vector():
     assert rotation_vector(one.platform[:3, :3])[1] == pytest.approx(0.9, abs=EXACT)
 
 
-def test_a_target_half_a_turn_away_is_reached():
-    """All three components given: no trouble where the rotation vector flips."""
+def test_target_half_a_turn_away_is_reached():
+    """All components are given; the rotation vector changes its sign at half a turn."""
     robot = Robot("disc", "hand", (frame("q", **driven(0.1)), frame("hand", "q")))
     posture = place_robot(robot, pose={"rx": 0.0, "ry": 0.0, "rz": math.pi})
     assert abs(posture.coordinates[0]) == pytest.approx(math.pi, abs=EXACT)
 
 
-def test_a_serial_arm_is_its_transforms_multiplied():
+def test_serial_arm_pose_is_the_product_of_its_transforms():
     """T = prod(fixed_i motion_i), multiplied here by hand."""
     robot = Robot("chain", "tool", (
         frame("a", at=(0.1, 0.2, 0.3), turn=(0.4, -0.2, 0.1), **driven(0.5)),
@@ -201,7 +201,7 @@ def test_a_serial_arm_is_its_transforms_multiplied():
     np.testing.assert_allclose(posture.platform, T, rtol=0, atol=1e-14)
 
 
-def test_a_slider_crank_slides():
+def test_slider_crank_position_equals_its_closed_form():
     """Passive prismatic joint: x = r cos q + sqrt(l^2 - r^2 sin^2 q)."""
     half = math.pi / 2
     r, l, q = 0.2, 0.5, 1.1
@@ -221,8 +221,8 @@ def test_a_slider_crank_slides():
 
 
 @pytest.mark.parametrize("x", [-0.2, 0.05, 0.25])
-def test_a_parallel_robot_has_the_drives_of_its_inverse_kinematics(x):
-    """Both legs by the law of cosines; the platform's turn is left near home."""
+def test_five_bar_drives_equal_the_inverse_kinematics(x):
+    """Both legs by the law of cosines; the platform's rotation is unspecified."""
     y = 0.45
     robot = five_bar()
     posture = place_robot(robot, pose={"tx": x, "ty": y})
@@ -251,7 +251,7 @@ def test_a_parallel_robot_has_the_drives_of_its_inverse_kinematics(x):
         ({"joints": {"a": math.inf}}, "joint a: found inf, expected a finite number"),
     ],
 )
-def test_a_request_that_makes_no_sense_is_refused(given, message):
+def test_invalid_pose_or_joint_request_is_refused(given, message):
     with pytest.raises(BadInput) as caught:
         place_robot(arm(), **given)
     assert str(caught.value).startswith(message)

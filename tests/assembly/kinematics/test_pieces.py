@@ -1,4 +1,4 @@
-"""Beams in pieces: frames in a row that are the beam, and postures of these."""
+"""Beams in pieces: serial frames equivalent to the beam, and their postures."""
 
 from dataclasses import replace
 
@@ -25,8 +25,8 @@ def arm(pieces):
     ))  # fmt: skip
 
 
-def test_a_posture_is_cut_as_the_cut_robot_is_placed():
-    """Of any drives; and of many postures in one."""
+def test_cutting_a_posture_equals_placing_the_cut_robot():
+    """For any drive positions, and for several postures together."""
     robot = arm(3)
     cut = cut_beams(robot)
     joints = {"hinge": 1.1, "elbow": 0.3}

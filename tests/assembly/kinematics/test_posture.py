@@ -1,4 +1,4 @@
-"""Postures, one or many in one: what they show, their maps, their cached contents."""
+"""Postures, one or many: their text, their screw maps, their cached arrays."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ def turned(*angles):
     return [place_robot(four_bar(), joints={"crank": angle}) for angle in angles]
 
 
-def test_one_posture_shows_its_pose_and_many_their_number():
+def test_posture_text_states_the_drives_or_the_number_of_postures():
     one, other = turned(0.4, 0.9)
     assert "drives" in repr(one)
     assert "crank 0.4 [rad, m]" in repr(one)
@@ -34,13 +34,13 @@ def test_one_posture_shows_its_pose_and_many_their_number():
     assert "(1, 3)" in repr(grid)
 
 
-def test_a_robot_without_drives_says_so():
+def test_posture_text_of_a_robot_without_drives_states_none():
     assert "drives            none [rad, m]" in repr(
         home_posture(Robot("rod", "tip", (Frame("tip", translation=[1.0, 0, 0]),)))
     )
 
 
-def test_paths_move_screws_from_each_frame_to_the_platform():
+def test_paths_transform_screws_from_each_frame_to_the_platform():
     """[R 0; [p_j - p]x R, R], of one posture and of each of many."""
     postures = turned(0.4, 0.9)
     many = together(postures)
@@ -56,8 +56,8 @@ def test_paths_move_screws_from_each_frame_to_the_platform():
         many.paths[0, 0, 0, 0] = 1.0
 
 
-def test_joints_that_are_not_named_keep_their_home(rng):
-    """Of drives; passive joints are free."""
+def test_drives_not_named_keep_their_home_position(rng):
+    """Passive joints are free."""
     robot = load_robot("five_bar")
     drives = [f.name for f in robot.frames if f.actuated]
     asked = joint_target(robot, {drives[1]: 0.25}).coordinates
@@ -71,7 +71,7 @@ def test_joints_that_are_not_named_keep_their_home(rng):
             assert np.isnan(asked[0, i])
 
 
-def test_coordinates_beyond_any_machine_are_refused():
+def test_coordinates_above_1e6_are_refused():
     with pytest.raises(BadInput, match=r"pose.tx: found 2e\+06, expected a number of"):
         place_robot(four_bar(), pose={"tx": 2e6})
     with pytest.raises(
@@ -80,13 +80,13 @@ def test_coordinates_beyond_any_machine_are_refused():
         place_robot(four_bar(), joints={"crank": -2e6})
 
 
-def test_the_reference_length_is_that_of_the_longest_body():
+def test_reference_length_is_that_of_the_longest_body():
     assert size_of(four_bar()) == pytest.approx(GROUND)
     assert size_of(load_robot("irsbot2")) > 0
     assert size_of(Robot("point", "a", (Frame("a"),))) == 1.0
 
 
-def test_the_posture_reports_the_worst_closure_that_rounding_leaves():
+def test_posture_reports_its_largest_closure_gap():
     robot = Robot(
         "gaps", "a",
         (Frame("a"), Frame("b", translation=[3e-7, 0, 0]),
@@ -96,8 +96,8 @@ def test_the_posture_reports_the_worst_closure_that_rounding_leaves():
     assert home_posture(robot).mismatch == pytest.approx(5e-7, rel=1e-6)
 
 
-def test_joints_at_and_beyond_a_closure_stay_where_they_are():
-    """Their motion comes after the frame that closes, and after the platform."""
+def test_joints_after_a_closure_or_the_platform_keep_their_position():
+    """Their motion changes neither the closing frame nor the platform."""
     robot = four_bar()
     closed = {"end", "seat"}
     frames = tuple(
@@ -123,8 +123,8 @@ def test_joints_at_and_beyond_a_closure_stay_where_they_are():
         ({"ry": 0.3, "rz": 0.4}, "0.5 rad"),
     ],
 )  # fmt: skip
-def test_what_is_missing_has_the_units_of_what_was_asked(asked, missing):
-    """A slide along x neither rises nor tilts, wherever it stands."""
+def test_missing_distance_has_the_unit_of_the_requested_component(asked, missing):
+    """A slide along x neither rises nor tilts at any position."""
     robot = Robot("slide", "car", (
         Frame("rail", rotation=[0, np.pi / 2, 0], joint="prismatic", actuated=True),
         Frame("car", "rail", rotation=[0, -np.pi / 2, 0]),

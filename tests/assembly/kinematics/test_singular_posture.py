@@ -1,4 +1,4 @@
-"""Singular postures, modes that meet there, and the far side of a singularity."""
+"""Singular postures, modes that meet there, and poses beyond a singularity."""
 
 import math
 from dataclasses import replace
@@ -28,8 +28,8 @@ def flat(x=0.0, y=0.0, z=HEIGHT):
 
 
 @pytest.mark.parametrize("z", [0.3, HEIGHT, 0.6])
-def test_three_upu_above_its_centre_is_singular_and_beside_it_is_not(z):
-    """There its three couples are parallel; 2 mm beside they span two directions."""
+def test_three_upu_is_singular_above_its_centre_and_regular_2_mm_away(z):
+    """At the centre its three couples are parallel; 2 mm away they are not."""
     robot = three_upu()
     assert singular(place_robot(robot, pose=flat(z=z)))
     assert not singular(place_robot(robot, pose=flat(x=0.002, z=z)))
@@ -40,7 +40,7 @@ def test_built_in_robots_are_regular_at_home(name):
     assert not singular(home_posture(load_robot(name)))
 
 
-def test_robot_without_drives_is_regular_where_it_always_moves():
+def test_robot_without_drives_is_regular():
     robot = load_robot("four_bar")
     loose = tuple(replace(frame, actuated=False) for frame in robot.frames)
     assert not singular(home_posture(replace(robot, frames=loose)))
@@ -56,15 +56,15 @@ GIVEN = [{"tz": HEIGHT}, {"tx": 0.0, "ty": 0.0, "tz": HEIGHT}, flat()]
 
 
 @pytest.mark.parametrize("pose", GIVEN)
-def test_parallel_and_closure_distance_are_zero_however_the_pose_is_given(pose):
+def test_singular_distances_are_zero_for_every_form_of_the_singular_pose(pose):
     robot = three_upu()
     found = find_singularities(robot, place_robot(robot, pose=pose).transforms[None])
     assert found.parallel[0] == 0.0
     assert found.closure[0] == 0.0
 
 
-def test_pose_from_a_singular_home_is_reached_without_turning():
-    """Poses of pure translation exist everywhere; what is not given stays at home."""
+def test_pose_from_a_singular_home_is_reached_by_pure_translation():
+    """Pure translations exist everywhere; unspecified components stay at home."""
     robot = three_upu()
     pose = {"tx": 0.002, "ty": 0.001, "tz": HEIGHT}
     posture = place_robot(robot, pose=pose)
@@ -87,19 +87,19 @@ def test_drives_from_a_singular_home_keep_the_mode_of_translation():
     assert "pure translation" in remark
 
 
-def test_pose_that_turns_is_named_as_another_mode():
+def test_pose_that_rotates_is_reported_as_another_mode():
     posture = place_robot(three_upu(), pose={"rx": 0.05})
     assert posture.pose()["rx"] == pytest.approx(0.05, abs=1e-9)
     assert "turns" in posture_remarks(posture)[0]
 
 
-def test_unreachable_pose_says_that_home_is_singular():
+def test_unreachable_pose_message_states_that_home_is_singular():
     with pytest.raises(BadInput, match=r"home is a singular posture: name all six"):
         place_robot(three_upu(), pose={"tz": HEIGHT, "rz": 3.0})
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_hexapod_turned_by_a_right_angle_has_crossed_its_singularity(side):
+def test_hexapod_turned_beyond_90_degrees_is_beyond_its_singularity(side):
     """A regular hexapod is singular at 90 degrees about z (Fichter 1986)."""
     robot = load_robot("hexapod")
     height = home_posture(robot).pose()["tz"]
@@ -112,7 +112,7 @@ def test_hexapod_turned_by_a_right_angle_has_crossed_its_singularity(side):
     assert "without passing a singularity" in posture_remarks(postures[2])[0]
 
 
-def test_five_bar_has_a_far_side_below_the_line_of_its_elbows():
+def test_five_bar_below_the_line_of_its_elbows_is_beyond_its_singularity():
     """At tx = 0 the far arms are one line at ty = sqrt(90^2 - 30^2) mm."""
     robot, line = load_robot("five_bar"), math.sqrt(0.09**2 - 0.03**2)
     poses = np.full((4, 6), np.nan)
@@ -123,7 +123,7 @@ def test_five_bar_has_a_far_side_below_the_line_of_its_elbows():
     assert far.tolist() == [False, False, True, True]
 
 
-def test_joint_beyond_its_limits_is_named_with_them():
+def test_joint_beyond_its_limits_is_reported_with_its_limits():
     robot = load_robot("four_bar")
     frames = tuple(
         replace(f, limits=(-0.5, 1.5)) if f.actuated else f for f in robot.frames

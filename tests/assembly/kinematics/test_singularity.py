@@ -51,8 +51,8 @@ def five_bar():
     return robot, np.array([p.transforms for p in postures if p is not None])
 
 
-def test_a_five_bar_has_the_singular_values_of_its_closed_form(five_bar):
-    """J = A^-1 B with the tip's turn beside its shift: tangents of the angles."""
+def test_five_bar_distances_equal_the_closed_form_jacobian(five_bar):
+    """J = A^-1 B with the tip's rotation and translation: tangents of the angles."""
     robot, T = five_bar
     found = find_singularities(robot, T)
     assert len(T) >= 30
@@ -74,7 +74,7 @@ def test_a_five_bar_has_the_singular_values_of_its_closed_form(five_bar):
         assert found.condition[i] == pytest.approx(tangents[0] / tangents[-1])
 
 
-def test_second_arms_in_line_are_a_parallel_singularity_and_it_is_named():
+def test_five_bar_distal_arms_in_line_are_a_parallel_singularity():
     """det A = d_1 x d_2 = 0 where the elbows are 2 * 90 mm apart, the tip between them.
 
     With equal drive angles either side of 90 degrees the elbows are 120 + 180 cos(t) mm
@@ -95,10 +95,10 @@ def test_second_arms_in_line_are_a_parallel_singularity_and_it_is_named():
     assert name.endswith(", platform TY")
 
 
-def test_arms_in_line_are_a_serial_singularity_and_its_drive_is_named():
+def test_arms_in_line_are_a_serial_singularity_with_the_drive_named():
     """B_11 = d.(k x a) = 0 where the left arms are one line, 180 mm long.
 
-    A length e short of that, the arms are bent by an angle that goes with sqrt(e).
+    If they are shorter by e, they are bent by an angle proportional to sqrt(e).
     """
     robot = load_robot("five_bar")
     found = []
@@ -112,7 +112,7 @@ def test_arms_in_line_are_a_serial_singularity_and_its_drive_is_named():
 
 
 @pytest.mark.parametrize("angle", [0.3, 1.1, 2.5, 4.0])
-def test_a_four_bar_moves_its_point_as_its_closed_form_says(angle):
+def test_four_bar_distances_equal_the_speed_of_its_closed_form(angle):
     """Speed and turn of Hoeken's coupler by differences of its closed form."""
     robot = load_robot("four_bar")
     found = at(robot, joints={"crank": angle})
@@ -137,15 +137,15 @@ def test_a_four_bar_moves_its_point_as_its_closed_form_says(angle):
     assert found.serial[0] == pytest.approx(math.sin(math.atan(tangent)), rel=1e-8)
 
 
-def test_an_orthoglide_is_isotropic_at_home():
-    """Chablat, Wenger (2003): its Jacobian is the unit matrix there, tan = 1."""
+def test_orthoglide_is_isotropic_at_home():
+    """Chablat, Wenger (2003): its Jacobian is the identity there, tan = 1."""
     robot = load_robot("orthoglide")
     found = find_singularities(robot, home_posture(robot).transforms[None])
     assert found.condition[0] == pytest.approx(1.0, abs=1e-9)
     assert found.serial[0] == pytest.approx(math.sqrt(0.5), abs=1e-9)
 
 
-def test_a_stretched_arm_is_serially_singular_and_has_no_closures():
+def test_arm_with_aligned_wrist_axes_is_serially_singular():
     """An arm's wrist with its fourth and sixth axes in line loses a freedom."""
     robot = load_robot("arm6")
     driven = [f.name for f in robot.frames if f.actuated]
@@ -163,8 +163,8 @@ def test_a_stretched_arm_is_serially_singular_and_has_no_closures():
     assert found.names(robot, 0.02)[1].startswith("serial: ")
 
 
-def test_distances_do_not_depend_on_the_unit_of_length(five_bar):
-    """Every length times 1000 moves no angle: lengths count in the longest body."""
+def test_singular_distances_do_not_depend_on_the_unit_of_length(five_bar):
+    """Every length times 1000 changes no angle: lengths are relative to a body's."""
     robot, T = five_bar
     frames = [replace(f, translation=1000 * f.translation) for f in robot.frames]
     large = T.copy()
@@ -193,8 +193,8 @@ def parallelogram(angle):
     return Robot("parallelogram", "coupler", frames, (("coupler", "rocker_end"),))
 
 
-def test_a_flat_parallelogram_is_a_closure_singularity_and_its_joint_is_named():
-    """All four axes meet one line: the distance falls in proportion to the angle."""
+def test_flat_parallelogram_is_a_closure_singularity_with_its_joint_named():
+    """All four axes meet one line: the distance is proportional to the angle."""
     found = []
     for angle in (0.1, 0.01):
         robot = parallelogram(angle)
@@ -231,9 +231,9 @@ def way_to(robot, name):
 
 
 @pytest.mark.parametrize("name", ["five_bar", "3rrr", "orthoglide", "arm6", "delta"])
-def test_singular_motions_keep_closures_closed(name):
-    """Of size one in all: the least share of the platform, or of the drives; joints
-    move with them, and closures stay closed."""
+def test_singular_motions_keep_closures_closed_and_have_unit_size(name):
+    """Motions have size one; the platform's, or the drives', share is the least.
+    Passive joints move with them, and closures stay closed."""
     robot = load_robot(name)
     driven = [k for k, f in enumerate(robot.frames) if f.actuated]
     home = home_posture(robot)
@@ -265,8 +265,8 @@ def test_singular_motions_keep_closures_closed(name):
         )
 
 
-def test_a_platform_that_no_joint_moves_is_at_no_serial_singularity():
-    """Nothing could be lost; its drive moves, but nothing of the platform."""
+def test_platform_that_no_joint_moves_has_no_serial_singularity():
+    """Its drive moves, but nothing of the platform."""
     turning = {"joint": "revolute", "actuated": True}
     robot = Robot("still", "tip", (
         Frame("tip"), Frame("one", **turning),

@@ -1,4 +1,4 @@
-"""Ways to one target and to many: where they end, in which assembly mode."""
+"""Tracks to one target and to many: where they end, and in which assembly mode."""
 
 import math
 
@@ -21,7 +21,7 @@ from tests.linkages_for_tests import five_bar
 EXACT = 1e-9  # closures are solved to 1e-10 of the longest body, all near 1 m here
 
 
-def test_many_poses_are_those_placed_one_by_one():
+def test_many_poses_equal_those_placed_one_by_one():
     robot = five_bar()
     goals = np.full((3, 6), np.nan)
     goals[:, :2] = [[0.1, 0.5], [0.0, 2.0], [-0.1, 0.6]]
@@ -38,8 +38,8 @@ def test_many_poses_are_those_placed_one_by_one():
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "orthoglide"])
-def test_a_long_way_ends_where_many_short_ones_do(name):
-    """Home's assembly mode: through 40 targets on the line, each from the last."""
+def test_direct_track_ends_in_the_posture_of_many_short_steps(name):
+    """Home's assembly mode: through 40 targets on the line, each from the previous."""
     robot = load_robot(name)
     home = home_posture(robot)
     given = (0, 2) if name == "irsbot2" else (0, 1, 2)
@@ -60,8 +60,8 @@ def test_a_long_way_ends_where_many_short_ones_do(name):
         np.testing.assert_allclose(posture.coordinates, at, rtol=0, atol=EXACT)
 
 
-def test_a_ball_near_gimbal_lock_turns_on_as_it_did():
-    """Beside the lock a long step ends half a turn about two of its axes away."""
+def test_ball_joint_near_gimbal_lock_keeps_its_branch():
+    """Near the lock a long step could end half a turn away about two of its axes."""
     robot = load_robot("hexapod")
     home = home_posture(robot)
     goal = np.array([[0.475133, 0.004732, 0.078543, 0.384865, -0.20706, -0.37498]])
@@ -74,8 +74,8 @@ def test_a_ball_near_gimbal_lock_turns_on_as_it_did():
     np.testing.assert_allclose(track.coordinates[0], at, rtol=0, atol=EXACT)
 
 
-def test_many_sets_of_joints_are_those_of_the_inverse_kinematics():
-    """Law of cosines one way, the closure the other; flat outward the elbows are
+def test_many_joint_targets_reach_the_poses_of_the_inverse_kinematics():
+    """Law of cosines against the closure; with both arms outward the elbows are
     0.9 m apart and two bars of 0.4 m cannot meet."""
     robot = five_bar()
     goals = np.full((3, 8), np.nan)
@@ -96,8 +96,8 @@ def test_many_sets_of_joints_are_those_of_the_inverse_kinematics():
 
 
 @pytest.mark.parametrize("name", ["arm6", "five_bar", "3rrr", "irsbot2"])
-def test_what_a_pose_leaves_open_does_not_hang_on_rounding(name):
-    """A target changed in its last digit, as another processor would change it."""
+def test_unspecified_pose_components_do_not_depend_on_rounding(name):
+    """A target changed in its last digit, as on another processor."""
     robot = load_robot(name)
     tx = place_robot(robot).pose()["tx"] + 0.06
     first, *others = (
@@ -123,8 +123,8 @@ BALL = Robot("ball", "body", (
 
 
 @pytest.mark.parametrize("given", ["all", "turns", "place"])
-def test_a_free_body_is_turned_and_put_where_it_is_told(given, rng):
-    """Rotation vectors by scipy, from no turn to nearly half a turn about any axis."""
+def test_free_body_reaches_the_requested_pose(given, rng):
+    """Rotation vectors by SciPy, up to nearly half a turn about any axis."""
     robot = BALL
     axes = rng.normal(size=(60, 3))
     axes /= np.linalg.norm(axes, axis=1)[:, None]
@@ -167,8 +167,8 @@ def targets_of(home, rng, count=40):
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_every_target_that_is_reached_is_where_it_was_sent(name, rng):
-    """With closures that hold; reached again from there in one step."""
+def test_reached_targets_have_the_requested_pose_and_closed_loops(name, rng):
+    """A new track from the reached posture needs one step."""
     home = home_posture(BUILT_IN[name]())
     reached = 0
     for target in targets_of(home, rng):
@@ -195,8 +195,8 @@ def assert_sent_there(robot, target, track):
         assert np.nanmax(np.abs(off[track.reached]), initial=0.0) < 1e-6
 
 
-def test_a_target_does_not_depend_on_its_neighbours(rng):
-    """To the last bit: alone, in another order, among others that ask for more."""
+def test_track_does_not_depend_on_other_targets(rng):
+    """Bit-identical: alone, in another order, among longer tracks."""
     home = home_posture(BUILT_IN["irsbot2"]())
     poses = targets_of(home, rng)[
         2
@@ -212,8 +212,8 @@ def test_a_target_does_not_depend_on_its_neighbours(rng):
         assert alone.progress[0] == together.progress[i]
 
 
-def test_joints_turn_as_far_as_they_are_told(rng):
-    """Scipy's rotation about z, from no turn to more than the polynomials carry."""
+def test_joint_rotation_equals_scipy_for_any_angle(rng):
+    """SciPy's rotation about z, also beyond the range of the polynomials."""
     robot = Robot("wheel", "rim", (Frame("rim", joint="revolute"), Frame("end", "rim")))
     angles = np.r_[
         rng.uniform(-10, 10, 200), rng.uniform(-9e4, 9e4, 200), 0.0, 1e-300,
@@ -226,7 +226,7 @@ def test_joints_turn_as_far_as_they_are_told(rng):
     np.testing.assert_allclose(track.transforms[:, 1, :3, :3], expected, atol=4e-16)
 
 
-def test_no_targets_are_no_tracks():
+def test_empty_list_of_targets_gives_empty_tracks():
     home = home_posture(BUILT_IN["five_bar"]())
     track = follow(home.robot, home.coordinates, Target(pose=np.zeros((0, 6))))
     assert track.coordinates.shape == (0, len(home.robot.frames))

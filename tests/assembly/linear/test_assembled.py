@@ -1,4 +1,4 @@
-"""Certificates of an assembly that is not the best, against their definitions."""
+"""Certificates of assemblies above the least energy, against their definitions."""
 
 from dataclasses import replace
 
@@ -56,7 +56,7 @@ def solvable(rng):
             continue
 
 
-def test_any_wrenches_bound_the_energy(rng):
+def test_any_wrenches_give_a_lower_bound_of_the_energy(rng):
     """Weak duality; the bound is the sum that its docstring defines."""
     some = list(solvable(rng))
     assert len(some) >= 3
@@ -69,8 +69,8 @@ def test_any_wrenches_bound_the_energy(rng):
         assert other.bound == pytest.approx(by_hand, rel=1e-9, abs=1e-9 * scale)
 
 
-def test_the_uncertainty_is_the_gap_without_cancellation(rng):
-    """Potential minus bound, each term at its worst sign: 2 |slip q|, |l residual|."""
+def test_uncertainty_is_the_gap_with_every_term_at_its_worst_sign(rng):
+    """Potential minus bound: 2 |slip q| and |multiplier residual|."""
     for _, other in solvable(rng):
         slip = other.joints.free.T @ other.joint_wrenches.ravel() * other.motions
         left = other.multipliers * (other.linearisation.rows @ other.screws.ravel())
@@ -83,8 +83,8 @@ def test_the_uncertainty_is_the_gap_without_cancellation(rng):
         assert other.uncertainty == pytest.approx(worst, rel=1e-8)
 
 
-def test_the_largest_force_is_named_by_the_first_body_that_carries_it():
-    """Bodies in series carry equal forces but for rounding; the idle one none."""
+def test_largest_force_is_named_by_the_first_of_equal_bodies():
+    """Bodies in series carry equal forces up to rounding; the idle body none."""
     robot = coaxial_beams([0, 0, 0, 1e-4, 2e-5, 3e-5])
     idle = replace(
         robot, frames=(Frame("idle", translation=[0.1, 0, 0]), *robot.frames)
@@ -93,8 +93,8 @@ def test_the_largest_force_is_named_by_the_first_body_that_carries_it():
     assert figures["largest force"].endswith(" N, in one")
 
 
-def test_points_solved_one_by_one_keep_their_own_certificate():
-    """The bound is the energy less the gap, also of what is not the best."""
+def test_combined_points_keep_their_own_certificates():
+    """The bound is the energy less the gap, also above the least energy."""
     robot = coaxial_beams([0, 0, 0, 1e-4, 0, 0])
     best = solve_assembly(home_posture(robot))
     worse = replace(best, elastic=1.001 * best.elastic)

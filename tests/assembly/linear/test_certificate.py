@@ -22,8 +22,8 @@ from tests.robots_for_tests import (
 
 
 @pytest.mark.parametrize("kappa", [0.0, 0.05, 0.1, 1.0])
-def test_energy_is_proved_over_half_of_the_workspace(kappa):
-    """Errors of 0.05 and 0.1 are near the edge of the zone: little energy is left."""
+def test_least_energy_is_certified_over_half_of_the_workspace(kappa):
+    """Errors times 0.05 and 0.1 are near the edge of the zone, with little energy."""
     robot, postures = irsbot2_over(
         np.arange(-0.65, 0.651, 0.15), np.arange(-0.75, 0.001, 0.15)
     )
@@ -41,7 +41,7 @@ def assert_proved(answer):
     assert gap <= 1e-8 * answer.energy + 1e-12 * answer.energy_without_clearance
 
 
-def test_values_that_are_no_numbers_prove_nothing():
+def test_nan_and_wrong_values_are_not_certified():
     answer = solve_assembly(place_robot(irsbot2_with(NUMBERS["cases"][0])))
     for spoilt_answer in (
         replace(answer, multipliers=answer.multipliers * np.nan),
@@ -73,7 +73,7 @@ def arm_against_wall(young, soft=50.0):
 
 
 @pytest.mark.parametrize("young", [7e10, 1e16, 1e20, 1e22, 1e30, 1e38])
-def test_a_hinges_turn_is_within_its_bound_or_refused_by_name(young):
+def test_hinge_rotation_is_within_its_bound_or_refused_as_ill_conditioned(young):
     """By hand: a force F across turns the hinge by F L / K = t and bends the bar by
     F L^3 / (3 E I); together t L + F L^3 / (3 E I) = 0.2 mm.
     """
@@ -91,7 +91,7 @@ def test_a_hinges_turn_is_within_its_bound_or_refused_by_name(young):
     assert bound.rotation_error < 1e-8
 
 
-def test_screws_of_least_energy_from_another_solver_are_within_the_bound():
+def test_platform_screw_of_cvxpy_is_within_the_bound():
     """cvxpy's energies are above the least by 1e-8 J, its screws off by the root of it:
     that excess is added to the uncertainty.
     """
@@ -117,8 +117,8 @@ def test_screws_of_least_energy_from_another_solver_are_within_the_bound():
     assert compared > 10
 
 
-def test_rounding_of_zero_is_zero():
-    """Errors of a loop that add up to nothing, but not in floating point: 0.1 + 0.2."""
+def test_errors_that_cancel_up_to_rounding_store_no_energy():
+    """Errors of a loop whose sum is zero, but not in floating point: 0.1 + 0.2."""
     parts = [1e-4, 2e-4, -3e-4]
     frames = [Frame("f0", translation=[0.1, 0, 0], link=MatrixLink(1e6 * np.eye(6)))]
     for i, error in enumerate(parts):
@@ -148,7 +148,7 @@ def test_rounding_of_zero_is_zero():
             assert found == pytest.approx(1e6 * gap**2 / 2, rel=1e-9)
 
 
-def test_the_certificate_trusts_nothing_but_the_wrenches():
+def test_wrong_multipliers_give_the_gap_worked_out_by_hand():
     """Wrong multipliers and springs open a gap of the size worked out by hand."""
     robot = coaxial_beams(np.array([0, 0, 0, 2e-4, 0, 0]), (1e6, 3e6))
     answer = solve_assembly(home_posture(robot))
@@ -163,8 +163,8 @@ def test_the_certificate_trusts_nothing_but_the_wrenches():
     assert stiffer.closure_residual() > 1e-7
 
 
-def test_each_half_of_the_screw_is_proved_to_its_own_size():
-    """1e-5 and a thousandth: a turn of 0.1 rad to 1.1e-4, no shift to 1e-5."""
+def test_rotation_and_translation_are_certified_to_their_own_tolerances():
+    """1e-5 and a thousandth: a rotation of 0.1 rad to 1.1e-4, a zero shift to 1e-5."""
     gap = np.array([0.2, 0, 0, 0, 0, 0])
     assembly = solve_assembly(home_posture(coaxial_beams(gap)))
     assert np.abs(assembly.platform_screw[0]) == pytest.approx(0.1)

@@ -14,8 +14,8 @@ from tests.robots_for_tests import (
 )
 
 
-def test_free_motions_that_are_not_unique_are_the_least():
-    """Two pins on one axis share its turn: half each, like the single answer."""
+def test_redundant_free_motions_have_least_norm():
+    """Two pins on one axis share its rotation: half each, as by the reference."""
     gap = [1e-3, 0, 2e-3, 1e-4, 0, 0]
     frames = (
         Frame("one", translation=[0.5, 0, 0], link=MatrixLink(1e5 * np.eye(6))),
@@ -35,8 +35,8 @@ def test_free_motions_that_are_not_unique_are_the_least():
     assert batch.platform_screw[0, 2] == pytest.approx(1e-3, rel=1e-9)
 
 
-def test_stiff_and_soft_springs_in_series_keep_the_stiff_one():
-    """1 and 1e-8 rad/(N m) about one axis, across it 1e-8 twice."""
+def test_stiff_spring_in_series_with_a_soft_one_keeps_its_energy():
+    """1 and 1e-8 rad/(N m) about one axis, twice 1e-8 across it."""
     soft = np.diag([1.0, 1e8, 1e8, 1e8, 1e8, 1e8])
     gap = np.array([1e-2, 1e-4, 0, 0, 0, 0])
     frames = (
@@ -56,8 +56,8 @@ def test_stiff_and_soft_springs_in_series_keep_the_stiff_one():
     assert batch.energy[0] == pytest.approx(by_hand, rel=1e-12)
 
 
-def test_the_certificate_refuses_a_spoilt_point(grid):
-    """Springs 1.5e-8 too long, multipliers 2e-4 too small or not a number."""
+def test_falsified_solution_is_not_certified(grid):
+    """Springs are 1.5e-8 too long, or multipliers 2e-4 too small or NaN."""
     robot, postures = grid
     T = postures[0].transforms[None].copy()
     good = assemble_at(robot, T)
@@ -78,7 +78,7 @@ def test_the_certificate_refuses_a_spoilt_point(grid):
         ((2, 6, 3, 4), None, r"transforms of shape \(2, 6, 3, 4\)"),
     ],
 )
-def test_wrong_shapes_are_refused(shape, errors, message):
+def test_transforms_or_errors_of_a_wrong_shape_are_refused(shape, errors, message):
     robot = coaxial_beams(np.zeros(6))
     given = None if errors is None else np.zeros(errors)
     with pytest.raises(ValueError, match=message):
@@ -95,13 +95,13 @@ def test_values_that_are_not_finite_are_refused():
         assemble_at(robot, T)
 
 
-def test_no_points_are_no_answers():
+def test_empty_list_of_postures_gives_an_empty_solution():
     robot = coaxial_beams(np.zeros(6))
     assert len(assemble_at(robot, np.zeros((0, 6, 4, 4))).energy) == 0
 
 
-def test_a_single_answer_closes_and_has_the_least_wrenches(grid):
-    """Springs of a compiled answer close to rounding; wrenches are the reference's."""
+def test_compiled_single_solution_closes_and_equals_the_reference_wrenches(grid):
+    """Closures hold up to rounding; wrenches equal those of the reference method."""
     _, postures = grid
     for posture in postures[::9]:
         answer, reference = (

@@ -1,4 +1,4 @@
-"""Bounds of (27) of many points: against the reference, and against each other."""
+"""Bounds of (27) at many points: against the reference method, and each other."""
 
 import numpy as np
 import pytest
@@ -32,8 +32,8 @@ def assert_overlap(batch, i, one, uncertain=2e-7, width=1e-6):
 
 
 @pytest.mark.parametrize("assumption", ASSUMPTIONS)
-def test_brackets_of_any_robot_share_a_point_with_the_references(assumption, rng):
-    """At another point of the platform, with and without bounds of passive joints."""
+def test_compiled_brackets_overlap_those_of_the_reference_method(assumption, rng):
+    """At a platform offset, with and without motion limits of passive joints."""
     homes = [home_posture(make()) for make in BUILT_IN.values()]
     for seed in range(12):
         draw = np.random.default_rng(seed)
@@ -57,7 +57,7 @@ def test_brackets_of_any_robot_share_a_point_with_the_references(assumption, rng
     assert compiled
 
 
-def test_tolerances_of_many_points_are_as_given(grid):
+def test_pose_error_brackets_have_the_requested_width(grid):
     robot, postures = grid
     errors = np.array([-0.3, 0.1, 0.2])[:, None, None] * robot.errors
     options = {
@@ -73,7 +73,7 @@ def test_tolerances_of_many_points_are_as_given(grid):
 
 
 @pytest.mark.parametrize("assumption", ASSUMPTIONS)
-def test_a_bound_does_not_depend_on_its_neighbours(grid, rng, assumption):
+def test_pose_error_bound_does_not_depend_on_other_points(grid, rng, assumption):
     """In another order, among other points, alone: bit-identical."""
     robot, postures = grid
     at, count = together(postures), len(postures)
@@ -91,8 +91,8 @@ def test_a_bound_does_not_depend_on_its_neighbours(grid, rng, assumption):
 
 @pytest.mark.parametrize("spin", [10.0, 1e-2, 3e-4, 1e-5, 0.0])
 @pytest.mark.parametrize("assumption", ["frozen", "free"])
-def test_bounds_of_passive_joints_count_in_a_batch(spin, assumption):
-    """Compiled where no clearance comes near them, else set up in numpy."""
+def test_motion_limits_of_passive_joints_apply_to_many_points(spin, assumption):
+    """Compiled where no clearance reaches the limit, else by the reference method."""
     posture = home_posture(hinged_frame(spin))
     one = bound_pose_error(
         solve_assembly(posture, method="reference"), assumption, method="reference"
@@ -107,8 +107,8 @@ def test_bounds_of_passive_joints_count_in_a_batch(spin, assumption):
 
 
 @pytest.mark.parametrize("assumption", ASSUMPTIONS)
-def test_bounds_of_joints_count_at_the_points_that_reach_them(assumption):
-    """Every other of six draws has errors so large that a clearance comes near them."""
+def test_only_points_that_reach_a_motion_limit_use_the_reference_method(assumption):
+    """In every other of six draws the errors are so large that a limit is reached."""
     home = home_posture(hinged_frame(2e-3))
     sizes = 1e-4 * np.array([0, 1, 3, 10, 30, 100])[:, None]
     errors = np.zeros((6, 6, 6))
@@ -121,7 +121,7 @@ def test_bounds_of_joints_count_at_the_points_that_reach_them(assumption):
         assert_overlap(found, i, one, uncertain=1e-12)
 
 
-def test_the_budget_goes_one_at_a_time():
+def test_budget_assumption_is_solved_point_by_point():
     robot = coaxial_beams(np.array([0, 0, 0, 2e-4, 0, 0]))
     posture = home_posture(robot)
     batch = bound_pose_error(solve_assembly([posture]), "budget", energy_budget=0.5)
@@ -130,7 +130,7 @@ def test_the_budget_goes_one_at_a_time():
     assert_overlap(batch, 0, one)
 
 
-def test_what_cannot_be_assembled_has_no_bounds():
+def test_robot_that_cannot_be_assembled_has_no_pose_error_bounds():
     rigid = (Frame("a", geometric_error=[0, 0, 0, 1e-3, 0, 0]), Frame("b"))
     robot = Robot("open", "a", rigid, (("a", "b"),))
     batch = bound_pose_error(solve_assembly([home_posture(robot)]))
@@ -140,8 +140,8 @@ def test_what_cannot_be_assembled_has_no_bounds():
     assert batch[0].unproved == batch.unproved[0] == batch.reason[0]
 
 
-def test_points_under_a_load_that_an_assumption_cannot_carry_say_so():
-    """A hinge that a soft spring holds turns freely in the assumption free."""
+def test_load_on_a_motion_freed_by_the_assumption_is_reported():
+    """A hinge held by a soft spring turns freely under the assumption free."""
     spring = np.diag([np.inf, np.inf, 1e2, *[np.inf] * 3])
     robot = Robot("sprung door", "tip", (
         Frame("hinge", joint="revolute", joint_stiffness=spring),

@@ -1,4 +1,4 @@
-"""Laws and closed forms of problem (22), and cvxpy for random robots."""
+"""Properties and closed forms of problem (22), and cvxpy for random robots."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 @pytest.mark.parametrize("axis", range(6))
-def test_two_springs_in_series_take_the_gap(axis):
+def test_two_springs_in_series_share_the_gap_as_in_closed_form(axis):
     """Energy g^2/2 k1 k2/(k1 + k2) for a gap along one axis, by hand."""
     gap = np.zeros(6)
     gap[axis] = 2e-4
@@ -55,8 +55,8 @@ def test_two_springs_in_series_take_the_gap(axis):
     ("gap", "left"),
     [(5e-5, 0.0), (1e-4, 0.0), (1e-4 * (1 + 1e-16), 0.0), (1.5e-4, 5e-5)],
 )
-def test_clearance_is_used_up_before_anything_bends(gap, left):
-    """Radial clearance of 1e-4 m: the springs close only the rest of the gap."""
+def test_springs_deform_only_by_the_gap_beyond_the_clearance(gap, left):
+    """A radial clearance of 1e-4 m takes up its part of the gap first."""
     clearance = Clearance(radial=1e-4)
     direction = np.array([0, 0, 0, 0.6, 0.8, 0.0])
     robot = coaxial_beams(gap * direction, (1e6, 1e6), clearance=clearance)
@@ -69,7 +69,7 @@ def test_clearance_is_used_up_before_anything_bends(gap, left):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_wrench_is_stiffness_times_deformation_everywhere(method):
+def test_wrench_equals_stiffness_times_deformation_of_every_spring(method):
     """w = K_E e = K_B b, eq. (6): half their squared difference is within the gap."""
     posture = place_robot(irsbot2_with(NUMBERS["cases"][0]), pose={"tx": 0.1})
     answer = solve_assembly(
@@ -94,8 +94,8 @@ def test_wrench_is_stiffness_times_deformation_everywhere(method):
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "3rrr", "delta"])
-def test_a_robot_without_clearances_stores_what_it_would_without_them(name, rng):
-    """The energy without clearance under a load is then the energy, loads bent it."""
+def test_energy_without_clearance_equals_the_energy_of_a_tight_robot(name, rng):
+    """Also under a load: the energy without clearance then includes the load's part."""
     home = home_posture(load_robot(name))
     errors = 1e-4 * rng.normal(size=home.robot.errors.shape)
     if name == "irsbot2":  # its proximal loops are rigid and perfect
@@ -110,8 +110,8 @@ def test_a_robot_without_clearances_stores_what_it_would_without_them(name, rng)
         assert answer.energy_without_clearance == pytest.approx(answer.energy, rel=1e-9)
 
 
-def test_moving_the_platform_frame_moves_the_screw_and_not_the_energy():
-    """Another reference point on the same body: a rigid body's small motion."""
+def test_platform_frame_changes_the_screw_and_not_the_energy():
+    """Another reference point of the same body: its small rigid-body motion."""
     robot = irsbot2_with(NUMBERS["cases"][0])
     arm = np.array([0.03, -0.2, 0.11])
     tool = Frame("tool", "leg1.tip", arm)
@@ -124,7 +124,7 @@ def test_moving_the_platform_frame_moves_the_screw_and_not_the_energy():
     assert np.allclose(other.platform_screw, expected, rtol=0, atol=1e-11)
 
 
-def test_serial_cantilever_under_load_is_the_compliance_times_the_load():
+def test_serial_cantilever_deflects_by_compliance_times_load():
     K = np.diag([2e3, 3e3, 4e3, 5e5, 6e5, 7e5])
     robot = Robot("arm", "tip", (Frame("tip", link=MatrixLink(K)),))
     load = np.array([1.0, -2.0, 3.0, -40.0, 50.0, 60.0])
@@ -136,7 +136,7 @@ def test_serial_cantilever_under_load_is_the_compliance_times_the_load():
     assert answer.duality_gap() <= 1e-12 * answer.energy
 
 
-def test_serial_arm_moves_by_its_errors_exactly_to_first_order():
+def test_serial_arm_displacement_equals_its_errors_to_first_order():
     """No closure, no load: eq. (8) with the errors alone, by finite motion."""
     error = np.array([1, -2, 3, 4, 5, -6.0]) * 1e-6
     frames = (
@@ -155,7 +155,7 @@ def test_serial_arm_moves_by_its_errors_exactly_to_first_order():
     assert np.allclose(screw[3:], moved[:3, 3] - T[1, :3, 3], rtol=0, atol=1e-11)
 
 
-def test_a_rigid_open_closure_cannot_be_assembled():
+def test_rigid_open_closure_cannot_be_assembled():
     robot = planar_four_bar()
     rigid = replace(robot, frames=tuple(replace(f, link=None) for f in robot.frames))
     errors = np.zeros((6, 6))
@@ -164,7 +164,7 @@ def test_a_rigid_open_closure_cannot_be_assembled():
         solve_assembly(home_posture(rigid.with_errors(errors)))
 
 
-def test_a_load_along_a_free_motion_has_no_equilibrium():
+def test_load_along_a_free_motion_has_no_equilibrium():
     frames = (Frame("slide", joint="prismatic"), Frame("tip", "slide"))
     robot = Robot("slider", "tip", frames)
     with pytest.raises(FreeMotion, match="the load drives a motion"):
@@ -174,8 +174,8 @@ def test_a_load_along_a_free_motion_has_no_equilibrium():
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_bound_of_a_passive_joints_motion_holds(method):
-    """A passive slider bounded to +-1e-4 m: the spring takes the rest of the gap."""
+def test_passive_joint_stops_at_its_motion_limit(method):
+    """A passive slide limited to +-1e-4 m: the spring takes the remaining gap."""
     frames = (
         Frame("link", translation=[0, 0, 0.5], link=MatrixLink(1e6 * np.eye(6))),
         Frame("slide", "link", joint="prismatic", clearance=Clearance(axial=1e-4)),
@@ -224,8 +224,8 @@ def as_bearings(robot):
     return replace(robot, frames=tuple(bearings)), replace(robot, frames=tuple(split))
 
 
-def test_a_bearing_is_its_springs_and_then_a_free_joint():
-    """In every solver; energies to 1e-8 of those without clearance."""
+def test_bearing_equals_springs_in_series_with_a_free_joint():
+    """In every solver, to 1e-8 of the energy without clearance."""
     compared = 0
     for seed in range(40):
         rng = np.random.default_rng(seed)
@@ -269,7 +269,9 @@ def test_a_bearing_is_its_springs_and_then_a_free_joint():
 @example(seed=0, legs=2, joints=1)
 @example(seed=17, legs=3, joints=1)
 @example(seed=58, legs=2, joints=2)
-def test_random_robots_equal_the_printed_problem_in_cvxpy(seed, legs, joints):
+def test_energy_of_random_robots_equals_the_printed_problem_in_cvxpy(
+    seed, legs, joints
+):
     """Tolerance 1e-6 of the energy without clearance: what cvxpy's solver reaches."""
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, legs, joints)
@@ -291,8 +293,8 @@ def test_random_robots_equal_the_printed_problem_in_cvxpy(seed, legs, joints):
 
 
 @pytest.mark.parametrize("turned", [1, -1])
-def test_a_closure_out_of_reach_is_infeasible(turned):
-    """H u reaches 5 over the disc and 2 over the interval: 7, and not 7 + 1e-6."""
+def test_closure_out_of_reach_is_infeasible(turned):
+    """H u reaches 5 over the disc and 2 over the interval, together at most 7."""
     H = np.array([[3.0, 4.0, 2.0]])
     problem = np.zeros((1, 3)), np.ones(1), np.zeros(3), H
     group = np.array([0, 0, 1])

@@ -1,4 +1,4 @@
-"""Many points in one call: each as if alone, and proved."""
+"""Many points in one call: results equal those of single points, with proof."""
 
 from dataclasses import replace
 
@@ -49,10 +49,8 @@ def test_energy_of_a_point_is_independent_of_its_neighbours(grid, rng, load):
 
 @pytest.mark.parametrize("loaded", [False, True])
 @pytest.mark.parametrize("seed", range(4))
-def test_where_bounds_of_motions_matter_no_answer_depends_on_its_neighbours(
-    seed, loaded
-):
-    """Some draws reach a bound: in another order, alone, by one posture."""
+def test_solutions_at_motion_limits_do_not_depend_on_other_points(seed, loaded):
+    """Some draws reach a limit: in another order, alone, and as single postures."""
     rng = np.random.default_rng(seed)
     home = home_posture(with_bounded_motion(random_robot(rng, joints=4), rng))
     load = rng.normal(size=6) if loaded else None
@@ -80,8 +78,8 @@ def test_where_bounds_of_motions_matter_no_answer_depends_on_its_neighbours(
 
 
 @pytest.mark.parametrize("loaded", [False, True])
-def test_within_bounds_of_motions_the_energy_is_the_references(loaded):
-    """Energies of each to 1e-8 of it and of the work: what both certificates allow."""
+def test_energy_with_motion_limits_equals_the_reference_method(loaded):
+    """Equal to 1e-8 of the energy and the work, which both certificates allow."""
     held = 0
     for seed in range(20):
         rng = np.random.default_rng(seed)
@@ -99,7 +97,7 @@ def test_within_bounds_of_motions_the_energy_is_the_references(loaded):
 
 
 def test_postures_of_different_rank_do_not_depend_on_each_other(rng):
-    """Three parallel hinges: their turns are independent unless they stand in line."""
+    """Rotations of three parallel hinges are independent unless they are in line."""
     home = home_posture(BUILT_IN["five_bar"]())
     robot, T = home.robot, np.repeat(home.transforms[None], 8, axis=0)
     T[::3, :, 1:3, 3] = 0.0
@@ -134,7 +132,7 @@ def test_margin_of_a_point_is_independent_of_its_neighbours(grid, rng, compliant
 
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
 @pytest.mark.parametrize("kappa", [0.05, 0.2, 1.0])
-def test_margins_are_proportional_to_the_errors_and_proved(grid, compliant, kappa):
+def test_margins_are_proportional_to_the_errors_and_certified(grid, compliant, kappa):
     """All clearances scale with the margin."""
     robot, postures = grid
     lanes = zone_margin(postures, compliant, kappa * robot.errors)
@@ -145,10 +143,10 @@ def test_margins_are_proportional_to_the_errors_and_proved(grid, compliant, kapp
 
 
 @pytest.mark.parametrize("each", [True, False])
-def test_margins_without_proof_are_the_references_with_their_own_errors(
+def test_uncertified_margins_are_solved_by_the_reference_method(
     grid, each, monkeypatch
 ):
-    """The last point is left out; errors are each point's own, or those of all."""
+    """The last point has no proof; errors are per point, or shared by all points."""
     robot, postures = grid
     at = postures[:3]
     errors = robot.errors * np.arange(1.0, 4.0)[:, None, None]
@@ -169,8 +167,10 @@ def test_margins_without_proof_are_the_references_with_their_own_errors(
 
 @pytest.mark.parametrize("kappa", [0.05, 0.3, 1.0])
 @pytest.mark.parametrize("load", [None, [1.0, 2.0, 3.0, 30.0, 10.0, -100.0]])
-def test_draws_at_one_posture_have_the_bits_of_points(grid, rng, kappa, load):
-    """One row for all, where some draws wait for others, or a row for each."""
+def test_draws_at_one_posture_are_bit_identical_to_separate_points(
+    grid, rng, kappa, load
+):
+    """One posture for all draws, or a posture for each."""
     robot, postures = grid
     errors = kappa * robot.errors * rng.uniform(-1, 1, (61, 1, 1))
     errors += kappa * robot.errors * rng.uniform(-1, 1, (61, *robot.errors.shape))
@@ -185,7 +185,7 @@ def test_draws_at_one_posture_have_the_bits_of_points(grid, rng, kappa, load):
 
 
 def test_forces_on_clearances_prove_the_margin(grid, rng):
-    """Their sizes on all cones add up to 1, and they grow no work but the errors'."""
+    """Their norms over all cones sum to 1, and only the errors do work on them."""
     robot, postures = grid
     joints, structure = structure_of(robot, springs=False, own_axes_free=True)
     errors = robot.errors * rng.uniform(-1, 1, (9, *robot.errors.shape))

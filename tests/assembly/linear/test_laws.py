@@ -1,4 +1,4 @@
-"""Laws of the whole model: units, frames, where a loop is cut, reciprocity."""
+"""Invariance of the model: units, frames, where a loop is cut, reciprocity."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ ROD = BeamLink({"radius": 0.01}, 70e9, 0.33)
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_another_unit_of_length_changes_numbers_and_nothing_else(seed):
+def test_unit_of_length_scales_energies_and_keeps_margins(seed):
     """Energy in N mm is 1000 times that in N m; margins and angles are the same."""
     robot = random_robot(np.random.default_rng(seed), legs=2)
     small = replace(robot, frames=tuple(
@@ -45,7 +45,7 @@ def test_another_unit_of_length_changes_numbers_and_nothing_else(seed):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_moving_the_whole_robot_moves_the_answer_with_it(seed):
+def test_moving_the_whole_robot_keeps_energy_and_pose_errors(seed):
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, legs=2)
     turn, shift = rng.uniform(-2, 2, 3), rng.uniform(-1, 1, 3)
@@ -91,8 +91,8 @@ def cut_at_the_crank(robot):
     return Robot("cut", "crank_end", frames, (("crank_end", "near_end"),))
 
 
-def test_where_a_loop_is_cut_changes_nothing():
-    """Errors of crank and rocker across the plane bend the coupler, cut or reversed."""
+def test_energy_does_not_depend_on_where_a_loop_is_cut():
+    """Out-of-plane errors of crank and rocker bend the coupler, at both cuts."""
     errors = np.zeros((6, 6))
     errors[1] = [1e-3, -2e-3, 0, 0, 0, 3e-4]
     errors[5] = [-2e-3, 1e-3, 0, 0, 0, -1e-4]
@@ -105,7 +105,7 @@ def test_where_a_loop_is_cut_changes_nothing():
     assert other.energy == pytest.approx(one.energy, rel=1e-9)
 
 
-def test_reciprocity_two_loads_do_each_others_work(rng):
+def test_two_loads_do_equal_work_on_each_others_displacements(rng):
     """Maxwell-Betti on closed loops without clearance: w1 . x2 = w2 . x1."""
     robot = irsbot2()
     tight = replace(robot, frames=tuple(
@@ -119,8 +119,8 @@ def test_reciprocity_two_loads_do_each_others_work(rng):
         assert float(first @ other.platform_screw) == pytest.approx(work, rel=1e-8)
 
 
-def test_a_rigid_serial_robot_stands_exactly_where_its_errors_put_it():
-    """Nothing can move, nothing is solved: the product of the transforms by hand."""
+def test_rigid_serial_robot_pose_is_the_product_of_its_erroneous_transforms():
+    """Nothing can deform: the product of the transforms by hand."""
     error = np.array([0.02, -0.01, 0.03, 1e-3, 2e-3, -3e-3])
     frames = (
         Frame("a", translation=[0.1, 0.2, 0.3], rotation=[0.3, 0.1, -0.2],

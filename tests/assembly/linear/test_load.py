@@ -30,7 +30,7 @@ def cantilever(cuts=1, theory="euler"):
 
 
 @pytest.mark.parametrize("cuts", [1, 2, 5])
-def test_a_beam_sags_under_its_weight_as_in_the_textbook(cuts):
+def test_self_weight_deflection_equals_the_textbook(cuts):
     """Tip: q L^4 / 8 EI down, slope q L^3 / 6 EI, in any number of pieces."""
     answer = solve_assembly(home_posture(cantilever(cuts)), gravity=[0, 0, -G])
     expected = [0, Q * L**3 / (6 * EI), 0, 0, 0, -Q * L**4 / (8 * EI)]
@@ -38,8 +38,8 @@ def test_a_beam_sags_under_its_weight_as_in_the_textbook(cuts):
     assert answer.duality_gap() <= 1e-9 * answer.energy
 
 
-def test_shear_adds_half_the_weight_at_the_tip():
-    """Timoshenko: q L^2 / 2 k G A more, k = 6 (1 + nu) / (7 + 6 nu)."""
+def test_timoshenko_beam_adds_the_shear_deflection():
+    """Additional deflection q L^2 / 2 k G A, k = 6 (1 + nu) / (7 + 6 nu)."""
     answer = solve_assembly(
         home_posture(cantilever(theory="timoshenko")), gravity=[0, 0, -G]
     )
@@ -48,7 +48,7 @@ def test_shear_adds_half_the_weight_at_the_tip():
     assert answer.platform_screw[5] == pytest.approx(expected, rel=1e-9)
 
 
-def test_a_mass_beside_the_frame_pulls_with_its_arm():
+def test_eccentric_mass_acts_with_its_lever_arm():
     """2 kg 0.3 m beyond the tip of a rigid arm on a torsion spring about y."""
     K = np.diag([np.inf] * 6).astype(float)
     K[2, 2] = 500.0
@@ -66,8 +66,8 @@ def test_a_mass_beside_the_frame_pulls_with_its_arm():
     assert answer.joint_wrenches[0, 2] == pytest.approx(2 * G * 0.8, rel=1e-12)
 
 
-def test_a_load_on_a_body_does_not_pass_its_own_joint():
-    """The body's link feels it, the soft joint at its far end does not."""
+def test_load_on_a_body_deforms_its_link_and_not_its_distal_joint():
+    """The body's link carries it; the soft joint at its far end does not."""
     K = 1e5 * np.eye(6)
     frames = (
         Frame("body", link=MatrixLink(K), joint="revolute", joint_stiffness=K),
@@ -85,8 +85,8 @@ def test_a_load_on_a_body_does_not_pass_its_own_joint():
     assert on_platform.joint_screws[0, 3] == pytest.approx(5e-4)
 
 
-def test_reactions_of_a_closed_loop_carry_its_weight():
-    """Both chains of a loop hang from the base: what enters there is the weight."""
+def test_base_reactions_of_a_closed_loop_sum_to_its_weight():
+    """Both chains of the loop are attached to the base."""
     from dataclasses import replace
 
     robot = planar_four_bar()
@@ -105,8 +105,8 @@ def test_reactions_of_a_closed_loop_carry_its_weight():
 
 
 @pytest.mark.parametrize("size", [1e6, 1e8])
-def test_a_load_however_large_moves_what_is_pressed_by_the_compliance(size):
-    """The least energy under a load of 1e8 N adds the compliance times the load."""
+def test_large_loads_deflect_by_the_compliance(size):
+    """Doubling a load of 1e8 N adds the compliance times the load."""
     posture = home_posture(load_robot("irsbot2"))
     once, twice = (
         solve_assembly(posture, [0, 0, 0, 0, 0, k * size]).platform_screw[5]
@@ -116,7 +116,7 @@ def test_a_load_however_large_moves_what_is_pressed_by_the_compliance(size):
     assert twice - once == pytest.approx(compliance * size, rel=1e-6)
 
 
-def test_a_load_that_a_hinge_does_not_resist_names_it_and_its_unit_turn():
+def test_load_about_a_free_hinge_is_refused_with_its_unit_motion():
     """About z at the origin a platform at (0.5, 0.25) moves by (-0.25, 0.5) per rad."""
     link = MatrixLink(1e6 * np.eye(6))
     frames = (
@@ -128,7 +128,7 @@ def test_a_load_that_a_hinge_does_not_resist_names_it_and_its_unit_turn():
         solve_assembly(home_posture(Robot("r", "tip", frames)), [0, 0, 1, 0, 0, 0])
 
 
-def test_a_bent_chains_links_hand_on_what_lies_beyond(rng):
+def test_link_wrenches_of_a_chain_balance_all_loads_beyond(rng):
     """Three beams in any directions: at each start the weights and moments of all that
     lies beyond, the tip's load among them; at each tip the next one's start."""
     link = BeamLink({"width": 0.02, "height": 0.03}, E, 0.3, density=RHO)
@@ -173,8 +173,8 @@ def beam_on_two_pins():
     return Robot("pinned", "end", frames, (("end", "ground"),))
 
 
-def test_a_pin_carries_no_moment_of_a_beams_own_weight():
-    """q L / 2 and no moment at both ends; K_E's own deformation knows q L^2 / 12."""
+def test_beam_on_two_pins_has_zero_end_moments_under_its_weight():
+    """q L / 2 and no moment at both ends; the deformation corresponds to q L^2 / 12."""
     posture = home_posture(beam_on_two_pins())
     answer = solve_assembly(posture, gravity=[0, 0, -G])
     row = posture.robot.index("b")
@@ -190,8 +190,8 @@ def test_a_pin_carries_no_moment_of_a_beams_own_weight():
     )
 
 
-def test_finite_motions_carry_the_same_weight_at_a_pin():
-    """The moment at the tip is zero exactly, the force q L / 2."""
+def test_exact_solution_has_zero_end_moment_at_a_pin():
+    """The moment at the tip is zero, the force q L / 2."""
     posture = home_posture(beam_on_two_pins())
     exact = solve_exact(posture, gravity=[0, 0, -G])
     row = posture.robot.index("b")
@@ -215,8 +215,8 @@ def test_finite_motions_carry_the_same_weight_at_a_pin():
         ({"gravity": 9.81}, r"gravity: found an array of shape \(\), expected \(3,\)"),
     ],
 )
-def test_loads_of_a_shape_that_does_not_fit_are_refused(given, message):
-    """At two postures of a robot of eight frames."""
+def test_loads_of_a_wrong_shape_are_refused(given, message):
+    """Two postures of a robot of eight frames."""
     posture = home_posture(load_robot("four_bar"))
     with pytest.raises(BadInput, match=message):
         solve_assembly([posture, posture], **given)

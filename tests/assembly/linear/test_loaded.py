@@ -1,4 +1,4 @@
-"""Problem (22), compiled, loaded or not: closed forms, reference, certificates."""
+"""Problem (22), compiled, with and without loads: closed forms and certificates."""
 
 from dataclasses import replace
 
@@ -37,8 +37,8 @@ def compiled(posture, *loads, **others):
 
 
 @pytest.mark.parametrize("force", [0.5, 50.0, 300.0])
-def test_a_pin_moves_to_its_rim_before_both_springs_deform(force):
-    """Radial clearance c: the platform's spring gives alone until it reaches the rim.
+def test_second_spring_deforms_only_after_the_pin_reaches_its_rim(force):
+    """Radial clearance c: only the platform's spring deforms until the rim is reached.
 
     From there on k1 x + k2 (x - c) = w.  Rim and force by hand: k1 = 1e6 N/m,
     c = 1e-4 m, so up to w = 100 N the other spring is at rest.
@@ -53,7 +53,7 @@ def test_a_pin_moves_to_its_rim_before_both_springs_deform(force):
     assert many.energy[0] == pytest.approx(stored, rel=2e-8)
 
 
-def test_clearance_without_a_spring_lets_the_load_fall_onto_its_rim():
+def test_load_moves_an_open_chain_to_the_rim_of_its_clearance():
     """A spring and a pin in series, in no closure: c + w / k, energy w^2 / 2k."""
     k, c, force = 1e5, 2e-4, 7.0
     frames = (
@@ -68,7 +68,7 @@ def test_clearance_without_a_spring_lets_the_load_fall_onto_its_rim():
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "3rrr", "five_bar", "four_bar"])
-def test_without_clearances_loads_and_errors_add_up(name, rng):
+def test_displacements_by_loads_and_errors_add_without_clearance(name, rng):
     """Superposition, and the reciprocity of the platform's compliance."""
     posture = home_posture(without_joint_clearances(load_robot(name)))
     robot = posture.robot
@@ -99,8 +99,8 @@ def test_all_points_of_the_papers_robot_are_certified(grid, kappa, size):
     assert many.clearance_excess().max() < 1e-14
 
 
-def test_wrenches_prove_the_bound_on_the_problem_as_it_is_written(grid):
-    """By the complementary energy in numpy, which shares nothing with the kernels."""
+def test_wrenches_give_the_complementary_energy_bound(grid):
+    """The complementary energy in NumPy is independent of the kernels."""
     _, postures = grid
     many = solve_assembly(postures, LOAD, gravity=GRAVITY)
     for i in (0, 11, 20, 33):
@@ -129,8 +129,8 @@ def cases_at_random():
 
 
 @pytest.mark.parametrize("loaded", [False, True])
-def test_random_robots_have_the_references_answers_or_its_reasons(loaded):
-    """Loads on every body, sizes and errors over decades; potentials within gaps."""
+def test_random_robots_equal_the_reference_method_or_its_refusal(loaded):
+    """Loads on every body, errors over decades; potentials agree within the gaps."""
     solved = 0
     for number, home in enumerate(cases_at_random()):
         rng = np.random.default_rng(number)
@@ -177,8 +177,8 @@ def test_random_robots_have_the_references_answers_or_its_reasons(loaded):
     assert solved
 
 
-def test_no_load_is_the_unloaded_answer_bit_for_bit(grid):
-    """Zero alone, or beside others that are loaded."""
+def test_zero_load_is_bit_identical_to_no_load(grid):
+    """Zero loads alone, or together with points that are loaded."""
     robot, postures = grid
     plain = solve_assembly(postures)
     zero = solve_assembly(postures, np.zeros(6), gravity=(0, 0, 0))
@@ -197,8 +197,8 @@ def test_no_load_is_the_unloaded_answer_bit_for_bit(grid):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_load_drives_a_joint_to_its_bound_or_without_end(method):
-    """An open chain: a pin of 1e-3 rad at most, turned about z."""
+def test_load_moves_a_pin_to_its_limit_or_has_no_equilibrium(method):
+    """An open chain: a pin limited to 1e-3 rad, or without limit, turned about z."""
     pin = Frame("pin", joint="revolute", clearance=Clearance(spin=1e-3))
     load = [0, 0, 2.0, 0, 0, 0]
     for own, status in ((pin, "ok"), (replace(pin, clearance=None), "no equilibrium")):
@@ -209,8 +209,8 @@ def test_a_load_drives_a_joint_to_its_bound_or_without_end(method):
             assert found.platform_screw[0, 2] == pytest.approx(1e-3, rel=1e-6)
 
 
-def test_a_driven_motion_stops_no_other_point():
-    """A hinge that a moment turns has no equilibrium; a force through it does."""
+def test_moment_on_a_free_hinge_has_no_equilibrium_and_a_force_has():
+    """A moment turns the hinge without end; a force through its axis does not."""
     link = MatrixLink(1e6 * np.eye(6))
     frames = (Frame("hinge", joint="revolute"), Frame("tip", "hinge", link=link))
     posture = home_posture(Robot("r", "tip", frames))

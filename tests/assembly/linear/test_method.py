@@ -1,4 +1,4 @@
-"""Points that the compiled method does not prove are the reference's."""
+"""Points without proof by the compiled method are solved by the reference method."""
 
 from dataclasses import replace
 
@@ -28,8 +28,8 @@ def rigid():
 
 
 @pytest.mark.parametrize("load", [None, LOAD])
-def test_what_is_not_proved_compiled_is_the_references_answer_to_the_bit(load):
-    """It says so, of one posture and of many."""
+def test_unproved_point_is_bit_identical_to_the_reference_method(load):
+    """The result names its method, for one posture and for many."""
     posture = rigid()
     asked = solve_assembly(posture, load, method="reference")
     one, many = solve_assembly(posture, load), solve_assembly([posture], load)
@@ -40,8 +40,8 @@ def test_what_is_not_proved_compiled_is_the_references_answer_to_the_bit(load):
     assert list(many.method).count("reference") == 1
 
 
-def test_only_the_point_that_is_not_proved_is_the_references(monkeypatch):
-    """One of three, with its own errors."""
+def test_only_unproved_points_use_the_reference_method(monkeypatch):
+    """One of three points, with its own errors."""
     robot = irsbot2_with(NUMBERS["cases"][0])
     postures = [home_posture(robot)] * 3
     errors = robot.errors * np.array([1.0, 0.5, 2.0])[:, None, None]
@@ -62,5 +62,5 @@ def test_only_the_point_that_is_not_proved_is_the_references(monkeypatch):
     assert found.to_xarray().method.values.tolist() == found.method.tolist()
 
 
-def test_the_classical_stiffness_is_the_reference():
+def test_classical_stiffness_of_one_posture_uses_the_reference_method():
     assert platform_stiffness(beams()).method == "reference"

@@ -1,4 +1,4 @@
-"""Poses that clearance leaves free: the nearest to nominal is predicted, and marked."""
+"""Poses that clearance leaves free: the nearest to nominal is predicted and marked."""
 
 import json
 import warnings
@@ -106,8 +106,8 @@ def nearest_by_cvxpy(posture, point, load=None):
 
 @pytest.mark.parametrize("name", ["five_bar", "delta", "hexapod", "four_bar"])
 @pytest.mark.parametrize("seed", [0, 1])
-def test_inside_the_zone_the_pose_is_the_nearest_that_closes(name, seed):
-    """No load: springs give nothing, and all else is a cone programme of its own."""
+def test_pose_inside_the_zone_is_the_nearest_to_nominal(name, seed):
+    """Without load the springs are unloaded: a cone programme solved by cvxpy."""
     posture = erring(name, seed)
     here = as_declared(posture, point=POINT)
     found = predict(here)
@@ -127,7 +127,7 @@ def test_inside_the_zone_the_pose_is_the_nearest_that_closes(name, seed):
 
 
 @pytest.mark.parametrize(("name", "margin"), [("five_bar", 0.0), ("orthoglide", 0.02)])
-def test_under_a_load_springs_stay_and_what_is_loose_goes_nearest(name, margin):
+def test_nearest_pose_under_a_load_keeps_the_energy(name, margin):
     posture = erring(name, 3)
     load = np.array([0, 0, 0, 0, -20.0, 0])
     here = as_declared(posture, load, point=POINT)
@@ -148,7 +148,7 @@ def test_under_a_load_springs_stay_and_what_is_loose_goes_nearest(name, margin):
 
 
 @pytest.mark.parametrize("clearance", [2e-5, 8e-5])
-def test_platform_on_two_pins_is_off_by_what_one_clearance_leaves(clearance):
+def test_platform_on_two_pins_is_off_by_its_error_minus_one_clearance(clearance):
     """Two rigid chains to one platform, 0.1 mm off, their pins with clearance c.
 
     The platform stands where both pins reach it: nearest to nominal it is off by
@@ -170,8 +170,8 @@ def test_platform_on_two_pins_is_off_by_what_one_clearance_leaves(clearance):
     assert found.deviation[0] == pytest.approx(expected, abs=1e-10)
 
 
-def test_a_pose_that_nothing_leaves_free_is_not_marked():
-    """A load that presses all clearances, or no clearance."""
+def test_determined_pose_is_not_marked_as_free():
+    """A load presses all clearances, or there is no clearance."""
     tight = home_posture(coaxial_beams(np.array([0, 0, 0, 1e-4, 0, 0])))
     assert predict(as_declared(tight)).undetermined.tolist() == [False]
     pin = Clearance(radial=2e-5, axial=2e-5, tilt=1e-4, spin=1e-4)
@@ -193,15 +193,15 @@ def test_a_pose_that_nothing_leaves_free_is_not_marked():
         assert found.deviation[0] == pytest.approx(pushed, abs=1e-10)
 
 
-def test_settled_clearance_reads_as_the_prediction_that_settled_it():
-    """Without an effect the prediction from settled clearances is the same."""
+def test_prediction_from_settled_clearances_equals_the_first_prediction():
+    """The prediction is the same if no effect is added."""
     here = as_declared(erring("five_bar", 5), point=POINT)
     found, held = predict(here), predict(with_rest_positions(here))
     assert held.deviation == pytest.approx(found.deviation, abs=1e-9)
 
 
 def test_finite_motions_start_from_the_nearest_pose():
-    """Errors of 20 um: what finite motions add is far below a micrometre."""
+    """Errors of 20 um: finite motions change the pose by far less than a micrometre."""
     here = as_declared(erring("five_bar", 0), point=POINT)
     found = predict(replace(here, exact=True))
     assert found.undetermined.tolist() == [True]
@@ -249,7 +249,7 @@ def with_clearance(tmp_path_factory):
 
 
 @pytest.mark.parametrize("command", ["inspect", "diagnose"])
-def test_rows_that_clearance_leaves_free_are_marked_in_what_is_printed(
+def test_commands_report_rows_with_undetermined_clearance(
     command, with_clearance, tmp_path, run
 ):
     target = tmp_path / "found.json"
@@ -260,8 +260,8 @@ def test_rows_that_clearance_leaves_free_are_marked_in_what_is_printed(
     assert json.loads(target.read_text())["open"] == [f"r{k}" for k in range(24)]
 
 
-def test_the_nearest_pose_keeps_to_the_bound_of_a_joints_own_motion():
-    """A pin of 1e-3 rad at most, off by 1.5e-3: it cannot come back to nominal.
+def test_nearest_pose_respects_the_motion_limit_of_a_joint():
+    """A pin limited to 1e-3 rad with an error of 1.5e-3: it cannot return to nominal.
 
     Closed against a clearance of 2e-3 it turns by q + 1.5e-3 = v: 5e-4 at least.
     """

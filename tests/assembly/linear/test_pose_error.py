@@ -55,7 +55,7 @@ def assert_holds(bracket, value, tolerance):
     assert high >= value - slip
 
 
-def test_one_joint_gives_its_own_cones():
+def test_pose_error_of_one_joint_equals_its_clearances_by_hand():
     """Rotation: tilt and spin are perpendicular.  Translation: disc and interval, and
     the arm of 0.3 m sweeps (spin along y, tilt along z); worked by hand below.
     """
@@ -69,18 +69,18 @@ def test_one_joint_gives_its_own_cones():
     assert_holds(found.translation_error, expected, 1e-9)
 
 
-def test_clearance_of_parallel_joints_adds_up_along_a_serial_chain():
+def test_clearances_of_parallel_axes_add_up_along_a_serial_chain():
     found = bounds(serial(Clearance(radial=1e-5), Clearance(radial=2e-5)))
     assert_holds(found.translation_error, 3e-5, 1e-9)
     assert_holds(found.rotation_error, 0.0, 1e-9)
 
 
-def test_any_point_of_the_platform_can_be_asked_about():
+def test_pose_error_at_a_platform_offset_includes_the_lever_arm():
     found = bounds(serial(Clearance(tilt=1e-3)), offset=[0.2, 0, 0])
     assert_holds(found.translation_error, 0.5e-3, 1e-9)
 
 
-def test_a_platform_that_moves_freely_has_no_bound():
+def test_free_platform_has_an_infinite_pose_error():
     robot = Robot(
         "door", "tip", (Frame("hinge", joint="revolute"), Frame("tip", "hinge"))
     )
@@ -96,8 +96,8 @@ def test_a_platform_that_moves_freely_has_no_bound():
 
 
 @pytest.mark.parametrize("spin", [1.0, 1e-3, 1e-4, 1e-6, 1e-9, 0.0])
-def test_a_passive_joint_with_a_bound_turns_up_to_it(spin):
-    """An arm L on it: y: radial + L spin, z: axial + L tilt, both at once, by hand."""
+def test_pose_error_includes_the_motion_limit_of_a_passive_joint(spin):
+    """With an arm L, y: radial + L spin, z: axial + L tilt, both together, by hand."""
     clearance = Clearance(radial=1e-5, axial=2e-5, tilt=3e-4, spin=spin)
     hub = Frame("hub", joint="revolute", clearance=clearance)
     found = bounds(Robot("arm", "tool", (hub, Frame("tool", "hub", [0.2, 0, 0]))))
@@ -106,10 +106,10 @@ def test_a_passive_joint_with_a_bound_turns_up_to_it(spin):
     assert_holds(found.rotation_error, np.hypot(spin, 3e-4), 1e-7 * spin + 1e-9)
 
 
-def test_a_tool_on_a_bearing_turns_freely_and_its_point_has_a_largest_error():
+def test_tool_point_on_a_bearing_axis_has_a_bounded_translation_error():
     """On the axis, h above the bearing: radial + h tilt, and axial; by hand.
 
-    Off the axis the point runs round without bound.
+    Off the axis the translation error is infinite.
     """
     clearance = Clearance(radial=1e-5, axial=2e-5, tilt=3e-4)
     hub = Frame("hub", joint="revolute", clearance=clearance)
@@ -150,8 +150,8 @@ def feasible(posture, cp):
 
 
 @pytest.mark.parametrize("spin", [1.0, 3e-4, 1e-4, 1e-5, 1e-8])
-def test_what_attains_the_bound_keeps_every_bound_of_the_closed_chain(spin, rng):
-    """Put back into the closures by cvxpy, which also finds the supports; its 1e-6."""
+def test_screws_of_the_bounds_are_feasible_in_the_closed_chain(spin, rng):
+    """Checked in the closures by cvxpy, which also gives the supports; to 1e-6."""
     import cvxpy as cp
 
     from assembly.linear.reference.as_printed import OPTIMAL, _solve
@@ -173,7 +173,7 @@ def test_what_attains_the_bound_keeps_every_bound_of_the_closed_chain(spin, rng)
 
 
 @pytest.mark.parametrize("asked", [{}, {"energy_budget": 0.5}])
-def test_budget_around_two_springs_is_a_ball_known_in_closed_form(asked):
+def test_energy_budget_of_two_springs_gives_a_ball_of_known_radius(asked):
     """E - E* = (k1 + k2)/2 |x - x*|^2 for every motion of the meeting point."""
     k1, k2, gap, eta = 1e6, 3e6, 2e-4, asked.get("energy_budget", 0.05)
     robot = coaxial_beams(np.array([0, 0, 0, gap, 0, 0]), (k1, k2))
@@ -185,7 +185,7 @@ def test_budget_around_two_springs_is_a_ball_known_in_closed_form(asked):
 
 
 @pytest.mark.parametrize("limit", [4.1, 1.5, 0.5])
-def test_a_joints_own_bound_limits_the_platform_of_a_closed_chain(limit):
+def test_motion_limit_of_a_joint_limits_the_pose_error_of_a_closed_chain(limit):
     """Closed by q + E = v_1 + v_2 + v_3, |v| <= E and |q| <= limit E: min(3, limit + 1)
     E is the farthest turn q + E of the platform.
     """
@@ -203,7 +203,7 @@ def test_a_joints_own_bound_limits_the_platform_of_a_closed_chain(limit):
 
 
 @pytest.mark.parametrize("stiffness", [1e6, 1e-6, 1e-12])
-def test_frozen_deformations_leave_a_loaded_joint_no_clearance(stiffness):
+def test_frozen_assumption_leaves_no_clearance_in_a_loaded_joint(stiffness):
     robot = coaxial_beams(
         np.array([0, 0, 0, 3e-4, 0, 0]), (stiffness, stiffness),
         clearance=Clearance(radial=1e-4, axial=2e-5),
@@ -216,7 +216,7 @@ def test_frozen_deformations_leave_a_loaded_joint_no_clearance(stiffness):
     assert_holds(found.translation_error, size, 1e-9)
 
 
-def test_assumption_must_be_known_and_budget_needs_no_load():
+def test_unknown_assumption_and_budget_under_load_are_refused():
     many = solve_assembly(
         [home_posture(coaxial_beams(np.zeros(6)))], [1, 0, 0, 0, 0, 0]
     )
@@ -229,7 +229,9 @@ def test_assumption_must_be_known_and_budget_needs_no_load():
 
 @pytest.mark.parametrize(("case", "point"), CASES)
 @pytest.mark.parametrize(("key", "assumption"), [("rigid", "frozen"), ("free", "free")])
-def test_brackets_meet_the_reference_brackets(case, point, key, assumption):
+def test_pose_error_brackets_overlap_the_published_brackets(
+    case, point, key, assumption
+):
     """Both hold the truth, so they overlap; 1e-7 is what the reference's own
     deformations leave uncertain where the energy is nearly zero.
     """
@@ -247,7 +249,7 @@ def test_brackets_meet_the_reference_brackets(case, point, key, assumption):
             assert bracket[1] >= low - 1e-7
 
 
-def test_clearances_alone_give_a_map_symmetric_in_x():
+def test_pose_error_by_clearances_alone_is_symmetric_in_x():
     both = []
     for x in (-0.25, 0.25):
         answer = solve_assembly(place_robot(irsbot2(), pose={"tx": x, "tz": -0.4}))

@@ -29,8 +29,8 @@ def by_cvxpy(reach, direction):
 
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("rows", [0, 1, 3])
-def test_vertices_of_intervals_meet_outer_approximation(seed, rows):
-    """Intervals alone make a polytope: the farthest of its vertices, one by one."""
+def test_pose_error_of_intervals_equals_the_farthest_vertex(seed, rows):
+    """Intervals alone make a polytope, whose vertices are enumerated."""
     rng, nv = np.random.default_rng(seed), 7
     reach = ReachableSet(
         rng.normal(size=6) * 2e-3, rng.normal(size=(6, nv)) * 1e-3,
@@ -58,7 +58,7 @@ def test_vertices_of_intervals_meet_outer_approximation(seed, rows):
 
 
 @pytest.mark.parametrize("assumption", ["frozen", "free", "budget"])
-def test_supports_of_the_paper_robot_equal_cvxpys(assumption, rng):
+def test_supports_of_the_paper_robot_equal_cvxpy(assumption, rng):
     robot = irsbot2() if assumption == "frozen" else irsbot2_with(NUMBERS["cases"][0])
     posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.5})
     reach = reachable_screws(solve_assembly(posture), assumption)
@@ -71,8 +71,8 @@ def test_supports_of_the_paper_robot_equal_cvxpys(assumption, rng):
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_no_random_screw_of_a_random_robot_is_farther(seed):
-    """From inside: points between the start and the cones' rims that keep the rows."""
+def test_random_feasible_screws_are_within_the_pose_error_bound(seed):
+    """Feasible points between the start and the rims of the cones."""
     rng = np.random.default_rng(seed)
     answer = solve_assembly(home_posture(random_robot(rng)))
     found = bound_pose_error(answer, "free")

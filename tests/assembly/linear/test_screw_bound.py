@@ -92,7 +92,7 @@ def assert_within(answer, exact):
 @pytest.mark.parametrize(
     "spread", [0, *(pytest.param(s, marks=pytest.mark.slow) for s in (6, 12, 15))]
 )
-def test_random_robots_whose_stiffnesses_differ_by_any_powers_of_ten(spread):
+def test_screw_bound_holds_for_stiffnesses_of_different_magnitude(spread):
     compared = 0
     for seed in range(12):
         rng = np.random.default_rng(seed)
@@ -116,8 +116,8 @@ def test_random_robots_whose_stiffnesses_differ_by_any_powers_of_ten(spread):
 
 @pytest.mark.parametrize("young", [7e10, 1e18, 1e24, 1e30])
 @pytest.mark.parametrize("name", ["four_bar", "five_bar"])
-def test_the_true_error_is_below_the_stated_one_however_stiff_the_links(name, young):
-    """With Young = 1e30 beside elastic drives the screw is off by more than it is."""
+def test_true_screw_error_is_below_the_stated_bound_for_any_stiffness(name, young):
+    """With Young = 1e30 Pa and elastic drives the error exceeds the screw itself."""
     rng = np.random.default_rng(1)
     robot = load_robot(name)
     robot = robot.with_errors(1e-3 * rng.uniform(-1, 1, (len(robot.frames), 6)))
@@ -135,8 +135,8 @@ def test_the_true_error_is_below_the_stated_one_however_stiff_the_links(name, yo
         assert "stiffnesses differ" in unproved(answer)
 
 
-def test_an_answer_that_rounding_spoils_is_reported_as_not_proved():
-    """Links of 1e24 Pa beside elastic drives; one posture, and one of many."""
+def test_solution_spoilt_by_rounding_is_reported_as_not_proved():
+    """Links of 1e24 Pa with elastic drives; one posture, and one of many."""
     robot = load_robot("five_bar")
     errors = 1e-3 * np.random.default_rng(1).uniform(-1, 1, (len(robot.frames), 6))
     robot = tight(robot.with_errors(errors), lambda link: replace(link, young=1e24))
@@ -158,7 +158,7 @@ def two_springs(k, gap, open_):
     return assembly
 
 
-def test_two_springs_are_open_by_what_their_energies_leave():
+def test_screw_bound_of_two_springs_equals_its_closed_form():
     """(y_1, y_2) within sqrt(2 g), equal if closed: sqrt(g / k) along every axis.
 
     Where the closure may stay open y_2 may be zero, and y_1 all: sqrt(2 g / k).
@@ -176,7 +176,7 @@ def test_two_springs_are_open_by_what_their_energies_leave():
     assert open_.translation_error == pytest.approx(np.sqrt(2) * expected, rel=1e-4)
 
 
-def test_clearance_outside_the_loop_is_open_and_no_error():
+def test_clearance_outside_the_loop_is_reported_as_open_and_not_as_error():
     """A hand with radial and axial clearance on two bent beams: disc r, length a."""
     r, a = 3e-5, 2e-5
     beams = coaxial_beams([0, 0, 0, 1e-4, 0, 0], (4e4, 4e4))
@@ -191,8 +191,8 @@ def test_clearance_outside_the_loop_is_open_and_no_error():
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "hexapod", "delta"])
-def test_without_errors_the_open_distance_is_the_largest_pose_error(name):
-    """The computed screw is zero: `solve` and `error` then speak of one quantity."""
+def test_open_distance_without_errors_equals_the_largest_pose_error(name):
+    """The computed screw is zero, so `solve` and `error` state one quantity."""
     assembly = solve_assembly(home_posture(load_robot(name)))
     assert not assembly.platform_screw.any()
     found = bound_screw(assembly)

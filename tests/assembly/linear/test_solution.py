@@ -1,4 +1,4 @@
-"""Many least energies in one: some of them, each of them, and loads of each."""
+"""Solutions of many points: selection, iteration, and loads of each point."""
 
 import numpy as np
 import pytest
@@ -33,8 +33,8 @@ def rigid_pins(gaps):
     return home_posture(robot), errors
 
 
-def test_a_load_and_gravity_of_each_posture_add_up(rng):
-    """Linear in the loads where nothing has clearance: superposition, row by row."""
+def test_displacements_by_load_and_gravity_add_up_for_each_posture(rng):
+    """Without clearance displacements are linear in the loads of each posture."""
     home = home_posture(coaxial_beams(np.zeros(6), (K, 3 * K)))
     load, gravity = rng.normal(size=(4, 6)), rng.normal(size=(4, 3))
     both = solve_assembly([home] * 4, load, gravity=gravity)
@@ -45,8 +45,8 @@ def test_a_load_and_gravity_of_each_posture_add_up(rng):
     assert both.platform_screw == pytest.approx(whole, rel=1e-12, abs=1e-20)
 
 
-def test_some_of_many_are_taken_by_mask_slice_and_numbers_more_than_once():
-    """By hand: K (gap - 1e-4)^2 / 2 beyond the clearance."""
+def test_points_are_selected_by_mask_slice_and_repeated_indices():
+    """The energy is K (gap - 1e-4)^2 / 2 beyond the clearance, by hand."""
     gaps = np.array([0.5e-4, 2e-4, 3e-4, 1.5e-4])
     home, errors = pins(gaps)
     many = solve_assembly(home, errors=errors)
@@ -62,7 +62,7 @@ def test_some_of_many_are_taken_by_mask_slice_and_numbers_more_than_once():
         many[4]
 
 
-def test_a_point_without_solution_is_so_wherever_it_is_taken():
+def test_point_without_solution_keeps_its_status_when_selected():
     home, errors = rigid_pins(np.array([0.5e-4, 2e-4, 0.1e-4]))
     many = solve_assembly(home, errors=errors)
     assert many.status.tolist() == ["ok", "cannot assemble", "ok"]
@@ -74,15 +74,15 @@ def test_a_point_without_solution_is_so_wherever_it_is_taken():
     assert twice[1].energy == many[0].energy == 0.0
 
 
-def test_one_point_has_no_length():
+def test_solution_of_one_point_has_no_length():
     home, _ = pins([0.0])
     with pytest.raises(TypeError, match="Assembly of one point has no length"):
         len(solve_assembly(home))
 
 
 @pytest.mark.parametrize("loaded", [(1, 0), (0, 1), (1, 1), (0, 0)])
-def test_points_with_and_without_loads_have_their_own_errors(loaded):
-    """Stored: K g^2 / 4 of the gap and F^2 / 4 K of the load, which do not mix."""
+def test_loaded_and_unloaded_points_keep_their_own_errors(loaded):
+    """Stored: K g^2 / 4 of the gap and F^2 / 4 K of the load, which are independent."""
     sets = np.zeros((2, 6, 6))
     sets[:, 2, 3] = 1e-4, 3e-4
     at = home_posture(coaxial_beams(np.zeros(6), (K, K)))

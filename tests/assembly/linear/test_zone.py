@@ -1,4 +1,4 @@
-"""The zone margin (21): closed forms, laws, and the printed problem in cvxpy."""
+"""The zone margin (21): closed forms, properties, and the problem in cvxpy."""
 
 from dataclasses import replace
 
@@ -43,14 +43,14 @@ def test_margin_of_one_joint_is_gap_over_clearance(gap, margin):
     assert zone.assemblable == (margin <= 1)
 
 
-def test_no_factor_helps_where_there_is_no_clearance():
+def test_margin_is_infinite_without_clearance_in_the_error_direction():
     robot = coaxial_beams(np.array([0, 0, 0, 0, 0, 1e-5]), clearance=Clearance(tilt=1))
     zone = zone_margin(home_posture(robot))
     assert (zone.margin, zone.bound, zone.assemblable) == (np.inf, np.inf, False)
 
 
-def test_passive_joints_take_up_what_they_can_for_nothing():
-    """A four-bar's pins take up errors in its plane; across, nothing does."""
+def test_passive_joints_take_up_in_plane_errors_without_clearance():
+    """A four-bar's pins take up errors in its plane, and none across it."""
     errors = np.zeros((6, 6))
     errors[2] = [0, 0, 1e-3, 1e-4, 2e-4, 0]
     robot = planar_four_bar(errors=errors)
@@ -79,7 +79,7 @@ def test_range_of_a_passive_joint_does_not_scale_with_the_margin(method):
         assert zone.bound == pytest.approx(margin, rel=1e-6, abs=1e-12)
 
 
-def test_scaling_the_clearances_by_the_margin_just_assembles():
+def test_clearances_scaled_by_the_margin_just_assemble():
     robot = irsbot2_with(NUMBERS["cases"][0])
     margin = zone_margin(home_posture(robot), "free").margin
 
@@ -96,7 +96,7 @@ def test_scaling_the_clearances_by_the_margin_just_assembles():
         assert zone.assemblable == inside
 
 
-def test_compliant_joints_must_be_rigid_or_free():
+def test_unknown_compliant_option_is_refused():
     at = home_posture(planar_four_bar())
     for posture in (at, [at]):
         with pytest.raises(ValueError, match="compliant is 'soft', expected 'rigid'"):
@@ -105,7 +105,7 @@ def test_compliant_joints_must_be_rigid_or_free():
 
 @settings(deadline=None, max_examples=12)
 @given(seed=st.integers(0, 2**32 - 1), legs=st.integers(2, 3))
-def test_random_robots_equal_the_printed_problem_in_cvxpy(seed, legs):
+def test_margin_of_random_robots_equals_the_printed_problem_in_cvxpy(seed, legs):
     rng = np.random.default_rng(seed)
     posture = home_posture(random_robot(rng, legs, 3))
     for compliant in ("rigid", "free"):
@@ -124,7 +124,7 @@ def test_random_robots_equal_the_printed_problem_in_cvxpy(seed, legs):
 
 
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
-def test_margins_of_many_robots_are_the_references(compliant, rng):
+def test_margins_of_many_robots_equal_the_reference_method(compliant, rng):
     """Both margins lie within 1e-8 of their common certified bounds."""
     homes = [home_posture(make()) for make in BUILT_IN.values()]
     for seed in range(80):
@@ -143,8 +143,8 @@ def test_margins_of_many_robots_are_the_references(compliant, rng):
     assert compiled
 
 
-def test_many_errors_or_postures_have_their_own_margins():
-    """Sets at one posture, a set for each, and postures alone: gap over clearance."""
+def test_margins_of_several_errors_or_postures_are_gap_over_clearance():
+    """Several errors at one posture, errors for each posture, and postures alone."""
     gaps = np.array([1e-5, 4e-5, -3e-5])
     sets = np.zeros((3, 6, 6))
     sets[:, 2, 5] = gaps
@@ -161,8 +161,8 @@ def test_many_errors_or_postures_have_their_own_margins():
     assert zone_margin([erring] * 2).margin == pytest.approx(expected[[1, 1]])
 
 
-def test_points_are_taken_out_of_many_and_one_has_no_length():
-    """Gap over clearance at one point; sizes of the forces on its cones add up to 1."""
+def test_margins_are_selected_by_index_and_one_point_has_no_length():
+    """Gap over clearance at one point; norms of the forces on its cones sum to 1."""
     sets = np.zeros((3, 6, 6))
     sets[:, 2, 5] = [1e-5, 4e-5, -3e-5]
     at = home_posture(coaxial_beams(np.zeros(6), clearance=PLAY))
@@ -182,7 +182,7 @@ def test_points_are_taken_out_of_many_and_one_has_no_length():
         len(one)
 
 
-def test_a_margin_that_does_not_exist_needs_no_proof():
+def test_infinite_margin_needs_no_proof():
     margin, bound = np.array([[np.inf] * 2, [2.0] * 2, [2.0, 1.99], [2.0, np.nan]]).T
     none = np.full((4, 1), np.nan)
     zones = Zone(margin, bound, np.full(4, "reference"), none, np.full(4, ""))

@@ -1,4 +1,4 @@
-"""Springs of a law in series: Newton's method against bisection, in any unit."""
+"""Contact laws in series with springs: Newton's method against bisection."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def alone(one, stiff, load):
 
 
 @pytest.mark.parametrize("force", [1e-12, 1e-6, 1.0, 1e9])
-def test_each_contact_by_itself_is_where_bisection_finds_it(rng, force):
+def test_deflection_of_a_single_contact_equals_bisection(rng, force):
     """c |d|^n sign d = w - k d; loads of either sign, and none."""
     w = np.array([[40.0, -3.0], [-1e-3, 2e2], [0.0, 5.0], [0.0, 0.0]])
     k = np.array([1e5, 4e3])
@@ -39,8 +39,8 @@ def test_each_contact_by_itself_is_where_bisection_finds_it(rng, force):
 
 
 @pytest.mark.parametrize("force", [1e-9, 1.0])
-def test_contacts_that_load_each_other_balance(rng, force):
-    """What A carries over, in a few steps of Newton's method."""
+def test_coupled_contacts_are_in_balance(rng, force):
+    """The matrix A couples them; Newton's method converges in a few steps."""
     B = rng.normal(size=(6, 2, 2)) * 300
     A = -force * B @ B.mT
     w = force * rng.normal(size=(6, 2)) * [50.0, 20.0]

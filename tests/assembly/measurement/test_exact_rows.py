@@ -1,4 +1,4 @@
-"""Many exact equilibria together are those found one by one."""
+"""Exact equilibria of many rows equal those of single rows."""
 
 from dataclasses import replace
 
@@ -41,8 +41,8 @@ def loaded_rows(name, rng, laws=()):
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_together_as_one_by_one(name, rng):
-    """Both converge to 1e-12; nominal closures are rounded at 1e-12 at worst."""
+def test_exact_rows_together_equal_single_exact_solutions(name, rng):
+    """Both converge to 1e-12; nominal closures are rounded to 1e-12 at worst."""
     here = loaded_rows(name, rng)
     screws, found = solve_rows(here, np.zeros((len(here), 0)))
     assert found.all()
@@ -53,7 +53,7 @@ def test_together_as_one_by_one(name, rng):
     assert np.abs(predict(here).deviation - linear).max() > 1e-7  # it matters here
 
 
-def test_beams_in_pieces_together_as_one_by_one(rng):
+def test_exact_rows_of_beams_in_pieces_equal_single_exact_solutions(rng):
     here = loaded_rows("five_bar", rng)
     links = {f.name: replace(f.link, pieces=3) for f in here.robot.frames if f.link}
     cut = replace(here, robot=here.robot.with_links(links))
@@ -76,7 +76,7 @@ BAR = Robot(
 
 
 @pytest.mark.parametrize("force", [5.0, 200.0, -200.0])
-def test_a_bar_on_a_contact_gives_by_its_law(force):
+def test_bar_on_a_contact_rests_at_its_moment_balance(force):
     """c |a|^n sign(a) = F L cos a for the angle a: the arm shortens as it turns."""
     c, n = 2e5, 1.5
     load = [0, 0, 0, 0, force, 0]
@@ -91,15 +91,15 @@ def test_a_bar_on_a_contact_gives_by_its_law(force):
     np.testing.assert_allclose(predict(here).deviation[0, 2], a, rtol=1e-10)
 
 
-def test_a_contact_without_load_stays_where_it_is():
-    """No load, no deflection: its secant, infinite there, must not matter."""
+def test_contact_without_load_has_zero_deflection():
+    """Its secant stiffness, infinite there, has no influence."""
     here = as_declared(home_posture(BAR), np.zeros(6))
     here = replace(here, laws=(ContactLaw("drive", 2e5, 1.5),), exact=True)
     np.testing.assert_array_equal(predict(here).deviation, 0.0)
 
 
-def test_rows_that_do_not_converge_claim_nothing():
-    """A spring so soft that the bar swings by radians is left to the exact solver."""
+def test_rows_that_do_not_converge_are_left_to_the_exact_solver():
+    """A spring so soft that the bar turns by radians."""
     K = np.diag([np.inf, np.inf, 1.0, np.inf, np.inf, np.inf])
     frames = (replace(BAR.frames[0], joint_stiffness=K), BAR.frames[1])
     robot = replace(BAR, frames=frames)
@@ -112,8 +112,8 @@ def test_rows_that_do_not_converge_claim_nothing():
 
 
 @pytest.mark.parametrize("seed", [0, 3, 5, 7])
-def test_rows_in_another_unit_of_length_turn_alike(seed, rng):
-    """And shift by as many millimetres; neither is refused."""
+def test_exact_rows_do_not_depend_on_the_unit_of_length(seed, rng):
+    """Rotations are equal and translations scale; neither is refused."""
     robot = random_robot(np.random.default_rng(seed), 2, link_share=1.0)
     tight = tuple(replace(f, clearance=None) for f in robot.frames)
     robot = replace(robot, frames=tight).with_errors(1e-2 * robot.errors)

@@ -31,8 +31,8 @@ def by_integration(times, values, time_constant, held):
 
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("time_constant", [0.5, 20.0, 1e4])
-def test_a_lag_solves_its_equation(held, time_constant):
-    """Rows of one moment too, between which nothing settles."""
+def test_lag_equals_the_integrated_differential_equation(held, time_constant):
+    """Also with two rows at the same time, between which nothing settles."""
     history, row = in_order({"time": TIMES, "u": VALUES}, None)
     assert row.tolist() == [*range(6)]
     found = history.lagged("u", time_constant, held=held)
@@ -44,7 +44,7 @@ def test_a_lag_solves_its_equation(held, time_constant):
 
 
 def test_sessions_begin_at_rest_and_rows_may_come_in_any_order(rng):
-    """Each row has the state that its own session gives it, whatever the others do."""
+    """The state of each row depends on the rows of its own session only."""
     mixed = rng.permutation(12)
     times, values = np.tile(TIMES, 2)[mixed], np.r_[VALUES, 2 * VALUES][mixed]
     session = np.repeat(["warm", "cold"], 6)[mixed]
@@ -72,8 +72,8 @@ def directions_by_hand(values, session, approach):
     return found
 
 
-def test_a_direction_is_that_of_the_last_step_within_its_session(rng):
-    """Sessions that begin anywhere, variables that stand still or hardly move."""
+def test_direction_is_that_of_the_last_step_of_the_session(rng):
+    """Sessions that begin anywhere, variables that do not or hardly change."""
     for _ in range(30):
         count = int(rng.integers(1, 9))
         values = np.cumsum(rng.choice([-1.0, 0.0, 0.0, 5e-10, 1.0], count))
@@ -87,8 +87,8 @@ def test_a_direction_is_that_of_the_last_step_within_its_session(rng):
         assert history.direction("approach").tolist() == approach.tolist()
 
 
-def test_nothing_settles_in_no_time():
-    """A row at time 0 has not begun to lag; one at the moment of another as that."""
+def test_lag_does_not_change_within_zero_time():
+    """A row at time 0 has no lag yet; two rows at the same time have the same state."""
     given = {"time": np.array([0.0, 2.0, 2.0]), "u": np.array([3.0, 3.0, 7.0])}
     history, _ = in_order(given, None)
     held = history.lagged("u", 4.0, held=True)
@@ -96,7 +96,7 @@ def test_nothing_settles_in_no_time():
     assert held == pytest.approx([0.0, settled, settled])
 
 
-def test_what_slips_at_once_is_the_direction():
+def test_slip_of_vanishing_depth_equals_the_direction():
     values = np.array([0.0, 1.0, 3.0, 9.0, 8.0, 5.0, 6.0])
     sides = np.full(7, -1.0)
     history, _ = in_order(

@@ -1,4 +1,4 @@
-"""Finite motions, contacts and laws in a prediction, by closed forms and bisection."""
+"""Finite motions, contacts and laws in predictions: closed forms and bisection."""
 
 from dataclasses import replace
 
@@ -55,8 +55,8 @@ def moved(turn):
     return found
 
 
-def test_second_order_is_what_errors_do_without_any_load():
-    """L (cos(q + e) - cos q + e sin q) and likewise; the load stays linear."""
+def test_second_order_part_equals_finite_errors_without_load():
+    """L (cos(q + e) - cos q + e sin q), likewise for y; the load stays linear."""
     e = 0.03
     here = rows(arm(), error=e)
     finite, linear = moved(np.full(4, e))
@@ -71,8 +71,8 @@ def test_second_order_is_what_errors_do_without_any_load():
 
 
 @pytest.mark.parametrize("exact", [False, True])
-def test_finite_motions_are_what_each_rows_load_makes_of_them(exact):
-    """K a = F L cos(q + e + a) in each row: the declared model is then exact."""
+def test_finite_motions_are_evaluated_at_the_load_of_each_row(exact):
+    """K a = F L cos(q + e + a) in each row, so the declared model becomes exact."""
     e = 0.03
     here = replace(rows(arm(), error=e), exact=exact)
     turn = np.array([
@@ -88,7 +88,7 @@ def test_finite_motions_are_what_each_rows_load_makes_of_them(exact):
 
 
 @pytest.mark.parametrize("exact", [False, True])
-def test_one_row_with_a_contact_is_where_that_of_all_rows_is(exact):
+def test_single_row_with_a_contact_equals_its_closed_form_and_all_rows(exact):
     """a = F L cos(q + a) / K + (M / c)^(1/n), the moment by finite motions or not."""
     c, n, force = 5e4, 1.5, 20.0
     here = replace(rows(arm(), force), laws=(ContactLaw("drive", c, n),), exact=exact)
@@ -106,8 +106,8 @@ def test_one_row_with_a_contact_is_where_that_of_all_rows_is(exact):
         assert predict(here).deviation[k, 2] == pytest.approx(turn, rel=1e-6)
 
 
-def test_a_law_of_its_own_gives_under_the_moment_of_finite_motions():
-    """a = F L cos(q + a) / K + b M^2: each row by itself."""
+def test_function_of_a_wrench_uses_the_moment_of_finite_motions():
+    """a = F L cos(q + a) / K + b M^2 in each row."""
     b = 2e-6
     one = Yield("drive", 2, (("drive", 2),), np.zeros((4, 1)),
                 lambda x, w: b * w[:, 0] ** 2)  # fmt: skip
@@ -124,8 +124,8 @@ def test_a_law_of_its_own_gives_under_the_moment_of_finite_motions():
         assert seen.deviation[:, 2] == pytest.approx(turn, rel=1e-6)
 
 
-def test_a_row_that_cannot_close_has_no_answer_and_its_clearance_is_centred():
-    """A four-bar with a loose pin, of which one row's coupler is out of the plane."""
+def test_row_that_cannot_close_has_no_prediction_and_centred_clearance():
+    """A four-bar with a loose pin; in one row its coupler is out of the plane."""
     robot = four_bar()
     frames = tuple(
         replace(f, clearance=Clearance(radial=2e-5) if f.name == "wrist" else None)
@@ -151,8 +151,8 @@ def test_a_row_that_cannot_close_has_no_answer_and_its_clearance_is_centred():
     assert held.deviation[0] == pytest.approx(seen.deviation[0], abs=1e-9)
 
 
-def test_clearance_of_an_open_chain_is_taken_up_by_finite_motions_too():
-    """A radius along the force; a joint without load in that way is undetermined."""
+def test_load_takes_up_open_chain_clearance_also_with_finite_motions():
+    """By the radius along the force; without a load the clearance is undetermined."""
     c = 1e-4
     rigid = Frame("drive", joint="revolute", actuated=True)
     here = rows(Robot("rigid", "tip", (rigid, arm().frames[1])), 5.0)
@@ -167,7 +167,7 @@ def test_clearance_of_an_open_chain_is_taken_up_by_finite_motions_too():
 
 
 @pytest.mark.parametrize("exact", [False, True])
-def test_a_contact_beside_a_spring_takes_its_share_by_finite_motions_too(exact):
+def test_contact_in_parallel_with_a_spring_carries_its_share_of_the_force(exact):
     """x = f / K + (f / c)^(2/3) = (F - f) / K along two sliders that end together."""
     K, c, forces = 1e6, 3e8, [500.0, -2.0, 40.0]
     spring = np.diag([np.inf] * 5 + [K])

@@ -1,4 +1,4 @@
-"""What a device reads of a moved platform, by homogeneous transforms of SciPy."""
+"""Readings of a device on a moved platform, by homogeneous transforms of SciPy."""
 
 from dataclasses import replace
 
@@ -33,8 +33,8 @@ def rows():
 
 @pytest.mark.parametrize("own_targets", [False, True])
 @pytest.mark.parametrize("by_row", [False, True])
-def test_a_reading_is_that_of_rigid_bodies(rows, own_targets, by_row, rng):
-    """A device turned by 1 rad reads where a point of a turned platform is."""
+def test_reading_equals_the_rigid_body_transform(rows, own_targets, by_row, rng):
+    """A device turned by 1 rad reads the position of a point of a turned platform."""
     count = (ROWS,) if by_row else ()
     base, tool = rng.normal(size=(*count, 6)), rng.normal(size=(*count, 3))
     target = rng.normal(size=(ROWS, 3)) if own_targets else None
@@ -56,7 +56,7 @@ def test_a_reading_is_that_of_rigid_bodies(rows, own_targets, by_row, rng):
         assert seen[k] - here.reading[k] == pytest.approx(expected, abs=1e-12)
 
 
-def test_what_finite_motions_add_is_added_to_the_linear_model_alone(rows, rng):
+def test_second_order_part_is_added_to_the_linear_model_only(rows, rng):
     added = 1e-3 * rng.normal(size=(ROWS, 6))
     here = as_declared(rows)
     linear = replace(here, second_order=added)
@@ -65,8 +65,8 @@ def test_what_finite_motions_add_is_added_to_the_linear_model_alone(rows, rng):
     assert exact == pytest.approx(np.zeros((ROWS, 6)), abs=1e-12)
 
 
-def test_rows_taken_keep_what_is_theirs_and_what_all_share(rows, rng):
-    """Each array of rows by number and by mask; a base and a tool of all rows stay."""
+def test_selected_rows_keep_their_own_and_shared_arrays(rows, rng):
+    """Selection by number and by mask; base and tool shared by all rows are kept."""
     some, mask = [3, 0], np.isin(np.arange(ROWS), [1, 4])
     whole = as_declared(
         rows, rng.normal(size=(ROWS, 6)), gravity=rng.normal(size=(ROWS, 3)),
@@ -87,7 +87,7 @@ def test_rows_taken_keep_what_is_theirs_and_what_all_share(rows, rng):
     assert np.array_equal(replace(whole, base=np.ones(6)).take(some).base, np.ones(6))
 
 
-def test_a_load_does_the_same_work_wherever_it_is_read(rows, rng):
+def test_work_of_a_load_does_not_depend_on_the_reference_point(rows, rng):
     """M . theta + F . t at the reference point and at the platform's origin."""
     load, screw = rng.normal(size=(ROWS, 6)), rng.normal(size=6)
     here = as_declared(rows, load, point=POINT)

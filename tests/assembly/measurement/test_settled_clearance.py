@@ -1,4 +1,4 @@
-"""Clearances that loads take up, points measured, and wrenches of soft contacts."""
+"""Clearances taken up by loads, measured points, and clearances at rest."""
 
 from dataclasses import replace
 
@@ -33,8 +33,8 @@ def pin(**clearance):
 
 
 @pytest.mark.parametrize("unit", [1e-12, 1.0, 1e6])
-def test_clearance_goes_the_way_of_the_load_of_any_size(unit):
-    """Through a pin: radially along x by its radius, axially by nothing."""
+def test_load_of_any_size_takes_up_clearance_in_its_direction(unit):
+    """A pin along x: radially by its clearance, axially by nothing."""
     conditions = at_home(pin(radial=RADIAL), unit * np.array([0, 0, 0, 2.0, 0, 0]))
     settled, undetermined = with_clearances_taken_up(conditions)
     expected = np.zeros((1, 2, 6))
@@ -44,7 +44,7 @@ def test_clearance_goes_the_way_of_the_load_of_any_size(unit):
     assert undetermined.tolist() == [False]
 
 
-def test_clearance_that_no_load_takes_up_is_undetermined_and_centred():
+def test_clearance_without_load_is_undetermined_and_centred():
     conditions = at_home(pin(radial=RADIAL, axial=AXIAL), [0, 0, 0, 2.0, 0, 0])
     settled, undetermined = with_clearances_taken_up(conditions)
     assert undetermined.tolist() == [True]
@@ -52,8 +52,8 @@ def test_clearance_that_no_load_takes_up_is_undetermined_and_centred():
     assert settled.errors[0, 0, 3] == pytest.approx(RADIAL)
 
 
-def test_a_point_is_measured_where_it_is():
-    """On the platform, whose axes are turned by 0.7 rad about x."""
+def test_measured_point_is_transformed_with_the_platform():
+    """The platform's axes are turned by 0.7 rad about x."""
     point = np.array([0.1, 0.2, -0.3])
     conditions = at_home(pin(), np.zeros(6), point=point)
     c, s = np.cos(0.7), np.sin(0.7)
@@ -62,8 +62,8 @@ def test_a_point_is_measured_where_it_is():
     assert conditions.measured_arms[0] == pytest.approx(np.array(expected) - [1, 0, 0])
 
 
-def test_clearance_at_rest_is_a_share_of_its_bounds_and_no_clearance_is_none():
-    """Tilt, spin, radial and axial bounds; a pin's own spin is motion, no clearance."""
+def test_clearance_at_rest_is_a_fraction_of_its_bounds():
+    """Tilt, spin, radial and axial bounds; a pin's spin is motion and no clearance."""
     robot = Robot("two", "tip", (
         Frame("fixed", clearance=Clearance(1e-5, 2e-5, 3e-4, 4e-4)),
         Frame("pin", "fixed", joint="revolute",

@@ -1,4 +1,4 @@
-"""Variables of effects by public name, and the rows before a row."""
+"""Variables of effects by public name, and the history of rows."""
 
 from dataclasses import replace
 
@@ -32,7 +32,7 @@ def rows(rng):
     return here, commands, known
 
 
-def test_each_name_is_a_number_of_the_row(rows):
+def test_each_variable_name_gives_the_value_of_the_row(rows):
     """Positions are those of the platform; covariates with their prefix or, three of
     them, without; a quantity that is not given is unknown."""
     here, commands, known = rows
@@ -53,8 +53,8 @@ def test_each_name_is_a_number_of_the_row(rows):
         np.testing.assert_allclose(variable(here, name), values, atol=1e-12)
 
 
-def test_a_campaigns_rows_remember_all_of_them_in_the_order_of_time(rows):
-    """Session b began first in the table; parts taken have the same past."""
+def test_history_of_a_campaign_orders_rows_by_session_and_time(rows):
+    """Session b is first in the table; selected rows keep the same history."""
     whole = with_history(rows[0])
     history, row = past(whole, ["q.turn"])
     assert row.tolist() == [1, 3, 0, 2]
@@ -69,7 +69,7 @@ def test_a_campaigns_rows_remember_all_of_them_in_the_order_of_time(rows):
 
 
 @pytest.mark.parametrize("missing", ["history", "row", "both"])
-def test_rows_without_a_past_are_first_rows_of_sessions_of_their_own(rows, missing):
+def test_rows_without_history_are_first_rows_of_their_own_sessions(rows, missing):
     here = with_history(rows[0])
     lost = ("history", "row") if missing == "both" else (missing,)
     here = replace(here, **dict.fromkeys(lost))

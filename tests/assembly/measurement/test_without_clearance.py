@@ -1,4 +1,4 @@
-"""All rows together against the cone solver, and reciprocity."""
+"""Linear solution of all rows together: against the cone solver, reciprocity."""
 
 from dataclasses import replace
 
@@ -52,8 +52,8 @@ def elastic_robot(seed, legs):
 
 @settings(max_examples=20, deadline=None)
 @given(seeds, st.integers(2, 3))
-def test_a_loaded_robot_closes_as_the_cone_solver_closes_it(seed, legs):
-    """1e-6: what springs 1e6 apart leave of 1e-16 after two factorisations."""
+def test_linear_solution_of_a_loaded_robot_equals_the_cone_solver(seed, legs):
+    """1e-6: stiffness ratios of 1e6 and rounding of 1e-16 in two factorisations."""
     robot, rng = elastic_robot(seed, legs)
     load = rng.normal(size=6) * [5, 5, 5, 50, 50, 50]
     fast = solved(robot, load)
@@ -65,8 +65,8 @@ def test_a_loaded_robot_closes_as_the_cone_solver_closes_it(seed, legs):
 
 @settings(max_examples=30, deadline=None)
 @given(seeds, st.integers(2, 3))
-def test_what_is_claimed_to_be_closed_has_the_least_energy(seed, legs):
-    """Rigid bodies among the elastic ones: w C w / 2 where the robot can be closed.
+def test_solved_rows_have_the_least_energy(seed, legs):
+    """Rigid and elastic bodies: w C w / 2 equals the least energy if it can be closed.
 
     Where it cannot, or nearly cannot, nothing is claimed.
     """
@@ -93,8 +93,8 @@ def rigid_four_bar(error):
     return replace(robot, frames=tuple(frames))
 
 
-def test_a_rigid_linkage_takes_up_errors_in_its_plane():
-    """Its closure has rank 3 of 6; in the plane that is enough.
+def test_rigid_four_bar_takes_up_in_plane_errors_as_in_closed_form():
+    """The closure has rank 3 of 6, which suffices in the plane.
 
     The rocker longer by a: the pin of the coupler, which the locked crank holds, moves
     by h along the coupler's normal, and h n . u = a along the rocker's u.
@@ -120,8 +120,8 @@ def test_a_rigid_linkage_takes_up_errors_in_its_plane():
 
 @pytest.mark.parametrize("size", [1e-4, 1e-6])
 @pytest.mark.parametrize("row", [0, 1, 5])
-def test_a_rigid_linkage_cannot_take_up_errors_out_of_its_plane(row, size):
-    """Nothing is claimed, and the row goes to the solver that says why."""
+def test_rigid_four_bar_with_out_of_plane_errors_is_not_solved(row, size):
+    """The row goes to the solver that reports the reason."""
     robot = rigid_four_bar(size * np.eye(6)[row])
     assert not solved(robot, np.zeros(6)).solved.any()
     with pytest.raises(CannotAssemble):
@@ -131,7 +131,7 @@ def test_a_rigid_linkage_cannot_take_up_errors_out_of_its_plane(row, size):
     assert told.reason[0]
 
 
-def test_clearance_is_refused():
+def test_robot_with_clearance_is_refused():
     robot = coaxial_beams(np.zeros(6), clearance=Clearance(radial=1e-5))
     with pytest.raises(ValueError, match="has clearance, which is not linear"):
         flexibility(at_home(robot))
@@ -139,8 +139,8 @@ def test_clearance_is_refused():
 
 @settings(max_examples=20, deadline=None)
 @given(seeds)
-def test_a_load_meets_a_screw_as_the_screw_moves_the_load(seed):
-    """Betti and Maxwell: w . (platform per screw) = (what w sends through) . screw."""
+def test_work_of_a_load_on_a_screw_is_reciprocal(seed):
+    """Betti and Maxwell: w . (platform per screw) = (wrench by w) . screw."""
     robot, rng = elastic_robot(seed, 2)
     load = rng.normal(size=6)
     columns = rng.normal(size=(6 * len(robot.frames), 3))
@@ -154,8 +154,8 @@ def test_a_load_meets_a_screw_as_the_screw_moves_the_load(seed):
 
 @settings(max_examples=20, deadline=None)
 @given(seeds)
-def test_built_in_screws_push_back_with_the_energy_they_store(seed):
-    """A = A', x' A x <= 0, and -x' A x / 2 is the energy of the screws A is for."""
+def test_self_stress_matrix_gives_the_stored_energy(seed):
+    """A = A', x' A x <= 0, and -x' A x / 2 is the energy of the screws x."""
     robot, rng = elastic_robot(seed, 2)
     columns = 1e-4 * rng.normal(size=(6 * len(robot.frames), 2))
     A = flexibility(at_home(robot)).self_stress(columns)[0]
@@ -170,8 +170,8 @@ def test_built_in_screws_push_back_with_the_energy_they_store(seed):
 
 
 @pytest.mark.parametrize("stiffer", [1e-6, 1e6, 1e12])
-def test_forces_grow_with_stiffness_and_the_pose_stays(stiffer):
-    """The errors' pose is of no unit of force."""
+def test_wrenches_scale_with_stiffness_and_the_pose_does_not(stiffer):
+    """The pose due to errors does not depend on the unit of force."""
     gap = np.array([1e-4, -2e-4, 3e-4, 1e-5, 2e-5, -3e-5])
     soft = solved(coaxial_beams(gap, (1e4, 3e4)), np.zeros(6))
     stiff = solved(coaxial_beams(gap, (1e4 * stiffer, 3e4 * stiffer)), np.zeros(6))

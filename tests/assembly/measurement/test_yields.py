@@ -1,4 +1,4 @@
-"""Places that deform by laws of their own, by bisection."""
+"""Frames that deform by laws of their own wrench, compared with bisection."""
 
 from dataclasses import replace
 
@@ -34,30 +34,30 @@ def settled_by(law, unit=1.0):
 
 @pytest.mark.parametrize("power", [1.0, 1.5, 3.0])
 @pytest.mark.parametrize("unit", [1e-9, 1e-6, 1.0, 1e3])
-def test_a_place_gives_by_its_law_under_what_is_left(power, unit):
-    """d = (3 - 2 d)^p / 10, by bisection."""
+def test_deformation_by_a_power_law_equals_bisection(power, unit):
+    """The equation d = (3 - 2 d)^p / 10, solved by bisection."""
     give = settled_by(lambda w: np.sign(w) * np.abs(w) ** power / 10, unit)
     expected = brentq(lambda d: d - (3.0 - 2.0 * d) ** power / 10, 0.0, 1.5, xtol=1e-15)
     assert give / unit == pytest.approx(expected, rel=1e-9)
 
 
-def test_springs_that_give_without_end_are_refused():
-    """d = w + d: any load w moves it ever farther."""
+def test_springs_of_unbounded_deformation_are_refused():
+    """d = w + d has no solution under a load."""
     one = Yield("foot", 1, (("foot", 1),), np.zeros((1, 1)), lambda x, w: w[:, 0])
     here = replace(as_declared(home_posture(POST), np.zeros(6)), yields=(one,))
     with pytest.raises(SolverFailed, match="springs that give without end"):
         Yields(here).correction(np.ones((1, 1)), np.zeros((1, 1)), np.ones((1, 1, 1)))
 
 
-def test_laws_that_never_settle_are_refused():
-    """It deforms under any load, and so far that the load is gone."""
+def test_law_without_convergence_is_refused():
+    """It deforms under any load so far that the load vanishes."""
     with pytest.raises(SolverFailed, match="do not settle in 40 steps"):
         settled_by(lambda w: np.where(w > 0, 2.0, 0.0))
 
 
 @pytest.mark.parametrize("compliance", [-1e-4, 0.0, 3e-4])
-def test_springs_are_put_into_their_joint_and_other_laws_stay(compliance):
-    """In series with what is declared; one that is not positive is no spring."""
+def test_linear_compliances_become_joint_springs_and_other_laws_remain(compliance):
+    """In series with the declared spring; a compliance that is not positive remains."""
     K = np.diag([np.inf, 1e4] + [np.inf] * 4)
     robot = Robot("post", "top", (
         Frame("foot", joint_stiffness=K), Frame("top", "foot", [0, 0, 1.0]),

@@ -1,4 +1,4 @@
-"""Draws of geometric errors: repeatable by anyone, and distributed as told."""
+"""Draws of geometric errors: repeatable, and of the requested distributions."""
 
 from dataclasses import replace
 
@@ -37,19 +37,19 @@ def sources(write_file):
     return read_sources(write_file(FILE), load_robot("four_bar"))
 
 
-def test_a_draw_is_the_same_whoever_draws_it(sources):
+def test_draws_do_not_depend_on_their_division_into_blocks(sources):
     whole = sources.draw(0, 1000, seed=7)
     cut = [sources.draw(a, b - a, seed=7) for a, b in ((0, 1), (1, 400), (400, 1000))]
     np.testing.assert_array_equal(np.vstack(cut), whole)
 
 
-def test_other_seeds_and_streams_give_other_numbers(sources):
+def test_different_seeds_and_streams_give_different_numbers(sources):
     draws = [sources.draw(0, 200, *key) for key in ((1, 0), (2, 0), (1, 1))]
     for a, b in ((0, 1), (0, 2), (1, 2)):
         assert not np.any(draws[a] == draws[b])
 
 
-def test_every_source_follows_its_law(sources):
+def test_every_source_has_the_requested_distribution(sources):
     """Kolmogorov's test against SciPy's own distributions, 1e5 draws each."""
     x = sources.draw(0, 100_000, seed=3).T
     laws = {
@@ -71,7 +71,7 @@ def test_every_source_follows_its_law(sources):
         assert variance == pytest.approx(law.var(), rel=1e-9), label
 
 
-def test_sizes_with_random_signs_leave_the_gap_between_empty():
+def test_errors_of_random_sign_keep_their_least_absolute_value():
     robot = load_robot("four_bar")
     sources = tolerance_sources(robot, [1e-3, 0, 0, 0, 0, 0])
     gapped = replace(sources, least=np.full(len(sources), 0.4))
@@ -99,7 +99,9 @@ def test_sizes_with_random_signs_leave_the_gap_between_empty():
          "deviation: expected numbers >= 0"),
     ],
 )  # fmt: skip
-def test_a_mistake_in_the_file_is_named(change, message, write_file):
+def test_mistake_in_a_tolerance_file_is_refused_with_its_place(
+    change, message, write_file
+):
     path = write_file(FILE.replace(*change, 1))
     with pytest.raises(BadInput) as error:
         read_sources(path, load_robot("four_bar"))

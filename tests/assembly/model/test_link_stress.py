@@ -36,7 +36,7 @@ def two_bars(gap):
     return Robot("bars", "end_one", frames, (("end_one", "end_two"),))
 
 
-def test_bars_forced_together_carry_youngs_modulus_times_strain():
+def test_stress_of_bars_forced_together_equals_modulus_times_strain():
     robot = two_bars([0, 0, 0, 1e-4, 0, 0])
     answer = solve_assembly(place_robot(robot))
     # strain 1e-4 / 1 m over both bars
@@ -44,7 +44,7 @@ def test_bars_forced_together_carry_youngs_modulus_times_strain():
     np.testing.assert_allclose(stress, 70e9 * 1e-4, rtol=1e-9)
 
 
-def test_a_bars_own_axes_and_length_are_used():
+def test_von_mises_stress_of_a_bar_equals_hand_calculation():
     """Tip force across: M = F L at the base, sigma = 4 F L / (pi r^3)."""
     robot = two_bars(np.zeros(6))
     w = np.zeros((3, 5, 6))
@@ -58,7 +58,7 @@ def test_a_bars_own_axes_and_length_are_used():
     assert not stress[:, 0].any()
 
 
-def test_links_without_a_shape_are_left_out():
+def test_links_without_a_section_have_no_stress():
     robot = load_robot("irsbot2")
     known = [link.frame for link in stressed_links(robot)]
     assert known == [f.name for f in robot.frames if isinstance(f.link, BeamLink)]
@@ -67,8 +67,8 @@ def test_links_without_a_shape_are_left_out():
 
 
 @pytest.mark.slow
-def test_finite_elements_agree_with_the_beam_away_from_the_ends():
-    """Looked at from one radius above the base: F / A there, and F (L - r) / W.
+def test_finite_element_stress_equals_the_beam_away_from_the_ends():
+    """Evaluated from one radius above the base: F / A there, and F (L - r) / W.
 
     What the clamped ends do to an axial force has fallen to 3.9 % at one radius and to
     0.02 % at three (Saint-Venant), so it is seen here, from above.
@@ -114,7 +114,7 @@ def heavy(pinned):
 
 
 @pytest.mark.parametrize(("pinned", "share"), [(False, 2), (True, 8)])
-def test_a_bars_own_weight_bends_it_between_its_ends(pinned, share):
+def test_stress_under_own_weight_equals_the_bending_formula(pinned, share):
     """sigma = 6 M / h^3, M = W L / 2 at the wall or W L / 8 in the middle."""
     robot, gravity = heavy(pinned), [0, 0, -9.81]
     weight = 7850 * 0.02**2 * 9.81
@@ -124,8 +124,8 @@ def test_a_bars_own_weight_bends_it_between_its_ends(pinned, share):
     assert found[0] == pytest.approx(expected, rel=1e-9)
 
 
-def test_sweeps_and_draws_know_the_stress_of_a_links_own_weight():
-    """W L / 2 again, and a wrench at the tip of zero."""
+def test_sweeps_and_draws_include_the_stress_of_the_link_weight():
+    """W L / 2 at the base again, and a wrench of zero at the tip."""
     turned = Frame("drive", joint="revolute", actuated=True)  # about z
     bar = replace(heavy(pinned=False).frames[0], parent="drive")
     robot = Robot("sag", "tip", (turned, bar))
@@ -151,8 +151,8 @@ def test_sweeps_and_draws_know_the_stress_of_a_links_own_weight():
     np.testing.assert_allclose(rows["moment"], weight / 2, rtol=1e-9)
 
 
-def test_a_sweep_finds_stress_and_safety_of_every_posture():
-    """The same stress as one solve at a time, away from zero energy."""
+def test_sweep_stress_and_safety_equal_those_of_single_solutions():
+    """Compared at points whose energy is not zero."""
     robot = load_robot("irsbot2")
     errors = np.zeros_like(robot.errors)
     errors[robot.index("leg1.link_a"), 3] = 1e-3

@@ -1,4 +1,4 @@
-"""Mesh links put into place: rotations from mesh axes to frame axes."""
+"""Placement of mesh links: rotations from mesh axes to frame axes."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ numbers = st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(
 
 
 @given(a=numbers, b=numbers)
-def test_the_rotation_lays_one_span_along_the_other_and_is_the_smallest(a, b):
+def test_mesh_rotation_aligns_the_spans_by_the_smallest_angle(a, b):
     a, b = np.array(a), np.array(b)
     R = mesh_rotation(a, b)
     assert np.allclose(R @ a / np.linalg.norm(a), b / np.linalg.norm(b), atol=1e-9)
@@ -33,12 +33,12 @@ def test_the_rotation_lays_one_span_along_the_other_and_is_the_smallest(a, b):
 
 
 @pytest.mark.parametrize("b", [[0, 0, 2.0], [0, 0, -2.0]])
-def test_parallel_and_opposite_spans(b):
+def test_mesh_rotation_aligns_parallel_and_opposite_spans(b):
     R = mesh_rotation(np.array([0, 0, 0.5]), np.array(b))
     assert np.allclose(R @ [0, 0, 1], np.array(b) / 2, atol=1e-15)
 
 
-def test_up_fixes_the_roll():
+def test_up_directions_determine_the_roll():
     """Mesh z along the frame's x, mesh x up along the frame's z: worked by hand."""
     R = mesh_rotation(
         np.array([0, 0, 1.0]), np.array([2.0, 0, 0]), (1, 0, 0), (0, 0, 1)
@@ -99,8 +99,8 @@ def stiffness(frame):
 
 
 @pytest.mark.slow
-def test_a_mesh_with_an_axis_works_below_a_prismatic_joint_at_zero(ram):
-    """Along z as where a translation says so; along x the same K in turned axes."""
+def test_mesh_axis_below_a_slide_at_zero_gives_the_turned_stiffness(ram):
+    """Along z the result is that of a translation; along x K in turned axes."""
     spelt = read_robot(ram(more="translation = [0, 0, 0.08]")).frame("tool")
     K = stiffness(spelt).stiffness
     along_z = read_robot(ram(", axis = [0, 0, 2]")).frame("tool")
@@ -112,7 +112,7 @@ def test_a_mesh_with_an_axis_works_below_a_prismatic_joint_at_zero(ram):
     assert turned[3, 3] == pytest.approx(K[5, 5])
 
 
-def test_a_mesh_with_an_axis_may_slide_at_home_and_is_written_back(ram, tmp_path):
+def test_mesh_axis_below_a_moved_slide_is_read_and_written(ram, tmp_path):
     robot = read_robot(ram(", axis = [0, 0, 1]", position=0.05))
     assert robot.frame("tool").link.axis == (0.0, 0.0, 1.0)
     write_robot(robot, tmp_path / "again.toml")
@@ -131,12 +131,12 @@ def test_a_mesh_with_an_axis_may_slide_at_home_and_is_written_back(ram, tmp_path
          r'"tool".up: up = .* lies along the axis .*; expected another direction'),
     ],
 )  # fmt: skip
-def test_a_mesh_of_no_direction_is_refused(ram, changes, message):
+def test_mesh_without_a_direction_is_refused(ram, changes, message):
     with pytest.raises(BadInput, match=message):
         read_robot(ram(**changes))
 
 
-def test_an_up_along_the_mesh_is_refused(ram):
+def test_up_direction_along_the_mesh_axis_is_refused(ram):
     path = ram(", axis = [0, 0, 1], up = [0, 0, 1]", "up = [1, 0, 0]")
     message = r'"tool".link.mesh: up = .* lies along the axis .*; expected another'
     with pytest.raises(BadInput, match=message):

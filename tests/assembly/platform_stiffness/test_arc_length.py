@@ -18,8 +18,8 @@ def arch_force(height, half=1.0, rise=0.1, k=1e5):
     return 2 * k * (length / np.hypot(half, height) - 1) * height
 
 
-def test_the_whole_path_of_a_shallow_arch():
-    """Up to the limit point, back through the flat arch, and down again."""
+def test_path_of_a_shallow_arch_equals_its_closed_form_past_limit_points():
+    """The path rises to the limit point, passes the flat arch, and falls again."""
     limit = arch_force(np.linspace(0, 0.1, 100_001)).max()
     curve = follow_load(shallow_arch(), FY, 0.0, -1.5 * limit)
     heights = 0.1 + curve.deflection
@@ -34,8 +34,8 @@ def test_the_whole_path_of_a_shallow_arch():
     assert (curve.stiffness[np.abs(heights) < 0.03] < 0).all()
 
 
-def test_a_column_on_a_torsion_spring_branches_at_k_over_l():
-    """A straight rigid bar stays an equilibrium; from k / L on it could also buckle."""
+def test_column_on_a_torsion_spring_has_a_branch_point_at_k_over_l():
+    """A straight rigid bar stays in equilibrium; from k / L on it can also buckle."""
     K = np.diag([np.inf, np.inf, 50.0, np.inf, np.inf, np.inf])
     hinge = Frame("hinge", joint="revolute", joint_stiffness=K)
     bar = Frame("bar", "hinge", [0.4, 0, 0])
@@ -47,7 +47,7 @@ def test_a_column_on_a_torsion_spring_branches_at_k_over_l():
     assert np.abs(curve.screws).max() < 1e-12
 
 
-def test_two_bars_on_torsion_springs_branch_at_both_their_loads():
+def test_two_bars_on_torsion_springs_have_branch_points_at_both_loads():
     """(3 - sqrt 5) k / 2L and (3 + sqrt 5) k / 2L: det [[2k - PL, -k], ..] = 0."""
     K = np.diag([np.inf, np.inf, 50.0, np.inf, np.inf, np.inf])
     foot = Frame("foot", joint_stiffness=K)
@@ -61,8 +61,8 @@ def test_two_bars_on_torsion_springs_branch_at_both_their_loads():
         assert event.what.startswith("branch point, buckles")
 
 
-def test_rods_that_spin_in_their_ball_joints_are_no_part_of_the_path():
-    """The delta's six rods; the tangent at no load is the classical stiffness."""
+def test_spinning_rods_cause_no_events_on_the_path():
+    """The delta has six rods; the tangent without load is the classical stiffness."""
     posture = home_posture(load_robot("delta"))
     curve = follow_load(posture, 5, 0.0, -500.0, count=4)
     classical = platform_stiffness(posture).along(np.eye(6)[5])[0]
@@ -71,7 +71,7 @@ def test_rods_that_spin_in_their_ball_joints_are_no_part_of_the_path():
     assert abs(curve.loads[-1]) >= 500.0
 
 
-def test_a_load_along_a_free_motion_is_refused_before_the_path_begins():
+def test_load_along_a_free_motion_is_refused():
     slide = Frame("slide", joint="prismatic")
     robot = Robot("slide", "tip", (slide, Frame("tip", "slide")))
     with pytest.raises(FreeMotion, match="it moves slide tz"):

@@ -1,4 +1,4 @@
-"""What has no stiffness is refused in one line that says which."""
+"""Robots, loads and directions without a stiffness are refused in one line."""
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ from assembly.robots import load_robot
 from forcefit.inputs.errors import BadInput
 
 
-def test_a_load_that_nothing_resists_is_refused_with_the_motion_it_drives():
-    """The slide's own z is along x: the platform goes there, and nothing else does."""
+def test_load_without_resistance_is_refused_with_its_free_motion():
+    """The slide's z axis is along x, so the platform moves along x."""
     spring = Frame("spring", rotation=[0, np.pi / 2, 0], joint="prismatic",
                    link=MatrixLink(np.eye(6)))  # fmt: skip
     posture = home_posture(Robot("slide", "tip", (spring, Frame("tip", "spring"))))
@@ -23,8 +23,8 @@ def test_a_load_that_nothing_resists_is_refused_with_the_motion_it_drives():
             platform_stiffness(posture, state, load=[0, 0, 0, 5.0, 1.0, 0])
 
 
-def test_what_turns_beside_the_platform_leaves_it_where_it_is():
-    """A wheel that runs freely, driven by a couple on its rim."""
+def test_free_motion_of_another_body_is_refused_with_a_fixed_platform():
+    """A wheel turns freely, driven by a couple on its rim."""
     frames = (
         Frame("wheel", joint="revolute"),
         Frame("rim", "wheel", [0.1, 0, 0]),
@@ -49,13 +49,13 @@ def test_what_turns_beside_the_platform_leaves_it_where_it_is():
         ({"side": "left"}, "no side 'left'"),
     ],
 )
-def test_what_is_no_point_load_or_state_is_refused(words, message):
+def test_invalid_point_load_or_state_is_refused(words, message):
     with pytest.raises(ValueError, match=message):
         platform_stiffness(home_posture(load_robot("orthoglide")), **words)
 
 
 @pytest.mark.parametrize("direction", [[0] * 6, [1, 0, 0], [np.nan] * 6, "tx"])
-def test_what_is_no_direction_is_refused(direction):
+def test_invalid_direction_is_refused(direction):
     stiffness = platform_stiffness(home_posture(load_robot("orthoglide")))
     for asked in (stiffness.along, stiffness.shares):
         with pytest.raises(BadInput, match="direction: found"):

@@ -1,4 +1,4 @@
-"""Load against deflection: clearances, contacts, buckling, jumps; closed forms."""
+"""Load-deflection curves: clearances, contacts, buckling, jumps; closed forms."""
 
 import numpy as np
 import pytest
@@ -27,8 +27,8 @@ def cantilever(link):
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_platform_that_a_load_does_not_move_is_rigid_and_never_jumps(state):
-    """A sprung slide along x, turned by a rounded right angle: rigid along z."""
+def test_rigid_direction_has_infinite_stiffness_and_no_events(state):
+    """A slide with a spring along x, turned by a rounded right angle: rigid along z."""
     K = np.diag([np.inf] * 5 + [1e5])
     frames = (
         Frame("slide", rotation=[0, np.pi / 2, 0], joint="prismatic",
@@ -44,8 +44,8 @@ def test_platform_that_a_load_does_not_move_is_rigid_and_never_jumps(state):
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_free_clearance_then_contact_then_a_spring(state):
-    """Deflection = sign(F) c + F / k; at no load anything within the clearance."""
+def test_curve_crosses_the_clearance_and_then_follows_the_spring(state):
+    """Deflection = sign(F) c + F / k; without load it is anywhere in the clearance."""
     c, k = 1e-4, 1e5
     curve = deflection_curve(bush(c, k), FZ, np.arange(-30.0, 31.0, 10.0), state=state)
     loaded = curve.loads != 0.0
@@ -61,11 +61,11 @@ def test_free_clearance_then_contact_then_a_spring(state):
     assert max(abs(release.load), abs(contact.load)) < 0.01
 
 
-def test_an_error_is_pressed_back_at_the_load_that_it_took():
-    """Forced by k (e - c) against its stop, a closure lets go at that load.
+def test_contact_forced_by_an_error_opens_at_its_preload():
+    """A closure pressed on its stop by k (e - c) opens at that load.
 
-    Two springs k hold the tip; the one behind the stop lets go when the other carries
-    all: at 2 k (e - c) / 2 on each.
+    Two springs k hold the tip; the contact opens when the other spring carries the
+    whole load, 2 k (e - c) / 2.
     """
     c, e, k = 1e-4, 3e-4, 1e5
     K = np.diag([1e3, 1e3, 1e3, 1e5, 1e5, k])
@@ -90,7 +90,7 @@ def test_an_error_is_pressed_back_at_the_load_that_it_took():
     np.testing.assert_allclose(curve.stiffness[between], k, rtol=1e-6)
 
 
-def test_the_tangent_is_the_slope_of_the_curve():
+def test_tangent_stiffness_is_the_slope_of_the_curve():
     """Central differences along a loaded robot's curve, error of second order."""
     posture = home_posture(load_robot("four_bar"))
     loads = 100.0 + np.array([-0.5, 0.0, 0.5])
@@ -100,7 +100,7 @@ def test_the_tangent_is_the_slope_of_the_curve():
 
 
 @pytest.mark.slow
-def test_euler_s_column_is_found_to_buckle():
+def test_clamped_column_has_a_critical_event_at_the_euler_load():
     width, E = 0.02, 70e9
     link = BeamLink({"width": width, "height": width}, E, 0.3, pieces=16,
                     theory="euler")  # fmt: skip
@@ -112,8 +112,8 @@ def test_euler_s_column_is_found_to_buckle():
     assert "tip link" in event.what
 
 
-def test_a_thin_cantilever_buckles_sideways():
-    """4.013 sqrt(EI GJ) / L^2 (Michell, Prandtl 1899), and what bending before it adds.
+def test_thin_cantilever_has_a_critical_event_at_the_lateral_buckling_load():
+    """4.013 sqrt(EI GJ) / L^2 (Michell, Prandtl 1899), and the effect of prebuckling.
 
     1 / sqrt((1 - I_y/I_z) (1 - GJ/EI_z)) for the latter; 16 pieces leave 0.1 %.
     """
@@ -149,7 +149,7 @@ def shallow_arch():
 
 
 @pytest.mark.slow
-def test_a_shallow_arch_snaps_through_at_its_limit_point():
+def test_shallow_arch_jumps_at_its_limit_load():
     """F(w) = 2 k (L / l - 1) (h - w), l^2 = a^2 + (h - w)^2: largest, then a jump."""
     half, rise, k = 1.0, 0.1, 1e5
     length = np.hypot(half, rise)
@@ -169,7 +169,7 @@ def test_a_shallow_arch_snaps_through_at_its_limit_point():
     assert curve.deflection[-2] < -2 * rise < curve.deflection[1]
 
 
-def test_column_whose_platform_cannot_move_sideways_buckles_inside_its_links():
+def test_pinned_column_with_a_guided_platform_buckles_in_its_links():
     """Pinned at both ends, the platform on a slide along it: pi^2 E I / L^2.
 
     Sixteen pieces buckle earlier by a share that falls with the square of their number.

@@ -1,4 +1,4 @@
-"""K_C of many postures at once is that of one at a time."""
+"""K_C of many postures together equals that of single postures."""
 
 import numpy as np
 import pytest
@@ -39,15 +39,15 @@ def assert_same(many, row, one):
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_at_home_it_is_that_of_one_posture(name):
+def test_stiffness_of_many_postures_equals_that_of_one_at_home(name):
     posture = home_posture(load_robot(name))
     many = platform_stiffness([posture])
     assert set(many.method) == {"compiled"}
     assert_same(many, 0, without_clearance(posture))
 
 
-def test_a_posture_does_not_depend_on_its_neighbours(rng):
-    """To the last bit: alone, or in another order."""
+def test_stiffness_does_not_depend_on_other_postures(rng):
+    """Bit-identical: alone, or in another order."""
     robot = load_robot("irsbot2")
     poses = np.full((19, 6), np.nan)
     poses[:, 0], poses[:, 2] = np.linspace(-0.3, 0.3, 19), -0.45
@@ -60,15 +60,15 @@ def test_a_posture_does_not_depend_on_its_neighbours(rng):
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_of_random_robots_it_is_the_same(seed):
-    """Some have free motions, some rigid directions; ranks are told alike."""
+def test_stiffness_of_random_robots_equals_that_of_one_posture(seed):
+    """Some have free motions, some rigid directions; the ranks are equal."""
     rng = np.random.default_rng(seed)
     posture = home_posture(random_robot(rng, legs=int(rng.integers(1, 4))))
     many = platform_stiffness([posture])
     assert_same(many, 0, without_clearance(posture))
 
 
-def test_a_free_motion_has_no_number():
+def test_free_motion_has_nan_compliance_and_zero_stiffness():
     frames = (
         Frame("slide", joint="prismatic", link=MatrixLink(UNIT)),
         Frame("tip", "slide"),
@@ -85,8 +85,8 @@ def test_a_free_motion_has_no_number():
     )
 
 
-def test_stiffness_of_what_gives_way_along_x_alone_is_infinite_across_it():
-    """A sprung slide along x, turned by a rounded right angle."""
+def test_spring_along_x_has_infinite_stiffness_across_it():
+    """A slide with a spring along x, turned by a rounded right angle."""
     K = np.diag([np.inf] * 5 + [1e5])
     frames = (
         Frame("slide", rotation=[0, np.pi / 2, 0], joint="prismatic",
@@ -101,8 +101,8 @@ def test_stiffness_of_what_gives_way_along_x_alone_is_infinite_across_it():
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_one_of_many_read_anywhere_is_that_of_its_posture(method):
-    """Compliance, stiffness and shares by modes of its own."""
+def test_one_of_many_stiffnesses_equals_that_of_its_posture_at_any_point(method):
+    """Compliance, stiffness and shares of each posture."""
     robot = load_robot("irsbot2")
     poses = np.full((3, 6), np.nan)
     poses[:, 0], poses[:, 2] = [-0.2, 0.0, 0.25], -0.45
@@ -126,8 +126,8 @@ def test_one_of_many_read_anywhere_is_that_of_its_posture(method):
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_a_tangent_of_many_postures_is_that_of_each(state):
-    """To the last bit, whatever is asked of all."""
+def test_tangents_of_many_postures_are_bit_identical_to_single_ones(state):
+    """For every property of the result."""
     clearance = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3)
     gap = np.array([0, 0, 0, 1e-4, 0, 0])
     posture = home_posture(coaxial_beams(gap, clearance=clearance))

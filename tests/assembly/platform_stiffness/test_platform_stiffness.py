@@ -40,7 +40,7 @@ def serial(*frames):
     return home_posture(Robot("chain", above, tuple(chain)))
 
 
-def test_a_cantilever_has_the_textbook_compliance():
+def test_cantilever_compliance_equals_the_textbook():
     """L/EA, L/GJ, L^3/3EI + 6/5 L/GA, L^2/2EI, L/EI of a square section along x."""
     L, a, E = 0.8, 0.02, 70e9
     A, inertia, G, J = a**2, a**4 / 12, E / 2, 0.1406 * a**4
@@ -55,7 +55,7 @@ def test_a_cantilever_has_the_textbook_compliance():
     assert_same_matrix(C, expected, 1e-12)
 
 
-def test_a_chain_is_the_sum_of_its_parts():
+def test_serial_chain_compliance_is_the_sum_of_its_moved_parts():
     """C = sum of X C_i X', each part moved to the tip: a serial arm."""
     rng = np.random.default_rng(1)
     frames, expected = [], np.zeros((6, 6))
@@ -73,8 +73,8 @@ def test_a_chain_is_the_sum_of_its_parts():
 
 
 @pytest.mark.parametrize("pose", [{}, {"tx": 0.03, "tz": 0.5, "ry": 0.2}])
-def test_a_gough_platform_is_the_sum_over_its_struts(pose):
-    """K = sum of k w w', w the unit wrench of a strut's line (Merlet 2006, 4.2)."""
+def test_gough_platform_stiffness_is_the_sum_over_its_struts(pose):
+    """K = sum of k w w', w the unit wrench along a strut (Merlet 2006, 4.2)."""
     P = HexapodParameters()
     posture = place_robot(hexapod(), pose) if pose else home_posture(hexapod())
     base, platform = points()
@@ -90,22 +90,22 @@ def test_a_gough_platform_is_the_sum_over_its_struts(pose):
 
 
 @pytest.mark.parametrize("name", ["3rrr", "delta"])
-def test_a_machine_of_three_equal_legs_looks_the_same_turned_by_a_third(name):
+def test_stiffness_of_three_equal_legs_has_threefold_symmetry(name):
     K = platform_stiffness(home_posture(load_robot(name))).stiffness
     turn = np.array([[-1, -np.sqrt(3), 0], [np.sqrt(3), -1, 0], [0, 0, 2]]) / 2
     X = np.kron(np.eye(2), turn)
     assert_same_matrix(X @ K @ X.T, K, 1e-9)
 
 
-def test_the_orthoglide_is_isotropic_at_home():
-    """Wenger and Chablat designed it so: k I for forces, no coupling."""
+def test_orthoglide_stiffness_is_isotropic_at_home():
+    """By design (Wenger and Chablat): k I for forces, no coupling."""
     K = platform_stiffness(home_posture(load_robot("orthoglide"))).stiffness
     assert_same_matrix(K, np.diag([K[0, 0]] * 3 + [K[3, 3]] * 3), 1e-9)
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "hexapod", "four_bar", "delta", "arm6"])
-def test_the_work_of_a_small_load_is_twice_its_energy(name):
-    """The least energy under a load is w.Cw/2: another solver, with its certificate."""
+def test_displacement_under_a_unit_load_equals_the_compliance(name):
+    """The least energy solution under a load w moves by C w: another solver."""
     robot = load_robot(name)
     frames = tuple(replace(frame, clearance=None) for frame in robot.frames)
     posture = home_posture(replace(robot, frames=frames))
@@ -139,8 +139,8 @@ LOAD = np.array([3.0, -5.0, 2.0, 150.0, 80.0, -200.0])
 
 
 @pytest.mark.parametrize("case", NUMBERS["cases"], ids=lambda case: case["name"])
-def test_the_tangent_of_the_paper_robot_is_the_difference_of_its_equilibria(case):
-    """At the paper's full errors, clearances pressed: internal forces count.
+def test_paper_robot_tangent_equals_differences_of_its_equilibria(case):
+    """At the paper's full errors, with pressed clearances and internal forces.
 
     The cone solver stops at a gap of 1e-8 of the energy, which leaves 1e-4 in screws;
     the exact equilibrium is solved to rounding.
@@ -160,7 +160,7 @@ def test_the_tangent_of_the_paper_robot_is_the_difference_of_its_equilibria(case
     "seed",
     [0, 1, 2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (3, 4, 5))],
 )
-def test_the_tangent_of_random_robots_is_the_difference_of_their_equilibria(seed):
+def test_random_robot_tangents_equal_differences_of_equilibria(seed):
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, legs=3)
     posture = home_posture(robot.with_errors(0.3 * robot.errors))
@@ -179,8 +179,8 @@ def test_the_tangent_of_random_robots_is_the_difference_of_their_equilibria(seed
 @pytest.mark.parametrize(
     "seed", [12, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (42, 65))]
 )
-def test_the_tangent_holds_where_moments_act_on_a_platform_turned_by_a_radian(seed):
-    """Differences extrapolated to step zero; second derivatives are exact there too."""
+def test_tangent_equals_differences_at_rotations_of_a_radian(seed):
+    """Differences extrapolated to step zero; moments act on the turned platform."""
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, legs=int(rng.integers(1, 4)))
     posture = home_posture(robot)
@@ -189,8 +189,8 @@ def test_the_tangent_holds_where_moments_act_on_a_platform_turned_by_a_radian(se
     assert by_differences(posture, load)[0] < 1e-8
 
 
-def test_read_at_another_point_power_is_the_same():
-    """w . s does not depend on where both are read: C moves by X C X'."""
+def test_compliance_at_another_point_follows_the_screw_transform():
+    """w . s does not depend on the reference point: C changes to X C X'."""
     posture = home_posture(load_robot("irsbot2"))
     at_origin, r = platform_stiffness(posture), np.array([0.1, -0.2, 0.05])
     at_point = platform_stiffness(posture, at=r)
@@ -201,8 +201,8 @@ def test_read_at_another_point_power_is_the_same():
     np.testing.assert_allclose(at_point.centre, at_origin.centre, atol=1e-9)
 
 
-def test_the_centre_of_a_spring_is_where_it_sits():
-    """A link of diagonal stiffness, carried on by a rigid arm: centred at its tip."""
+def test_stiffness_centre_is_at_the_spring():
+    """A diagonal link stiffness, a rigid arm beyond: the centre is at its tip."""
     K = np.diag([20.0, 30.0, 40.0, 1e4, 2e4, 3e4])
     spring = Frame("spring", translation=[0.3, 0.1, 0.2], link=MatrixLink(K))
     arm = Frame("arm", translation=[0.5, -0.4, 0.1])
@@ -211,7 +211,7 @@ def test_the_centre_of_a_spring_is_where_it_sits():
     )
 
 
-def test_eigen_stiffnesses_of_a_diagonal_spring_are_its_own():
+def test_eigen_stiffnesses_of_a_diagonal_spring_are_its_diagonal():
     """Rotations count as length times angle: k / length^2."""
     K = np.diag([20.0, 30.0, 40.0, 1e4, 2e4, 3e4])
     spring = Frame("spring", translation=[0.5, 0, 0], link=MatrixLink(K))
@@ -221,7 +221,7 @@ def test_eigen_stiffnesses_of_a_diagonal_spring_are_its_own():
     )
 
 
-def test_shares_are_of_the_whole_and_a_lone_link_has_all_of_it():
+def test_compliance_shares_sum_to_one_and_a_single_link_has_all():
     tangent = platform_stiffness(home_posture(load_robot("irsbot2")))
     for row in range(6):
         assert sum(tangent.shares(UNIT[row]).values()) == pytest.approx(1.0, rel=1e-12)
@@ -232,7 +232,7 @@ def test_shares_are_of_the_whole_and_a_lone_link_has_all_of_it():
     assert alone.shares(UNIT[4]) == {Part("beam", "link"): pytest.approx(1.0)}
 
 
-def test_a_stiffer_material_lowers_the_compliance_by_the_link_s_share():
+def test_compliance_slope_by_the_modulus_is_minus_the_link_share():
     """dC = -C_i dE/E (Castigliano): differences of Young's modulus."""
     robot = load_robot("orthoglide")
     posture = place_robot(robot, {"tx": 0.03, "ty": -0.02})
@@ -252,8 +252,8 @@ def test_a_stiffer_material_lowers_the_compliance_by_the_link_s_share():
     )
 
 
-def test_a_motion_that_nothing_resists_is_named_and_has_no_number():
-    """A slide along x on a spring: TX is free, what does not touch it is the spring."""
+def test_free_motion_is_reported_with_nan_compliance():
+    """A slide along x on a spring: TX is free, the other entries are the spring's."""
     K = np.diag([20.0, 30.0, 40.0, 1e4, 2e4, 3e4])
     spring = Frame("spring", rotation=[0, np.pi / 2, 0], joint="prismatic",
                    link=MatrixLink(K))  # fmt: skip
@@ -269,7 +269,7 @@ def test_a_motion_that_nothing_resists_is_named_and_has_no_number():
     assert np.isnan([*tangent.shares(UNIT[3]).values()]).all()
 
 
-def test_a_rigid_direction_has_no_compliance_and_no_finite_stiffness():
+def test_rigid_direction_has_zero_compliance_and_infinite_stiffness():
     """A hinge with a torsion spring, a rigid arm along x: RZ and TY move together."""
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, 50.0))
     tangent = platform_stiffness(serial(hinge, Frame("arm", translation=[0.4, 0, 0])))
@@ -282,7 +282,7 @@ def test_a_rigid_direction_has_no_compliance_and_no_finite_stiffness():
     assert tangent.eigen.condition == np.inf
 
 
-def test_a_column_on_a_torsion_spring_buckles_at_its_critical_load():
+def test_tangent_of_a_column_on_a_torsion_spring_vanishes_at_buckling():
     """Rigid bar of length L on a spring k under a dead force F: k/L^2 - F/L."""
     k, L = 50.0, 0.4
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, k))
@@ -299,8 +299,8 @@ def test_a_column_on_a_torsion_spring_buckles_at_its_critical_load():
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_a_pin_in_a_hole_holds_across_and_rolls_along_its_rim(state):
-    """Pressed by F with a radial clearance c it gives way along the rim as F/c."""
+def test_pressed_pin_is_stiff_across_and_rolls_along_its_rim(state):
+    """Pressed by F with a radial clearance c, its stiffness along the rim is F/c."""
     force, c, k = 30.0, 1e-3, 1e5
     K = np.diag([1e9, 1e9, 1e9, k, k, k])  # so that the arm c turns nothing
     clearance = Clearance(radial=c)
@@ -315,7 +315,7 @@ def test_a_pin_in_a_hole_holds_across_and_rolls_along_its_rim(state):
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_within_its_clearance_nothing_holds_the_platform(state):
+def test_platform_within_its_clearance_has_zero_stiffness(state):
     K = np.diag([1e3, 1e3, 1e3, 1e5, 1e5, 1e5])
     spring = Frame("spring", link=MatrixLink(K), clearance=Clearance(axial=1e-4))
     posture = serial(spring, Frame("tip"))
@@ -326,10 +326,10 @@ def test_within_its_clearance_nothing_holds_the_platform(state):
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_both_sides_of_a_change_of_contact(state):
+def test_stiffness_at_a_change_of_contact_depends_on_the_side(state):
     """An error just takes up the clearance: rigid against the stop, else a spring.
 
-    The stop is met without a force, so both are true, each for one sense of the load.
+    The contact force is zero, so both apply, each for one direction of the load.
     """
     K = np.diag([1e3, 1e3, 1e3, 1e5, 1e5, 1e5])
     frames = (

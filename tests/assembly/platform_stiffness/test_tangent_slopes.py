@@ -1,4 +1,4 @@
-"""Derivatives of tangents, against closed forms and against solving again."""
+"""Derivatives of tangent compliances: closed forms, and differences of solutions."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def torsion_bar(k, L):
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, -1.0, 1.5])
-def test_a_loaded_bar_on_a_torsion_spring(share):
+def test_slopes_of_a_loaded_bar_equal_its_closed_form(share):
     """C = 1 / (k/L^2 - F/L), by k and by L, below, without and beyond buckling."""
     k, L = 50.0, 0.4
     F = share * k / L
@@ -39,8 +39,8 @@ def test_a_loaded_bar_on_a_torsion_spring(share):
     assert by_L[4, 4] == pytest.approx(C**2 * (2 * k / L**3 - F / L**2), rel=1e-6)
 
 
-def test_a_pin_that_is_pressed_into_its_hole_gives_way_along_the_rim():
-    """C = c / F, and F is the load: dC/dc = 1 / F, with the motion of the contact."""
+def test_slope_of_a_pressed_pin_by_its_clearance_is_1_over_the_load():
+    """C = c / F, where F is the load: dC/dc = 1 / F, with the motion of the contact."""
     c, F = 1e-4, 200.0
     pin = Frame("pin", clearance=Clearance(radial=c, axial=0.0, tilt=0.0, spin=0.0))
     robot = Robot("pin", "tip", (pin, Frame("tip", "pin")))
@@ -59,8 +59,8 @@ def test_a_pin_that_is_pressed_into_its_hole_gives_way_along_the_rim():
         ("leg1.link_a.geometric_error.tx", 1e-7),
     ],
 )
-def test_the_paper_s_robot_against_solving_again(state, path, step):
-    """At its full errors, under load; what is pressed stays so."""
+def test_slopes_of_the_paper_robot_equal_differences_of_solutions(state, path, step):
+    """At its full errors, under load; pressed clearances stay pressed."""
     design, asked = design_of(PAPER), TangentState(state, LOAD, at=(0, 0, 0.05))
     slope = stiffness_slopes(design, [path], POSE, asked=asked)[path]
 
@@ -82,8 +82,8 @@ def test_the_paper_s_robot_against_solving_again(state, path, step):
     )
 
 
-def test_at_a_change_of_contact_there_is_no_derivative():
-    """A gap as large as the clearance that takes it up: it touches without a force."""
+def test_slope_at_a_change_of_contact_is_nan():
+    """The gap equals the clearance that takes it up: contact without a force."""
     touching = coaxial_beams(
         [0, 0, 0, 0, 1e-4, 0], clearance=Clearance(radial=1e-4, axial=0, tilt=0, spin=0)
     )

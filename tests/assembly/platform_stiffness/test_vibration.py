@@ -42,7 +42,7 @@ def bending(root):
     return root**2 * speed / (2 * np.pi) / np.sqrt(1 + turning)
 
 
-def test_a_mass_on_a_torsion_spring():
+def test_frequency_of_a_mass_on_a_torsion_spring_equals_its_closed_form():
     """omega^2 = k / (m l^2)."""
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, 50.0))
     arm = Frame("arm", "hinge", [0.4, 0, 0], mass=2.0, centre_of_mass=[0.1, 0, 0])
@@ -52,7 +52,7 @@ def test_a_mass_on_a_torsion_spring():
     assert modes.shares[0] == {("hinge", "joint"): pytest.approx(1.0)}
 
 
-def test_a_standing_pendulum_slows_down_under_its_weight():
+def test_weight_lowers_the_frequency_of_a_standing_pendulum():
     """omega^2 = (k - m g l) / (m l^2); the exact tangent has the geometric part."""
     k, m, length, g = 50.0, 2.0, 0.4, 9.81
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, k))
@@ -66,7 +66,7 @@ def test_a_standing_pendulum_slows_down_under_its_weight():
 @pytest.mark.parametrize(
     ("pieces", "first", "second"), [(1, 6e-3, 0.6), (4, 5e-5, 2e-3), (8, 4e-6, 2e-4)]
 )
-def test_a_cantilever_has_the_textbook_frequencies(pieces, first, second):
+def test_bending_frequencies_of_a_cantilever_equal_the_textbook(pieces, first, second):
     """Roots 1.8751 and 4.6941; Rayleigh: from above, errors of order 1/n^4."""
     modes = natural_modes(cantilever(pieces), 4)
     off = modes.frequencies / np.repeat([bending(1.8751041), bending(4.6940911)], 2) - 1
@@ -75,7 +75,7 @@ def test_a_cantilever_has_the_textbook_frequencies(pieces, first, second):
     assert off[2:].max() < second
 
 
-def test_stretching_and_twisting_waves():
+def test_axial_and_torsional_frequencies_equal_the_textbook():
     """(1/4L) sqrt(E / rho) and (1/4L) sqrt(GJ / rho I_p), 8 pieces: 0.2 % high."""
     modes = natural_modes(cantilever(8), 60)
     G, J = E / 2.6, 0.140577 * SIDE**4
@@ -86,21 +86,21 @@ def test_stretching_and_twisting_waves():
         assert nearest < 2e-3
 
 
-def test_turning_the_beam_changes_nothing():
+def test_frequencies_do_not_depend_on_the_orientation_of_the_beam():
     R = rotation_matrix([0.3, -1.0, 0.7])
     straight = natural_modes(cantilever(3), 6).frequencies
     turned = natural_modes(cantilever(3, tuple(R[:, 0])), 6).frequencies
     np.testing.assert_allclose(turned, straight, rtol=1e-6)
 
 
-def test_a_free_motion_has_the_frequency_zero():
+def test_free_motion_has_zero_frequency():
     slide = Frame("slide", joint="prismatic")
     body = Frame("body", "slide", mass=1.0)
     modes = natural_modes(home_posture(Robot("slider", "body", (slide, body))))
     np.testing.assert_array_equal(modes.frequencies, [0.0])
 
 
-def test_masses_four_times_as_heavy_swing_half_as_fast():
+def test_four_times_the_mass_halves_the_frequencies():
     robot = load_robot("delta")
     frames = tuple(
         replace(
@@ -117,7 +117,7 @@ def test_masses_four_times_as_heavy_swing_half_as_fast():
     np.testing.assert_allclose(light[0], light[1], rtol=1e-6)
 
 
-def test_clearances_are_held_and_a_robot_without_mass_is_refused():
+def test_vibration_ignores_clearances_and_refuses_a_robot_without_mass():
     posture = cantilever(1)
     (tip,) = posture.robot.frames
     loose = replace(tip, name="beam", clearance=Clearance(radial=1e-4))
@@ -131,8 +131,8 @@ def test_clearances_are_held_and_a_robot_without_mass_is_refused():
 
 
 @pytest.mark.slow
-def test_a_meshed_bar_swings_as_the_beam_it_is():
-    """A round bar of L / r = 11: bending within what its ends' restraint costs.
+def test_frequencies_of_a_meshed_bar_equal_those_of_the_beam():
+    """A round bar of L / r = 11: bending to within the restraint of its ends.
 
     Its 12 by 12 mass moved as a whole is that of its volume, 48 facets of a circle or
     more; ends that cannot warp make it 2 % stiffer at most.

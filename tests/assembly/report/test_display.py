@@ -1,4 +1,4 @@
-"""What objects show of themselves: a few lines, with units, whatever their size."""
+"""Text of objects in a console or notebook: a few lines, with units, at any size."""
 
 import re
 from dataclasses import dataclass, replace
@@ -53,8 +53,8 @@ def shown(answer, link):
     ]  # fmt: skip
 
 
-def test_every_object_is_a_few_lines_long(shown):
-    """A robot took 11 000 characters, a posture 20 000, an assembly 52 000."""
+def test_text_of_every_object_is_a_few_lines_long(shown):
+    """The default text of a robot has 11 000 characters, of an assembly 52 000."""
     for thing in shown:
         text = repr(thing)
         assert len(text) <= CHARACTERS, type(thing)
@@ -62,7 +62,7 @@ def test_every_object_is_a_few_lines_long(shown):
         assert text.startswith(type(thing).__name__)
 
 
-def test_a_notebook_gets_the_same_figures(shown):
+def test_notebook_table_has_a_row_for_each_line_of_text(shown):
     for thing in shown:
         if not hasattr(thing, "_repr_html_"):
             continue
@@ -70,7 +70,7 @@ def test_a_notebook_gets_the_same_figures(shown):
         assert len(cells) == len(repr(thing).splitlines()) - 1
 
 
-def test_an_assembly_shows_what_the_command_prints(answer):
+def test_assembly_summary_equals_the_lines_of_the_command(answer):
     printed = solution_text(solution_of(answer.posture))
     shown = answer.summary()
     for name in ("pose", "assembly energy", "platform error"):
@@ -79,8 +79,8 @@ def test_an_assembly_shows_what_the_command_prints(answer):
     assert answer.summary() == repr(answer)
 
 
-def test_many_points_show_how_many_and_the_largest():
-    """Gap over play is 1, 2 and 4."""
+def test_text_of_many_points_states_their_number_and_the_largest_value():
+    """Gap over clearance is 1, 2 and 4."""
     play = Clearance(axial=1e-5, radial=1e-5)
     at = home_posture(coaxial_beams(np.zeros(6), clearance=play))
     errors = np.zeros((3, 6, 6))
@@ -95,7 +95,7 @@ def test_many_points_show_how_many_and_the_largest():
     assert f"translation  {1e3 * low:.6g} to {1e3 * high:.6g} mm" in repr(bounds)
 
 
-def test_the_largest_force_and_error_are_those_of_the_arrays(answer):
+def test_text_states_the_largest_force_and_error_of_the_arrays(answer):
     robot = answer.posture.robot
     forces = np.linalg.norm(answer.wrenches[:, 3:], axis=1)
     where = robot.frames[forces.argmax()].name
@@ -126,7 +126,7 @@ class Thing:
     __repr__, _repr_html_ = short_repr, html_table
 
 
-def test_fields_are_shortened_when_nothing_else_is_said():
+def test_default_text_shortens_long_fields():
     thing = Thing("a\nb", (0,) * 99, [1, 2], np.zeros((6, 6)), np.array([1e-12, 2.0]),
                   "x" * 500)  # fmt: skip
     assert repr(thing).splitlines() == [
@@ -144,5 +144,5 @@ def test_fields_are_shortened_when_nothing_else_is_said():
     [(None, "None"), (0.1, "0.1"), ({}, "none"), ({"a": 1.0}, "{'a': 1.0}"),
      ([[1], [2]], "list of 2"), (np.zeros((6, 0)), "float64 array (6, 0)")],
 )  # fmt: skip
-def test_any_value_has_a_short_line(value, text):
+def test_any_value_has_a_one_line_text(value, text):
     assert brief(value) == text

@@ -1,4 +1,4 @@
-"""The body of possible errors: closed forms, and both sides of it."""
+"""The body of possible errors: closed forms, inner points and outer bounds."""
 
 from itertools import product
 
@@ -24,7 +24,7 @@ def reach_of(*plays):
     return reachable_screws(solve_assembly(home_posture(robot)), "frozen")
 
 
-def test_play_of_a_joint_is_a_cylinder():
+def test_error_body_of_a_joint_clearance_is_a_cylinder():
     """Disc of 3e-5 and interval of 1e-5: heights r sin(polar) + h cos(polar)."""
     body = error_body(reach_of(Clearance(radial=3e-5, axial=1e-5)), "translation", 150)
     flat = np.hypot(body.directions[:, 0], body.directions[:, 1])
@@ -37,14 +37,14 @@ def test_play_of_a_joint_is_a_cylinder():
     assert body.slack < 1e-12
 
 
-def test_a_flat_body_has_points_but_no_faces():
+def test_flat_error_body_has_points_and_no_faces():
     body = error_body(reach_of(Clearance(radial=3e-5)), "translation", 60)
     assert len(body.faces) == 0
     assert np.abs(body.points[:, 2]).max() < 1e-15
     assert np.hypot(*body.points[:, :2].T).max() == pytest.approx(3e-5, rel=1e-8)
 
 
-def test_the_bodys_farthest_point_is_within_the_certified_bounds():
+def test_farthest_point_of_the_error_body_is_within_the_certified_bounds():
     answer = solve_assembly(place_robot(irsbot2(), pose={"tx": 0.1, "tz": -0.5}))
     body = error_body(reachable_screws(answer, "frozen"), "rotation", 100)
     found = bound_pose_error(answer, "frozen")
@@ -54,7 +54,7 @@ def test_the_bodys_farthest_point_is_within_the_certified_bounds():
     assert body.contains(found.rotation_screw[:3])
 
 
-def test_what_has_no_body_is_refused():
+def test_free_platform_or_unknown_part_has_no_error_body():
     free = Robot("door", "tip", (Frame("h", joint="revolute"), Frame("tip", "h")))
     reach = reachable_screws(solve_assembly(home_posture(free)), "frozen")
     with pytest.raises(ValueError, match="moves freely"):
@@ -63,15 +63,15 @@ def test_what_has_no_body_is_refused():
         error_body(reach_of(Clearance(radial=1e-5)), "both")
 
 
-def test_directions_are_unit_vectors_spread_over_all_octants():
+def test_even_directions_are_unit_vectors_in_all_octants():
     directions = even_directions(200)
     assert np.allclose(np.linalg.norm(directions, axis=1), 1, rtol=0, atol=1e-14)
     octants = (directions > 0) @ [1, 2, 4]
     assert np.bincount(octants).min() >= 20
 
 
-def test_the_slack_is_the_farthest_height_beyond_all_points():
-    """A cube's four corners of even parity within it: the others miss 2 / sqrt 3."""
+def test_slack_is_the_largest_support_height_beyond_the_points():
+    """Four of the corners of a cube: the other corners are 2 / sqrt 3 beyond them."""
     corners = np.array(list(product([-1.0, 1.0], repeat=3)))
     even = corners[corners.prod(axis=1) > 0]
     directions = np.vstack([corners / np.sqrt(3), np.eye(3)])
@@ -83,7 +83,7 @@ def test_the_slack_is_the_farthest_height_beyond_all_points():
 
 
 @pytest.mark.slow
-def test_the_picture_shows_the_body_and_says_its_size():
+def test_picture_shows_the_error_body_and_states_its_size():
     answer = solve_assembly(place_robot(irsbot2(), pose={"tx": 0.1, "tz": -0.5}))
     plotter = plot_assembly(answer, errors="translation", assumption="frozen")
     said = plotter.actors["body"].GetText(0)
@@ -95,9 +95,9 @@ def test_the_picture_shows_the_body_and_says_its_size():
 
 
 @pytest.mark.parametrize("count", [50, 200, 1000])
-def test_directions_share_the_sphere_evenly(count):
-    """One in the middle of each slice of one area; none much nearer to another
-    than in the densest packing, sqrt(8 pi / (sqrt(3) n)) apart."""
+def test_even_directions_are_evenly_spaced_on_the_sphere(count):
+    """Each is in the middle of a slice of equal area; the least distance is near that
+    of the densest packing, sqrt(8 pi / (sqrt(3) n))."""
     directions = even_directions(count)
     middles = np.linspace(1, -1, 2 * count + 1)[1::2]
     np.testing.assert_allclose(directions[:, 2], middles, atol=1e-12)

@@ -1,4 +1,4 @@
-"""Singular postures have no first-order verdict: solve, error and study say so."""
+"""Singular postures have no first-order verdict in solve, error and study."""
 
 import math
 import re
@@ -21,7 +21,7 @@ SAID = "singular posture: first order decides nothing; finite motions: 0 J"
 
 
 def test_solution_at_a_singular_posture_gives_the_energy_of_finite_motions():
-    """The modes that meet there let errors be taken up without force."""
+    """In first order, modes that meet there take up errors without force."""
     results = solution_of(home_posture(three_upu(seed=1)))
     assert results["energy"] > 1e-4
     assert results["status"] == "singular"
@@ -29,27 +29,27 @@ def test_solution_at_a_singular_posture_gives_the_energy_of_finite_motions():
     assert SAID in solution_text(results)
 
 
-def test_perfect_robot_at_a_singular_posture_stands_there():
+def test_perfect_robot_at_a_singular_posture_is_solved_with_zero_energy():
     results = solution_of(home_posture(three_upu()))
     assert results["status"] == "ok"
     assert results["energy"] == 0.0
 
 
-def test_solution_beside_the_singular_posture_is_that_of_first_order():
+def test_solution_away_from_the_singular_posture_is_of_first_order():
     aside = {"tx": 0.05, "ty": 0.02, "tz": HEIGHT}
     assert solution_of(place_robot(three_upu(seed=1), pose=aside))["status"] == "ok"
 
 
 @pytest.mark.parametrize("seed", [None, 1])
-def test_pose_error_at_a_singular_posture_has_no_bound_of_first_order(seed):
+def test_pose_error_at_a_singular_posture_has_no_first_order_bound(seed):
     results = pose_error_of(home_posture(three_upu(seed)), ["frozen"])
     assert results["status"] == "singular"
     assert results["error"] is None
     assert SAID in pose_error_text(results)
 
 
-def test_energy_that_only_finite_motions_see_is_no_first_order_verdict():
-    """Near its dead centre a short rod needs tension: k (e - s)^2 / 2.
+def test_energy_only_of_finite_motions_is_reported_as_singular():
+    """Near its dead centre a short rod is in tension: k (e - s)^2 / 2.
 
     By s = crank + rod - distance it could be shorter; first order turns the crank
     through the dead centre and sees no force.
@@ -68,8 +68,8 @@ def test_energy_that_only_finite_motions_see_is_no_first_order_verdict():
     assert float(said[1]) == pytest.approx(expected, rel=1e-3)
 
 
-def test_motion_that_is_not_small_is_no_first_order_verdict():
-    """0.1 mm beside the singular axis first order turns the platform by radians."""
+def test_large_first_order_motion_is_reported_as_singular():
+    """0.1 mm from the singular axis first order turns the platform by radians."""
     aside = {"tx": 1e-4, "ty": 0.0, "tz": HEIGHT}
     results = solution_of(place_robot(three_upu(seed=1), pose=aside))
     assert np.abs(results["platform_screw"][:3]).max() > 0.3

@@ -1,4 +1,4 @@
-"""What ``assembly stiffness`` answers: its keys, its sums, its statuses."""
+"""Results of ``assembly stiffness``: keys, sums, statuses."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def total(shares):
 
 
 @pytest.mark.parametrize("exact", [False, True])
-def test_shares_add_up_to_one_in_every_direction(exact):
+def test_compliance_shares_sum_to_one_in_every_direction(exact):
     load = [0, 0, 0, 10.0, -20.0, -50.0]
     posture = home_posture(load_robot("hexapod"))
     results = stiffness_of(posture, load, state="exact" if exact else "nominal")
@@ -36,7 +36,7 @@ def test_shares_add_up_to_one_in_every_direction(exact):
     np.testing.assert_allclose(C @ K, np.eye(6), atol=1e-6)
 
 
-def test_a_free_motion_is_named_and_leaves_the_other_entries():
+def test_free_motion_is_reported_and_other_entries_stay_finite():
     slide = Frame("slide", joint="prismatic", link=MatrixLink(np.eye(6)))
     tip = Frame("tip", "slide")
     results = stiffness_of(home_posture(Robot("slider", "tip", (slide, tip))))
@@ -49,7 +49,7 @@ def test_a_free_motion_is_named_and_leaves_the_other_entries():
     assert "free motion 1 [0 0 0 0 0 1]" in said
 
 
-def test_a_load_that_nothing_carries_is_said_to_be_one():
+def test_load_without_resistance_is_reported_as_no_equilibrium():
     slide = Frame("slide", joint="prismatic", link=MatrixLink(np.eye(6)))
     posture = home_posture(Robot("slider", "tip", (slide, Frame("tip", "slide"))))
     results = stiffness_of(posture, [0, 0, 0, 0, 0, 1.0], state="exact")
@@ -57,15 +57,15 @@ def test_a_load_that_nothing_carries_is_said_to_be_one():
     assert "no equilibrium" in stiffness_text(results)
 
 
-def test_the_chart_has_a_bar_for_each_part_and_direction():
+def test_bars_of_the_share_chart_sum_to_100_percent_per_direction():
     results = stiffness_of(home_posture(load_robot("four_bar")))
     (axes,) = plot_shares(results).axes
     heights = [bar.get_height() for bar in axes.patches]
     np.testing.assert_allclose(sum(heights), 600.0)
 
 
-def test_the_contact_state_is_how_the_least_energy_moves_with_the_load():
-    """Central differences of (22), the load pressing clearances of two legs."""
+def test_contact_compliance_equals_differences_of_the_least_energy_solution():
+    """Central differences of (22); the load presses clearances of two legs."""
     posture = place_robot(load_robot("irsbot2"), {"tx": 0.1, "tz": -0.5})
     load, step = np.array([0, 0, 0, 20.0, 50.0, -100.0]), np.eye(6)[5]
     ahead, back = (

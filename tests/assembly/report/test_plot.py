@@ -1,4 +1,4 @@
-"""The picture of a robot: bodies meet where they should, and pixels are drawn."""
+"""The picture of a robot: displaced bodies meet, and every element is drawn."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def _assembly():
 
 
 def test_displaced_chains_meet_at_every_closure():
-    """The tree walk is another road to eqs (16)-(20) than the closure's matrix."""
+    """The walk along the tree is independent of the closure matrix of eqs (16)-(20)."""
     answer = _assembly()
     robot = answer.posture.robot
     screws = displaced_bodies(answer).end_screws
@@ -28,7 +28,7 @@ def test_displaced_chains_meet_at_every_closure():
     assert np.abs(tip - answer.platform_screw).max() < 1e-13
 
 
-def test_the_picture_shows_links_bodies_and_the_exaggeration():
+def test_picture_shows_links_bodies_and_the_exaggeration():
     plotter = robot_plotter(_assembly(), exaggeration=20)
     said = plotter.actors["caption"].GetText(2)
     pixels = plotter.screenshot(return_img=True)
@@ -42,8 +42,8 @@ def test_the_picture_shows_links_bodies_and_the_exaggeration():
 
 
 @pytest.mark.parametrize("name", ["delta", "hexapod", "orthoglide", "arm6"])
-def test_the_picture_shows_the_whole_robot_as_large_as_fits(name):
-    """Nothing is drawn at the edges; and it fills more than half of the window."""
+def test_picture_fits_the_whole_robot_into_the_window(name):
+    """Nothing is drawn at the edges, and it fills more than half of the window."""
     answer = solve_assembly(home_posture(load_robot(name)))
     plotter = robot_plotter(answer, exaggeration=1)
     plotter.remove_actor("caption")
@@ -58,7 +58,7 @@ def test_the_picture_shows_the_whole_robot_as_large_as_fits(name):
     assert np.ptp(rows) > height / 2 or np.ptp(columns) > width / 2
 
 
-def test_the_picture_shows_the_axes_of_driven_and_passive_joints():
+def test_picture_shows_the_axes_of_driven_and_passive_joints():
     plotter = robot_plotter(_assembly(), exaggeration=20)
     colours = [actor.prop.color.hex_rgb for actor in plotter.actors.values()
                if hasattr(actor, "prop") and hasattr(actor.prop, "color")]  # fmt: skip
@@ -81,7 +81,7 @@ def test_the_picture_shows_the_axes_of_driven_and_passive_joints():
          "--exaggeration: found 1e+300"),
     ],
 )  # fmt: skip
-def test_a_picture_that_cannot_be_drawn_is_refused_before_the_work(
+def test_impossible_picture_is_refused_before_solving(
     run, tmp_path, monkeypatch, words, message
 ):
     import assembly.linear.energy
@@ -96,8 +96,10 @@ def test_a_picture_that_cannot_be_drawn_is_refused_before_the_work(
 
 
 @pytest.mark.slow
-def test_a_loaded_robot_shows_the_errors_that_a_load_leaves(run, tmp_path, monkeypatch):
-    """The reading budget, the default without a load, is of unloaded robots."""
+def test_error_body_of_a_loaded_robot_uses_the_frozen_assumption(
+    run, tmp_path, monkeypatch
+):
+    """The assumption budget, the default without a load, needs an unloaded robot."""
     import assembly.report.plot
 
     readings = []
@@ -117,7 +119,7 @@ def test_a_loaded_robot_shows_the_errors_that_a_load_leaves(run, tmp_path, monke
     assert (tmp_path / "x.jpg").read_bytes().startswith(b"\xff\xd8\xff")
 
 
-def test_a_robot_that_does_not_go_together_is_not_drawn_and_says_so(run, tmp_path):
+def test_robot_that_cannot_be_assembled_is_reported_and_not_drawn(run, tmp_path):
     path = tmp_path / "stuck.toml"
     path.write_text(
         'platform = "a"\n[[frame]]\nname = "a"\nparent = "base"\n[[frame]]\n'

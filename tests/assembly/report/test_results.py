@@ -1,4 +1,4 @@
-"""What solve prints: certified sizes, rounding left out, equal numbers in order."""
+"""Results printed by solve: certified sizes, without rounding, stable order."""
 
 from pathlib import Path
 
@@ -15,8 +15,8 @@ from assembly.robots import load_robot
 from forcefit.results.display import largest_row
 
 
-def test_largest_error_that_solve_names_is_the_one_that_error_certifies():
-    """A bush of radius r and half length a lets its tip go hypot(r, a), no box."""
+def test_largest_error_of_solve_equals_the_certified_pose_error():
+    """A bush of radius r and half length a: the tip moves by hypot(r, a)."""
     r, a = 3e-5, 4e-5
     frames = (
         Frame("bush", clearance=Clearance(radial=r, axial=a)), Frame("tip", "bush")
@@ -29,7 +29,7 @@ def test_largest_error_that_solve_names_is_the_one_that_error_certifies():
     assert "assumption frozen of (27)" in solution_text(results)
 
 
-def test_wrenches_leave_out_what_is_rounding_of_the_largest():
+def test_wrench_components_at_rounding_level_are_shown_as_zero():
     wrenches = np.array([[1e-13, 7.0, 0, 1.5e-14, 2e-8, 1e3], [0, 0, 5e-6, 0, 0, 0]])
     shown = without_rounding(wrenches)
     assert shown.tolist() == [[0, 7.0, 0, 0, 0, 1e3], [0, 0, 5e-6, 0, 0, 0]]
@@ -37,11 +37,11 @@ def test_wrenches_leave_out_what_is_rounding_of_the_largest():
 
 
 @pytest.mark.parametrize("noise", [1e-15, -1e-15])
-def test_first_of_equal_numbers_is_the_largest_whatever_rounding_says(noise):
+def test_first_of_numbers_equal_up_to_rounding_is_the_largest(noise):
     assert largest_row([0.5, 1.0, 1.0 + noise, 0.2]) == 1
 
 
-def test_gravity_on_a_robot_without_mass_is_said_to_change_nothing():
+def test_gravity_without_mass_is_reported_to_have_no_effect():
     robot = load_robot("irsbot2")
     (remark,) = massless(robot, [0, 0, -9.81])
     assert remark.startswith("nothing has a mass: gravity changes nothing")

@@ -1,4 +1,4 @@
-"""The robot as a scene: displacements and forces are those of the assembly."""
+"""The robot as a scene: displacements and forces equal those of the assembly."""
 
 import numpy as np
 import pytest
@@ -26,8 +26,8 @@ def scene_of(assembly, closing=None, body=None):
     return spec
 
 
-def test_a_bent_bar_has_the_elastic_line_of_a_cantilever():
-    """w(s) = F s^2 (3 L - s) / (6 E I); halfway 5/16 of the tip's."""
+def test_bent_bar_follows_the_elastic_line_of_a_cantilever():
+    """w(s) = F s^2 (3 L - s) / (6 E I); at the middle 5/16 of the tip's."""
     (bar,) = scene_of(cantilever())["bodies"]
     moved, nominal = np.array(bar["moved"]), np.array(bar["nominal"])
     s = nominal[:, 0]
@@ -40,12 +40,12 @@ def test_a_bent_bar_has_the_elastic_line_of_a_cantilever():
     assert bar["elastic"]
 
 
-def test_arrows_are_the_forces_in_base_axes():
+def test_arrows_show_the_forces_in_base_axes():
     (arrow,) = scene_of(cantilever())["forces"]
     np.testing.assert_allclose(arrow["force"], [0, 0, -FORCE], atol=1e-9)
 
 
-def test_the_closing_and_the_error_body_are_kept_as_they_are():
+def test_scene_contains_the_closing_motion_and_the_error_body():
     assembly = cantilever()
     frames = np.tile(assembly.posture.transforms, (3, 1, 1, 1))
     frames[0, 0, 2, 3] += 1e-3
@@ -59,7 +59,7 @@ def test_the_closing_and_the_error_body_are_kept_as_they_are():
     assert "0.1732 mm" in spec["body"]["text"]  # sqrt(3) of 0.1 mm
 
 
-def test_a_robot_that_nothing_moves_is_drawn_too():
+def test_unloaded_robot_is_drawn_without_displacement():
     spec = scene_of(cantilever(0.0))
     assert spec["forces"] == []
     assert spec["exaggeration"] == 1.0

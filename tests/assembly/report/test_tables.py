@@ -1,4 +1,4 @@
-"""Answers as data sets and tables: the same numbers, labelled, with units."""
+"""Results as data sets and tables: equal numbers, labels, units."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def batches(answer):
     return many, zone_margin(at), bound_pose_error(many)
 
 
-def test_an_assembly_is_a_data_set_over_frames(answer):
+def test_assembly_data_set_has_labelled_frames_and_equal_numbers(answer):
     data = answer.to_xarray()
     assert data.sizes == {"frame": 42, "screw": 6, "wrench_component": 6, "closure": 5}
     assert float(data.energy) == answer.energy
@@ -38,8 +38,8 @@ def test_an_assembly_is_a_data_set_over_frames(answer):
     np.testing.assert_array_equal(data.closure_wrench, answer.closure_wrenches)
 
 
-def test_its_screws_add_up_over_the_data_set(answer):
-    """Eq. (8) with labels: errors, play, links and joints make the platform's screw."""
+def test_screws_of_the_data_set_sum_to_the_platform_screw(answer):
+    """Eq. (8) with labels: errors, clearances, links and joints."""
     data = answer.to_xarray()
     total = (
         data.geometric_error + data.clearance_screw + data.link_screw + data.joint_screw
@@ -48,19 +48,19 @@ def test_its_screws_add_up_over_the_data_set(answer):
     np.testing.assert_allclose(screw, data.platform_screw, rtol=1e-12)
 
 
-def test_finite_motions_have_the_same_names(answer):
+def test_exact_data_set_has_the_names_of_the_linear_one(answer):
     linear, exact = answer.to_xarray(), solve_exact(answer.posture).to_xarray()
     assert {*linear.variables} == {*exact.variables}
     assert float(exact.energy) < float(linear.energy)
 
 
-def test_every_variable_has_a_unit_and_a_meaning(answer, batches):
+def test_every_variable_of_a_data_set_has_a_unit_and_a_long_name(answer, batches):
     for data in (answer.to_xarray(), *(one.to_xarray() for one in batches)):
         for name, variable in data.data_vars.items():
             assert set(variable.attrs) == {"units", "long_name"}, name
 
 
-def test_units_and_dimensions_are_those_of_sweeps(answer, batches):
+def test_units_and_dimensions_of_data_sets_equal_those_of_sweeps(answer, batches):
     asked = variables(Question(answer.posture.robot, assumption="frozen"))
     seen = set()
     for one in batches:
@@ -72,7 +72,7 @@ def test_units_and_dimensions_are_those_of_sweeps(answer, batches):
     assert seen >= {"energy", "margin", "platform_screw", "rotation_error"}
 
 
-def test_a_table_has_a_row_for_each_frame(answer):
+def test_assembly_table_has_a_row_for_each_frame(answer):
     table = answer.to_pandas()
     assert list(table.index) == [f.name for f in answer.posture.robot.frames]
     np.testing.assert_array_equal(table["wrench"][list(WRENCH)], answer.wrenches)
@@ -80,7 +80,7 @@ def test_a_table_has_a_row_for_each_frame(answer):
     assert table.attrs["units"]["wrench"] == "N m, N"
 
 
-def test_a_table_has_a_row_for_each_point(batches):
+def test_table_of_many_points_has_a_row_for_each_point(batches):
     energies, margins, errors = (one.to_pandas() for one in batches)
     assert list(energies.index) == [0, 1, 2]
     np.testing.assert_array_equal(energies["energy", ""], batches[0].energy)

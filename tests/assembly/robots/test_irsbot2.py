@@ -1,4 +1,4 @@
-"""The paper's robot against the reference reconstruction, number by number."""
+"""The paper's robot compared with the reference reconstruction."""
 
 import numpy as np
 import pytest
@@ -34,8 +34,8 @@ def robot():
 
 
 @pytest.mark.parametrize("point", POINTS, ids=lambda p: f"{p['x']}-{p['z']}")
-def test_frames_stand_where_the_reference_puts_them(robot, point):
-    """Home is elsewhere, so this also proves that the parallelograms are loops."""
+def test_frame_poses_equal_the_reference(robot, point):
+    """The home pose is elsewhere, so this also proves that the parallelograms close."""
     posture = place_robot(robot, pose={"tx": point["x"], "tz": point["z"]})
     T = {f.name: posture.transforms[i] for i, f in enumerate(robot.frames)}
     link, elbow = T["leg1.link_a"], T["leg1.elbow_a"]
@@ -65,7 +65,7 @@ def test_elbow_and_platform_bodies_keep_their_orientation(robot):
     assert np.abs(posture.platform[:3, :3] - np.eye(3)).max() < 1e-12
 
 
-def test_two_freedoms_none_when_locked_and_eight_times_overconstrained(robot):
+def test_irsbot2_has_two_freedoms_and_overconstraint_eight(robot):
     for x, z in [(0, -0.5), (0.4, -0.45), (-0.3, -0.2), (0.0, -0.7)]:
         found = mobility(place_robot(robot, pose={"tx": x, "tz": z}))
         assert (found.freedoms, found.locked_freedoms) == (2, 0)
@@ -74,7 +74,7 @@ def test_two_freedoms_none_when_locked_and_eight_times_overconstrained(robot):
 
 @pytest.mark.parametrize(("case", "point"), CASES)
 def test_energy_pose_and_wrenches_equal_the_reference(case, point):
-    """The reference stops at a gap of 1e-9 J or so; ours is certified below that."""
+    """The reference has a gap of about 1e-9 J; our certificate is below that."""
     robot = irsbot2_with(case)
     answer = solve_assembly(
         place_robot(robot, pose={"tx": point["x"], "tz": point["z"]})
@@ -102,7 +102,7 @@ def test_energy_pose_and_wrenches_equal_the_reference(case, point):
 
 
 @pytest.mark.parametrize(("case", "point"), CASES)
-def test_zone_margin_equals_the_reference_in_both_readings(case, point):
+def test_zone_margin_equals_the_reference_for_rigid_and_free_joints(case, point):
     posture = place_robot(irsbot2_with(case), pose={"tx": point["x"], "tz": point["z"]})
     for compliant in ("rigid", "free"):
         zone = zone_margin(posture, compliant)
@@ -114,7 +114,7 @@ def test_zone_margin_equals_the_reference_in_both_readings(case, point):
 
 
 def test_printed_equation_23_counts_the_wrench_twice():
-    """The paper's w_E + w_B; both equal the wrench, so the sum is twice the truth."""
+    """The paper adds w_E and w_B, which both equal the wrench: twice the truth."""
     point = NUMBERS["cases"][0]["points"][0]
     answer = solve_assembly(
         place_robot(irsbot2_with(NUMBERS["cases"][0]), pose={"tx": 0, "tz": -0.5})
@@ -137,7 +137,7 @@ def test_link_wrenches_on_the_unloaded_platform_sum_to_zero():
 
 
 def test_euler_and_timoshenko_links_store_the_same_energy():
-    """The distal links carry no shear; the reference shows 2e-11."""
+    """The distal links carry no shear; the reference differs by 2e-11."""
     case = NUMBERS["cases"][0]
     energies = []
     for theory in ("euler", "timoshenko"):
@@ -151,14 +151,14 @@ def test_euler_and_timoshenko_links_store_the_same_energy():
     assert energies[1] == pytest.approx(point["energy_timoshenko"], rel=1e-10)
 
 
-def test_link_beam_axis_is_the_links_own_x(robot):
+def test_link_beam_axis_is_the_x_axis_of_the_link(robot):
     """C_E is written with the beam along local x, up to the link's roll."""
     K = np.linalg.inv(link_compliance(robot.frame("leg1.link_a")))
     size = np.sqrt(np.diag(NUMBERS["K_E"]))
     assert np.abs((K - NUMBERS["K_E"]) / np.outer(size, size)).max() < 1e-13
 
 
-def test_the_seed_draws_the_reference_errors(robot):
+def test_seed_1_draws_the_reference_errors(robot):
     frames = frames_named(robot, ERROR_FRAMES)
     draw = ErrorDraw(frames, ERROR_LEAST, ERROR_MOST, seed=1)
     expected = irsbot2_with(NUMBERS["cases"][0]).errors
@@ -168,8 +168,8 @@ def test_the_seed_draws_the_reference_errors(robot):
     assert 20 < np.sum(signed < 0) < 52  # of 72, all but surely
 
 
-def test_every_point_of_the_papers_grid_is_reached_or_refused(robot):
-    """1113 of the 25 mm half workspace; here one row of it, by the reach formula."""
+def test_grid_points_are_reached_exactly_within_the_reach_of_the_links(robot):
+    """One row of the paper's half workspace of 1113 points, by the reach formula."""
     x = np.arange(-0.7, 0.7001, 0.05)
     poses = np.full((len(x), 6), np.nan)
     poses[:, 0], poses[:, 2] = x, -0.4

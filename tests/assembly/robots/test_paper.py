@@ -1,4 +1,4 @@
-"""The paper's study: 25 mm over the half workspace, against the reference's table.
+"""The paper's study on a 25 mm grid of the half workspace, against the reference.
 
 The table gives least, median and largest values to two or three digits; a digit more
 would be the reference's rounding, so the tolerance is one unit of its last digit.
@@ -48,7 +48,7 @@ def assert_as_printed(values, printed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", NUMBERS["cases"], ids=lambda c: c["name"])
-def test_maps_have_the_references_least_median_and_largest_values(case):
+def test_maps_have_the_least_median_and_largest_values_of_the_reference(case):
     data = sweep_poses(irsbot2_with(case), parse_grid(GRID))
     # the paper counts what home reaches through singularities too
     reached = np.isin(data.status.values, ["ok", "beyond_singularity"])
@@ -68,7 +68,7 @@ def test_maps_have_the_references_least_median_and_largest_values(case):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", NUMBERS["cases"], ids=lambda c: c["name"])
-def test_pose_errors_have_the_references_least_median_and_largest_values(case):
+def test_pose_errors_have_least_median_and_largest_values_of_the_reference(case):
     x, z = np.meshgrid(*parse_grid(GRID).values(), indexing="ij")
     poses = np.full((x.size, 6), np.nan)
     poses[:, 0], poses[:, 2] = x.ravel(), z.ravel()
@@ -87,8 +87,8 @@ def test_pose_errors_have_the_references_least_median_and_largest_values(case):
 
 
 @pytest.mark.slow
-def test_clearances_alone_give_the_references_pose_errors():
-    """A 100 mm grid, in x > 0 by symmetry: within the table's least and largest."""
+def test_pose_errors_by_clearances_alone_are_within_the_reference_range():
+    """A 100 mm grid in x > 0 by symmetry, against the table's least and largest."""
     x, z = np.meshgrid(np.arange(0, 0.61, 0.1), np.arange(-0.7, -0.05, 0.1))
     poses = np.full((x.size, 6), np.nan)
     poses[:, 0], poses[:, 2] = x.ravel(), z.ravel()

@@ -1,4 +1,4 @@
-"""Planar robots: a published or closed-form fact each."""
+"""Planar robots: one published or closed-form result for each."""
 
 import math
 from dataclasses import replace
@@ -23,7 +23,7 @@ from tests.built_in_robots_for_tests import (
 )
 
 
-def test_hoekens_crank_turns_fully_and_its_point_follows_the_law_of_cosines():
+def test_hoekens_crank_turns_fully_and_its_point_has_the_closed_form():
     """Grashof: 1 + 2.5 < 2 + 2.5, and the shortest is the crank."""
     robot = BUILT_IN["four_bar"]()
     foot = np.array([0.2, 0.0])
@@ -42,8 +42,8 @@ def test_hoekens_crank_turns_fully_and_its_point_follows_the_law_of_cosines():
 
 
 @pytest.mark.parametrize(("degrees", "x"), [(90, 0.4), (180, 0.2), (270, 0.0)])
-def test_hoekens_point_is_on_its_line_three_times(degrees, x):
-    """At four cranks from the ground link, by Thales exactly."""
+def test_hoekens_point_is_on_its_line_at_the_known_crank_angles(degrees, x):
+    """Four crank lengths from the ground link, exactly by Thales' theorem."""
     robot = BUILT_IN["four_bar"]()
     posture = place_robot(robot, joints={"crank": math.radians(degrees)})
     assert posture.platform[:2, 3] == pytest.approx([x, 0.4], abs=1e-12)
@@ -66,7 +66,7 @@ def test_hoekens_point_stays_near_its_line_over_half_a_turn():
     assert off < 0.01 * 0.4  # of a line 0.4 m long
 
 
-def test_five_bar_tip_is_where_two_circles_meet(rng):
+def test_five_bar_tip_is_the_intersection_of_two_circles(rng):
     P = FiveBarParameters()
     robot = BUILT_IN["five_bar"]()
     for _ in range(5):
@@ -92,7 +92,7 @@ def half_angle_solutions(foot, tip, near, far):
     return [2 * math.atan2(y + s * root, x + e) for s in (1, -1)]
 
 
-def test_3rrr_drives_follow_gosselin_and_angeles(rng):
+def test_3rrr_drives_equal_gosselin_and_angeles(rng):
     robot = BUILT_IN["3rrr"]()
     angles = np.radians([90, 210, 330])
     corners = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -118,7 +118,7 @@ def only_radial(robot):
 
 
 def test_3rrr_pose_error_is_the_farthest_corner_of_a_prism(rng):
-    """(27) in closed form: 3 lines that give by 2c each, 8 corners."""
+    """(27) in closed form: 3 lines with a clearance of 2c each, 8 corners."""
     robot = only_radial(BUILT_IN["3rrr"]())
     posture = place_robot(robot, pose=random_pose("3rrr", rng))
     play = robot.frame("leg1.pin").clearance.radial
@@ -148,7 +148,7 @@ def arm_lines(posture):
     return np.array(lines)
 
 
-def test_3rrr_reaches_as_far_as_its_pins_clearance(rng):
+def test_3rrr_displacement_under_load_equals_its_pin_clearances(rng):
     """The support of the reachable errors, w.x <= sum of |f| 2c over the legs.
 
     A leg's second arm passes a force f along itself; its two pins give by c each.

@@ -1,4 +1,4 @@
-"""Laws that hold for all built-in robots."""
+"""Properties that hold for all built-in robots."""
 
 from dataclasses import replace
 
@@ -76,14 +76,14 @@ def with_random_errors(robot, rng, rotation=1e-3, translation=2e-4):
     return robot.with_errors(errors)
 
 
-def test_every_joint_has_clearance_once(name, robot):
+def test_built_in_robots_have_the_known_number_of_joint_clearances(name, robot):
     playing = [f for f in robot.frames if f.clearance is not None]
     assert len(playing) == PLAYING[name]
     assert all(f.clearance.radial > 0 and f.clearance.axial > 0 for f in playing)
 
 
-def test_beams_run_from_the_parents_origin_to_the_frames(robot):
-    """At home, also where a slide lies between and the length is written out."""
+def test_beams_extend_from_the_parent_origin_to_the_frame_origin(robot):
+    """In the home pose, also below a slide, where the length is given."""
     origins = home_posture(robot).transforms[:, :3, 3]
     beams = [f for f in robot.frames if isinstance(f.link, BeamLink)]
     assert beams
@@ -96,8 +96,8 @@ def test_beams_run_from_the_parents_origin_to_the_frames(robot):
         assert np.abs(origins[row] - start - length * R @ axis).max() < 1e-12
 
 
-def test_freedoms_and_overconstraint_are_the_published_ones(name, robot, rng):
-    """At home and elsewhere: the home pose could be a special one."""
+def test_freedoms_and_overconstraint_equal_published_values(name, robot, rng):
+    """In the home pose and elsewhere, as the home pose could be a special one."""
     postures = [home_posture(robot)]
     postures += [place_robot(robot, pose=random_pose(name, rng)) for _ in range(3)]
     for posture in postures:
@@ -106,8 +106,8 @@ def test_freedoms_and_overconstraint_are_the_published_ones(name, robot, rng):
         assert counts == COUNTS[name]
 
 
-def test_a_robot_is_the_same_after_writing_and_reading(robot, tmp_path):
-    """Files keep all digits, so nothing but a turn's round trip may change."""
+def test_built_in_robot_is_equal_after_writing_and_reading(robot, tmp_path):
+    """Files keep all digits, so no transform may change."""
     write_robot(robot, tmp_path / "robot.toml")
     again = read_robot(tmp_path / "robot.toml")
     assert again.closures == robot.closures
@@ -118,7 +118,7 @@ def test_a_robot_is_the_same_after_writing_and_reading(robot, tmp_path):
         assert np.array_equal(table(again), table(robot))
 
 
-def test_pose_to_joints_and_back(name, robot, rng):
+def test_pose_is_recovered_from_its_joint_positions(name, robot, rng):
     """Both ends are solved to 1e-10, and no pose here is near a singular one."""
     for _ in range(4):
         pose = random_pose(name, rng)
@@ -130,7 +130,7 @@ def test_pose_to_joints_and_back(name, robot, rng):
         assert max(there.mismatch, back.mismatch) < 1e-9
 
 
-def test_a_perfect_robot_closes_at_no_cost(name, robot, rng):
+def test_perfect_robot_closes_without_energy(name, robot, rng):
     posture = place_robot(robot, pose=random_pose(name, rng))
     answer = solve_assembly(posture)
     assert answer.energy < 1e-20
@@ -138,7 +138,7 @@ def test_a_perfect_robot_closes_at_no_cost(name, robot, rng):
     assert zone_margin(posture).margin < 1e-9
 
 
-def test_small_errors_are_closed_and_certified(name, robot, rng):
+def test_robot_with_small_errors_is_assembled_and_certified(name, robot, rng):
     faulty = with_random_errors(robot, rng)
     answer = solve_assembly(place_robot(faulty, pose=random_pose(name, rng)))
     assert answer.relative_gap() < 1e-6
@@ -148,8 +148,8 @@ def test_small_errors_are_closed_and_certified(name, robot, rng):
 
 
 @pytest.mark.parametrize("load", [None, LOAD], ids=["free", "loaded"])
-def test_energies_equal_the_printed_problem(name, robot, rng, load):
-    """Of 1e-6 J or more here; just constrained robots store none without a load."""
+def test_energies_equal_the_printed_problem_in_cvxpy(name, robot, rng, load):
+    """Energies of 1e-6 J or more; just constrained robots store none without a load."""
     faulty = with_random_errors(robot, rng)
     posture = place_robot(faulty, pose=random_pose(name, rng))
     answer = solve_assembly(posture, load)
@@ -160,8 +160,8 @@ def test_energies_equal_the_printed_problem(name, robot, rng, load):
         assert work == pytest.approx(float(np.dot(load, screw)), rel=1e-6)
 
 
-def test_order_of_frames_and_sense_of_closures_do_not_matter(name, robot, rng):
-    """The same equations in another order."""
+def test_energy_and_margin_do_not_depend_on_frame_or_closure_order(name, robot, rng):
+    """The same equations in another order, with closures reversed."""
     pose = random_pose(name, rng)
     faulty = with_random_errors(robot, rng)
     order = rng.permutation(len(faulty.frames))
@@ -178,7 +178,7 @@ def test_order_of_frames_and_sense_of_closures_do_not_matter(name, robot, rng):
 
 
 @pytest.mark.parametrize("name", ELASTIC_DRIVES)
-def test_elastic_drives_give_j_c_jt(name, rng):
+def test_platform_compliance_of_elastic_drives_equals_j_c_jt(name, rng):
     """Salisbury (1980): C = J diag(1 / k) J^T; J here by differences of postures.
 
     Central differences leave 1e-8 of J times its third derivative over J.
@@ -197,8 +197,8 @@ def test_elastic_drives_give_j_c_jt(name, rng):
 
 
 @pytest.mark.parametrize("name", WITHOUT_SPRINGY_PASSIVE_JOINTS)
-def test_an_error_along_a_drive_moves_the_platform_as_the_drive_would(name, rng):
-    """Encoder offsets: no energy, and the drive's column of J, by differences."""
+def test_error_along_a_drive_moves_the_platform_by_its_jacobian_column(name, rng):
+    """An encoder offset stores no energy; J by differences of postures."""
     robot = BUILT_IN[name]()
     tight = replace(
         robot, frames=tuple(replace(f, clearance=None) for f in robot.frames)
@@ -216,7 +216,7 @@ def test_an_error_along_a_drive_moves_the_platform_as_the_drive_would(name, rng)
         assert np.abs(left / size).max() < 1e-5 * max(np.abs(column / size).max(), 1.0)
 
 
-def test_a_load_here_moves_there_as_a_load_there_moves_here(name, robot, rng):
+def test_platform_compliance_is_symmetric_and_positive(name, robot, rng):
     """Maxwell and Betti: without clearance the compliance is symmetric.
 
     The paper's soft joints turn by half a radian per unit load before others take it
@@ -233,14 +233,14 @@ def test_a_load_here_moves_there_as_a_load_there_moves_here(name, robot, rng):
 
 
 @pytest.mark.parametrize("name", sorted(set(BUILT_IN) - {"hexapod"}))
-def test_out_of_reach_is_refused(name):
-    """Ten metres away; the hexapod's struts have no ends of stroke."""
+def test_pose_out_of_reach_is_refused(name):
+    """A pose ten metres away; the hexapod is omitted, as its stroke is unlimited."""
     robot = BUILT_IN[name]()
     with pytest.raises(BadInput, match="cannot be reached"):
         place_robot(robot, pose={next(iter(WORKSPACE[name])): 10.0})
 
 
-def test_built_in_names_load_and_misspelt_ones_are_answered_with_the_nearest():
+def test_misspelt_robot_name_is_refused_with_the_nearest_name():
     assert load_robot("3rrr").name == "3rrr"
     with pytest.raises(BadInput, match="hexapod"):
         load_robot("hexpod")

@@ -36,7 +36,7 @@ PUMA = [  # d, a [m], alpha [rad]
 ]  # fmt: skip
 
 
-def test_arm_stands_where_denavit_and_hartenberg_put_it(rng):
+def test_arm_pose_equals_the_denavit_hartenberg_product(rng):
     robot = BUILT_IN["arm6"]()
     for _ in range(5):
         q = np.array(robot.positions[:6]) + rng.uniform(-1.0, 1.0, 6)
@@ -57,7 +57,7 @@ def test_arm_stands_where_denavit_and_hartenberg_put_it(rng):
     ],
     ids=["nominal", "zero"],
 )  # fmt: skip
-def test_arm_reaches_corkes_poses(joints, position, approach):
+def test_arm_poses_equal_corkes_printed_values(joints, position, approach):
     """Printed to four or five digits."""
     named = {f"joint{k + 1}": value for k, value in enumerate(joints)}
     T = place_robot(BUILT_IN["arm6"](), joints=named).platform
@@ -71,7 +71,7 @@ def arm_jacobian(posture):
     return np.hstack([z, np.cross(z, posture.platform[:3, 3] - p)]).T
 
 
-def test_arm_under_load_gives_by_its_drives(rng):
+def test_arm_compliance_equals_that_of_its_drives(rng):
     """C = J K^-1 J^T to rounding, with the Jacobian of the axes."""
     robot = only_drives_give(BUILT_IN["arm6"]())
     posture = place_robot(robot, pose=random_pose("arm6", rng))
@@ -82,8 +82,8 @@ def test_arm_under_load_gives_by_its_drives(rng):
     assert np.abs((found - expected) / np.outer(size, size)).max() < 1e-12
 
 
-def test_arm_reaches_as_far_as_its_joints_clearance(rng):
-    """A load pushes every joint to the bound of its clearance, each by itself."""
+def test_arm_displacement_under_load_equals_its_joint_clearances(rng):
+    """A load moves every joint to the bound of its clearance independently."""
     posture = place_robot(only_play(BUILT_IN["arm6"]()), pose=random_pose("arm6", rng))
     play = Clearance(radial=5e-6, axial=5e-6, tilt=5e-5, spin=1e-4)
     answer = solve_assembly(posture, LOAD)

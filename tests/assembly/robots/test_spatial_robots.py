@@ -1,4 +1,4 @@
-"""Hexapod, Delta and Orthoglide: published or closed-form facts."""
+"""Hexapod, Delta and Orthoglide: published or closed-form results."""
 
 import math
 from dataclasses import replace
@@ -41,7 +41,7 @@ def strut_lines(posture):
     return np.hstack([np.cross(arms, n), n]), lengths
 
 
-def test_hexapod_struts_are_as_long_as_the_inverse_kinematics_says(rng):
+def test_hexapod_strut_lengths_equal_the_inverse_kinematics(rng):
     robot = BUILT_IN["hexapod"]()
     for _ in range(5):
         posture = place_robot(robot, pose=random_pose("hexapod", rng))
@@ -68,8 +68,8 @@ def test_hexapod_stiffness_is_the_sum_over_its_struts(rng):
         assert np.abs((found - expected) / np.outer(size, size)).max() < 1e-9
 
 
-def test_hexapod_struts_carry_forces_along_themselves_only(rng):
-    """Between a cardan and a ball joint, whatever the load."""
+def test_hexapod_struts_carry_axial_forces_only(rng):
+    """Between a universal and a ball joint, for any load."""
     posture = place_robot(BUILT_IN["hexapod"](), pose=random_pose("hexapod", rng))
     w, _ = strut_lines(posture)
     forces = np.linalg.solve(w.T, LOAD)
@@ -117,7 +117,7 @@ def test_hexapod_pose_error_is_the_farthest_of_64_corners(rng):
         ((0.3, 0.5, -1.1), (47.5, -11.6, 21.4)),
     ],
 )
-def test_delta_drives_are_those_of_williams_examples(position, degrees):
+def test_delta_drives_equal_williams_examples(position, degrees):
     """Printed to a tenth of a degree."""
     pose = dict(zip(POSE, position, strict=False))
     posture = place_robot(BUILT_IN["delta"](), pose=pose)
@@ -125,7 +125,7 @@ def test_delta_drives_are_those_of_williams_examples(position, degrees):
     assert np.abs(found - degrees).max() < 0.05
 
 
-def test_delta_platform_is_where_three_spheres_meet(rng):
+def test_delta_platform_is_the_intersection_of_three_spheres(rng):
     base, platform = 0.567 * math.sqrt(3) / 6, 0.076 * math.sqrt(3) / 3
     robot = BUILT_IN["delta"]()
     for _ in range(5):
@@ -168,7 +168,7 @@ def test_delta_platform_keeps_its_orientation_and_its_rods_stay_parallel(rng):
 
 
 def test_delta_without_the_spins_of_its_rods_has_three_freedoms():
-    """Where a rod cannot turn in its upper ball joint, it still does in the lower."""
+    """A rod that cannot turn in its upper ball joint still turns in the lower one."""
     robot = BUILT_IN["delta"]()
     frames = (
         replace(f, joint="fixed") if f.name.endswith("high_3") else f
@@ -184,7 +184,7 @@ def test_delta_out_of_reach_is_refused_with_the_reach():
 
 
 def test_delta_pose_error_is_the_farthest_of_64_corners(rng):
-    """Its six rods hold the platform as six struts would."""
+    """Its six rods constrain the platform as six struts do."""
     posture = place_robot(BUILT_IN["delta"](), pose=random_pose("delta", rng))
     T, index = posture.transforms, posture.robot.index
     rods = [f"leg{k}.{r}" for k in (1, 2, 3) for r in "ab"]
@@ -209,14 +209,14 @@ def test_orthoglide_legs_keep_their_length(rng):
         assert np.abs(posture.platform[:3, :3] - np.eye(3)).max() < 1e-11
 
 
-def test_orthoglide_moves_as_its_slides_do_at_the_isotropic_point():
-    """Chablat, Wenger (2003): the Jacobian is the identity there."""
+def test_orthoglide_jacobian_is_the_identity_at_the_isotropic_point():
+    """Chablat, Wenger (2003)."""
     J = drive_jacobian(home_posture(BUILT_IN["orthoglide"]()))
     assert np.abs(J[3:] - np.eye(3)).max() < 1e-7
     assert np.abs(J[:3]).max() < 1e-7
 
 
-def test_orthoglide_gives_as_its_drives_do_at_the_isotropic_point():
+def test_orthoglide_compliance_is_that_of_its_drives_at_the_isotropic_point():
     posture = home_posture(only_drives_give(BUILT_IN["orthoglide"]()))
     found = platform_compliance(posture) * 5e7
     assert np.abs(found[3:, 3:] - np.eye(3)).max() < 1e-9

@@ -1,4 +1,4 @@
-"""Least energies and factors: optimality written out, proofs, and which is kept."""
+"""Least energies and factors: optimality conditions, proofs and special cases."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ def rng():
     return np.random.default_rng(3)
 
 
-def test_nothing_to_close_costs_nothing_and_no_clearance_costs_all(rng):
+def test_least_energy_without_gap_is_zero_and_without_clearance_is_full(rng):
     G, H, h = rng.normal(size=(2, 5)), rng.normal(size=(1, 5)), np.array([3.0, 4.0])
     none = minimise_energy(G, 0 * h, np.zeros(5), H, np.zeros(1), GROUP)
     assert (none.value, none.bound, none.feasible) == (0.0, 0.0, True)
@@ -29,7 +29,7 @@ def test_nothing_to_close_costs_nothing_and_no_clearance_costs_all(rng):
 
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 30.0])
-def test_within_all_cones_the_solution_is_that_of_linear_equations(rng, unit, scale):
+def test_solution_within_all_cones_solves_the_linear_equations(rng, unit, scale):
     """G'(G u + h) - d = H'n, H u = k: in any unit of energy and any length of rows."""
     G, H = rng.normal(size=(6, 5)), scale * np.array([[1.0], [7.0]]) * np.eye(2, 5)
     u, n = np.array([0.1, 0.2, -0.3, 0.1, 0.2]), np.array([0.4, -0.3]) / scale
@@ -49,7 +49,7 @@ def test_within_all_cones_the_solution_is_that_of_linear_equations(rng, unit, sc
 
 @pytest.mark.parametrize("row", [1e-5, 1.0, 1e4])
 @pytest.mark.parametrize("fixed", [False, True])
-def test_the_least_factor_is_proved_by_its_multipliers(rng, row, fixed):
+def test_multipliers_prove_the_least_factor(rng, row, fixed):
     """n.B u = n.right <= t sum_scaled |(B'n)_k| + sum_fixed |(B'n)_k|, equal at t."""
     B, scaled = rng.normal(size=(2, 5)), ~(fixed & (GROUP == 1))
     right = B @ np.array([3.0, 4.0, 0.0, 1.0, 2.0]) + B[:, 2]
@@ -67,8 +67,8 @@ def test_the_least_factor_is_proved_by_its_multipliers(rng, row, fixed):
 
 
 @pytest.mark.parametrize("reach", [1.2, 1.9, 30.0])
-def test_no_factor_helps_where_what_it_scales_does_not_reach(reach):
-    """The interval that is not scaled alone enters the first row."""
+def test_unreachable_row_without_scaled_cones_has_no_factor(reach):
+    """The first row contains only the interval that is not scaled."""
     B = np.array([[3.0, 0.0], [50.0, 0.02]])
     right = np.array([3.0 * reach, 0.01])
     t, u, n = least_factor(B, right, np.array([0, 1]), np.array([False, True]))

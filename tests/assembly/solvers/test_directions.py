@@ -25,7 +25,7 @@ def found(rows, group, d, right, tolerance=1e-9):
     )
 
 
-def test_without_rows_each_cone_is_at_its_end_along_the_direction(rng):
+def test_farthest_point_without_rows_is_on_the_rim_of_each_cone(rng):
     d = directions_of(rng, 20)
     points, multipliers, solved = found(
         np.zeros((0, 6)), GROUP, d, np.zeros((20, 0)), 1e-12
@@ -55,7 +55,7 @@ def test_multipliers_prove_that_no_point_is_farther(rng, rows):
         assert d[i] @ points[i] >= d[i] @ start[i] - 1e-9
 
 
-def test_intervals_alone_are_a_linear_programme(rng):
+def test_farthest_points_of_intervals_equal_a_linear_programme(rng):
     H, d = rows_of(rng, 2), directions_of(rng, 8)
     start = rng.uniform(-0.5, 0.5, size=(8, 6))
     points, _, solved = found(H, np.arange(6), d, start @ H.T)
@@ -65,14 +65,14 @@ def test_intervals_alone_are_a_linear_programme(rng):
         assert d[i] @ points[i] == pytest.approx(-least.fun, abs=1e-8)
 
 
-def test_what_no_point_satisfies_is_not_solved(rng):
+def test_infeasible_rows_are_reported_as_not_solved(rng):
     H, d = rows_of(rng, 1), directions_of(rng, 3)
     _, _, solved = found(H, GROUP, d, np.array([[0.1], [10.0], [-0.2]]))
     assert solved.tolist() == [True, False, True]
 
 
-def test_a_direction_does_not_depend_on_its_neighbours(rng):
-    """Other order, other neighbours, alone: not a bit changes."""
+def test_farthest_point_does_not_depend_on_other_directions(rng):
+    """In another order, among others, and alone: bit-identical results."""
     H, d = rows_of(rng, 2), directions_of(rng, 30)
     right = rng.uniform(-0.4, 0.4, size=(30, 6)) @ H.T
     tolerance = 10 ** rng.uniform(-11, -4, 30)

@@ -65,7 +65,7 @@ def interior_point(p, tolerance):
 @pytest.mark.parametrize("rows", [0, 1, 2])
 @pytest.mark.parametrize("widest", [2, 7])
 @pytest.mark.parametrize("seed", range(3))
-def test_the_interior_point_is_clarabels_least_value_and_proves_it(seed, widest, rows):
+def test_interior_point_value_equals_clarabel_and_is_proved(seed, widest, rows):
     group = GROUP if widest == 2 else random_cones(np.random.default_rng(seed), widest)
     p = programme(seed, min(rows, len(group) - 1), group=group)
     u, n = interior_point(p, 1e-9)
@@ -79,8 +79,8 @@ def test_the_interior_point_is_clarabels_least_value_and_proves_it(seed, widest,
 
 @pytest.mark.parametrize("widest", [1, 2, 3, 20])
 @pytest.mark.parametrize("springs", [0, 5])
-def test_least_energies_of_both_methods_prove_each_other(rng, widest, springs):
-    """Neither's certified bound is above the other's value."""
+def test_least_energies_of_both_methods_lie_above_both_bounds(rng, widest, springs):
+    """The certified bound of each method is at most the other's value."""
     for _ in range(6):
         group = random_cones(rng, widest)
         p = rng.integers(0, max(1, min(4, len(group) - 2)))
@@ -115,7 +115,7 @@ def body_of(rng, group, rows=0, size=1.0):
 
 
 @pytest.mark.parametrize("part", [0, 3])
-def test_a_body_of_one_point_is_its_centre(part):
+def test_farthest_point_of_a_single_point_is_that_point(part):
     centre = np.array([1.0, 2.0, 2.0, 2.0, 3.0, 6.0])
     one = ReachableSet(
         centre, np.zeros((6, 0)), np.zeros((0, 0)), np.zeros(0), np.zeros(0, np.int64)
@@ -125,7 +125,7 @@ def test_a_body_of_one_point_is_its_centre(part):
     assert np.array_equal(screw, centre)
 
 
-def test_the_farthest_point_of_a_ball_and_of_an_interval():
+def test_farthest_point_of_a_ball_or_interval_equals_its_closed_form():
     """|c + r v| with |v| <= 1 is |c| + r; of a ball of three and one more column."""
     centre = np.array([0.0, 0.0, 0.0, 3e-3, 0.0, 4e-3])
     X = np.zeros((6, 4))
@@ -142,7 +142,7 @@ def test_the_farthest_point_of_a_ball_and_of_an_interval():
     assert (low, high) == pytest.approx((5e-3, 5e-3), abs=1e-9)
 
 
-def test_of_an_ellipse_two_supports_tell_all():
+def test_farthest_point_of_an_ellipse_needs_at_most_two_supports():
     """|x|, |y|, |z| <= 1, 3, 2 in a ball, with v_y = v_z: sqrt((9 + 4) / 2)."""
     X = np.zeros((6, 3))
     X[3:] = np.diag([1.0, 3.0, 2.0])
@@ -155,8 +155,8 @@ def test_of_an_ellipse_two_supports_tell_all():
 
 
 @pytest.mark.parametrize("widest", [2, 12])
-def test_no_support_is_higher_than_the_farthest_and_its_own_is_no_lower(rng, widest):
-    """By Clarabel, along many directions; with rows, and cones of many columns."""
+def test_farthest_distance_bounds_the_support_in_every_direction(rng, widest):
+    """Supports by Clarabel in many directions; with rows, and cones of many columns."""
     for _ in range(4):
         group = random_cones(rng, widest)
         rows = int(rng.integers(0, max(1, min(4, len(group) - 2))))

@@ -1,4 +1,4 @@
-"""The farthest point of a body between cuts: boxes, ellipsoids, and flat bodies."""
+"""Farthest points by outer cuts: boxes, ellipsoids, and flat bodies."""
 
 import numpy as np
 import pytest
@@ -38,8 +38,8 @@ def box(sides, half):
 @pytest.mark.parametrize(
     "sides", [[1e-3, 2e-3, 3e-3], [1e-3, 0.0, 2e-3], [0.0, 0.0, 3e-3], [0.0] * 3]
 )
-def test_a_boxs_farthest_point_is_its_corner(half, sides):
-    """Flat ones, a segment and a point among them."""
+def test_farthest_point_of_a_box_is_its_corner(half, sides):
+    """Also of flat boxes, a segment and a point."""
     sides = np.array(sides)
     (low, high), best, _ = farthest(np.zeros(6), half, 1e-7, box(sides, half))
     corner = np.linalg.norm(sides)
@@ -50,7 +50,7 @@ def test_a_boxs_farthest_point_is_its_corner(half, sides):
 
 
 @pytest.mark.parametrize("size", [1e-5, 1.0, 1e3])
-def test_an_ellipsoids_farthest_point_is_on_its_longest_axis(size, rng):
+def test_farthest_point_of_an_ellipsoid_is_on_its_longest_axis(size, rng):
     turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     axes = size * turned @ np.diag([1.0, 0.3, 0.1])
     support = ellipsoid(axes, np.zeros(3), 0)
@@ -62,8 +62,8 @@ def test_an_ellipsoids_farthest_point_is_on_its_longest_axis(size, rng):
     assert np.linalg.norm(best[:3]) == low
 
 
-def test_a_ball_off_the_origin_is_farthest_on_the_far_side():
-    """Distance plus radius."""
+def test_farthest_point_of_a_ball_is_its_distance_plus_radius():
+    """The centre is 5 mm from the origin, the radius is 1 mm."""
     centre = np.array([3e-3, 0.0, 4e-3])
     support = ellipsoid(1e-3 * np.eye(3), centre, 3)
     (low, high), best, _ = farthest(screw(centre, 3), 3, 1e-6, support)

@@ -1,4 +1,4 @@
-"""Newton's method with the pressed cones known: closed forms, and the conditions."""
+"""Newton's method with known pressed cones: closed forms and optimality."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ NONE = np.zeros((0, 2))
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-3, 1e-2])
-def test_a_disc_is_left_at_the_point_nearest_to_the_target(off):
+def test_pressed_disc_ends_at_the_point_nearest_to_the_target(off):
     """The least |u - a| with |u| <= 1 is at a / |a|, pressed by |a| - 1 = 12."""
     a = np.array([5.0, 12.0])
     guess = (1.0 - off) * np.array([np.cos(1.17 + off), np.sin(1.17 + off)])
@@ -20,7 +20,7 @@ def test_a_disc_is_left_at_the_point_nearest_to_the_target(off):
     assert len(n) == 0
 
 
-def test_what_presses_nothing_is_solved_by_its_springs_and_rows():
+def test_problem_without_pressed_cones_solves_the_linear_equations():
     """Least |u|^2 / 2 on u_1 + u_2 = 1 / 2: a quarter each, multiplier a quarter."""
     H, k = np.array([[1.0, 1.0]]), np.array([0.5])
     problem = (np.eye(2), np.zeros(2), np.zeros(2), H, k, np.array([0, 1]))
@@ -30,7 +30,7 @@ def test_what_presses_nothing_is_solved_by_its_springs_and_rows():
     assert n == pytest.approx([0.25], abs=1e-14)
 
 
-def test_an_interval_ends_at_its_bound_and_the_row_moves_the_other():
+def test_pressed_interval_ends_at_its_bound_and_the_row_moves_the_other():
     """Work 3 u_1 + u_2 on u_1 + u_2 = 1 / 2 within +-1: the corner (1, -1 / 2)."""
     H, k = np.array([[1.0, 1.0]]), np.array([0.5])
     problem = (NONE, np.zeros(0), np.array([3.0, 1.0]), H, k, np.array([0, 1]))

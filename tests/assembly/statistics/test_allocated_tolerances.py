@@ -1,4 +1,4 @@
-"""An allocation's numbers in plain values, lines and a data set."""
+"""Results of an allocation as plain values, text lines and a data set."""
 
 from dataclasses import replace
 
@@ -41,7 +41,7 @@ def allocation(**values):
     return replace(found, **values)
 
 
-def test_a_class_has_the_unit_of_its_first_error():
+def test_tolerance_class_has_the_unit_of_its_first_error():
     first, second = allocation_of(allocation())["tolerances"]
     assert first == {
         "name": "length", "tolerance": 1.25e-3, "unit": "m", "scaled_alike": 1e-3,
@@ -54,8 +54,8 @@ def test_a_class_has_the_unit_of_its_first_error():
         assert allocation_of(some)["tolerances"][1]["at_loosest"] == loosest
 
 
-def test_the_lines_of_an_allocation():
-    """Lengths in mm, angles in mrad; what is not proven or not checked is not told."""
+def test_allocation_text_states_tolerances_price_and_proofs():
+    """Lengths in mm, angles in mrad; missing proofs and checks are omitted."""
     plain = allocation_of(allocation())
     assert allocation_text(plain).splitlines() == [
         "  length: +-1.25 mm (98%)",
@@ -79,19 +79,19 @@ def test_the_lines_of_an_allocation():
     ]
 
 
-def test_a_wrench_s_worst_is_found_and_not_proven():
+def test_allocation_text_states_that_the_worst_wrench_is_not_proven():
     found = allocation(limits={"force": 40.0}, worst={"force": (39.0, NAN)})
     text = allocation_text(allocation_of(found))
     assert "worst force: 39 found, nothing proven, limit 40" in text.splitlines()
 
 
-def test_draws_that_are_undecided_are_told_with_the_looks():
+def test_allocation_text_states_undecided_draws():
     undecided = {"yield": CHECK["yield"] | {"undecided": 3}}
     text = allocation_text(allocation_of(allocation(verification=CHECK | undecided)))
     assert text.endswith("95% for all, 3 draws undecided)")
 
 
-def test_the_clearance_is_told_where_a_pose_error_is_limited():
+def test_allocation_states_the_clearance_model_only_for_pose_error_limits():
     for limits, play in (({"rotation": 1e-3}, "worst"), ({"energy": 1.0}, None)):
         plain = allocation_of(allocation(limits=limits))
         assert plain["clearance"] == play
@@ -111,13 +111,13 @@ def test_the_clearance_is_told_where_a_pose_error_is_limited():
         ("reciprocal", 19.0, ""),
     ],
 )  # fmt: skip
-def test_a_price_is_compared_with_that_of_proportions_scaled_alike(cost, alike, said):
-    """A logarithm's zero is anywhere: no share of it is saved."""
+def test_price_is_compared_with_that_of_uniform_scaling(cost, alike, said):
+    """A logarithmic price has no natural zero, so no relative saving is stated."""
     found = allocation_of(allocation(cost=cost, price_uniformly_scaled=alike))
     assert allocation_text(found).splitlines()[-1] == f"price 20{said}"
 
 
-def test_the_data_set_holds_tolerances_and_where_they_came_from():
+def test_allocation_data_set_contains_tolerances_and_provenance():
     found = allocation(verification=CHECK, seed=7)
     data = found.to_xarray()
     assert list(data["class"].values) == ["length", "angle"]

@@ -1,4 +1,4 @@
-"""The walk against straight lines reflected by hand, with the same random numbers."""
+"""The billiard walk against reflections by hand with the same random numbers."""
 
 import numpy as np
 import pytest
@@ -50,8 +50,8 @@ def reflected(starts, M, u, speed, left):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_trajectory_is_reflected_at_discs_and_sides_as_by_mirrors(seed, rng):
-    """In the coordinates of Dikin's ellipsoid, whatever its axes; also a thin one."""
+def test_billiard_trajectory_equals_reflections_by_hand(seed, rng):
+    """In the coordinates of Dikin's ellipsoid, for any axes; also for a thin one."""
     starts = [0, 2, 3, 5]
     for M in (np.eye(5), rng.normal(size=(5, 5)), rng.normal(size=(5, 3))):
         start = np.array([0.6, -0.5, 0.2, 0.0, 0.1])
@@ -63,8 +63,8 @@ def test_a_trajectory_is_reflected_at_discs_and_sides_as_by_mirrors(seed, rng):
         assert max(sizes(starts, u)) <= 1 + 1e-9
 
 
-def test_a_cone_that_does_not_move_is_no_bound(rng):
-    """Even where it stands on its bound: the others decide how far a chain starts."""
+def test_cone_that_does_not_move_does_not_bound_the_walk(rng):
+    """Also if it is on its bound: the other cones determine the range of the starts."""
     starts, centre = np.array([0, 2, 3]), np.array([0.6, 0.8, 0.5])
     M, walks = np.array([[0.0], [0.0], [0.3]]), np.empty((8, 3))
     positions = Positions(M, starts, np.zeros((6, 3)))
@@ -77,7 +77,7 @@ def test_a_cone_that_does_not_move_is_no_bound(rng):
     np.testing.assert_array_equal(still, centre)
 
 
-def test_a_point_outside_by_rounding_turns_back():
+def test_walk_from_a_point_outside_by_rounding_returns_inside():
     starts, outside = [0, 1], [1 + 1e-15]
     for seed in range(6):
         u, _, _ = walked(starts, [[0.5]], outside, seed=seed)

@@ -1,4 +1,4 @@
-"""Clearance models where passive joints' own motion is bounded: intervals by hand."""
+"""Clearance models with limited motion of passive joints: intervals by hand."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def positions(robot, clearance, errors, count=200, **options):
     return screws
 
 
-def test_a_hinge_at_contact_turns_to_the_end_of_its_motion():
+def test_contact_model_turns_a_hinge_to_its_motion_limit():
     """The tip moves by arm times angle along y, and by the radius along the force."""
     hinge = arm(passive=True, radial=RADIAL, spin=SPIN)
     screws = positions(hinge, "contact", np.zeros((2, 6)))
@@ -39,7 +39,7 @@ def test_a_hinge_at_contact_turns_to_the_end_of_its_motion():
 @pytest.mark.parametrize(
     ("joint", "key", "component"), [("revolute", "spin", 2), ("prismatic", "axial", 5)]
 )
-def test_a_bounded_joint_is_uniform_over_its_motion(joint, key, component):
+def test_uniform_model_is_uniform_over_the_limited_motion(joint, key, component):
     robot = arm(passive=True, joint=joint, **{key: SPIN})
     screws = positions(robot, "uniform", np.zeros((2, 6)))
     part = (screws[:, component] / SPIN + 1) / 2
@@ -48,7 +48,7 @@ def test_a_bounded_joint_is_uniform_over_its_motion(joint, key, component):
 
 @pytest.mark.parametrize("error", [0.0, 1.5e-4, 2.4e-4])
 @pytest.mark.parametrize("steel", [0.0, 1e9])
-def test_two_hinges_on_one_axis_turn_as_far_as_both_let_them(error, steel):
+def test_two_hinges_on_one_axis_turn_within_both_motion_limits(error, steel):
     """|angle| <= a, |angle - error| <= b: an interval, whose ends are the contacts."""
     a, b = 1e-4, 1.5e-4
     link = MatrixLink(np.eye(6) * steel) if steel else None
@@ -72,8 +72,8 @@ def test_two_hinges_on_one_axis_turn_as_far_as_both_let_them(error, steel):
 
 
 @pytest.mark.parametrize("clearance", ["uniform", "contact", "least"])
-def test_a_moment_turns_a_hinge_to_the_end_of_its_motion(clearance):
-    """Under 5 N m about its axis it stops at +spin, whatever is assumed."""
+def test_moment_turns_a_hinge_to_its_limit_in_every_clearance_model(clearance):
+    """Under 5 N m about its axis it stops at +spin."""
     robot = arm(passive=True, spin=SPIN)
     load = [0, 0, 5.0, 0, 0, 0]
     screws = positions(robot, clearance, np.zeros((2, 6)), 5, load=load)
@@ -82,7 +82,7 @@ def test_a_moment_turns_a_hinge_to_the_end_of_its_motion(clearance):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_no_clearance_model_exceeds_the_certified_worst_in_any_draw(seed):
-    """Random robots whose passive joints have bounds of the size of the errors."""
+    """Random robots with motion limits of passive joints of the size of the errors."""
     rng = np.random.default_rng(seed)
     robot = with_bounded_motion(random_robot(rng, joints=4), rng)
     sources = tolerance_sources(robot, [1e-5] * 6, [f.name for f in robot.frames])

@@ -1,4 +1,4 @@
-"""Play sampled uniformly and at contact, against known volumes and rejection."""
+"""Uniform and contact clearance positions, against known volumes and rejection."""
 
 from dataclasses import replace
 
@@ -37,14 +37,14 @@ def walked(rows, starts, count=1500, start=None):
     return u
 
 
-def test_in_a_disc_the_squared_radius_is_uniform():
+def test_uniform_positions_in_a_disc_have_a_uniform_squared_radius():
     u = walked([], [0, 2], start=[0.9, 0.0])
     assert stats.kstest((u**2).sum(axis=1), "uniform").pvalue > 1e-3
     assert stats.kstest(np.arctan2(*u.T) / (2 * np.pi) + 0.5, "uniform").pvalue > 1e-3
 
 
 @pytest.mark.slow
-def test_a_cut_disc_agrees_with_rejection():
+def test_uniform_positions_in_a_cut_disc_equal_rejection_sampling():
     """Row u0 = u2 / 2 with |u2| <= 1 leaves the strip |u0| <= 1/2 of the unit disc."""
     u = walked([[1, 0, -0.5]], [0, 2, 3])
     assert np.abs(u[:, 0] - u[:, 2] / 2).max() < 1e-12
@@ -61,10 +61,10 @@ def test_a_cut_disc_agrees_with_rejection():
 @pytest.mark.parametrize(
     "thin", [pytest.param(t, marks=pytest.mark.slow) for t in (1e-1, 1e-3, 1e-5)]
 )
-def test_a_thin_cap_of_a_disc_beside_long_sides_keeps_its_marginals(thin):
+def test_uniform_clearance_mixes_near_the_edge_of_the_zone(thin):
     """Row u0 - thin u2 = 1 with |u2| <= 1 leaves the disc's cap 1 - thin <= u0; two
     sides stay free.  A walk with steps alike in all directions would take 1 / thin^2 of
-    them.  The density of u0 is as the width of the cap, sqrt(1 - u0^2).
+    them.  The density of u0 is proportional to the cap's width, sqrt(1 - u0^2).
     """
     u = walked(
         [[1, 0, -thin, 0, 0]], [0, 2, 3, 4, 5], start=[1 - thin / 2, 0, -0.5, 0.9, -0.9]
@@ -83,8 +83,8 @@ def test_a_thin_cap_of_a_disc_beside_long_sides_keeps_its_marginals(thin):
     assert stats.kstest(share, "uniform").pvalue > 1e-3
 
 
-def test_a_walk_that_is_not_mixed_says_so():
-    """No inside at all; and no walk of its own, where none may be made longer."""
+def test_walk_without_mixing_is_reported():
+    """The set has no interior, or the chains may not be doubled."""
     starts, rng = np.array([0, 1, 2]), generators(1)[0]
     along = np.array([[1.0], [1.0]]) / np.sqrt(2)
     corner, to_screw = np.array([1.0, -1.0]), np.eye(6)[:, :2].copy()
@@ -95,11 +95,11 @@ def test_a_walk_that_is_not_mixed_says_so():
     assert sample_uniform_position(along, starts, to_screw, middle, rng)
 
 
-def test_two_clearances_of_two_sizes_leave_the_platform_what_both_let_it():
+def test_platform_between_two_pins_is_uniform_over_their_common_range():
     """Along z a pin of 2 mm on one side and of 1 mm on the other, errors 0.5 mm apart.
 
     The platform, on the first, moves from -2 to 2 mm, and on the second from 0.5 - 1 to
-    0.5 + 1: what both let is -0.5 to 1.5, not even about the least clearances.
+    0.5 + 1: the common range is -0.5 to 1.5, not symmetric about the solution.
     """
     shift = [0.0, 0.0, 0.0, 0.0, 0.0, 5e-4]
     steel = MatrixLink(np.eye(6) * 1e6)
@@ -120,8 +120,8 @@ def test_two_clearances_of_two_sizes_leave_the_platform_what_both_let_it():
 
 
 @pytest.mark.parametrize(("kind", "first"), [("radial", 3), ("tilt", 0)])
-def test_pushed_from_anywhere_a_pin_rests_anywhere_on_the_narrower_rim(kind, first):
-    """Two pins on one axis, of 2 and 1 mm or mrad: the contacts are a circle of 1."""
+def test_contact_positions_are_uniform_on_the_narrower_rim(kind, first):
+    """Two pins on one axis, of 2 and 1 mm or mrad: contact is on a circle of 1."""
     steel = MatrixLink(np.eye(6) * 1e6)
     frames = (
         Frame("one", link=steel, clearance=Clearance(**{kind: 2e-3})),
@@ -154,8 +154,8 @@ def drawn():
 
 
 @pytest.mark.parametrize("play", ["uniform", "contact"])
-def test_clearance_changes_neither_energy_nor_bounds(drawn, play):
-    """Screws moved by clearances that leave every spring as it was."""
+def test_unloaded_clearances_move_the_platform_by_finite_screws(drawn, play):
+    """Clearances are loaded only in draws that store energy."""
     one, found = drawn
     loaded = loaded_clearances(one, found)
     assert not loaded[found.energy < 1e-20].any()
@@ -167,7 +167,7 @@ def test_clearance_changes_neither_energy_nor_bounds(drawn, play):
 
 
 @pytest.mark.slow
-def test_contact_goes_at_least_as_far_along_its_push_as_uniform_clearance(drawn):
+def test_contact_position_is_at_least_as_far_along_its_force_as_uniform(drawn):
     one, found = drawn
     push = np.array([rng.normal(size=6) for rng in generators(DRAWN)])
     size = size_of(one.posture.robot)
@@ -180,7 +180,7 @@ def test_contact_goes_at_least_as_far_along_its_push_as_uniform_clearance(drawn)
     assert reach.min() > -1e-9
 
 
-def test_the_least_clearances_are_those_of_the_solution(drawn):
+def test_least_clearance_positions_are_those_of_the_solution(drawn):
     one, found = drawn
     screws, mixed = position_clearances(one, found, "least", [])
     np.testing.assert_array_equal(screws, found.platform_screw)
@@ -189,16 +189,16 @@ def test_the_least_clearances_are_those_of_the_solution(drawn):
 
 
 @pytest.mark.parametrize("play", ["most", "worst"])
-def test_an_unknown_way_is_refused(drawn, play):
-    """The worst is no one place, but many."""
+def test_unknown_clearance_position_is_refused(drawn, play):
+    """The model worst has no single position, so it is refused too."""
     one, found = drawn
     with pytest.raises(ValueError, match=f"clearance is '{play}'") as error:
         position_clearances(one, found, play, generators(DRAWN))
     assert str(error.value).endswith("expected one of ('uniform', 'contact', 'least')")
 
 
-def test_contact_clearance_knows_no_unit_of_length():
-    """The same random pushes in metres and in millimetres: the same positions."""
+def test_contact_positions_do_not_depend_on_the_unit_of_length():
+    """The same random forces in metres and in millimetres."""
     robot = load_robot("3rrr")
     frames = (replace(f, link=None, joint_stiffness=None) for f in robot.frames)
     robot, screws = replace(robot, frames=tuple(frames)), []

@@ -1,4 +1,4 @@
-"""Farthest positions in discs and sides, where they are known."""
+"""Farthest positions in discs and intervals, where they are known."""
 
 import numpy as np
 import pytest
@@ -22,8 +22,8 @@ def moved(directions, starts, rows=(), free=None, positions=None):
 
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
-def test_in_discs_and_sides_each_goes_its_own_way(size, rng):
-    """A linear function is largest at d / |d| of a disc, at the sign of a side."""
+def test_farthest_positions_in_discs_and_intervals_equal_closed_forms(size, rng):
+    """A linear function is largest at d / |d| of a disc, at the sign of an interval."""
     directions = rng.normal(size=(6, 3)) + 0.1
     expected = np.column_stack([
         directions[:, :2] / np.linalg.norm(directions[:, :2], axis=1)[:, None],
@@ -33,16 +33,16 @@ def test_in_discs_and_sides_each_goes_its_own_way(size, rng):
     np.testing.assert_allclose(found, expected, atol=1e-4)
 
 
-def test_equations_are_kept_with_what_they_were():
-    """u0 - u1 stays 0.5: along both the first ends at 1, the second at a half."""
+def test_farthest_positions_keep_the_equations_of_their_start():
+    """u0 - u1 stays 0.5: the first ends at 1, and hence the second at 0.5."""
     row = np.array([[1.0, -1.0, 0.0]]) / np.sqrt(2)
     start = np.array([[0.25, -0.25, 0.3], [0.25, -0.25, 0.3]])
     found = moved([[1, 1, 0.5], [-1, -2, -0.5]], [0, 1, 2, 3], row, positions=start)
     np.testing.assert_allclose(found, [[1, 0.5, 1], [-0.5, -1, -1]], atol=1e-5)
 
 
-def test_loaded_clearances_stay_in_place():
-    """Its direction does not count, nor does it enter the equations."""
+def test_loaded_clearances_do_not_move():
+    """Their direction has no influence, and they do not enter the equations."""
     start = np.array([[0.6, 0.8, 0.1, -0.2]])
     row = np.array([[0.0, 0.0, 1.0, 1.0]]) / np.sqrt(2)
     found = moved(
@@ -51,7 +51,7 @@ def test_loaded_clearances_stay_in_place():
     np.testing.assert_allclose(found, [[0.6, 0.8, 0.9, -1.0]], atol=1e-5)
 
 
-def test_without_a_direction_nothing_moves():
+def test_positions_without_a_direction_do_not_move():
     start = np.array([[0.3, -0.4], [0.3, -0.4]])
     found = moved([[0.0, 0.0], [0.0, 2.0]], [0, 1, 2], positions=start)
     np.testing.assert_array_equal(found[0], [0.3, -0.4])
@@ -61,7 +61,7 @@ def test_without_a_direction_nothing_moves():
 
 
 @pytest.mark.parametrize("length", [0.05, 0.4, 5.0])
-def test_the_contact_length_weighs_moments_against_forces(length):
+def test_contact_length_weighs_moments_against_forces(length):
     """A pin with tilt t, and the platform on an arm L along x across its axis z.
 
     The moments at the pin are M_x and M_y - L F_z, of deviations 1 and

@@ -1,4 +1,4 @@
-"""Cheapest tolerances within planes by Lagrange's multipliers, and planes by hand."""
+"""Cheapest tolerances within planes by Lagrange multipliers, and planes by hand."""
 
 from types import SimpleNamespace
 
@@ -21,8 +21,8 @@ def plan(cost="reciprocal", **options):
                 **options)  # fmt: skip
 
 
-def test_tolerances_at_a_bound_leave_the_rest_of_the_plane_to_the_others():
-    """The first no looser than 5e-4, the second no tighter than 0.15."""
+def test_cheapest_tolerances_respect_their_bounds_and_use_the_plane_fully():
+    """The first is at most 5e-4, the second at least 0.15."""
     best = np.sqrt(COSTS / PLANE) / np.sqrt(COSTS * PLANE).sum()
     most, least = LOOSE.copy(), NONE.copy()
     most[0], least[1] = 5e-4, 0.15
@@ -37,7 +37,7 @@ def test_tolerances_at_a_bound_leave_the_rest_of_the_plane_to_the_others():
     np.testing.assert_allclose(cheapest_within(plan(), [], NONE, most), most, rtol=1e-3)
 
 
-def test_tolerances_that_may_not_be_tight_enough_are_refused():
+def test_least_tolerances_beyond_a_plane_are_refused():
     with pytest.raises(BadInput) as error:
         cheapest_within(plan(), [PLANE], np.array([0.0, 0.21, 0.0]), LOOSE)
     assert str(error.value) == (
@@ -63,7 +63,7 @@ class Sums:
 ROWS = {"a": np.array([10.0, 20, 5]), "b": np.array([0.0, 0, 40])}
 
 
-def test_planes_are_added_until_no_limit_is_exceeded():
+def test_cutting_planes_are_added_until_no_limit_is_exceeded():
     """Sums of tolerances of two limits: 10 t1 + 20 t2 + 5 t3 <= 1, 40 t3 <= 1."""
     requirement = Sums(ROWS, {"a": 1.0, "b": 1.0})
     t, bound, count = cut_planes(requirement, silent)
@@ -76,7 +76,7 @@ def test_planes_are_added_until_no_limit_is_exceeded():
     assert (bound, count) == (-np.inf, 0)
 
 
-def test_a_limit_that_perfect_parts_exceed_is_refused():
+def test_limit_exceeded_by_perfect_parts_is_refused():
     requirement = Sums(ROWS, {"a": 2.0, "b": 1e9}, constant=2.1)
     with pytest.raises(BadInput, match="^even perfect parts exceed a limit of 2$"):
         cut_planes(requirement, silent)

@@ -1,4 +1,4 @@
-"""Confidence intervals and modes against closed forms and their own promise."""
+"""Confidence intervals and modes against closed forms and their confidence level."""
 
 from math import comb
 
@@ -14,20 +14,20 @@ from assembly.statistics.estimates import (
 )
 
 
-def test_no_success_in_n_draws_has_the_known_upper_bound():
+def test_upper_bound_of_zero_successes_equals_clopper_and_pearson():
     """1 - (alpha / 2)^(1/n), Clopper and Pearson (1934)."""
     found = proportion(0, 300)
     assert found["probability"] == found["lower"] == 0.0
     assert found["upper"] == pytest.approx(1 - 0.025 ** (1 / 300), rel=1e-12)
 
 
-def test_a_sample_too_small_for_a_quantile_says_so():
+def test_quantile_of_a_small_sample_has_an_infinite_upper_bound():
     found = quantile(np.arange(10.0), 0.99)
     assert found["upper"] == np.inf
     assert np.isfinite(found["lower"])
 
 
-def test_the_mean_of_three_numbers_by_hand():
+def test_mean_and_interval_of_three_numbers_equal_hand_calculation():
     """1, 2, 4: 7/3, deviation sqrt(7/3), Student's t of two degrees 4.302653."""
     answer = mean([1.0, 2.0, 4.0])
     assert answer["value"] == pytest.approx(7 / 3, rel=1e-14)
@@ -38,11 +38,11 @@ def test_the_mean_of_three_numbers_by_hand():
 
 
 @pytest.mark.parametrize("values", [[3.0, 3.0], [0.0, 0.0, 0.0], [-2.0] * 5])
-def test_equal_numbers_are_their_own_mode(values):
+def test_mode_of_equal_numbers_is_that_number(values):
     assert set(most_probable(values).values()) == {values[0]}
 
 
-def test_a_mode_scales_and_shifts_with_its_sample(rng):
+def test_mode_scales_and_shifts_with_its_sample(rng):
     x = rng.gamma(3.0, size=400)
     one, other = most_probable(x), most_probable(5.0 - 1e-9 * x)
     assert other["value"] == pytest.approx(5.0 - 1e-9 * one["value"], abs=1e-11)
@@ -54,8 +54,8 @@ def test_a_mode_scales_and_shifts_with_its_sample(rng):
 
 @pytest.mark.parametrize("level", [0.9, 0.95])
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
-def test_the_ends_of_a_quantile_s_interval_follow_from_binomial_sums(share, level):
-    """The numbers next to it such that so few samples leave it out on either side."""
+def test_quantile_interval_follows_from_binomial_sums(share, level):
+    """Order statistics outside which at most (1 - level) / 2 lies on either side."""
     x, count = np.arange(40.0) ** 2, 40
     pmf = [comb(count, k) * share**k * (1 - share) ** (count - k) for k in range(41)]
     at_most = np.cumsum(pmf)
@@ -66,8 +66,8 @@ def test_the_ends_of_a_quantile_s_interval_follow_from_binomial_sums(share, leve
     assert found["value"] == pytest.approx(np.quantile(x, share))
 
 
-def test_a_quantile_among_infinite_values_is_one_of_the_sample():
-    """Between 3 and infinity there is no middle: the higher one."""
+def test_quantile_among_infinite_values_is_a_value_of_the_sample():
+    """Between 3 and infinity there is no middle: the higher value is returned."""
     x = [1.0, 2.0, 3.0, np.inf, np.inf, np.inf]
     assert quantile(x, 0.5)["value"] == np.inf
     assert quantile(x, 0.3)["value"] == 3.0
@@ -75,8 +75,8 @@ def test_a_quantile_among_infinite_values_is_one_of_the_sample():
     assert quantile([1.0, 2.0, 3.0, 4.0], 0.5)["value"] == 2.5
 
 
-def test_trials_that_are_undecided_may_all_have_succeeded_or_failed():
-    """Of 20: 12 held, 5 failed; the interval reaches from 12 of 20 to 15 of 20."""
+def test_interval_with_undecided_trials_covers_both_outcomes():
+    """Of 20: 12 held, 5 failed; the interval covers from 12 of 20 to 15 of 20."""
     found = bracketed(12, 5, 20, 0.9)
     assert (found["probability"], found["undecided"]) == (0.6, 3)
     assert found["lower"] == pytest.approx(proportion(12, 20, 0.9)["lower"])
@@ -99,8 +99,8 @@ def densest(x, positive):
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("positive", [False, True])
-def test_the_most_probable_value_is_that_of_silverman_s_kernels(positive, seed):
-    """Of 150 numbers of two lumps: where the maximum is depends on the width."""
+def test_mode_equals_the_maximum_of_silverman_kernels(positive, seed):
+    """150 numbers with two peaks: the maximum depends on the kernel width."""
     rng = np.random.default_rng(seed)
     x = np.concatenate([rng.gamma(2.0, 1.0, 90), rng.normal(3.0, 0.7, 60)])
     x = np.abs(x) if positive else x
@@ -110,8 +110,8 @@ def test_the_most_probable_value_is_that_of_silverman_s_kernels(positive, seed):
     )
 
 
-def test_the_interval_of_a_mode_grows_with_its_confidence(rng):
-    """Of the same resampled modes: half of them, or 19 of 20; a seed repeats them."""
+def test_mode_interval_grows_with_its_confidence_level(rng):
+    """From the same resampled modes: half of them, or 19 of 20; a seed repeats them."""
     x = rng.gamma(3.0, size=300)
     half, most = (most_probable(x, level) for level in (0.5, 0.95))
     assert most["lower"] < half["lower"] < half["upper"] < most["upper"]

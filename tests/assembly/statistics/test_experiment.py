@@ -1,4 +1,4 @@
-"""Records of draws: two springs in a row, and an arm with clearance at its pin."""
+"""Results of draws: two springs in series, and an arm with clearance at its pin."""
 
 from dataclasses import replace
 
@@ -36,7 +36,7 @@ def tip(**options):
     return Experiment(home_posture(robot), sources, **options)
 
 
-def test_pressed_springs_carry_one_force_and_its_moment_at_the_mount():
+def test_draws_of_pressed_springs_have_closed_form_energy_force_and_moment():
     """Beyond the clearance p of a gap d: k (d - p)^2 / 4, k (d - p) / 2, half of that.
 
     Margins are d/p in both readings, as no joint is compliant; nothing is short of
@@ -63,7 +63,7 @@ def test_pressed_springs_carry_one_force_and_its_moment_at_the_mount():
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_bars_that_are_turned_against_each_other_carry_a_moment_alone(axis):
+def test_draws_of_relative_rotation_carry_a_moment_and_no_force(axis):
     """Springs k of both ends, turned by d about an axis on their line: k d / 2."""
     experiment = springs(margins=False, clearance="least")
     widths = np.zeros(6)
@@ -79,8 +79,8 @@ def test_bars_that_are_turned_against_each_other_carry_a_moment_alone(axis):
     np.testing.assert_allclose(rows["force"], 0.0, atol=1e-3)
 
 
-def test_draws_that_do_not_close_have_a_status_and_no_numbers():
-    """Rigid parts without clearance fit where both errors are equal."""
+def test_draws_that_cannot_be_assembled_have_a_status_and_nan_results():
+    """Rigid parts without clearance fit only if both errors are equal."""
     robot = rigid_pair()
     sources = tolerance_sources(robot, [0, 0, 0, 3e-4, 0, 0], ("one", "two"))
     rows = Experiment(home_posture(robot), sources, margins=False).evaluate(
@@ -92,7 +92,7 @@ def test_draws_that_do_not_close_have_a_status_and_no_numbers():
     assert "margin" not in rows.dtype.names
 
 
-def test_later_draws_are_those_of_a_longer_run():
+def test_later_draws_equal_those_of_a_longer_run():
     experiment = springs(clearance="contact", seed=4)
     whole, later = experiment.solve(0, 9), experiment.solve(5, 4)
     assert len(later) == 4
@@ -102,7 +102,7 @@ def test_later_draws_are_those_of_a_longer_run():
 
 
 @pytest.mark.parametrize("model", ["least", "uniform", "contact"])
-def test_a_pose_error_is_the_size_of_its_part_of_the_screw(model):
+def test_pose_errors_are_norms_of_the_rotation_and_translation(model):
     rows = tip(clearance=model).solve(0, 6)
     screws = rows["platform_screw"]
     for part, name in ((slice(0, 3), "rotation"), (slice(3, 6), "translation")):
@@ -115,8 +115,8 @@ def test_a_pose_error_is_the_size_of_its_part_of_the_screw(model):
     assert "translation_lower" not in rows.dtype.names
 
 
-def test_the_worst_pose_errors_have_bounds_of_the_precision_asked_for():
-    """An error e about x and clearance: rotation |e|, and hypot(e_xy + p, e_z)."""
+def test_worst_pose_error_bounds_have_the_requested_precision():
+    """For an error e about x and clearance: rotation |e|, and hypot(e_xy + p, e_z)."""
     experiment = tip(precision=(1e-8, 1e-7))
     values = experiment.sources.draw(0, 30, seed=2)
     rows = experiment.evaluate(values, range(30))
@@ -133,7 +133,7 @@ def test_the_worst_pose_errors_have_bounds_of_the_precision_asked_for():
     np.testing.assert_allclose(rows["platform_screw"][:, 3:], values[:, 1:], atol=1e-12)
 
 
-def test_stress_is_that_of_the_links_alone_and_of_none_where_it_is_left_out(rng):
+def test_drawn_stress_equals_single_solutions_and_can_be_left_out(rng):
     posture = place_robot(load_robot("irsbot2"), {"tx": 0.1, "tz": -0.5})
     robot = posture.robot
     sources = tolerance_sources(robot, [0, 0, 0, 2e-3, 0, 0])
@@ -151,7 +151,7 @@ def test_stress_is_that_of_the_links_alone_and_of_none_where_it_is_left_out(rng)
     assert replace(experiment, stress=False).solve(0, 1)["stress"].shape == (1, 0)
 
 
-def test_limits_on_what_is_not_computed_are_refused():
+def test_limits_on_quantities_that_are_not_computed_are_refused():
     posture = place_robot(load_robot("irsbot2"))
     sources = tolerance_sources(posture.robot, [1e-3] * 6)
     whole = Experiment(posture, sources)
@@ -169,14 +169,14 @@ def test_limits_on_what_is_not_computed_are_refused():
         assert str(error.value) == message
 
 
-def test_a_tight_limit_is_bracketed_to_a_thousandth_of_itself():
+def test_precision_is_a_thousandth_of_a_tight_limit():
     found = precision_for({"rotation": 2e-5, "translation": 1e-4})
     assert found == pytest.approx((2e-8, 1e-7))
 
 
 @pytest.mark.parametrize("contact_length", [None, 0.25])
-def test_the_contact_length_is_named_with_the_pose_errors(contact_length):
-    """In the text, the plain values and the data set: given, or the longest body."""
+def test_results_state_the_contact_length_of_pose_errors(contact_length):
+    """In text, plain values and data set; the default is the longest body."""
     robot = arm()
     sources = tolerance_sources(robot, [0, 0, 0, 1e-4, 0, 0], ("tip",))
     data = run_draws(

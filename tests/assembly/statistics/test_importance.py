@@ -1,4 +1,4 @@
-"""Sobol's indices against the literature and against the closed form."""
+"""Sobol's indices against the literature and closed forms."""
 
 from dataclasses import replace
 
@@ -25,8 +25,8 @@ from assembly.statistics.summary import summarise, summary_text
 from tests.tolerances_for_tests import arm
 
 
-def test_ishigamis_function_has_its_known_indices():
-    """a = 7, b = 0.1 (Saltelli et al. 2008, p. 196): worked from its variance parts."""
+def test_sobol_indices_of_ishigamis_function_equal_published_values():
+    """a = 7, b = 0.1 (Saltelli et al. 2008, p. 196), from its partial variances."""
 
     def ishigami(x):
         value = np.sin(x[:, 0]) * (1 + 0.1 * x[:, 2] ** 4) + 7 * np.sin(x[:, 1]) ** 2
@@ -59,7 +59,7 @@ def additive(scale=1.0, shift=0.0):
 @pytest.mark.parametrize(
     ("scale", "shift"), [(1e-9, 0.0), (-1e7, 0.0), (1.0, 100.0), (3e7, 1e14)]
 )
-def test_indices_know_no_units(scale, shift):
+def test_sobol_indices_do_not_depend_on_scale_and_shift(scale, shift):
     first, other = sobol_indices(*additive()), sobol_indices(*additive(scale, shift))
     for name in ("first", "total"):
         one, two = getattr(first, name), getattr(other, name)
@@ -69,7 +69,7 @@ def test_indices_know_no_units(scale, shift):
     np.testing.assert_allclose(first.total[0, :, 0], [9 / 14, 4 / 14, 1 / 14], atol=0.1)
 
 
-def test_a_result_that_only_rounds_has_no_importance():
+def test_result_that_varies_by_rounding_only_has_nan_indices():
     design, results = additive()
     rounded = 1e6 + 1e-8 * np.sign(results)
     found = sobol_indices(design, np.hstack([results, rounded, np.nan * results]))
@@ -78,8 +78,8 @@ def test_a_result_that_only_rounds_has_no_importance():
     assert np.isnan(found.variance[2])
 
 
-def test_failed_draws_of_one_group_leave_the_others_alone():
-    """A result that fails where a group's draws were exchanged: that group's alone."""
+def test_failed_draws_of_one_group_do_not_affect_other_groups():
+    """A result fails only in draws where one group's values were exchanged."""
     design, results = additive()
     whole = sobol_indices(design, results)
     some = results.reshape(5, 400, 1).copy()
@@ -92,8 +92,8 @@ def test_failed_draws_of_one_group_leave_the_others_alone():
 
 
 @pytest.mark.slow
-def test_without_clearance_the_closed_form_holds():
-    """Then the platform's screw is linear in the errors."""
+def test_sobol_indices_without_clearance_equal_the_linear_closed_form():
+    """Without clearance the platform's screw is linear in the errors."""
     robot = load_robot("irsbot2")
     robot = replace(
         robot, frames=tuple(replace(f, clearance=None) for f in robot.frames)
@@ -129,8 +129,8 @@ def three(stream, k):
 THREE = [(str(i), np.array([i])) for i in range(3)]
 
 
-def test_a_few_draws_that_fail_are_left_out_and_counted():
-    """4 a + b: shares 4/5 and 1/5; a draw of A, B or the mixed one fails."""
+def test_few_failed_draws_are_left_out_and_counted():
+    """For 4 a + b, shares 4/5 and 1/5, a draw of A, B or the mixed one fails."""
     found = sobol_importance(lambda x: failing(x, 0.01), three, THREE, 8000)
     np.testing.assert_allclose(found.first[0, :, 0], [0.8, 0.2, 0.0], atol=0.05)
     np.testing.assert_allclose(found.total[0, :, 0], [0.8, 0.2, 0.0], atol=0.05)
@@ -139,7 +139,7 @@ def test_a_few_draws_that_fail_are_left_out_and_counted():
     assert np.isfinite(found.variance).all()
 
 
-def test_intervals_are_as_wide_as_their_confidence(rng):
+def test_index_intervals_scale_with_their_confidence_level(rng):
     """Nearly normal: half of all are within 0.674 deviations, 95 % within 1.960."""
     design, _ = additive()
     x = design.rows(0, len(design))
@@ -168,8 +168,8 @@ def stiff():
     return Experiment(home_posture(robot), sources)
 
 
-def test_the_table_says_how_far_the_platform_moves_for_each_um_of_error(stiff):
-    """0.9 and 0.1 um; parts of 1e-5 / sqrt(3) times these."""
+def test_importance_table_states_platform_motion_per_um_of_error(stiff):
+    """0.9 and 0.1 um per um; parts of 1e-5 / sqrt(3) times these."""
     data = run_draws(stiff, 50, importance=ImportanceOptions(3000, "source"))
     said = summarise(data)
     report = said["importance"]["platform"]
@@ -185,10 +185,10 @@ def test_the_table_says_how_far_the_platform_moves_for_each_um_of_error(stiff):
     assert float(gain) == pytest.approx(0.9, rel=0.05)
 
 
-def test_random_clearance_is_not_taken_for_importance():
-    """A free disc of clearance 0.1 mm at a driven arm's pin; the tip follows its error.
+def test_random_clearance_does_not_change_the_importance_of_errors():
+    """A disc of 0.1 mm of clearance at a driven arm's pin; the tip follows its error.
 
-    One um for each um whatever is assumed of it; alone it moves the tip by up to 100.
+    The gain is 1 um per um in every model; clearance alone moves it by 100 um.
     """
     robot = arm(radial=1e-4)
     sources = tolerance_sources(robot, [0, 0, 0, 1e-6, 0, 0], ("tip",))
@@ -205,7 +205,7 @@ def test_random_clearance_is_not_taken_for_importance():
         assert said["importance"]["clearance"] == expected
 
 
-def test_groups_by_kind_join_the_legs():
+def test_groups_by_kind_combine_the_legs():
     robot = load_robot("irsbot2")
     sources = tolerance_sources(robot, [1e-3, 0, 0, 1e-4, 0, 0])
     names = [name for name, _ in source_groups(sources, "kind")]
@@ -215,7 +215,7 @@ def test_groups_by_kind_join_the_legs():
         source_groups(sources, "leg")
 
 
-def test_shares_of_linear_results_are_their_squared_slopes_times_variances(stiff):
+def test_linear_shares_are_squared_slopes_times_variances(stiff):
     """Uniform errors within 1 and 2: variances in the ratio 1 to 4."""
     limits = stiff.sources.limit * 0 + [1.0, 2.0]
     sources = replace(stiff.sources, scale=limits, least=0 * limits, centre=0 * limits)

@@ -14,7 +14,7 @@ from tests.tolerances_for_tests import arm
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_lever_gains_by_its_length_whatever_is_drawn(seed):
+def test_gain_of_a_rotation_error_is_its_lever_arm(seed):
     """A turn of the pin moves a tip 0.4 m away by 0.4 um for each urad, along y or z.
 
     Along x the tip stays, so the gain of RX is 0 in translation and 1 in rotation.
@@ -28,7 +28,7 @@ def test_a_lever_gains_by_its_length_whatever_is_drawn(seed):
     np.testing.assert_allclose(translation, [0.0, 0.4, 0.4], atol=1e-12)
 
 
-def test_the_gain_of_a_group_is_its_root_mean_square_by_variance():
+def test_gain_of_a_group_is_the_root_mean_square_weighted_by_variance():
     """RY at the pin (lever 0.4) and at the tip (none), deviations 1 and 2."""
     robot = arm()
     pin = tolerance_sources(robot, [0, 1e-3, 0, 0, 0, 0], ("pin", "tip"))
@@ -50,8 +50,8 @@ def test_the_gain_of_a_group_is_its_root_mean_square_by_variance():
         ("five_bar", [0, 0, 0, 20.0, -10.0, 0]),
     ],
 )
-def test_slopes_are_those_of_the_solution_under_loads_too(name, load, rng):
-    """Central differences of the screws of (22); springs pressed by errors or loads."""
+def test_platform_slopes_equal_central_differences_also_under_load(name, load, rng):
+    """Differences of the screws of (22); springs are pressed by errors or loads."""
     robot = load_robot(name)
     pose = {"tx": 0.1, "tz": -0.5} if name == "irsbot2" else None
     posture = place_robot(robot, pose=pose) if pose else home_posture(robot)

@@ -1,4 +1,4 @@
-"""Parts, gains and reasons of a linear platform whose indices are known."""
+"""The importance table of a linear platform whose indices are known."""
 
 from dataclasses import replace
 
@@ -38,8 +38,8 @@ def solved(by="source", draws=400, **options):
     return data, importance_report(data)
 
 
-def test_a_platform_that_follows_each_error_has_gains_of_one():
-    """An even law of half width w deviates by w / sqrt(3), and so does the platform.
+def test_platform_that_follows_each_error_has_gains_of_one():
+    """A uniform error of half width w has the deviation w / sqrt(3), as the platform.
 
     400 draws know a deviation to 4 %; a gain is a slope, and no draw changes it.
     """
@@ -64,8 +64,8 @@ def test_a_platform_that_follows_each_error_has_gains_of_one():
     assert [total[name][0] for name in NAMES] == pytest.approx([1, 0, 0], abs=0.15)
 
 
-def test_angles_and_lengths_together_have_parts_and_no_gain():
-    """The tip's own part is the root of the sum of the squares of its errors' parts."""
+def test_group_of_angles_and_lengths_has_parts_and_no_gain():
+    """The part of a frame is the root sum of squares of its errors' parts."""
     data, report = solved("frame")
     (one,) = report["platform"].values()
     assert one["error_unit"] == "rad, m"
@@ -76,8 +76,8 @@ def test_angles_and_lengths_together_have_parts_and_no_gain():
     assert data["part"].sel(component="rotation").item() == one["rotation_part"]
 
 
-def test_draws_without_an_answer_are_told_with_their_reason():
-    """Less than a twentieth may be left out: beyond, the others are not independent."""
+def test_draws_without_a_solution_are_reported_with_the_reason():
+    """At most 5 % may be left out; beyond, the remaining draws are not independent."""
     experiment = arm(clearance="least")
     design = importance_design(experiment, ImportanceOptions(100, "source"))
     rows = importance_rows(experiment, design, 0, len(design))
@@ -108,7 +108,7 @@ def test_draws_without_an_answer_are_told_with_their_reason():
         assert np.isnan(parts).all()
 
 
-def test_margins_count_where_they_are_computed_and_stress_where_links_have_a_shape():
+def test_importance_covers_margins_if_computed_and_stress_only_with_sections():
     with_margins = replace(arm(clearance="least"), margins=True)
     design = importance_design(with_margins, ImportanceOptions(8, "source"))
     rows = importance_rows(with_margins, design, 0, len(design))
@@ -149,7 +149,7 @@ def told(units, left_out=0.0, rank=(1, 1)):
     return lines[:-1]
 
 
-def test_lengths_give_um_for_each_um_and_angles_for_each_mrad():
+def test_importance_table_has_um_per_um_for_lengths_and_um_per_mrad_for_angles():
     head, stress, columns, length, angle, both = told(["m", "rad", "rad, m"])
     assert "64 base draws" in head
     assert stress == "stress: it does not vary"
@@ -165,7 +165,7 @@ def test_lengths_give_um_for_each_um_and_angles_for_each_mrad():
     assert len(set(ends)) == 1
 
 
-def test_draws_left_out_are_told_and_groups_beyond_the_table_counted():
+def test_importance_table_reports_left_out_draws_and_further_groups():
     lines = told(["m"] * 18, left_out=0.015)
     assert "energy: up to 1.5% of the draws have no answer and are left out" in lines
     assert lines[-1] == "and 3 more, see --json"
@@ -177,14 +177,14 @@ def test_draws_left_out_are_told_and_groups_beyond_the_table_counted():
     assert "more" not in told(["m"] * 15)[-1]
 
 
-def test_errors_with_a_rank_in_common_are_said_not_to_be_distinguished():
+def test_importance_table_reports_errors_that_share_a_rank():
     lines = told(["m", "m"], rank=(1, 2))
     assert [line.split()[-1] for line in lines[-3:-1]] == ["1-2", "1-2"]
     assert lines[-1].endswith("are not distinguished by these draws")
     assert "distinguished" not in told(["m", "m"])[-1]
 
 
-def test_the_largest_error_of_all_legs_is_named_as_one():
+def test_largest_errors_of_equal_legs_are_named_together():
     index = {f"leg{i}.hinge.RX": np.array([0.3, 0.2, 0.4]) for i in (1, 2, 3)}
     index["leg1.tip.TX"] = np.array([0.1, 0.05, 0.15])
     ranks = dict.fromkeys(list(index)[:3], (1, 3)) | {"leg1.tip.TX": (4, 4)}

@@ -1,4 +1,4 @@
-"""Steps towards the least cost, for sums of errors whose least cost is known."""
+"""Steps towards the least cost, for limits whose least cost is known."""
 
 from types import SimpleNamespace
 
@@ -39,8 +39,8 @@ class Sums:
 CORNERS = Samples(np.array([[1.0, -1, 1], [-1, -1, 1]]), 0)
 
 
-def test_two_limits_that_cross_cost_least_where_both_are_met():
-    """4 t1 + t2 <= 1 and t1 + 2 t2 <= 1 cross at (1/7, 3/7); c/t is least there."""
+def test_least_cost_of_two_crossing_limits_is_at_their_crossing():
+    """4 t1 + t2 <= 1 and t1 + 2 t2 <= 1 cross at (1/7, 3/7), where c/t is least."""
     requirement = Sums([[4.0, 0.5, 0.5], [1.0, 1.0, 1.0]])
     t, _ = least_cost(requirement, CORNERS, np.array([1.0, 1.0]), silent)
     np.testing.assert_allclose(t, [1 / 7, 3 / 7], rtol=5e-3)
@@ -58,8 +58,8 @@ class Signed(Sums):
         return np.sign(sums)[:, None] * self.weights[case]
 
 
-def test_a_worse_corner_that_is_found_on_the_way_is_met_too():
-    """At the first samples 3 t2 is taken from the sum; the worst corner adds it."""
+def test_least_cost_respects_a_worse_corner_found_during_the_steps():
+    """At the first samples 3 t2 reduces the sum; at the worst corner it adds to it."""
     requirement = Signed([[2.0, 3.0, 5.0]])
     t, _ = least_cost(requirement, CORNERS, np.array([1.0, 1.0]), silent)
     assert 2 * t[0] + 8 * t[1] == pytest.approx(1.0, rel=2e-3)
@@ -78,8 +78,8 @@ class Norm(Sums):
 
 
 @pytest.mark.parametrize("weights", [[1.0, 1.0, 1.0], [20.0, 1.0, 0.5]])
-def test_squares_that_add_up_cost_least_by_cube_roots(weights):
-    """Minimise sum c/t with sum (a t)^2 = 1: t ~ (c / a^2)^(1/3), over a bent limit."""
+def test_least_cost_of_a_sum_of_squares_follows_cube_roots(weights):
+    """Minimise sum c/t with sum (a t)^2 = 1: t ~ (c / a^2)^(1/3)."""
     squares = np.array([weights[0] ** 2, weights[1] ** 2 + weights[2] ** 2])
     best = (COSTS / squares) ** (1 / 3)
     best /= np.sqrt(squares @ best**2)

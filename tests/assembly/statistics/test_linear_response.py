@@ -1,4 +1,4 @@
-"""Many draws of the errors at one posture, against one solve at a time."""
+"""Many draws of errors at one posture, against single solutions."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ LOAD, GRAVITY = [1.0, 2.0, 3.0, 30.0, 10.0, -100.0], [1.0, 2.0, -9.81]
     [(0.2, None, None), (1.0, None, None), (10.0, None, None), (4.0, LOAD, None),
      (4.0, LOAD, GRAVITY)],
 )  # fmt: skip
-def test_draws_agree_with_one_solve_at_a_time(name, scale, load, gravity):
+def test_draws_equal_single_solutions(name, scale, load, gravity):
     """Both certify 1e-8 of the energy, so wrenches agree to about its root, 1e-4."""
     robot = load_robot(name)
     posture = place_robot(robot)
@@ -46,8 +46,8 @@ def test_draws_agree_with_one_solve_at_a_time(name, scale, load, gravity):
             assert off <= limit * np.abs(answer.wrenches).max()
 
 
-def test_screws_of_robots_without_clearance_agree(rng):
-    """Without clearances the answer is unique and linear: only rounding is allowed."""
+def test_drawn_screws_without_clearance_equal_single_solutions(rng):
+    """Without clearances the solution is unique and linear: only rounding differs."""
     robot = load_robot("irsbot2")
     robot = replace(
         robot, frames=tuple(replace(f, clearance=None) for f in robot.frames)
@@ -65,8 +65,8 @@ def test_screws_of_robots_without_clearance_agree(rng):
 @pytest.mark.parametrize(
     ("seed", "load"), [*((k, None) for k in range(20)), *((k, LOAD) for k in range(6))]
 )
-def test_random_robots_agree_whatever_their_ranks(seed, load):
-    """Rigid rows, bounded joints and parts that stay open among them."""
+def test_draws_of_random_robots_equal_single_solutions(seed, load):
+    """Among them are rigid rows, limited joints and parts that stay open."""
     robot = random_robot(np.random.default_rng(seed))
     posture = place_robot(robot)
     draws = np.random.default_rng(seed + 100).normal(size=(4, len(robot.frames), 6))
@@ -90,7 +90,7 @@ def test_random_robots_agree_whatever_their_ranks(seed, load):
         assert found.duality_gap()[i] <= allowed
 
 
-def test_errors_of_another_shape_are_refused():
+def test_errors_of_a_wrong_shape_are_refused():
     robot = load_robot("four_bar")
     posture = place_robot(robot)
     with pytest.raises(ValueError, match=r"expected \(k, 8, 6\)"):
@@ -99,8 +99,8 @@ def test_errors_of_another_shape_are_refused():
         prepare_margins(posture).solve(np.full((1, 8, 6), np.nan))
 
 
-def test_a_joint_at_the_end_of_its_motion_carries_its_share_of_the_wrench():
-    """Passive joints with clearance only: the stop's wrench is the solver's."""
+def test_drawn_wrenches_at_motion_limits_equal_single_solutions():
+    """Robots whose passive joints have clearance."""
     seen = 0
     for seed in (1, 4, 16, 24):
         robot = random_robot(np.random.default_rng(seed))

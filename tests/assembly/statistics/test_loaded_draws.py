@@ -1,4 +1,4 @@
-"""Draws of the errors under loads and weight: the same laws, and what follows."""
+"""Draws of errors under loads and weight."""
 
 import json
 from dataclasses import replace
@@ -30,8 +30,8 @@ def cantilever():
     return home_posture(Robot("bar", "tip", frames))
 
 
-def test_a_cantilever_stores_f2_l3_over_6ei_whatever_its_errors():
-    """And its root carries F L: force and moment through the body, stress F L / W."""
+def test_draws_of_a_loaded_cantilever_store_f2_l3_over_6ei():
+    """Its root carries F L; force and moment through the body, stress F L / W."""
     posture, F = cantilever(), 100.0
     sources = tolerance_sources(posture.robot, [1e-3] * 3 + [1e-4] * 3)
     load = (0.0, 0.0, 0.0, 0.0, 0.0, -F)
@@ -46,8 +46,8 @@ def test_a_cantilever_stores_f2_l3_over_6ei_whatever_its_errors():
 
 @pytest.mark.parametrize("play", ["uniform", "contact"])
 @pytest.mark.parametrize("load", [[0, 0, 0, 0, 0, -1], [0, 0, 0, 1, 0, 0]])
-def test_clearance_that_is_left_does_no_work_on_the_load(play, load):
-    """Else the least of energy minus work would have used it."""
+def test_unloaded_clearances_do_no_work_on_the_load(play, load):
+    """Otherwise the least of energy minus work would have used them."""
     robot = load_robot("3rrr")
     one = linear_response(home_posture(robot), load)
     found = one.solve(drawn_errors(robot, 4.0) / 50)
@@ -59,7 +59,7 @@ def test_clearance_that_is_left_does_no_work_on_the_load(play, load):
     assert np.abs(moved @ load).max() < 1e-9 * np.abs(moved).max()
 
 
-def test_a_load_on_a_free_motion_is_refused():
+def test_draws_under_a_load_on_a_free_motion_are_refused():
     frames = (
         Frame("pin", joint="revolute"),
         Frame("tip", "pin", translation=[0.3, 0, 0]),
@@ -71,8 +71,8 @@ def test_a_load_on_a_free_motion_is_refused():
         run_draws(swing, 4)
 
 
-def test_the_command_takes_load_and_gravity(tmp_path):
-    """A hundredfold load exceeds a limit on force that the errors alone do not."""
+def test_statistics_command_applies_load_and_gravity(tmp_path):
+    """A hundredfold load exceeds a limit on force that the smaller load does not."""
     robot = cantilever().robot
     write_robot(robot, tmp_path / "bar.toml")
     (tmp_path / "errors.toml").write_text(
@@ -93,8 +93,8 @@ def test_the_command_takes_load_and_gravity(tmp_path):
 
 
 @pytest.mark.parametrize("load", [None, LOAD])
-def test_errors_drawn_replace_the_robots_own(load):
-    """A robot with errors and one without: the same draws, the same answers."""
+def test_drawn_errors_replace_the_errors_of_the_robot(load):
+    """A robot with errors and one without give the same results for the same draws."""
     robot = load_robot("irsbot2")
     posture, errors = place_robot(robot), drawn_errors(robot, 4.0, 2)
     own = replace(posture, robot=robot.with_errors(0.5 * errors[::-1][0]))
@@ -105,8 +105,8 @@ def test_errors_drawn_replace_the_robots_own(load):
     )
 
 
-def test_loads_and_errors_together_bring_a_joint_to_its_bound():
-    """A pin of L at most against a spring of K: it turns by M / K less the error.
+def test_load_and_error_together_move_a_joint_to_its_limit():
+    """A pin limited to L against a spring K turns by M / K less the error.
 
     Where M = K L, errors of L / 2 either way leave it free, or at its bound.
     """
@@ -130,8 +130,8 @@ def test_loads_and_errors_together_bring_a_joint_to_its_bound():
     assert (found.duality_gap() < 1e-8 * found.energy).all()
 
 
-def test_a_load_that_only_a_bound_resists_holds_the_joint_there_in_every_draw():
-    """A link of stiffness K on a pin with motion L: it turns by L and M / K."""
+def test_load_resisted_only_by_a_limit_holds_every_draw_at_the_limit():
+    """A link of stiffness K on a pin with motion L turns by L and M / K."""
     L, K, M = 1e-3, 2e4, 20.0
     robot = Robot("pin", "end", (
         Frame("pin", joint="revolute", clearance=Clearance(spin=L)),

@@ -1,4 +1,4 @@
-"""Runs of draws: whole, cut, resumed, by threads; and the commands around them."""
+"""Runs of draws: whole, interrupted, resumed, in threads; and their commands."""
 
 import json
 import subprocess
@@ -45,10 +45,8 @@ def experiment():
 
 
 @pytest.mark.parametrize("at", [60, 200])
-def test_a_run_that_was_killed_goes_on_and_ends_in_the_same_bytes(
-    experiment, monkeypatch, tmp_path, at
-):
-    """Killed among its 100 draws, and while importance is computed."""
+def test_killed_run_resumes_to_the_same_file(experiment, monkeypatch, tmp_path, at):
+    """Killed among its 100 draws, and during the importance."""
     monkeypatch.setattr(monte_carlo, "BLOCK", 64)
     groups = ImportanceOptions(16, "kind")
     path, whole = tmp_path / "draws.nc", tmp_path / "whole.nc"
@@ -70,8 +68,8 @@ def test_a_run_that_was_killed_goes_on_and_ends_in_the_same_bytes(
 
 
 @pytest.mark.slow
-def test_a_command_killed_again_and_again_ends_in_the_same_bytes(tmp_path):
-    """SIGKILL at growing times; what was computed is never computed again."""
+def test_repeatedly_killed_command_resumes_to_the_same_file(tmp_path):
+    """SIGKILL at growing times; finished results are never computed again."""
     limits = "margin_free = 2.0\ntranslation = 8e-4"
     plan = "yield = 0.9\ndraws = 200\n" + PLAN.replace("margin_free = 1.0", limits)
     (tmp_path / "plan.toml").write_text(plan)
@@ -98,7 +96,9 @@ def test_a_command_killed_again_and_again_ends_in_the_same_bytes(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_commands_from_files_to_figures(run, tmp_path, monkeypatch):
+def test_statistics_and_tolerances_commands_write_results_and_figures(
+    run, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "errors.toml").write_text(ERRORS)
     (tmp_path / "plan.toml").write_text(PLAN)
@@ -158,7 +158,7 @@ def test_the_commands_from_files_to_figures(run, tmp_path, monkeypatch):
         (["--errors", "errors.toml", "-o", "no/d.nc"], "no folder"),
     ],
 )  # fmt: skip
-def test_bad_input_is_one_line_and_exit_2(
+def test_invalid_statistics_options_are_refused_in_one_line(
     run, arguments, message, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
@@ -170,7 +170,7 @@ def test_bad_input_is_one_line_and_exit_2(
     assert [p.name for p in tmp_path.iterdir()] == ["errors.toml"]
 
 
-def test_a_robot_without_errors_has_none_to_judge(run):
+def test_tolerances_of_a_robot_without_errors_are_refused(run):
     status, _, err = run("assembly", "tolerances", "four_bar", "--grid", "tx=0.2")
     assert status == 2
     assert "no errors to judge" in err

@@ -1,4 +1,4 @@
-"""Blocks of a run, what identifies it, its data set: an arm that follows its errors."""
+"""Blocks of a run, its identity and its data set: an arm that follows its errors."""
 
 from contextlib import ExitStack
 from dataclasses import replace
@@ -26,8 +26,8 @@ def arm():
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_blocks_of_a_run_change_no_number(arm, monkeypatch, workers):
-    """21 draws and the 20 rows of a design, whole and in blocks of 4."""
+def test_block_size_and_workers_do_not_change_the_draws(arm, monkeypatch, workers):
+    """21 draws and the 20 rows of a design, in one block and in blocks of 4."""
     asked = ImportanceOptions(4, "source", 0.5)
     whole = run_draws(arm, 21, importance=asked)
     monkeypatch.setattr(monte_carlo, "BLOCK", 4)
@@ -41,7 +41,7 @@ def test_blocks_of_a_run_change_no_number(arm, monkeypatch, workers):
 
 
 @pytest.mark.parametrize("held", [None, ExitStack()])
-def test_a_journal_that_is_held_stays_until_it_is_let_go(arm, tmp_path, held):
+def test_held_journal_is_kept_until_it_is_closed(arm, tmp_path, held):
     path = tmp_path / "draws.nc"
     run_draws(arm, 3, path, held=held)
     assert path.exists()
@@ -51,8 +51,8 @@ def test_a_journal_that_is_held_stays_until_it_is_let_go(arm, tmp_path, held):
         assert not journal_path(path).exists()
 
 
-def test_a_killed_run_goes_on_at_another_confidence_of_its_importance(arm, tmp_path):
-    """The same rows are solved; with more of them it is another run."""
+def test_killed_run_resumes_with_another_confidence_level(arm, tmp_path):
+    """The same rows are solved; a different number of rows is refused."""
 
     def kill(done, total):
         if done:
@@ -71,8 +71,8 @@ def test_a_killed_run_goes_on_at_another_confidence_of_its_importance(arm, tmp_p
     assert seen == [(3, 23), (23, 23)]
 
 
-def test_a_data_set_of_draws_says_what_was_solved(arm):
-    """Units, meanings by clearance model, and everything that its numbers depend on."""
+def test_data_set_of_draws_records_units_meanings_and_inputs(arm):
+    """Long names depend on the clearance model; attributes hold every input."""
     asked = replace(
         arm, clearance="worst", margins=True, seed=9, precision=(1e-6, np.inf)
     )
@@ -111,8 +111,8 @@ def test_a_data_set_of_draws_says_what_was_solved(arm):
         {"precision": (1e-6, 1e-5)}, {"stiffness": "contact"},
     ],
 )  # fmt: skip
-def test_runs_that_give_other_numbers_share_no_journal(arm, change):
-    """What differs is found in what identifies a run; the same run is the same."""
+def test_runs_with_different_options_have_different_provenance(arm, change):
+    """Only the changed option differs; equal runs have equal provenance."""
     before, after = provenance(arm), provenance(replace(arm, **change))
     assert before == provenance(replace(arm))
     (name,) = change
@@ -121,7 +121,7 @@ def test_runs_that_give_other_numbers_share_no_journal(arm, change):
     } == {name}
 
 
-def test_runs_of_other_distributions_or_postures_share_no_journal(arm):
+def test_runs_with_different_errors_or_postures_have_different_hashes(arm):
     sources = arm.sources
     turned = place_robot(arm.posture.robot, {"rz": 0.1})
     others = [replace(arm, posture=turned)]

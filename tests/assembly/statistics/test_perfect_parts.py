@@ -1,4 +1,4 @@
-"""Perfect parts: clearances by hand, and limits that no tolerance of errors mends."""
+"""Perfect parts: clearances by hand, and limits exceeded by clearances alone."""
 
 import json
 
@@ -28,8 +28,8 @@ def experiment(robot, **options):
     return Experiment(home_posture(robot), sources, margins=False, **options)
 
 
-def test_the_parts_of_two_clearances_add_up_to_the_largest_error():
-    """The disc r is across the shift L t: hypot(r, L t), of parts r^2 and (L t)^2."""
+def test_clearance_shares_of_a_pin_sum_to_the_largest_error():
+    """The disc r is perpendicular to L t: hypot(r, L t), shares r^2 and (L t)^2."""
     parts = perfect_parts(experiment(arm(radial=RADIAL, tilt=TILT)))
     largest = np.hypot(RADIAL, ARM * TILT)
     translation = parts["translation"]
@@ -42,8 +42,8 @@ def test_the_parts_of_two_clearances_add_up_to_the_largest_error():
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "delta", "hexapod"])
-def test_the_parts_of_all_clearances_are_the_largest_error_of_a_loop_too(name):
-    """Euler's sum for a homogeneous function, whatever the closures are."""
+def test_clearance_shares_of_a_closed_loop_sum_to_the_largest_error(name):
+    """Euler's sum for a homogeneous function, for any closures."""
     robot = load_robot(name)
     pose = {"tx": 0.1, "tz": -0.5} if name == "irsbot2" else None
     posture = place_robot(robot, pose=pose) if pose else home_posture(robot)
@@ -54,7 +54,7 @@ def test_the_parts_of_all_clearances_are_the_largest_error_of_a_loop_too(name):
         assert total == pytest.approx(parts[key]["reached"], rel=5e-3)
 
 
-def test_limits_that_perfect_parts_meet_are_not_broken():
+def test_only_limits_below_the_clearances_are_reported_as_broken():
     parts = perfect_parts(experiment(arm(radial=RADIAL, tilt=TILT)))
     largest = np.hypot(RADIAL, ARM * TILT)
     assert not limits_broken(parts, {"translation": 1.01 * largest, "energy": 1.0})
@@ -63,8 +63,8 @@ def test_limits_that_perfect_parts_meet_are_not_broken():
     assert broken["translation"]["limit"] == 0.9 * largest
 
 
-def test_a_load_is_part_of_what_perfect_parts_reach():
-    """5 N along y press the pin to its rim: its radius, by the force of 5 N."""
+def test_perfect_parts_include_the_displacement_by_the_load():
+    """5 N along y press the pin to its rim: its radius, and a force of 5 N."""
     parts = perfect_parts(experiment(arm(radial=RADIAL), load=(0, 0, 0, 0, 5.0, 0)))
     assert parts["translation"]["reached"] == pytest.approx(RADIAL, rel=1e-6)
     assert parts["force"]["reached"] == pytest.approx(5.0)
@@ -72,7 +72,7 @@ def test_a_load_is_part_of_what_perfect_parts_reach():
 
 
 @pytest.mark.parametrize("limit", [5e-4, 2e-3])
-def test_the_advice_is_the_clearances_where_these_alone_break_the_limit(
+def test_advice_names_the_clearances_if_they_alone_exceed_the_limit(
     tmp_path, run, limit
 ):
     """Clearances alone move the tip by 0.806 mm; the errors are of 1 um."""
@@ -92,8 +92,8 @@ def test_the_advice_is_the_clearances_where_these_alone_break_the_limit(
     assert "perfect parts, clearances alone: rotation of 0.002 rad (pin.tilt" in text
 
 
-def test_equal_legs_are_named_together_on_the_page(tmp_path, run):
-    """Three equal errors by symmetry: no leg governs the result, all do."""
+def test_report_names_equal_legs_together(tmp_path, run):
+    """Three equal errors by symmetry: all legs govern the result."""
     (tmp_path / "errors.toml").write_text(
         ERRORS.replace("tip", "elbow").replace(
             "0, 0, 0, 1e-6, 1e-6, 1e-6", "0, 1e-3, 0, 0, 0, 0"
@@ -113,8 +113,8 @@ def test_equal_legs_are_named_together_on_the_page(tmp_path, run):
     assert answer == "elbow.RY of all legs"
 
 
-def test_a_platform_that_moves_freely_has_no_bound(tmp_path, run):
-    """A passive hinge without a bound of its motion, and an arm across its axis."""
+def test_free_platform_is_reported_without_a_bound(tmp_path, run):
+    """A passive hinge without a motion limit, and an arm across its axis."""
     write_robot(arm(passive=True, radial=RADIAL), tmp_path / "arm.toml")
     (tmp_path / "errors.toml").write_text(ERRORS)
     status, text, err = run(
@@ -126,7 +126,7 @@ def test_a_platform_that_moves_freely_has_no_bound(tmp_path, run):
     assert "perfect parts reach a translation without bound, limit 0.001 m" in text
 
 
-def test_the_bounded_motion_of_a_joint_has_its_part_too():
+def test_limited_motion_of_a_passive_joint_has_its_own_share():
     """A hinge within 1e-3 rad on the arm: 0.4 mm of it, and 0.1 mm of the radius."""
     parts = perfect_parts(experiment(arm(passive=True, radial=RADIAL, spin=1e-3)))
     by_kind = parts["translation"]["clearances"]

@@ -1,4 +1,4 @@
-"""Margins of many draws of the errors at one posture: laws, and one solve at a time."""
+"""Margins of many draws at one posture: properties, and single solutions."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ ROBOTS = ["irsbot2", "five_bar", "3rrr", "orthoglide", "hexapod"]
 
 @pytest.mark.parametrize("name", ROBOTS)
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
-def test_margins_agree_with_one_solve_at_a_time(name, compliant):
+def test_margins_of_draws_equal_single_solutions(name, compliant):
     robot = load_robot(name)
     posture = place_robot(robot)
     errors = drawn_errors(robot)
@@ -29,7 +29,7 @@ def test_margins_agree_with_one_solve_at_a_time(name, compliant):
 
 
 def test_margins_are_proportional_to_the_errors_and_convex():
-    """Euler: slope . errors is the margin; a mean of draws has no larger margin."""
+    """Euler: slope . errors is the margin; the margin of a mean is at most the mean."""
     robot = load_robot("irsbot2")
     errors = drawn_errors(robot, count=40)
     ready = prepare_margins(place_robot(robot), "free")
@@ -44,7 +44,7 @@ def test_margins_are_proportional_to_the_errors_and_convex():
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_margins_of_random_robots_agree(seed):
+def test_margins_of_draws_of_random_robots_equal_single_solutions(seed):
     robot = random_robot(np.random.default_rng(seed))
     posture = place_robot(robot)
     draws = np.random.default_rng(seed + 100).normal(size=(3, len(robot.frames), 6))
@@ -57,8 +57,8 @@ def test_margins_of_random_robots_agree(seed):
             assert found.margin[i] == pytest.approx(zone.margin, rel=1e-6)
 
 
-def test_errors_that_nothing_closes_have_no_margin_and_ask_no_other_solver():
-    """A planar four-bar whose coupler is out of the plane, by any amount that shows."""
+def test_errors_that_cannot_be_closed_have_infinite_compiled_margins():
+    """A planar four-bar whose coupler is out of the plane by more than rounding."""
     robot = load_robot("four_bar")
     tight = tuple(replace(f, clearance=None) for f in robot.frames)
     robot = replace(robot, frames=tight)

@@ -1,4 +1,4 @@
-"""The errors that a robot has, at several postures: bars in a row with clearance."""
+"""The errors that a robot has, at several postures: bars in series with clearance."""
 
 from dataclasses import replace
 
@@ -35,8 +35,8 @@ def bars(play, errors):
 ERRORS = {"one": 3 * PLAY, "two": -1 * PLAY, "mount": 0.5 * PLAY}
 
 
-def test_the_tightest_posture_tells_how_much_each_error_takes_of_its_clearance():
-    """A gap of 3 + 1 - 0.5 clearances; at the other posture they are four times wider.
+def test_present_errors_rank_the_shares_of_the_largest_margin():
+    """A gap of 3 + 1 - 0.5 clearances; the other posture has four times the clearance.
 
     The errors that open the gap have 3 / 3.5 and 1 / 3.5 of it, the other less than
     none; the springs are pressed by 2.5 clearances.
@@ -63,7 +63,7 @@ def test_the_tightest_posture_tells_how_much_each_error_takes_of_its_clearance()
     np.testing.assert_allclose(energy_slopes, signs * K * 2.5 * PLAY / 2, rtol=1e-6)
 
 
-def test_the_lines_tell_the_five_largest_errors_and_where():
+def test_present_errors_text_states_the_five_largest_errors_and_the_posture():
     slopes = [
         {"error": f"e{k}", "value": 1e-4 * (k + 1), "share_of_margin": 0.5 / (k + 1)}
         for k in range(7)
@@ -85,8 +85,8 @@ def test_the_lines_tell_the_five_largest_errors_and_where():
     assert home.endswith("largest margin 1.235 at the origin")
 
 
-def test_errors_within_clearance_store_no_energy_and_rigid_parts_have_none():
-    """Rigid parts too far apart have a margin and no energy."""
+def test_present_errors_within_clearance_have_zero_energy_and_rigid_parts_nan():
+    """Rigid parts too far apart have a margin and an energy of NaN."""
     within = present_errors([bars(PLAY, {"one": 0.5 * PLAY})], "rigid")
     assert within["energy_there"] == pytest.approx(0.0, abs=1e-12)
     assert within["assemblable_share"] == 1.0
@@ -102,7 +102,7 @@ def test_errors_within_clearance_store_no_energy_and_rigid_parts_have_none():
     assert np.isnan(found["slopes"][0]["energy_slope"])
 
 
-def test_a_grid_has_the_postures_that_are_reached():
+def test_grid_of_postures_contains_only_reached_ones():
     robot = load_robot("irsbot2")
     postures, _ = grid_postures(robot, "tx=-0.1:0.1:0.1,tz=-9.5:-0.5:9")
     places = [(p.pose()["tx"], p.pose()["tz"]) for p in postures]
@@ -111,7 +111,7 @@ def test_a_grid_has_the_postures_that_are_reached():
         grid_postures(robot, "tx=0,tz=-9")
 
 
-def test_allocations_share_results_only_where_everything_is_the_same():
+def test_allocation_identity_changes_with_every_input():
     robot = load_robot("irsbot2")
     postures = [place_robot(robot, {"tx": x, "tz": -0.5}) for x in (0.0, 0.1)]
     links = [("leg1.link_a", 3), ("leg2.link_a", 3)]
@@ -133,8 +133,8 @@ def test_allocations_share_results_only_where_everything_is_the_same():
     assert len(told) == len(others) + 1
 
 
-def test_postures_that_may_not_be_used_are_left_out_and_counted():
-    """Above the centre of a 3-UPU the locked platform turns; beside it, it does not."""
+def test_singular_postures_of_a_grid_are_left_out_and_counted():
+    """Above the centre of a 3-UPU the locked platform turns; elsewhere it does not."""
     postures, left_out = grid_postures(
         three_upu(seed=1), "tx=-0.02:0.02:0.02,ty=0,tz=0.45"
     )

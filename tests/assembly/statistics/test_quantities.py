@@ -1,4 +1,4 @@
-"""Limits as they are written on the command line."""
+"""Limits as written on the command line."""
 
 import pytest
 
@@ -7,21 +7,21 @@ from forcefit.inputs.table import BadInput
 
 
 @pytest.mark.parametrize("name", limit_names())
-def test_a_limit_is_a_quantity_and_a_number_with_spaces_or_without(name):
+def test_limit_is_read_with_and_without_spaces(name):
     assert parse_limit(f"{name}=2.5e-4") == (name, 2.5e-4)
     assert parse_limit(f" {name} = 3 ") == (name, 3.0)
     assert UNITS[name]
 
 
 @pytest.mark.parametrize("number", ["0", "-1e-9", "inf", "nan", "", "2 J", "1=2"])
-def test_a_limit_that_is_no_number_above_zero_is_quoted(number):
+def test_limit_that_is_no_positive_number_is_refused_with_its_text(number):
     with pytest.raises(BadInput) as error:
         parse_limit(f"force={number}")
     expected = f'--limit force: found "{number}", expected a number > 0'
     assert str(error.value) == expected
 
 
-def test_unknown_quantities_are_quoted_with_the_nearest():
+def test_unknown_quantity_is_refused_with_the_nearest_name():
     with pytest.raises(BadInput, match='unknown quantity "enrgy".*energy'):
         parse_limit("enrgy=2")
     for name in ("translation_lower", "duality_gap", "platform_screw", ""):
@@ -29,7 +29,7 @@ def test_unknown_quantities_are_quoted_with_the_nearest():
             parse_limit(f"{name}=1")
 
 
-def test_long_words_are_cut():
+def test_long_words_are_shortened_in_messages():
     for text in ("x" * 99, "force=" + "9x" * 99):
         with pytest.raises(BadInput) as error:
             parse_limit(text)

@@ -1,4 +1,4 @@
-"""Ranks by intervals, and names of what intervals do not tell apart."""
+"""Ranks by intervals, and names of errors that intervals do not distinguish."""
 
 from assembly.statistics.ranking import (
     kind_of,
@@ -13,8 +13,8 @@ def shares(**intervals):
     return {name: ((a + b) / 2, a, b) for name, (a, b) in intervals.items()}
 
 
-def test_overlapping_intervals_share_their_ranks():
-    """a and b overlap, b and c do, a and c do not; d is surely the last."""
+def test_overlapping_intervals_share_ranks():
+    """a and b overlap, b and c overlap, a and c do not; d is certainly last."""
     ranks = possible_ranks(
         shares(a=(0.5, 0.7), b=(0.4, 0.6), c=(0.3, 0.45), d=(0.0, 0.1))
     )
@@ -31,7 +31,7 @@ def test_unknown_shares_have_no_rank():
     assert possible_ranks({}) == {}
 
 
-def test_legs_that_are_not_distinguished_are_named_as_all_legs():
+def test_undistinguished_legs_are_named_as_all_legs():
     every = [f"leg{i}.hinge.{c}" for i in (1, 2, 3) for c in ("RX", "RY")]
     some = ["leg3.hinge.RX", "leg1.hinge.RX", "leg2.hinge.RX"]
     assert named_together(some, every) == ["hinge.RX of all legs"]

@@ -1,4 +1,4 @@
-"""Results that a killed computation left behind."""
+"""Stored results of a killed computation."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def run(path, values, computed, stop=None, whose="mine"):
 
 
 @pytest.mark.parametrize("changed", [None, 1])
-def test_results_before_a_kill_are_read_for_equal_arguments(changed, tmp_path):
+def test_stored_results_are_reused_for_equal_arguments_only(changed, tmp_path):
     path, values = tmp_path / "out.nc", [3.0, 4.0, 5.0]
     first, second = [], []
     with pytest.raises(Killed):
@@ -44,7 +44,7 @@ def test_results_before_a_kill_are_read_for_equal_arguments(changed, tmp_path):
     assert not journal_path(path).exists()
 
 
-def test_without_a_file_everything_is_computed():
+def test_results_without_a_file_are_computed_every_time():
     computed = []
     assert len(run(None, [1.0, 1.0], computed)) == 2
     assert computed == [1.0, 1.0]

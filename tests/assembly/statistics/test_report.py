@@ -1,4 +1,4 @@
-"""Pages of draws and tolerances: their numbers are those of the JSON."""
+"""Reports of draws and tolerances: their numbers equal those of the JSON."""
 
 import json
 from pathlib import Path
@@ -38,7 +38,7 @@ def shown(path):
     return seen, rows
 
 
-def test_the_page_of_draws_is_their_summary(tmp_path, run):
+def test_draws_report_shows_the_numbers_of_the_summary(tmp_path, run):
     page, written = tmp_path / "s.html", tmp_path / "s.json"
     status, _, err = run(
         "assembly", "statistics", "hexapod", "--errors", ERRORS, "--draws", 100,
@@ -70,7 +70,7 @@ def test_the_page_of_draws_is_their_summary(tmp_path, run):
     assert str(ERRORS.name) in " ".join(rows)  # with its digest
 
 
-def test_the_page_of_tolerances_is_their_json(tmp_path, run):
+def test_tolerance_report_shows_the_numbers_of_the_json(tmp_path, run):
     (tmp_path / "plan.toml").write_text(PLAN)
     page, written = tmp_path / "t.html", tmp_path / "t.json"
     status, _, err = run(
@@ -89,7 +89,7 @@ def test_the_page_of_tolerances_is_their_json(tmp_path, run):
     assert [c.value for c in cells] == [1.0, worst["found"], worst["proven"]]
 
 
-def test_the_page_of_the_errors_there_are_ranks_them(tmp_path, run):
+def test_tolerance_report_ranks_the_declared_errors(tmp_path, run):
     write_robot(irsbot2_with(NUMBERS["cases"][0]), tmp_path / "robot.toml")
     page, written = tmp_path / "t.html", tmp_path / "t.json"
     status, _, err = run(
@@ -105,9 +105,7 @@ def test_the_page_of_the_errors_there_are_ranks_them(tmp_path, run):
 
 
 @pytest.mark.parametrize("command", ["statistics", "tolerances"])
-def test_a_page_that_cannot_be_written_is_refused_before_the_work(
-    tmp_path, run, command
-):
+def test_report_with_a_wrong_ending_is_refused_before_solving(tmp_path, run, command):
     status, printed, err = run(
         "assembly", command, "hexapod", "--errors" if command == "statistics" else
         "--grid", ERRORS, "--report", tmp_path / "x.txt",
@@ -116,8 +114,8 @@ def test_a_page_that_cannot_be_written_is_refused_before_the_work(
     assert 'found the ending ".txt", expected an HTML page' in err
 
 
-def test_the_robot_of_the_page_is_a_draw_solved_alone():
-    """Its platform is where its own assembly, outside the experiment, puts it."""
+def test_report_robot_has_the_platform_displacement_of_its_draw():
+    """The draw nearest to the 95 % quantile, solved as a single assembly."""
     posture = place_robot(load_robot("hexapod"))
     experiment = Experiment(
         posture, read_sources(ERRORS, posture.robot), seed=3, clearance="least"
@@ -132,7 +130,7 @@ def test_the_robot_of_the_page_is_a_draw_solved_alone():
     assert moved == pytest.approx(data["platform_screw"].values[draw, 3:], rel=1e-6)
 
 
-def test_margins_over_a_grid_are_a_map_and_the_largest_a_robot():
+def test_report_maps_margins_over_a_grid_and_shows_the_tightest_robot():
     robot = irsbot2_with(NUMBERS["cases"][0])
     postures, _ = grid_postures(robot, "tx=-0.1:0.1:0.1,tz=-0.5:-0.4:0.1")
     present = present_errors(postures)
@@ -149,7 +147,7 @@ def test_margins_over_a_grid_are_a_map_and_the_largest_a_robot():
     assert {one["name"] for one in scene["bodies"]} == {f.name for f in robot.frames}
 
 
-def test_a_line_of_postures_is_a_curve_and_one_posture_no_map():
+def test_report_shows_a_curve_for_a_line_and_no_map_for_one_posture():
     robot = irsbot2_with(NUMBERS["cases"][0])
     for grid, figures in (("tx=-0.1:0.1:0.1,tz=-0.5", 1), ("tx=0,tz=-0.5", 0)):
         postures, _ = grid_postures(robot, grid)

@@ -14,8 +14,8 @@ from tests.tolerances_for_tests import PLAY, arm, plan_for, rigid_pair
 ENDS = [("one", 3), ("two", 3)]
 
 
-def test_draws_that_do_not_close_exceed_every_limit():
-    """Rigid parts without clearance: only equal errors of both fit."""
+def test_draws_that_cannot_be_assembled_exceed_every_limit():
+    """Rigid parts without clearance fit only with equal errors."""
     robot = rigid_pair()
     plan = plan_for(robot, ENDS, [1, 1], {"energy": 1.0, "force": 1.0})
     requirement = Requirement([home_posture(robot)], plan)
@@ -23,8 +23,8 @@ def test_draws_that_do_not_close_exceed_every_limit():
         np.testing.assert_array_equal(np.isinf(found), [[False, True]] * 2)
 
 
-def test_draws_of_random_clearance_are_the_same_in_one_batch_and_in_several():
-    """The clearance of draw 515 is its own, whatever is solved with it."""
+def test_random_clearances_do_not_depend_on_the_batch():
+    """Draw 515 has the same clearance in any batch."""
     posture = home_posture(arm(radial=PLAY))
     plan = plan_for(posture.robot, [("tip", 3)], [1], {"translation": 1e-3},
                     clearance="contact")  # fmt: skip
@@ -38,7 +38,7 @@ def test_draws_of_random_clearance_are_the_same_in_one_batch_and_in_several():
     assert np.ptp(found[0, -8:] - np.abs(values[-8:, 0]) / 1e-3) > 0.01
 
 
-def test_a_limit_that_no_result_meets_is_refused_before_the_work():
+def test_limit_without_a_computed_quantity_is_refused_before_solving():
     posture = home_posture(coaxial_beams(np.zeros(6)))
     plan = plan_for(posture.robot, ENDS, [1, 1], {"margin": 1.0, "stress": 1e6})
     with pytest.raises(BadInput, match="limit stress: no link of beams has a shape"):
@@ -54,10 +54,10 @@ def test_a_limit_that_no_result_meets_is_refused_before_the_work():
         ({"energy": 1.0}, True, False),
     ],
 )
-def test_a_limit_within_the_clearance_of_perfect_parts_is_refused(
+def test_limit_within_the_clearances_of_perfect_parts_is_refused(
     limits, worst_play, refused
 ):
-    """Of two postures that of more clearance is named; only where all of it counts."""
+    """The posture with more clearance is named; only for the worst clearance."""
     postures = [home_posture(arm(radial=0.5 * PLAY)), home_posture(arm(radial=PLAY))]
     plan = plan_for(postures[0].robot, [("tip", 3)], [1], limits,
                     clearance="worst" if worst_play else "least")  # fmt: skip
@@ -84,8 +84,10 @@ def test_a_limit_within_the_clearance_of_perfect_parts_is_refused(
         ("energy", [("two", 4)], "two.TY"),
     ],
 )
-def test_an_error_that_nothing_takes_up_is_named(limit, places, named):
-    """Play in x and y takes up no error along z, and stores no energy.
+def test_error_that_no_clearance_or_spring_takes_up_is_refused_by_name(
+    limit, places, named
+):
+    """Clearance in x and y takes up no error along z, and stores no energy.
 
     Nor an error along x of a frame turned by 1e-3 rad about y, of which 1e-3 is in z.
     """

@@ -31,8 +31,8 @@ def stiff():
 
 @pytest.mark.parametrize("key", QUANTITIES)
 @pytest.mark.parametrize("play", ["least", "worst"])
-def test_without_clearances_errors_times_slopes_are_the_quantity(stiff, key, play):
-    """Euler: all are homogeneous, the energy of degree two, and all others of one."""
+def test_slopes_without_clearance_satisfy_eulers_theorem(stiff, key, play):
+    """The energy is homogeneous of degree two, all other quantities of degree one."""
     prepared, sources, values = stiff
     size, slopes = respond(prepared, sources, values, key, play)
     assert (size > 0).all()
@@ -51,7 +51,7 @@ def tip():
     return home_posture(robot), sources
 
 
-def test_the_largest_error_of_an_arm_has_the_slopes_of_its_closed_form():
+def test_slopes_of_the_largest_error_of_an_arm_equal_its_closed_form():
     """R = hypot(e_xy + p, e_z): dR/dx = (e_xy + p) x / (e_xy R), dR/dz = z / R."""
     posture, sources = tip()
     values = sources.draw(0, 20, seed=1)
@@ -78,8 +78,8 @@ def test_the_largest_error_of_an_arm_has_the_slopes_of_its_closed_form():
 
 @pytest.mark.parametrize("play", ["least", "contact", "uniform"])
 @pytest.mark.parametrize("key", ["rotation", "translation"])
-def test_random_clearance_of_a_response_is_that_of_the_first_experiment(play, key):
-    """Draw by draw; the slopes are the direction of the platform's error."""
+def test_response_has_the_random_clearances_of_the_experiment(play, key):
+    """For each draw; the slopes are the direction of the platform's error."""
     posture, sources = tip()
     values = sources.draw(0, 12, seed=1)
     rows = Experiment(posture, sources, seed=1, clearance=play, margins=False).evaluate(
@@ -93,8 +93,8 @@ def test_random_clearance_of_a_response_is_that_of_the_first_experiment(play, ke
     assert not np.delete(slopes, np.r_[kept], axis=1).any()
 
 
-def test_draws_without_an_answer_have_neither_a_quantity_nor_slopes():
-    """Two rigid parts, which fit where their errors are equal."""
+def test_draws_without_a_solution_have_nan_quantities_and_slopes():
+    """Two rigid parts fit only if their errors are equal."""
     link = MatrixLink(np.eye(6) * STIFFNESS)
     frames = (
         Frame("one", translation=[0.5, 0, 0]),
@@ -118,8 +118,8 @@ def test_draws_without_an_answer_have_neither_a_quantity_nor_slopes():
 
 
 @pytest.mark.parametrize("component", [3, 4])
-def test_a_platform_beyond_a_pin_follows_the_part_that_it_is_closed_with(component):
-    """Rigid parts: the pin's clearance takes up what the errors of its own side do."""
+def test_platform_beyond_a_pin_follows_the_part_closed_with_it(component):
+    """Rigid parts: the pin's clearance takes up the errors of the part below it."""
     robot = rigid_pair(radial=PLAY)
     widths = np.zeros(6)
     widths[component] = PLAY

@@ -1,4 +1,4 @@
-"""Uniform scaling against utilisations of which the answer is known."""
+"""Uniform scaling of tolerances against utilisations with a known solution."""
 
 from types import SimpleNamespace
 
@@ -30,7 +30,7 @@ ONE = Samples(np.ones((1, 1)), 0)
 
 @pytest.mark.parametrize("power", [0.4, 1.0, 2.0, 8.0])
 @pytest.mark.parametrize("start", [0.2, 1.0, 5.0])
-def test_a_power_law_is_met(power, start):
+def test_scaling_of_a_power_law_meets_its_limit(power, start):
     """(t / 3)^power is 1 at 3."""
     known = Known(lambda size: (size / 3.0) ** power)
     (found,) = scale_uniformly(known, ONE, np.array([start]))
@@ -40,24 +40,24 @@ def test_a_power_law_is_met(power, start):
 @pytest.mark.parametrize("start", [1e-6, 1.0, 1e6])
 @pytest.mark.parametrize("within", [0.0, 0.5])
 @pytest.mark.parametrize("beyond", [2.0, np.inf])
-def test_a_jump_is_approached_from_within(start, within, beyond):
-    """Nothing is between: the largest factor that fits, to the precision asked for."""
+def test_scaling_approaches_a_jump_from_the_admissible_side(start, within, beyond):
+    """The largest admissible factor, to the requested precision."""
     known = Known(lambda size: np.where(size <= 3.0, within, beyond))
     for precision in (1e-2, 1e-4):
         (found,) = scale_uniformly(known, ONE, np.array([start]), precision)
         assert 3.0 * (1 - precision) <= found <= 3.0
 
 
-def test_a_steep_law_with_an_end_is_met():
-    """Energy beyond a clearance of 1: (t - 1)^2 = 4 at 3, nothing at all below 1."""
+def test_scaling_meets_a_limit_that_is_zero_below_a_threshold():
+    """Energy beyond a clearance of 1: (t - 1)^2 = 4 at 3, zero below 1."""
     for start in (1e-3, 0.5, 1.5, 40.0):
         known = Known(lambda size: np.maximum(size - 1.0, 0.0) ** 2 / 4)
         (found,) = scale_uniformly(known, ONE, np.array([start]))
         assert found == pytest.approx(3.0, rel=1e-4)
 
 
-def test_proportions_are_kept_between_the_bounds_of_the_plan():
-    """Samples (1, 1) of tolerances 1 to 4: those at their loosest stay there."""
+def test_scaling_keeps_proportions_within_the_bounds_of_the_plan():
+    """Samples (1, 1) of tolerances 1 to 4; tolerances at their loosest stay there."""
     known = Known(lambda size: size / 6.0, least=0.5, most=8.0, tolerances=3)
     found = scale_uniformly(known, Samples(np.ones((1, 3)), 0), np.array([1.0, 2, 4]))
     np.testing.assert_allclose(found, [1.5, 3.0, 6.0], rtol=1e-4)
@@ -69,8 +69,8 @@ def test_proportions_are_kept_between_the_bounds_of_the_plan():
 
 
 @pytest.mark.parametrize("allowed", [0, 1, 300])
-def test_all_samples_fit_but_those_that_may_fail(allowed):
-    """Sizes 1 to 1000 of a limit 6: the largest that must fit is 1000 less those."""
+def test_scaling_lets_at_most_the_allowed_samples_fail(allowed):
+    """Sizes 1 to 1000 and a limit 6: the largest that must fit is 1000 - allowed."""
     values = np.random.default_rng(1).permutation(np.arange(1.0, 1001.0))[:, None]
     known = Known(lambda size: size / 6.0)
     (found,) = scale_uniformly(known, Samples(values, allowed), np.ones(1))
@@ -78,8 +78,8 @@ def test_all_samples_fit_but_those_that_may_fail(allowed):
 
 
 @pytest.mark.parametrize("least", [0.0, 0.7])
-def test_limits_met_at_no_scale_are_refused(least):
-    """Perfect parts that use twice a limit; or those as tight as they may be."""
+def test_limits_that_no_scale_meets_are_refused(least):
+    """Perfect parts exceed the limit twofold, or the tightest tolerances do."""
     constant = Known(lambda size: 2.0 + 0 * size, least)
     beyond = Known(lambda size: 2.0 + size, least)
     for known in (constant, beyond):
@@ -88,7 +88,7 @@ def test_limits_met_at_no_scale_are_refused(least):
 
 
 @pytest.mark.parametrize(("draws", "allowed"), [(59, 0), (92, 0), (93, 1), (124, 2)])
-def test_failures_that_still_show_a_yield_are_wilks_numbers(draws, allowed):
+def test_allowed_failures_for_a_yield_equal_wilks_numbers(draws, allowed):
     """Wilks (1942): 59, 93, 124 draws show 95 % at 95 % with 0, 1, 2 failures."""
     plan = SimpleNamespace(
         asked_yield=0.95, draws=draws, draws_of=lambda stream, count: (stream, count)
@@ -98,7 +98,7 @@ def test_failures_that_still_show_a_yield_are_wilks_numbers(draws, allowed):
     assert samples.values == (7, draws)
 
 
-def test_draws_too_few_to_show_a_yield_are_refused():
+def test_too_few_draws_for_a_yield_are_refused():
     plan = SimpleNamespace(asked_yield=0.95, draws=29, draws_of=lambda *_: np.zeros(1))
     requirement = SimpleNamespace(plan=plan)
     with pytest.raises(BadInput) as error:

@@ -30,8 +30,8 @@ def some_errors(robot, rng):
 
 
 @pytest.mark.parametrize("pose", POSES)
-def test_energy_slopes_of_the_papers_robot(pose, rng):
-    """Every delta l by itself; central differences of 1e-4 of the errors' size."""
+def test_energy_slopes_of_the_paper_robot_equal_central_differences(pose, rng):
+    """For every component of every error; steps of 1e-3 of the errors' size."""
     robot = load_robot("irsbot2")
     posture = place_robot(robot, pose=pose)
     errors = some_errors(robot, rng)
@@ -52,7 +52,9 @@ def test_energy_slopes_of_the_papers_robot(pose, rng):
 
 @pytest.mark.parametrize("pose", POSES)
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
-def test_margin_slopes_of_the_papers_robot(pose, compliant, rng):
+def test_margin_slopes_of_the_paper_robot_equal_central_differences(
+    pose, compliant, rng
+):
     robot = load_robot("irsbot2")
     posture = place_robot(robot, pose=pose)
     errors = some_errors(robot, rng)
@@ -69,7 +71,7 @@ def test_margin_slopes_of_the_papers_robot(pose, compliant, rng):
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_slopes_of_random_robots(seed):
+def test_energy_slopes_of_random_robots_equal_central_differences(seed):
     """Any frame may have errors: steps along random directions."""
     rng = np.random.default_rng(seed)
     robot = random_robot(rng)
@@ -89,7 +91,7 @@ def test_slopes_of_random_robots(seed):
     assert (above - below) / 2 == pytest.approx(along, rel=1e-4, abs=1e-4 * scale)
 
 
-def test_errors_that_nothing_decides_have_no_slopes():
+def test_margin_slopes_of_a_zero_margin_are_zero():
     robot = load_robot("hexapod")  # mobile in every direction: margin 0, slopes 0
     ready = prepare_margins(place_robot(robot), "free")
     margins = ready.solve(robot.errors[None])
@@ -98,7 +100,7 @@ def test_errors_that_nothing_decides_have_no_slopes():
 
 
 @pytest.mark.parametrize("seed", range(25))
-def test_wrenches_of_random_robots_have_slopes(seed):
+def test_wrench_slopes_of_random_robots_equal_central_differences(seed):
     """A random sum of all wrenches, along a random direction of all errors."""
     rng = np.random.default_rng(seed)
     robot = random_robot(rng)
@@ -122,8 +124,8 @@ def test_wrenches_of_random_robots_have_slopes(seed):
     "key", ["force", "moment", "stress", "rotation", "translation"]
 )
 @pytest.mark.parametrize("pose", POSES)
-def test_limited_quantities_of_the_papers_robot_have_slopes(pose, key, rng):
-    """Along random directions, at errors so large that no clearance is undecided."""
+def test_quantity_slopes_of_the_paper_robot_equal_central_differences(pose, key, rng):
+    """In random directions, at errors so large that every clearance is pressed."""
     robot = load_robot("irsbot2")
     posture = place_robot(robot, pose=pose)
     frames = tuple(f.name for f in robot.frames if f.link is not None)

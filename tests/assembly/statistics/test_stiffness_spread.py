@@ -33,8 +33,8 @@ def spring(row, stiffness):
     return K
 
 
-def test_a_bush_is_stiff_where_a_gap_presses_it_and_free_where_none_does():
-    """Two springs k that a gap forces together: 2 k if it exceeds the clearance, or k.
+def test_stiffness_of_drawn_bushes_depends_on_their_contact():
+    """Two springs k forced together: 2 k if the gap exceeds the clearance, else k.
 
     With less the platform hangs on its own spring alone.
     """
@@ -56,7 +56,7 @@ def test_a_bush_is_stiff_where_a_gap_presses_it_and_free_where_none_does():
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_a_draw_s_stiffness_is_that_of_its_robot(state):
+def test_drawn_stiffness_equals_that_of_the_robot_with_its_errors(state):
     robot = load_robot("irsbot2")
     posture = place_robot(robot, {"tx": 0.1, "tz": -0.5})
     sources = tolerance_sources(robot, [2e-2] * 3 + [2e-4] * 3)
@@ -74,7 +74,7 @@ def test_a_draw_s_stiffness_is_that_of_its_robot(state):
     assert np.ptp(data["stiffness"].values, axis=0).min() > 0.0
 
 
-def test_the_report_tells_free_draws_from_stiff_ones():
+def test_stiffness_report_separates_free_draws_from_stiff_ones():
     values = np.full((10, 6), 2e6)
     values[:4, 5], values[4, 5] = 0.0, np.nan
     motions = np.full((10, 6, 6), np.nan)
@@ -90,7 +90,7 @@ def test_the_report_tells_free_draws_from_stiff_ones():
     assert report["fz"]["mean"]["value"] == report["fx"]["mean"]["value"] == 2e6
 
 
-def test_the_command_gives_the_spread_and_writes_it(run, tmp_path):
+def test_statistics_command_writes_the_stiffness_spread(run, tmp_path):
     errors = tmp_path / "errors.toml"
     errors.write_text(ERRORS)
     words = ["assembly", "statistics", "irsbot2", "--errors", str(errors), "--pose",
@@ -110,8 +110,8 @@ def test_the_command_gives_the_spread_and_writes_it(run, tmp_path):
     assert '--state: found "linear"' in err
 
 
-def test_small_stiffnesses_are_not_free_motions():
-    """0.01 N m/rad is a spring; zero is none, and NaN no answer."""
+def test_small_stiffness_is_not_reported_as_a_free_motion():
+    """0.01 N m/rad is a spring; zero is free, and NaN has no solution."""
     stiffnesses = np.full((6, 6), 2.0)
     stiffnesses[:, 2] = 0.01, 0.02, 0.03, 0.0, 0.0, np.nan
     said = stiffness_report(stiffnesses, np.full((6, 6, 6), np.nan), "contact", 0.9)
@@ -123,7 +123,7 @@ def test_small_stiffnesses_are_not_free_motions():
 
 
 @pytest.mark.parametrize(("held", "described"), [(0, False), (1, False), (2, True)])
-def test_two_draws_that_resist_have_a_mean(held, described):
+def test_stiffness_mean_needs_two_draws_that_resist(held, described):
     stiffnesses = np.zeros((4, 6))
     stiffnesses[:held] = np.array([[2.0], [4.0]])[:held]
     said = stiffness_report(stiffnesses, np.full((4, 6, 6), np.nan), "contact", 0.95)
@@ -138,8 +138,8 @@ def test_two_draws_that_resist_have_a_mean(held, described):
     assert said["axes"]["my"]["unit"] == "N m/rad"
 
 
-def test_free_motions_alike_to_two_decimals_are_one_whatever_the_sign_of_zero():
-    """Of the five of most draws the first is named first."""
+def test_free_motions_equal_to_two_decimals_are_counted_together():
+    """At most five are listed, in the order of their number of draws."""
     motions = np.full((9, 6, 6), np.nan)
     motions[:, 0] = np.eye(6)[5]
     motions[:4, 0, :2] = [[-1e-3, 0], [1e-3, -2e-3], [-0.0, 0], [0, 4e-3]]

@@ -1,4 +1,4 @@
-"""The summary of draws whose results are given, counted by hand."""
+"""The summary of given draw results, counted by hand."""
 
 import numpy as np
 import pytest
@@ -26,8 +26,8 @@ def draws(play="least", status=None, screws=None, **values):
     return xarray.Dataset(variables, attrs={"clearance": play})
 
 
-def test_draws_without_an_answer_count_in_every_probability():
-    """Of eight, two do not assemble and three go together by clearances alone.
+def test_draws_without_a_solution_count_in_every_probability():
+    """Of eight draws, two do not assemble and three assemble by clearances alone.
 
     A margin above 1 by rounding is one; the largest gap is that of an answer.
     """
@@ -48,7 +48,7 @@ def test_draws_without_an_answer_count_in_every_probability():
     assert summarise(none)["duality_gap"] == 0.0
 
 
-def test_walks_that_are_not_mixed_are_counted_among_the_draws_that_assemble():
+def test_summary_counts_assembled_draws_with_unmixed_clearances():
     data = draws("uniform", status=[0, 0, 0, 1], energy=[1.0, 1, 1, NAN],
                  clearance_mixed=[0, 1, 0, 0])  # fmt: skip
     said = summarise(data)
@@ -61,8 +61,8 @@ def test_walks_that_are_not_mixed_are_counted_among_the_draws_that_assemble():
     assert "clearance_not_mixed" not in summarise(draws(energy=[1.0]))
 
 
-def test_a_limit_is_met_up_to_itself_and_by_no_draw_without_an_answer():
-    """Energies 1 to 4 and no answer within 2; forces of which one is too large."""
+def test_limit_is_met_up_to_equality_and_never_without_a_solution():
+    """Energies 1 to 4 and one without a solution, limit 2; one force is too large."""
     data = draws(energy=[1.0, 2, 3, 4, NAN], force=[9.0, 5, 5, 9, NAN],
                  status=[0, 0, 0, 0, 1])  # fmt: skip
     said = summarise(data, {"energy": 2.0, "force": 8.0}, level=0.9)
@@ -79,8 +79,8 @@ def test_a_limit_is_met_up_to_itself_and_by_no_draw_without_an_answer():
     assert "within_limits" not in summarise(data)
 
 
-def test_a_draw_whose_bounds_enclose_a_limit_is_undecided():
-    """Of the largest translation within 2: bounds 0 to 2, 1 to 3, 2 to 3 and 3 to 4."""
+def test_draw_with_bounds_that_enclose_a_limit_is_undecided():
+    """Bounds 0 to 2, 1 to 3, 2 to 3 and 3 to 4 of the translation, limit 2."""
     data = draws("worst", translation=[2.0, 3, 3, 4, NAN], status=[0, 0, 0, 0, 1],
                  translation_lower=[0.0, 1, 2, 3, NAN])  # fmt: skip
     said = summarise(data, {"translation": 2.0})
@@ -97,8 +97,8 @@ def test_a_draw_whose_bounds_enclose_a_limit_is_undecided():
     )
 
 
-def test_the_strength_limits_the_most_stressed_link_unless_a_limit_is_given():
-    """Safety is the strength over each link's largest stress; endless without any."""
+def test_strength_is_the_stress_limit_unless_a_limit_is_given():
+    """Safety is the strength over the largest stress of a link, or infinite."""
     data = draws(stress=[[1e6, 0.0], [4e6, 0.0], [9e6, 0.0]], status=[0, 0, 1])
     said = summarise(data, strength=2e6)
     assert said["exceeds"]["stress"]["limit"] == 2e6
@@ -110,7 +110,7 @@ def test_the_strength_limits_the_most_stressed_link_unless_a_limit_is_given():
     assert "safety" not in summarise(data)
 
 
-def test_a_quantity_is_described_by_those_draws_that_have_it():
+def test_quantity_is_described_by_draws_with_finite_values():
     data = draws(force=[1.0, 2, 4, NAN, np.inf, 7], status=[0, 0, 0, 0, 0, 1])
     one = summarise(data)["quantities"]["force"]
     assert (one["of"], one["assembled"], one["draws"]) == (6, 5, 3)
@@ -122,7 +122,7 @@ def test_a_quantity_is_described_by_those_draws_that_have_it():
 
 
 @pytest.mark.parametrize(("known", "described"), [(0, False), (1, False), (2, True)])
-def test_two_draws_at_least_have_a_mean_and_a_mean_screw(known, described):
+def test_mean_and_mean_screw_need_two_assembled_draws(known, described):
     status = [0] * known + [1] * (5 - known)
     screws = np.arange(30.0).reshape(5, 6)
     said = summarise(draws(energy=[1.0, 3, 5, 7, 9], status=status, screws=screws))
@@ -137,7 +137,7 @@ def test_two_draws_at_least_have_a_mean_and_a_mean_screw(known, described):
         assert len(screw["most_probable"]) == 6
 
 
-def test_the_screws_of_the_worst_clearances_are_those_of_the_least():
+def test_screws_of_the_worst_model_are_those_of_least_clearances():
     for play, named in (("worst", "least"), ("contact", "contact")):
         assert (
             summarise(draws(play, energy=[1.0, 2]))["platform_screw"]["clearance"]
@@ -145,7 +145,7 @@ def test_the_screws_of_the_worst_clearances_are_those_of_the_least():
         )
 
 
-def test_screws_that_are_not_known_are_left_out_of_their_mean():
+def test_unknown_screws_are_left_out_of_the_mean():
     screws = np.ones((4, 6))
     screws[2:] = [[3.0] * 6, [1.0] * 5 + [NAN]]
     found = summarise(draws(energy=[1.0] * 4, screws=screws))["platform_screw"]
@@ -154,8 +154,8 @@ def test_screws_that_are_not_known_are_left_out_of_their_mean():
 
 
 @pytest.mark.parametrize(("zeros", "mode"), [(50, 7.0), (51, 0.0)])
-def test_zero_is_most_probable_where_more_than_half_are_zero(zeros, mode):
-    """The others about 7; 1e-19 of the largest is rounding, 1e-17 is not."""
+def test_zero_is_the_mode_if_more_than_half_are_zero(zeros, mode):
+    """The other values are about 7; 1e-19 of the largest is rounding, 1e-17 is not."""
     energy = np.r_[
         np.zeros(zeros - 2), 9e-19, -7e-18, np.linspace(6.9, 7.1, 100 - zeros)
     ]
@@ -167,8 +167,8 @@ def test_zero_is_most_probable_where_more_than_half_are_zero(zeros, mode):
     assert more["zero"]["probability"] == (zeros - 1) / 100
 
 
-def test_margins_are_also_those_of_draws_that_do_not_assemble():
-    """One without an answer has none that suffices: it counts as infinite."""
+def test_margins_include_draws_that_do_not_assemble():
+    """A draw without a margin counts as infinite."""
     data = draws(margin=[0.5, 1.0, 2.0, np.inf, NAN], status=[0, 0, 1, 1, 1])
     one = summarise(data)["quantities"]["margin"]
     assert one["draws"] == 2
@@ -182,15 +182,15 @@ def test_margins_are_also_those_of_draws_that_do_not_assemble():
     assert "all_draws" not in energy
 
 
-def test_only_quantities_of_draws_are_described():
-    """Not bounds, gaps, screws, nor what is known of no link or of the whole run."""
+def test_summary_describes_only_quantities_of_draws():
+    """Bounds, gaps, screws, missing links and quantities of the run are omitted."""
     data = draws("worst", translation=[1.0, 2], translation_lower=[0.5, 1.5],
                  stress=np.zeros((2, 0)))  # fmt: skip
     data["force"] = ("group", [1.0, 2.0, 3.0])
     assert list(summarise(data)["quantities"]) == ["translation"]
 
 
-def test_the_summary_s_lines_name_quantities_units_and_intervals():
+def test_summary_text_states_quantities_units_and_intervals():
     """A pure number has no unit; a pose error is given with its clearance model."""
     one = {"value": 1.0, "lower": 0.5, "upper": 2.0}
     described = {
@@ -225,14 +225,14 @@ def test_the_summary_s_lines_name_quantities_units_and_intervals():
 
 
 @pytest.mark.parametrize("key", ["force", "stress"])
-def test_a_limit_on_what_was_not_computed_is_refused(key):
-    """Not at all, or of no link."""
+def test_limit_on_a_quantity_that_was_not_computed_is_refused(key):
+    """The quantity is missing, or has no link."""
     data = draws(energy=[1.0, 2.0], stress=np.zeros((2, 0)))
     with pytest.raises(BadInput, match=f"^limit {key}: not among what was computed$"):
         summarise(data, {"energy": 1.0, key: 1.0})
 
 
-def test_where_no_draw_assembles_only_margins_are_told():
+def test_summary_without_assembled_draws_states_only_margins():
     text = summary_text(summarise(draws(margin=[2.0, 3, 4], status=[1, 1, 1])))
     assert text.splitlines()[-2:] == [
         "of the 0 of 3 draws that assemble: no results",

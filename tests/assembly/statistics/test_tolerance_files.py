@@ -36,8 +36,8 @@ class Coin:
         return share, share
 
 
-def test_looking_several_times_is_wrong_no_more_often_than_said(monkeypatch):
-    """The last look's interval misses the truth in 5 % of all verifications, at most.
+def test_repeated_verification_keeps_its_error_probability(monkeypatch):
+    """The last interval misses the truth in at most 5 % of all verifications.
 
     The yield is just so low that most looks contradict it and another follows; with
     the whole error at every look 9 % missed.  A coin cannot be tightened.
@@ -76,7 +76,7 @@ components = ["RX", "RY"]
 """
 
 
-def test_a_tolerance_file_is_read(write_file):
+def test_tolerance_file_is_read_with_groups_costs_and_limits(write_file):
     plan = read_plan(write_file(FILE), load_robot("irsbot2"))
     assert plan.names == ("length", "leg1.tip.RX")
     assert plan.group.tolist() == [0] * 4 + [1] * 2
@@ -87,8 +87,8 @@ def test_a_tolerance_file_is_read(write_file):
 
 
 @pytest.mark.parametrize("cost", ["logarithm", "reciprocal"])
-def test_a_price_by_its_law(cost, write_file):
-    """Parts of prices 2 and 1 made e times, or twice, as rough, together and alone."""
+def test_price_follows_its_cost_function(cost, write_file):
+    """Tolerances of costs 2 and 1, multiplied by e or by 2, together and separately."""
     plan = read_plan(write_file(FILE.replace("logarithm", cost)), load_robot("irsbot2"))
     t = np.array([3e-4, 2e-2])
     if cost == "reciprocal":
@@ -101,7 +101,7 @@ def test_a_price_by_its_law(cost, write_file):
 
 
 @pytest.mark.parametrize("name", ["always", "mostly", "forced", "limited"])
-def test_the_plans_of_the_example_are_read(name):
+def test_tolerance_files_of_the_example_are_read(name):
     folder = Path(__file__).parents[3] / "examples" / "tolerance_allocation"
     plan = read_plan(folder / f"{name}.toml", load_robot("irsbot2"))
     assert len(plan.names) == 7
@@ -169,15 +169,17 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("old", "new", "message"), REFUSED.values(), ids=REFUSED)
-def test_a_tolerance_file_is_refused_with_one_message(old, new, message, write_file):
+def test_invalid_tolerance_file_is_refused_with_one_message(
+    old, new, message, write_file
+):
     path = write_file(FILE.replace(old, new, 1))
     with pytest.raises(BadInput) as error:
         read_plan(path, load_robot("irsbot2"))
     assert str(error.value) == f"{path}: {message}"
 
 
-def test_errors_that_need_no_clearance_have_no_share_of_it():
-    """Of an open chain, which closes whatever its errors: any factor will do."""
+def test_errors_of_an_open_chain_have_zero_margin_shares():
+    """An open chain closes for any errors, so any factor is admissible."""
     arm = load_robot("arm6")
     robot = arm.with_errors(np.full((len(arm.frames), 6), 1e-4))
     found = present_errors([home_posture(robot)])
@@ -187,8 +189,8 @@ def test_errors_that_need_no_clearance_have_no_share_of_it():
     assert {one["share_of_margin"] for one in found["slopes"]} == {0.0}
 
 
-def test_present_errors_times_their_factor_just_fit():
-    """The margin is proportional: solved again with the scaled errors it is 1."""
+def test_present_errors_scaled_by_their_factor_just_assemble():
+    """The margin is proportional: with the scaled errors it is 1."""
     robot = irsbot2_with(NUMBERS["cases"][0])
     postures, _ = grid_postures(robot, "tx=-0.1:0.1:0.1,tz=-0.5")
     found = present_errors(postures)
@@ -207,10 +209,10 @@ def test_present_errors_times_their_factor_just_fit():
     [("truncated", "deviations = 4.0", 1 / 4), ("truncated", "", 0.9866 / 3),
      ("uniform", "", 1 / np.sqrt(3))],
 )  # fmt: skip
-def test_errors_of_a_plan_are_within_their_tolerances_and_as_wide_as_it_says(
+def test_errors_of_a_plan_have_the_requested_range_and_deviation(
     write_file, kind, deviations, deviation
 ):
-    """A normal law of a third of the tolerance unless stated, cut there; or uniform.
+    """Normal with a third of the tolerance by default, truncated there; or uniform.
 
     Cutting at three deviations leaves a standard deviation of 0.9866.
     """
@@ -222,7 +224,7 @@ def test_errors_of_a_plan_are_within_their_tolerances_and_as_wide_as_it_says(
 
 
 def test_defaults_of_a_tolerance_file_are_as_documented(write_file):
-    """A price of 1, from 0 to 0.1 rad or 10 mm, and to go together by clearance."""
+    """A cost of 1, from 0 to 0.1 rad or 10 mm, and assembly by clearance alone."""
     tables = [f'[[tolerance]]\nframes = ["link_a"]\ncomponents = ["{c}"]\n' for c in
               ("RX", "TX")]  # fmt: skip
     plan = read_plan(write_file("".join(tables)), load_robot("irsbot2"))

@@ -39,7 +39,9 @@ ENDS = [("one", 3), ("two", 3)]
     ],
     ids=["roots of costs", "costs", "right angles"],
 )
-def test_two_lengths_share_the_clearance_by_their_costs(places, costs, cost, expected):
+def test_tolerances_of_two_lengths_share_the_clearance_by_their_costs(
+    places, costs, cost, expected
+):
     """Minimise c1/t1 + c2/t2, or -c1 log t1 - c2 log t2, with t1 + t2 = clearance.
 
     At right angles with equal costs t1^2 + t2^2 = clearance^2.
@@ -60,8 +62,8 @@ def test_two_lengths_share_the_clearance_by_their_costs(places, costs, cost, exp
         assert found.proven_scale >= 1 / np.sqrt(2) - 1e-6
 
 
-def test_springs_in_a_row_share_the_energy():
-    """1/2 (k/2) (t1 + t2)^2 = E, equal costs: sqrt(E / k) each."""
+def test_tolerances_of_springs_in_series_share_the_energy_limit():
+    """1/2 (k/2) (t1 + t2)^2 = E with equal costs: sqrt(E / k) each."""
     robot = coaxial_beams(np.zeros(6))
     plan = plan_for(robot, ENDS, [1, 1], {"energy": 1e-3})
     found = allocate([place_robot(robot)], plan, fresh=0)
@@ -72,8 +74,8 @@ def test_springs_in_a_row_share_the_energy():
 
 
 @pytest.mark.slow
-def test_with_a_yield_a_single_error_may_leave_the_clearance_that_often():
-    """Uniform within t: the share within the clearance is its part of t: the yield.
+def test_single_tolerance_is_the_clearance_over_the_yield():
+    """Uniform within t: the share within the clearance, clearance / t, is the yield.
 
     Of 20000 training draws so many may fail that a yield of 0.8 is held with 95 %.
     """
@@ -100,8 +102,8 @@ def paper():
 
 
 @pytest.mark.parametrize("kind", ["free", "rigid", "energy"])
-def test_the_worst_corner_is_found_and_bounded(paper, kind):
-    """Brute force over all 256 corners; the worst of a convex function is at one."""
+def test_worst_corner_equals_brute_force_and_is_within_its_bound(paper, kind):
+    """All 256 corners; a convex function is largest at a corner."""
     posture, sources, t = paper
     energy = kind == "energy"
     ready = linear_response(posture) if energy else prepare_margins(posture, kind)
@@ -119,7 +121,7 @@ def test_the_worst_corner_is_found_and_bounded(paper, kind):
     ("clearance", "cost"),
     [(None, "reciprocal"), (1e-4, "reciprocal"), (None, "logarithm")],
 )
-def test_a_force_is_shared_by_lagranges_multipliers(clearance, cost):
+def test_tolerances_within_a_force_limit_equal_lagranges_solution(clearance, cost):
     """Two springs k in a row carry (k/2) (t1 + t2 - clearance): at most F in each pair.
 
     Minimise sum c/t, or -sum c log t, with t1 + t2 = 2F/k + clearance in each pair by
@@ -161,7 +163,7 @@ def several(paper):
     return postures, plan, allocate(postures, plan, fresh=300)
 
 
-def test_several_limits_of_every_kind_cost_no_more_than_scaling(several):
+def test_price_for_several_limits_is_at_most_that_of_uniform_scaling(several):
     _, _, found = several
     assert np.isnan(found.price_bound)
     assert found.price <= found.price_uniformly_scaled
@@ -169,8 +171,8 @@ def test_several_limits_of_every_kind_cost_no_more_than_scaling(several):
 
 
 @pytest.mark.slow
-def test_fresh_draws_solved_one_by_one_meet_the_limits_as_often(several):
-    """Another seed, each draw by itself through :func:`solve_assembly`, slowly."""
+def test_allocated_tolerances_have_the_yield_in_new_single_solutions(several):
+    """Another seed; each draw is solved by :func:`solve_assembly`."""
     postures, plan, found = several
     half = plan.spread(found.tolerances)
     rng, fits, largest = np.random.default_rng(12345), 0, 0.0
@@ -198,8 +200,8 @@ def largest_share(posture, limits):
     return max(values[key] / limit for key, limit in limits.items())
 
 
-def test_a_limit_below_the_clearance_of_perfect_parts_is_refused(paper):
-    """The paper's clearances alone move the platform by 0.39 mm: 0.2 cannot be had."""
+def test_limit_below_the_clearances_of_perfect_parts_is_refused(paper):
+    """The paper's clearances alone give 0.39 mm of translation, limit 0.2 mm."""
     posture, sources, _ = paper
     plan = Plan(sources, np.tile([0, 1], 4), ("RX", "TX"), np.ones(2), np.zeros(2),
                 np.array([0.05, 0.005]), {"translation": 2e-4}, asked_yield=0.9,
@@ -211,8 +213,8 @@ def test_a_limit_below_the_clearance_of_perfect_parts_is_refused(paper):
 
 
 @pytest.mark.slow
-def test_with_the_worst_clearance_fresh_draws_stay_within_the_limit(paper):
-    """Solved and bracketed one by one, slowly; a yield of 0.9."""
+def test_allocation_for_the_worst_clearance_has_the_yield_in_new_draws(paper):
+    """Each draw is solved and bounded on its own; a yield of 0.9."""
     posture, sources, _ = paper
     limit = 6e-4
     plan = Plan(sources, np.tile([0, 1], 4), ("RX", "TX"), np.array([1.0, 0.01]),

@@ -1,4 +1,4 @@
-"""Tolerances within a limit of the pose error against closed forms."""
+"""Tolerances within a limit on the pose error against closed forms."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ def parallel(k1, k2):
     return Robot("parallel", "one", frames, (("one", "two"),))
 
 
-def test_a_pose_error_is_shared_by_lagranges_multipliers():
+def test_tolerances_within_a_pose_error_limit_equal_lagranges_solution():
     """Between springs k1, k2 the platform moves w1 t1 + w2 t2, w_i = k_i / (k1 + k2).
 
     Minimise c1/t1 + c2/t2 with that sum D: t_i = D sqrt(c_i/w_i) / sum sqrt(c w).  The
@@ -42,7 +42,7 @@ def test_a_pose_error_is_shared_by_lagranges_multipliers():
 
 
 @pytest.mark.slow
-def test_with_a_yield_pose_errors_add_up_as_squares():
+def test_tolerances_with_a_yield_share_the_pose_error_as_squares():
     """Normal errors of deviation t/3: the platform's is |w t| / 3, D at 90 % of it.
 
     Minimise sum c/t with sum (w t)^2 fixed: t_i ~ (c_i / w_i^2)^(1/3).  Cutting the
@@ -66,8 +66,8 @@ def test_with_a_yield_pose_errors_add_up_as_squares():
     assert found.verification["verdict"] != "contradicted"
 
 
-def test_the_worst_clearance_takes_its_share_of_a_limit_on_the_pose():
-    """A serial arm: errors e and a clearance disc r reach e + r, so e <= limit - r."""
+def test_worst_clearance_reduces_the_tolerance_within_a_pose_error_limit():
+    """An error e and a clearance disc r of a serial arm reach e + r <= limit."""
     robot = arm(radial=PLAY)
     plan = plan_for(robot, [("tip", 3)], [1], {"translation": 3e-4}, draws=50)
     for play, tolerance in (("worst", 3e-4 - PLAY), ("least", 3e-4)):

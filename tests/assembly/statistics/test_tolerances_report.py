@@ -1,4 +1,4 @@
-"""The page of tolerances: shares of the price, what was asked, what clearances take."""
+"""The tolerance report: shares of the price, requirements, effect of clearances."""
 
 import json
 from dataclasses import replace
@@ -50,14 +50,14 @@ def shown(tolerances, costs, most=(0.1, 0.1), cost="reciprocal"):
 
 @pytest.mark.parametrize("loosest", [1e-2, 0.1, 10.0])
 def test_advice_on_tightening_does_not_depend_on_inactive_bounds(loosest):
-    """Prices are 1 / 1e-3 and 1 / 1e-4: the length has 10 of 11 parts of the price."""
+    """Prices are 1 / 1e-3 and 1 / 1e-4; the second, the length, has 10 of 11 parts."""
     page = shown([1e-3, 1e-4], [1.0, 1.0], (loosest, 0.1))
     answer, note = tiles(page)["Tolerance to tighten"]
     assert (answer, note[:4]) == ("length", "91\u00a0%")
 
 
-def test_with_a_logarithmic_price_the_costs_are_the_multipliers():
-    """t dL/dt is the cost over the multiplier, whatever the tolerances are."""
+def test_advice_for_a_logarithmic_price_follows_the_costs():
+    """t dL/dt is the cost over the multiplier, for any tolerances."""
     answer, note = tiles(shown([1e-3, 1e-4], [3.0, 1.0], cost="logarithm"))[
         "Tolerance to tighten"
     ]
@@ -68,16 +68,16 @@ def test_with_a_logarithmic_price_the_costs_are_the_multipliers():
     assert answer == "angle, length"
 
 
-def test_a_tolerance_at_its_loosest_is_not_to_be_tightened():
-    """The angle costs more, and may not be looser: the length is to be tight."""
+def test_advice_omits_tolerances_at_their_loosest():
+    """The angle has the higher cost but is at its loosest: the length is named."""
     both = shown([1e-5, 1e-4], [1.0, 1.0], (1e-5, 0.1))
     assert tiles(both)["Tolerance to tighten"][0] == "length"
     none = shown([1e-5, 1e-4], [1.0, 1.0], (1e-5, 1e-4))
     assert tiles(none)["Tolerance to tighten"][0] == "nothing"
 
 
-def test_bars_begin_at_zero_on_a_linear_axis():
-    """25.66 and 26.72 urad are drawn as they are, 1 to 1.04."""
+def test_report_bars_start_at_zero_on_a_linear_axis():
+    """25.66 and 26.72 urad are drawn in the ratio 1 to 1.04."""
     figures = parse(shown([2.566e-5, 2.672e-5], [1.0, 1.0])).figures
     assert len(figures) == 2
     for figure in figures:
@@ -86,15 +86,15 @@ def test_bars_begin_at_zero_on_a_linear_axis():
         assert '"log"' not in json.dumps(figure)
 
 
-def test_without_a_proof_the_page_says_so_and_has_no_empty_table():
+def test_report_without_a_proof_states_so_and_has_no_empty_table():
     page = shown([1e-3, 1e-4], [1.0, 1.0])
     assert "not proved" in page
     assert "at least none" not in page
     assert all(len(table) > 1 for table in parse(page).tables)
 
 
-def test_the_page_says_what_was_asked_and_what_clearances_take(tmp_path, run):
-    """A pin of radius r, and a length t behind it: t = limit - r, 1 / t is the price.
+def test_report_states_requirements_and_the_share_of_clearances(tmp_path, run):
+    """A pin of radius r, and a length t beyond it: t = limit - r, 1 / t is the price.
 
     Without the clearance t would be the limit: 1.5 times looser, at 1 / limit.
     """
@@ -123,7 +123,7 @@ def test_the_page_says_what_was_asked_and_what_clearances_take(tmp_path, run):
     assert asked["yield"].text == "1: every robot within tolerance"
 
 
-def test_errors_that_fit_everywhere_leave_nothing_to_tighten():
+def test_advice_for_errors_that_fit_everywhere_is_nothing():
     """A margin of 0.5: the errors could be twice as large."""
     present = {
         "postures": 2, "assemblable_share": 1.0, "factor_on_errors": 2.0,

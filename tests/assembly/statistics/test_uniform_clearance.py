@@ -1,4 +1,4 @@
-"""The diagnosis of chains by its textbook formulas, and Dikin's ellipsoid of boxes."""
+"""Convergence diagnosis of chains by textbook formulas, and Dikin's ellipsoids."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def by_the_textbook(x):
 
 @pytest.mark.parametrize("length", [8, 9, 12, 64])
 @pytest.mark.parametrize("correlation", [-0.5, 0.0, 0.7, 0.95])
-def test_the_diagnosis_is_that_of_the_textbook(length, correlation, rng):
+def test_chain_diagnosis_equals_the_textbook_formulas(length, correlation, rng):
     x = rng.normal(size=(4, length)) + rng.normal(size=(4, 1))
     for t in range(1, length):
         x[:, t] += correlation * x[:, t - 1]
@@ -47,8 +47,8 @@ def test_the_diagnosis_is_that_of_the_textbook(length, correlation, rng):
     np.testing.assert_allclose(diagnose(1e-6 * x + 1e-3), diagnose(x), rtol=1e-6)
 
 
-def test_chains_are_mixed_where_every_component_that_varies_is(rng):
-    """Neither chains of correlated points, nor chains about different means."""
+def test_chains_are_mixed_only_if_every_varying_component_is(rng):
+    """Chains of correlated points and chains about different means are not mixed."""
     apart = np.array([-1.5, -0.5, 0.5, 1.5])[:, None]
     slow = rng.normal(size=(4, 64))
     for t in range(1, 64):
@@ -65,7 +65,7 @@ def test_chains_are_mixed_where_every_component_that_varies_is(rng):
     assert not is_mixed(np.where(np.arange(6) == 2, np.nan, trace))
 
 
-def test_chains_that_are_each_stuck_elsewhere_are_not_mixed():
+def test_chains_stuck_at_different_points_are_not_mixed():
     """Nothing varies within a chain, as in corners of the set: R-hat is infinite."""
     trace = np.zeros((4, 64, 6))
     trace[:, :, 1] = np.arange(4)[:, None]
@@ -75,7 +75,7 @@ def test_chains_that_are_each_stuck_elsewhere_are_not_mixed():
 
 @pytest.mark.parametrize("dimensions", [1, 2, 5])
 @pytest.mark.parametrize("start", [0.0, 0.6, 0.95, 1.0])
-def test_the_ellipsoid_of_a_box_is_a_ball_about_its_middle(dimensions, start):
+def test_dikin_ellipsoid_of_a_box_is_a_ball_about_its_middle(dimensions, start):
     """-sum log(1 - u_i^2) has the Hessian 2 I at 0: axes of 1 / sqrt 2."""
     heads = np.arange(dimensions + 1)
     u, M = _ellipsoid(np.eye(dimensions), heads, np.full(dimensions, start))
@@ -83,7 +83,7 @@ def test_the_ellipsoid_of_a_box_is_a_ball_about_its_middle(dimensions, start):
     np.testing.assert_allclose(M @ M.T, np.eye(dimensions) / 2, atol=1e-4)
 
 
-def test_a_point_that_may_not_move_is_mixed_and_stays():
+def test_point_without_freedom_is_mixed_and_does_not_move():
     u, to_screw = np.array([0.3, 0.4]), np.eye(6)[:, :2].copy()
     rng = draw_generator(1, 0, 9)
     assert sample_uniform_position(np.zeros((2, 0)), np.array([0, 2]), to_screw, u, rng)

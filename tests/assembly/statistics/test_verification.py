@@ -1,4 +1,4 @@
-"""Proofs of springs in a row, and verdicts on draws that are counted by hand."""
+"""Proofs for springs in series, and verdicts on draws counted by hand."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def springs(stiffnesses, limits, clearance=None):
 
 
 @pytest.mark.parametrize(("limit", "scale"), [(0.01, 0.2), (0.25, 1.0), (1.0, 1.0)])
-def test_the_energy_of_springs_is_proven_and_scales_as_the_square(limit, scale):
+def test_proven_energy_of_springs_scales_with_the_square_of_tolerances(limit, scale):
     """k (t1 + t2)^2 / 4 at the stiffer of three postures; 0.25 J of 1e6 N/m."""
     requirement = springs([4e5, 4e6, 1e6], {"energy": limit})
     k = 4e6
@@ -38,16 +38,16 @@ def test_the_energy_of_springs_is_proven_and_scales_as_the_square(limit, scale):
 
 
 @pytest.mark.parametrize(("limit", "scale"), [(1.0, 0.2), (4.0, 0.8), (6.0, 1.0)])
-def test_a_margin_is_proven_and_scales_with_the_tolerances(limit, scale):
-    """(t1 + t2) / p = 5 whatever the springs."""
+def test_proven_margin_scales_with_the_tolerances(limit, scale):
+    """(t1 + t2) / p = 5, for any springs."""
     requirement = springs([1e6, 1e5], {"margin": limit}, PLAY)
     worst, found = prove_worst(requirement, T, silent)
     np.testing.assert_allclose(worst["margin"], 5.0, rtol=1e-5)
     assert found == pytest.approx(scale, rel=1e-5)
 
 
-def test_the_tightest_of_all_limits_scales_and_a_force_is_not_proven():
-    """Half of k (t1 + t2) is found; nothing bounds it, and so nothing is to scale."""
+def test_tightest_limit_decides_the_scale_and_a_force_is_not_proven():
+    """Half of k (t1 + t2) is found; there is no bound for it, hence no scale."""
     requirement = springs([1e6], {"energy": 0.01, "force": 60.0})
     worst, found = prove_worst(requirement, T, silent)
     assert worst["force"][0] == pytest.approx(1e6 * REACH / 2, rel=1e-6)
@@ -82,7 +82,7 @@ class Given:
 TWO = np.array([2.0])
 
 
-def test_a_draw_fits_where_it_meets_every_limit_at_every_posture():
+def test_draw_passes_only_if_every_limit_holds_at_every_posture():
     """Of 600 draws in three batches, 60 fail at the first posture, 30 at the second."""
     share = np.full((4, 600), 0.5)
     share[0, 240:270] = 1.5  # limit a, first posture, in two batches
@@ -100,7 +100,7 @@ def test_a_draw_fits_where_it_meets_every_limit_at_every_posture():
     assert found["verdict"] == "not contradicted"
 
 
-def test_a_draw_between_its_bounds_is_undecided():
+def test_draw_with_a_limit_between_its_bounds_is_undecided():
     lower, upper = np.full((2, 4, 10), 0.5)
     lower[0, :3] = upper[0, :3] = 1.5  # fail
     upper[1, 2:5] = 1.5  # the third has failed elsewhere
@@ -126,7 +126,7 @@ def test_a_draw_between_its_bounds_is_undecided():
         (10, 0.96, "contradicted"),
     ],
 )
-def test_the_verdict_is_that_of_the_interval(failing, asked, verdict):
+def test_verdict_follows_from_the_confidence_interval(failing, asked, verdict):
     share = np.zeros((4, 100))
     share[2, :failing] = 2.0
     found = verify_yield(Given(share, share, asked), TWO, 100, silent)

@@ -1,4 +1,4 @@
-"""Worst cases of errors within tolerances against sums and squares known by hand."""
+"""Worst cases of errors within tolerances against sums and squares by hand."""
 
 import numpy as np
 import pytest
@@ -28,8 +28,10 @@ def bars(clearance=None):
 
 @pytest.mark.parametrize("directions", [1, 2])
 @pytest.mark.parametrize("radial", [0.0, PLAY])
-def test_clearance_along_all_errors_is_taken_from_their_sum(directions, radial):
-    """k (hypot(t1 + t2, t3 + t4) - p)^2 / 4; the bound adds all t, less p, squared."""
+def test_worst_energy_subtracts_the_clearance_from_the_sum_of_errors(
+    directions, radial
+):
+    """k (hypot(t1 + t2, t3 + t4) - p)^2 / 4; the bound is of all t together, less p."""
     posture, sources = bars(Clearance(radial=radial) if radial else None)
     prepared = linear_response(posture)
     t = np.array([3.0, 2.0, 0.0, 0.0]) * PLAY
@@ -44,8 +46,8 @@ def test_clearance_along_all_errors_is_taken_from_their_sum(directions, radial):
     assert bound >= corner.value * (1 - 1e-9)
 
 
-def test_a_margin_is_worst_and_bounded_by_sums_along_each_axis():
-    """hypot(t1 + t2, t3 + t4) / p; affine clearance reaches (t1 + t2 + t3 + t4) / p."""
+def test_worst_margin_and_its_bound_equal_sums_along_each_axis():
+    """hypot(t1 + t2, t3 + t4) / p; the bound is (t1 + t2 + t3 + t4) / p."""
     posture, sources = bars(Clearance(radial=PLAY))
     zone, t = prepare_margins(posture, "rigid"), np.array([3.0, 2, 1, 4]) * PLAY
     corner = worst_corner(zone, sources, t, random_corners(4, 4))
@@ -54,8 +56,8 @@ def test_a_margin_is_worst_and_bounded_by_sums_along_each_axis():
     assert bound_margin(zone, sources, t * [1, 1, 0, 0]) == pytest.approx(5.0, rel=1e-6)
 
 
-def test_the_bound_of_a_margin_shares_errors_among_several_clearances():
-    """Two pins in a row, of 1 and 3 clearances: an error x takes x / 4 of either.
+def test_margin_bound_distributes_errors_over_several_clearances():
+    """Two pins in series, of 1 and 3 clearances: an error x takes x / 4 of either.
 
     Across their axis and along it, which are cones of their own.
     """
@@ -78,8 +80,8 @@ def test_the_bound_of_a_margin_shares_errors_among_several_clearances():
         assert found == pytest.approx(expected, rel=1e-6)
 
 
-def test_an_error_that_nothing_takes_up_has_no_bound():
-    """Along z of a pin; a tolerance of zero of it is none, one of 1e-13 m rounding."""
+def test_error_that_no_clearance_takes_up_has_an_infinite_bound():
+    """Along z of a pin; a tolerance of zero has no effect, 1e-14 m is rounding."""
     robot = rigid_pair(radial=PLAY)
     posture = home_posture(robot)
     sources = plan_for(robot, [("one", 3), ("one", 5)], [1, 1], {}).sources
@@ -90,8 +92,8 @@ def test_an_error_that_nothing_takes_up_has_no_bound():
     assert bound_energy(linear_response(posture), sources, t) == np.inf
 
 
-def test_a_spring_along_one_axis_bounds_the_energy_of_errors_along_it():
-    """k t^2 / 2; rigid across it, where 1e-14 m are rounding and 1e-9 m are none."""
+def test_energy_bound_of_a_spring_is_finite_along_its_axis_only():
+    """k t^2 / 2; rigid across the axis, where 1e-14 m is rounding, 1e-9 m is not."""
     spring = np.diag([np.inf] * 6)
     spring[3, 3] = K
     frames = (
@@ -112,8 +114,8 @@ def test_a_spring_along_one_axis_bounds_the_energy_of_errors_along_it():
             assert found == pytest.approx(bound, rel=1e-6)
 
 
-def test_clearance_of_one_pair_is_not_spent_on_another():
-    """Two pairs of bars side by side: gaps of 1.5 and 10 clearances leave 0.5 and 9.
+def test_energy_bound_uses_the_clearance_of_each_pair_separately():
+    """Two parallel pairs of bars: gaps of 1.5 and 10 clearances exceed them by 0.5, 9.
 
     Each takes its own clearance; the bound adds up what is left: k (0.5 + 9)^2 p^2 / 4.
     """
@@ -124,7 +126,7 @@ def test_clearance_of_one_pair_is_not_spent_on_another():
     assert found == pytest.approx(K * (9.5 * PLAY) ** 2 / 4, rel=1e-4)
 
 
-def test_a_chain_that_always_closes_has_no_margin_to_bound():
+def test_open_chain_has_zero_bounds_of_margin_and_energy():
     robot = arm(link=MatrixLink(np.eye(6) * K), radial=PLAY)
     posture = home_posture(robot)
     sources = plan_for(robot, [("tip", 3)], [1], {}).sources

@@ -1,4 +1,4 @@
-"""The worst clearance: closed forms, other readings, slopes against differences."""
+"""The worst clearance: closed forms, other models, slopes against differences."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ def papers(share, **options):
     return Experiment(place_robot(robot, pose=POSE), sources, margins=False, **options)
 
 
-def test_the_screws_of_the_bounds_attain_them_part_by_part(rng):
+def test_screws_of_the_worst_clearance_attain_its_bounds(rng):
     """A disc of radius p and a tilt b on an arm L: rotation b, and hypot(e + p, L b).
 
     Beside errors e along x; a draw without an answer has no bounds.
@@ -56,8 +56,8 @@ def test_the_screws_of_the_bounds_attain_them_part_by_part(rng):
 
 
 @pytest.mark.parametrize("part", [0, 1])
-def test_a_part_that_is_not_asked_for_is_not_less_than_the_solution_s(part):
-    """Its bounds enclose the truth, however far apart they are."""
+def test_part_without_requested_precision_is_bounded_by_the_solution(part):
+    """Its bounds enclose the true value, at any width."""
     posture = home_posture(arm(radial=RADIAL, tilt=TILT))
     prepared, errors = linear_response(posture), np.zeros((4, 2, 6))
     errors[:, 1] = np.linspace(1e-4, 4e-4, 4)[:, None] * [1, 0, 0, 1, 0, 0]
@@ -78,7 +78,7 @@ def test_a_part_that_is_not_asked_for_is_not_less_than_the_solution_s(part):
     "share", [0.02, pytest.param(0.3, marks=pytest.mark.slow), 1.0]
 )
 @pytest.mark.parametrize("play", ["least", "uniform", "contact"])
-def test_no_other_clearance_is_worse_in_any_draw(share, play):
+def test_no_clearance_model_exceeds_the_worst_in_any_draw(share, play):
     """Inside the zone, at its edge and outside; 1e-9: two solutions of (22)."""
     worst, other = papers(share), papers(share, clearance=play)
     values = worst.sources.draw(0, 60, seed=1)
@@ -90,8 +90,8 @@ def test_no_other_clearance_is_worse_in_any_draw(share, play):
         assert np.median(bound["translation"] / found["translation"]) > 2
 
 
-def test_a_yield_of_all_draws_becomes_none_when_the_worst_clearance_counts():
-    """Parts so good that clearance alone suffices: 0.1 mm is met at rest only."""
+def test_yield_falls_to_zero_with_the_worst_clearance():
+    """Clearance alone suffices to assemble: 0.1 mm holds only for least clearances."""
     limits, share = {"translation": 1e-4}, {}
     for play in CLEARANCE_MODELS:
         data = run_draws(
@@ -110,8 +110,8 @@ def test_a_yield_of_all_draws_becomes_none_when_the_worst_clearance_counts():
     assert share["worst"] < share["contact"] < share["uniform"] < share["least"]
 
 
-def test_a_load_that_takes_up_all_clearance_leaves_nothing_to_the_worst():
-    """A weight pushes the pin to one side of its disc: sideways it may not move."""
+def test_worst_clearance_adds_nothing_if_a_load_takes_up_all_clearance():
+    """A load presses the pin to one side of its disc, so it cannot move sideways."""
     robot = arm(radial=RADIAL)
     sources, load = tip_errors(robot, 1e-4), (0, 0, 0, 10.0, 0, 0)
     values = sources.draw(0, 10, seed=1)
@@ -125,8 +125,8 @@ def test_a_load_that_takes_up_all_clearance_leaves_nothing_to_the_worst():
 
 @pytest.mark.parametrize("key", ["rotation", "translation"])
 @pytest.mark.parametrize("share", [0.05, 0.2, 0.6])
-def test_the_largest_pose_error_has_slopes(key, share, rng):
-    """Along random directions, inside the zone and outside it.
+def test_slopes_of_the_largest_pose_error_equal_central_differences(key, share, rng):
+    """Steps in random directions, inside the zone and outside it.
 
     Where the farthest point jumps to another corner there is a kink: 3 of 4 steps
     must agree, all within a tenth.
@@ -148,8 +148,8 @@ def test_the_largest_pose_error_has_slopes(key, share, rng):
     assert max(off) < 0.1
 
 
-def test_more_clearance_is_never_better_where_clearance_alone_suffices():
-    """Clearances that close without energy are nested sets; brackets are 1e-6 wide."""
+def test_worst_pose_error_grows_with_the_clearances():
+    """Sets of clearances without energy are nested; brackets are 1e-6 wide."""
     robot, before = load_robot("irsbot2"), None
     sources = tolerance_sources(robot, [1e-4] * 3 + [5e-6] * 3)
     values = sources.draw(0, 40, seed=3)
@@ -177,6 +177,6 @@ def replace_robot(sources, robot):
     return type(sources)(robot, *(getattr(sources, a) for a in arrays))
 
 
-def test_an_unknown_clearance_is_refused():
+def test_unknown_clearance_model_is_refused():
     with pytest.raises(ValueError, match="clearance is 'most', expected one of"):
         papers(0.1, clearance="most")

@@ -1,4 +1,4 @@
-"""A sweep on many processes gives the numbers of one, also when a worker dies."""
+"""Sweeps on many processes equal those of one process, also when a worker dies."""
 
 import os
 import pickle
@@ -32,14 +32,14 @@ def drawn_sweep(grid):
     return Sweep(question, targets, (), 3, block_size=32)
 
 
-def test_a_worker_with_another_question_refuses_it():
-    """As when a mesh differs there: its content is in the hash."""
+def test_worker_refuses_a_task_of_another_robot():
+    """For example, a mesh differs there: its content is part of the hash."""
     question = drawn_sweep("tx=0,ty=0.13").question
     with pytest.raises(BadInput, match="a worker reads another robot"):
         solve_task(pickle.dumps(question), "0" * 64, [])
 
 
-def test_workers_with_other_sources_are_refused():
+def test_workers_with_different_sources_are_refused():
     class Client:
         def __init__(self, **theirs):
             self.theirs = theirs
@@ -57,7 +57,7 @@ def test_workers_with_other_sources_are_refused():
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_is_not_there_is_bad_input(tmp_path):
+def test_unreachable_scheduler_is_refused(tmp_path):
     sweep = drawn_sweep("tx=0,ty=0.13")
     for address in ("tcp://127.0.0.1:9", "nonsense:/"):
         with pytest.raises(BadInput, match="--scheduler .* cannot be reached"):
@@ -108,7 +108,7 @@ def cluster(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_worker_killed_halfway_loses_nothing(cluster, tmp_path):
+def test_sweep_with_a_killed_worker_writes_the_same_file(cluster, tmp_path):
     """A scheduler and two workers as processes; one worker gets SIGKILL."""
     sweep = drawn_sweep("tx=-0.045:0.045:0.003,ty=0.10:0.15:0.003")
     run_sweep(sweep, tmp_path / "one.nc")
@@ -131,7 +131,7 @@ def test_a_worker_killed_halfway_loses_nothing(cluster, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_dies_is_one_message_and_the_sweep_goes_on(cluster, tmp_path):
+def test_lost_scheduler_is_reported_and_the_sweep_can_be_resumed(cluster, tmp_path):
     sweep = drawn_sweep("tx=-0.045:0.045:0.003,ty=0.10:0.15:0.003")
     kept = []
 
@@ -151,7 +151,7 @@ def test_a_scheduler_that_dies_is_one_message_and_the_sweep_goes_on(cluster, tmp
 
 
 @pytest.mark.slow
-def test_workers_on_this_machine_give_the_same_bytes(tmp_path):
+def test_local_workers_write_the_same_file_as_one_process(tmp_path):
     command = [sys.executable, "-m", "forcefit", "assembly", "sweep", "five_bar",
                "--grid", "tx=-0.04:0.04:0.004,ty=0.10:0.15:0.01"]  # fmt: skip
     for name, words in (("one", []), ("two", ["--workers", "2"])):

@@ -1,4 +1,4 @@
-"""Sweeps of robots under load and with effects: each point as one posture gives it."""
+"""Sweeps of robots under load and with effects equal single postures."""
 
 from dataclasses import replace
 
@@ -37,7 +37,7 @@ def swept(robot, grid, **given):
     return sweep_in_memory(Sweep(question, grid_targets(axes)))
 
 
-def test_an_arm_on_a_spring_sags_by_hand(tmp_path):
+def test_swept_arm_under_load_and_weight_equals_hand_calculation(tmp_path):
     """M / k with M = F L cos q of a load, and m g L cos q / 2 of the beam's weight."""
     path = arm_with(tmp_path)
     data = sweep(
@@ -63,7 +63,7 @@ def test_an_arm_on_a_spring_sags_by_hand(tmp_path):
     "load",
     [pytest.param(None, marks=pytest.mark.slow), [5.0, 0, 0, 100.0, -40.0, -200.0]],
 )
-def test_points_with_effects_are_those_of_one_posture(load):
+def test_swept_points_with_effects_equal_single_postures(load):
     robot = replace(irsbot2_with(NUMBERS["cases"][0]), effects=EFFECTS)
     data = swept(robot, GRID, under={"temperature": 8.0}, linearisation=True,
                  wrenches=("leg1.link_a",), load=load or (0.0,) * 6)  # fmt: skip
@@ -88,8 +88,8 @@ def test_points_with_effects_are_those_of_one_posture(load):
 
 
 @pytest.mark.parametrize("load", [None, [0.0, 0, 0, 30.0, 0, -50.0]])
-def test_functions_act_at_every_point(load):
-    """A screw of a joint, and with a load a compliance where the drive is."""
+def test_swept_points_with_functions_equal_single_postures(load):
+    """A screw at a joint, and with a load a compliance at the drive."""
     wave = Function("leg1.drive", ("rz",), ("q.leg1.drive",), "waves", {"2.sine": 3e-4})
     soft = Function("leg2.drive", ("rz",), ("cov.tilt",), "powers", {"1": 1e-6},
                     kind="compliance")  # fmt: skip
@@ -112,8 +112,8 @@ def test_functions_act_at_every_point(load):
         assert np.abs(change).max() > 0.02 * np.abs(other[3:]).max()
 
 
-def test_readings_of_a_device_are_stored_with_the_pose():
-    """A device shifted by b reads b less nothing: R = 1, so b more."""
+def test_sweep_stores_device_readings_with_the_pose():
+    """A device shifted by b and not rotated reads b more."""
     shift = {"base.tx": 3e-5, "base.tz": -1e-5}
     robot = irsbot2_with(NUMBERS["cases"][0])
     data = swept(replace(robot, effects={"registration": shift}), GRID)
@@ -124,8 +124,8 @@ def test_readings_of_a_device_are_stored_with_the_pose():
     assert "reading" not in swept(robot, GRID)
 
 
-def test_a_load_that_nothing_resists_is_a_status():
-    """No drive holds: the robot moves as it is pushed."""
+def test_load_without_resistance_has_the_status_no_equilibrium():
+    """No drive is actuated, so the load moves the robot freely."""
     robot = load_robot("five_bar")
     frames = tuple(
         replace(f, actuated=False, joint_stiffness=None) if f.actuated else f
@@ -137,7 +137,7 @@ def test_a_load_that_nothing_resists_is_a_status():
     assert "no joint or spring resists" in str(data.reason.values.ravel()[0])
 
 
-def test_bounds_of_a_loaded_robot_and_missing_covariates_are_refused(tmp_path):
+def test_sweep_refuses_bounds_under_load_and_missing_covariates(tmp_path):
     with pytest.raises(BadInput, match="--assumption none"):
         ask_sweep("irsbot2", SweepOptions(grid=GRID, load=[0, 0, 0, 0, 0, 1.0]))
     warm = 'name = "thermal_expansion"\nparameters = { tool = 2e-5 }'

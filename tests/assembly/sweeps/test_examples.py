@@ -1,4 +1,4 @@
-"""The examples that sweep: they run, and say what they should."""
+"""The example programs that sweep: they run and print the expected numbers."""
 
 import re
 import subprocess
@@ -21,8 +21,8 @@ def run(name, *words):
     return done.stdout
 
 
-def test_the_papers_figure_is_drawn_in_both_conventions(tmp_path):
-    """A coarse grid, part of the fine one: energies within the reference's."""
+def test_example_draws_the_papers_figure_in_both_sign_conventions(tmp_path):
+    """A coarse subset of the fine grid: energies are within the reference's range."""
     said = run("paper_figure5.py", "--step", "0.2", "-o", tmp_path)
     assert said.count("assemble by clearances with compliant joints free") == 2
     for signs in ("literal", "signed"):
@@ -31,7 +31,7 @@ def test_the_papers_figure_is_drawn_in_both_conventions(tmp_path):
     assert 1.1e-3 <= float(least) < float(most) <= 14.7
 
 
-def test_less_play_makes_a_hexapod_more_accurate(tmp_path):
+def test_example_hexapod_with_less_clearance_has_smaller_errors(tmp_path):
     said = run("hexapod_accuracy.py", "--draws", 2, "--step", 0.1, "-o",
                tmp_path / "hexapod.nc")  # fmt: skip
     play, error = (

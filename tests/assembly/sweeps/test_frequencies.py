@@ -11,7 +11,7 @@ from assembly.sweeps.robot_sweep import sweep
 from forcefit.inputs.table import BadInput
 
 
-def test_each_point_has_the_frequencies_of_its_posture_and_design():
+def test_swept_frequencies_equal_those_of_single_postures():
     path, pose = "leg1.elbow.link.density", {"tx": 0.1, "tz": -0.9}
     data = sweep(
         "delta", grid="tx=0:0.1:0.1,tz=-0.9", assumption="none", frequencies=3,
@@ -33,6 +33,6 @@ def test_each_point_has_the_frequencies_of_its_posture_and_design():
         ("irsbot2", 2, "found no mass that moves"),
     ],
 )
-def test_robots_without_frequencies_are_refused(robot, count, message):
+def test_sweep_of_frequencies_without_mass_is_refused(robot, count, message):
     with pytest.raises(BadInput, match=message):
         sweep(robot, grid="tx=0,tz=-0.5", assumption="none", frequencies=count)

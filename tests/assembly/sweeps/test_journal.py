@@ -1,4 +1,4 @@
-"""A sweep killed anywhere goes on, loses nothing and ends in the same bytes."""
+"""Interrupted sweeps are resumed without loss and write the same file."""
 
 import os
 import shutil
@@ -69,8 +69,8 @@ def go_on(sweep, folder, journal):
     return path.read_bytes(), solved
 
 
-def test_a_journal_cut_anywhere_loses_no_block_before_the_cut(whole, tmp_path):
-    """Every byte of the file is a place where a power failure may cut it."""
+def test_truncated_journal_keeps_every_block_before_the_cut(whole, tmp_path):
+    """A power failure may truncate the file at any byte."""
     sweep, _, kept = whole
     sizes = [len(journal) for journal in kept.values()]
     journal, path = kept[15], tmp_path / "map.nc.journal"
@@ -83,7 +83,7 @@ def test_a_journal_cut_anywhere_loses_no_block_before_the_cut(whole, tmp_path):
 
 
 @pytest.mark.parametrize("done", [0, 4, 12, 15])
-def test_a_sweep_goes_on_where_it_was_and_ends_in_the_same_bytes(whole, tmp_path, done):
+def test_resumed_sweep_writes_the_same_file(whole, tmp_path, done):
     sweep, expected, kept = whole
     torn = kept[done] + (kept[15][len(kept[done]) :][:50] if done < 15 else b"")
     found, solved = go_on(sweep, tmp_path, torn)
@@ -91,8 +91,8 @@ def test_a_sweep_goes_on_where_it_was_and_ends_in_the_same_bytes(whole, tmp_path
     assert solved == list(range(-(-done // 4), 4))
 
 
-def test_a_flipped_bit_of_a_journal_costs_only_its_record(whole, tmp_path):
-    """The first line and the records' numbers and lengths are covered too."""
+def test_flipped_bit_in_a_journal_drops_only_its_record(whole, tmp_path):
+    """The first line and the numbers and lengths of records are covered too."""
     sweep, expected, kept = whole
     journal, first_line = kept[15], kept[15].index(b"\n") + 1
     ends = [len(content) for content in kept.values()]
@@ -108,7 +108,7 @@ def test_a_flipped_bit_of_a_journal_costs_only_its_record(whole, tmp_path):
     assert go_on(sweep, tmp_path, bytes(spoilt)) == (expected, [3])
 
 
-def test_a_record_of_another_sweep_is_not_believed(whole, tmp_path):
+def test_journal_record_of_another_sweep_is_ignored(whole, tmp_path):
     sweep, expected, kept = whole
     other, path = small_sweep(near=0.5), tmp_path / "other.nc"
     run_sweep(other, path, lambda *_: kept.update(other=read_if(journal_path(path))))
@@ -120,7 +120,7 @@ def read_if(path):
     return path.read_bytes() if path.exists() else b""
 
 
-def test_a_block_changed_while_the_sweep_ran_is_one_message(whole, tmp_path):
+def test_block_changed_during_the_sweep_is_refused_with_one_message(whole, tmp_path):
     sweep, expected, _ = whole
     path = tmp_path / "map.nc"
 
@@ -137,8 +137,8 @@ def test_a_block_changed_while_the_sweep_ran_is_one_message(whole, tmp_path):
     assert path.read_bytes() == expected
 
 
-def test_two_runs_into_one_file_at_once_the_second_is_refused(whole, tmp_path):
-    """The second begins while the first is at work, and disturbs nothing."""
+def test_second_run_into_the_same_file_is_refused(whole, tmp_path):
+    """The second run starts during the first, and does not disturb it."""
     sweep, expected, _ = whole
     path, said = tmp_path / "map.nc", []
 
@@ -154,7 +154,7 @@ def test_two_runs_into_one_file_at_once_the_second_is_refused(whole, tmp_path):
     assert not journal_path(path).exists()
 
 
-def test_a_killed_run_holds_no_journal(whole, tmp_path):
+def test_killed_run_releases_its_journal(whole, tmp_path):
     sweep, expected, _ = whole
     path = tmp_path / "map.nc"
     child = os.fork()
@@ -166,8 +166,8 @@ def test_a_killed_run_holds_no_journal(whole, tmp_path):
     assert path.read_bytes() == expected
 
 
-def test_a_journal_of_other_sources_is_refused(whole, tmp_path, monkeypatch):
-    """The version is the same; a line of the sources is not."""
+def test_journal_of_different_sources_is_refused(whole, tmp_path, monkeypatch):
+    """The version is the same, but one line of the sources differs."""
     sweep, _, kept = whole
     copy = tmp_path / "sources" / "assembly"
     shutil.copytree(ROOT / "assembly", copy, ignore=shutil.ignore_patterns("__*__"))
@@ -189,13 +189,13 @@ def test_a_journal_of_other_sources_is_refused(whole, tmp_path, monkeypatch):
     "change", [{"under": {"temperature": 6.0}}, {"near": 0.03}, {"seed": 5},
                {"varied": ("elbow.link.young",)}, {"load": (0, 0, 0, 1.0, 0, 0)}]
 )  # fmt: skip
-def test_every_option_changes_the_questions_hash(change):
+def test_every_option_changes_the_question_hash(change):
     asked = small_sweep().question
     assert question_hash(asked) == question_hash(small_sweep().question)
     assert question_hash(replace(asked, **change)) != question_hash(asked)
 
 
-def test_designs_of_other_numbers_have_other_hashes(tmp_path):
+def test_designs_with_different_numbers_have_different_hashes(tmp_path):
     design = load_design("five_bar")
     path = next(p for p in design.paths if p.endswith("link.young"))
     other = type(design)(design.changed({path: 1e11}), design.file, design.name)
@@ -203,7 +203,7 @@ def test_designs_of_other_numbers_have_other_hashes(tmp_path):
     assert question_hash(design) == question_hash(moved) != question_hash(other)
 
 
-def test_blocks_may_come_in_any_order(whole, tmp_path):
+def test_block_order_does_not_change_the_file(whole, tmp_path):
     sweep, expected, _ = whole
     path = tmp_path / "map.nc"
     run_sweep(sweep, path, solve=lambda s, b: solve_here(s, [2, 0, 3, 1]))
@@ -219,7 +219,7 @@ def test_blocks_may_come_in_any_order(whole, tmp_path):
         (small_sweep(near=0.5), "found near '0.02'; expected near '0.5'"),
     ],
 )  # fmt: skip
-def test_a_journal_of_another_sweep_is_refused(whole, tmp_path, other, message):
+def test_journal_of_another_sweep_is_refused(whole, tmp_path, other, message):
     _, _, kept = whole
     path = journal_path(tmp_path / "map.nc")
     path.write_bytes(kept[8])
@@ -230,7 +230,7 @@ def test_a_journal_of_another_sweep_is_refused(whole, tmp_path, other, message):
     assert path.read_bytes() == kept[8]
 
 
-def test_a_file_that_is_no_journal_is_refused_and_left(tmp_path):
+def test_file_that_is_no_journal_is_refused_and_kept(tmp_path):
     path = journal_path(tmp_path / "map.nc")
     path.write_text("notes\n")
     with pytest.raises(BadInput, match="found no journal of a sweep; expected one"):
@@ -238,8 +238,8 @@ def test_a_file_that_is_no_journal_is_refused_and_left(tmp_path):
     assert path.read_text() == "notes\n"
 
 
-def test_block_size_changes_no_number():
-    """Points do not depend on their neighbours: blocks of 4 and of 15, bit for bit."""
+def test_block_size_does_not_change_the_results():
+    """Blocks of 4 and of 15 points give bit-identical results."""
     options = {
         "assumption": "frozen",
         "wrenches": ("left.elbow",),
@@ -253,8 +253,8 @@ def test_block_size_changes_no_number():
 
 
 @pytest.mark.slow
-def test_commands_stopped_at_random_moments_lose_nothing():
-    """The benchmark does hundreds; here some."""
+def test_commands_killed_at_random_times_resume_to_the_same_file():
+    """Twenty kills here; the benchmark does hundreds."""
     kills = [sys.executable, ROOT / "benchmarks" / "kills.py", "20"]
     run = [*kills, "--seed", "5"]
     done = subprocess.run(run, capture_output=True, text=True, check=False)
@@ -290,7 +290,7 @@ def start_command(folder, *words):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("words", [[], ["--workers", "1"]])
-def test_ctrl_c_keeps_everything_and_the_same_command_goes_on(tmp_path, words):
+def test_ctrl_c_keeps_the_journal_and_the_command_resumes(tmp_path, words):
     run = start_command(tmp_path, *words)
     os.killpg(next(run).pid, signal.SIGINT)
     status, message = next(run)

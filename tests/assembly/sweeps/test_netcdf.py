@@ -1,4 +1,4 @@
-"""A file of results on a full disk."""
+"""Result files on a full disk, and damaged result files."""
 
 import os
 import resource
@@ -45,21 +45,21 @@ def write_on_a_disk_of(size, path):
 
 
 @pytest.mark.parametrize("share", [0.02, 0.1, 0.6])
-def test_a_disk_full_at_any_moment_is_bad_input_and_leaves_nothing(tmp_path, share):
-    """HDF5 crashed where it read back what had not been written."""
+def test_full_disk_is_refused_and_leaves_no_file(tmp_path, share):
+    """HDF5 crashed when it read back data that had not been written."""
     path = tmp_path / "sweep.nc"
     assert write_on_a_disk_of(int(share * SIZE), path) == 2
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_disk_that_is_large_enough_takes_the_file(tmp_path):
+def test_file_is_written_if_the_disk_is_large_enough(tmp_path):
     path = tmp_path / "sweep.nc"
     assert write_on_a_disk_of(2 * SIZE, path) == 0
     assert path.stat().st_size == pytest.approx(SIZE, rel=0.3)
 
 
-def test_file_whose_heap_of_texts_is_damaged_is_refused_at_once(tmp_path):
-    """HDF5 steps from entry to entry; over a free space of size 0 for ever."""
+def test_file_with_a_damaged_text_heap_is_refused(tmp_path):
+    """HDF5 steps from entry to entry, and never ends at a free space of size 0."""
     path = tmp_path / "x.nc"
     texts = {f"a{k}": f"a text of some length, number {k}" for k in range(9)}
     save_dataset(xarray.Dataset({"x": ("y", np.arange(3.0), texts)}), path)

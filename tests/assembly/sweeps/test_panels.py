@@ -1,4 +1,4 @@
-"""Figures of quantities by name: what a panel shows is what the file holds."""
+"""Figures of quantities by name: panels show the numbers of the file."""
 
 import numpy as np
 import pytest
@@ -35,21 +35,21 @@ def shown(panel):
          "singular_distance.parallel [-]"),
     ],
 )  # fmt: skip
-def test_a_map_shows_the_component_that_is_named(data, name, at, scale, title):
+def test_map_shows_the_named_component(data, name, at, scale, title):
     (panel, *_) = ff.figure_of(data, quantities=[name]).axes
     expected = data[name.partition(".")[0]].sel(at).transpose("ty", "tx").values
     np.testing.assert_allclose(shown(panel), scale * expected, rtol=1e-12)
     assert panel.get_title().startswith(title)
 
 
-def test_the_shift_is_the_length_of_the_platforms_translation(data):
+def test_translation_panel_shows_the_norm_of_the_platform_translation(data):
     (panel, *_) = ff.figure_of(data, quantities=["translation"]).axes
     parts = data["platform_screw"].sel(screw=["TX", "TY", "TZ"])
     expected = np.linalg.norm(parts.transpose("ty", "tx", "screw").values, axis=2)
     np.testing.assert_allclose(shown(panel), 1e3 * expected, rtol=1e-12)
 
 
-def test_a_variable_alone_means_all_its_components_along_a_line_too(data):
+def test_variable_without_a_component_plots_all_its_components(data):
     figure = ff.figure_of(data.isel(ty=[0]), quantities=["stiffness", "energy"])
     lines = [panel for panel in figure.axes if panel.lines]
     titles = [panel.get_title() for panel in lines]
@@ -60,8 +60,8 @@ def test_a_variable_alone_means_all_its_components_along_a_line_too(data):
     np.testing.assert_allclose(lines[4].lines[0].get_ydata(), expected, rtol=1e-12)
 
 
-def test_a_single_natural_frequency_is_plotted(data):
-    """The axis of the modes has one value, and stays."""
+def test_single_natural_frequency_is_plotted(data):
+    """The mode axis has one value and is not dropped."""
     one = data.assign(
         frequency=(("tx", "ty", "mode"), np.ones((3, 2, 1)))
     ).assign_coords(mode=["1"])
@@ -70,7 +70,7 @@ def test_a_single_natural_frequency_is_plotted(data):
         assert any("frequency" in title for title in titles)
 
 
-def test_unknown_and_too_many_quantities_are_one_line(run, data, tmp_path):
+def test_unknown_or_too_many_quantities_are_refused_in_one_line(run, data, tmp_path):
     save_dataset(data, tmp_path / "s.nc")
     for name, said in (
         ("stifness", 'no "stifness"; did you mean "stiffness"?'),
@@ -86,7 +86,7 @@ def test_unknown_and_too_many_quantities_are_one_line(run, data, tmp_path):
     assert not (tmp_path / "p.png").exists()
 
 
-def test_histograms_of_signed_components_have_their_mode_below_zero(arm_draws):
+def test_histogram_of_a_signed_component_marks_its_negative_mode(arm_draws):
     figure = figure_of_draws(arm_draws, None, ["platform_screw.TX"])
     panel = figure.axes[0]
     assert panel.get_xlabel() == "platform_screw.TX [mm]"

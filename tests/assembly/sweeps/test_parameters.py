@@ -1,4 +1,4 @@
-"""Numbers of a robot file by their path."""
+"""Numbers of a robot file selected by their path."""
 
 from dataclasses import replace
 
@@ -18,11 +18,11 @@ def design():
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_a_design_without_changes_is_the_robot(name):
+def test_design_without_changes_equals_the_robot(name):
     assert robot_hash(load_design(name).robot({})) == robot_hash(load_robot(name))
 
 
-def test_a_path_changes_that_number_and_nothing_else(design):
+def test_path_changes_only_its_number(design):
     path = "leg1.link_a.link.beam.radius"
     changed, robot = design.robot({path: 0.031}), load_robot("irsbot2")
     link = robot.frame("leg1.link_a").link
@@ -32,7 +32,7 @@ def test_a_path_changes_that_number_and_nothing_else(design):
     )
 
 
-def test_a_name_without_a_leg_changes_every_leg(design):
+def test_path_without_a_leg_changes_every_leg(design):
     robot = design.robot({"link_b.link.young": 7e10})
     assert [robot.frame(f"leg{i}.link_b").link.young for i in (1, 2)] == [7e10, 7e10]
 
@@ -57,7 +57,7 @@ def test_every_kind_of_number_has_a_path(design, path, value, read):
     assert read(design.robot({path: value})) == value
 
 
-def test_both_places_of_a_symmetric_matrix_change_together():
+def test_path_into_a_symmetric_matrix_changes_both_entries():
     robot = load_robot("four_bar")
     K = np.diag([1e3, 1e3, 1e3, 1e6, 1e6, 1e6])
     design = design_of(robot.with_links({"middle": MatrixLink(K)}))
@@ -70,8 +70,8 @@ def test_both_places_of_a_symmetric_matrix_change_together():
     assert K[0, 4] == K[4, 0] == 5.0
 
 
-def test_numbers_that_only_the_file_has_can_be_changed(tmp_path):
-    """``dh`` is read into a translation and a rotation; the file still says d."""
+def test_numbers_that_exist_only_in_the_file_can_be_changed(tmp_path):
+    """``dh`` is converted to translation and rotation; the file still contains d."""
     text = """
 platform = "tip"
 [[frame]]
@@ -103,21 +103,21 @@ dh = { theta = 0.0, d = 0.2, a = 0.1, alpha = 0.0 }
          "number > 0"),
     ],
 )  # fmt: skip
-def test_a_wrong_path_or_number_is_one_message(design, values, message):
+def test_invalid_path_or_number_is_refused_with_one_message(design, values, message):
     with pytest.raises(BadInput) as error:
         design.robot(values)
     assert str(error.value).startswith(message)
 
 
 def test_numbers_that_break_the_closures_are_refused(design):
-    """A frame of the parallelogram 1 mm off its home: nothing closes it."""
+    """A frame of the parallelogram 1 mm off its home leaves its closure open."""
     values = {"leg1.elbow_a.translation.y": 0.2}
     design.check(values)  # a robot file could say it
     with pytest.raises(BadInput, match="does not hold in the home"):
         design.robot(values)
 
 
-def test_units_follow_the_name():
+def test_unit_of_a_path_follows_its_name():
     assert unit_of("a.link.beam.radius") == "m"
     assert unit_of("a.link.young") == "Pa"
     assert unit_of("a.geometric_error.rx") == "rad"

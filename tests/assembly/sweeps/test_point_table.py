@@ -1,4 +1,4 @@
-"""Tables of points: no axis multiplied, every number where the data set has it."""
+"""Tables of points: one row for each point, with the numbers of the data set."""
 
 import csv
 import itertools
@@ -25,14 +25,14 @@ def read(path):
         return list(csv.DictReader(file))
 
 
-def test_a_table_has_one_row_for_each_point_and_one_column_for_each_component(data):
+def test_point_table_has_rows_of_points_and_columns_of_components(data):
     table = ff.point_table(data)
     assert len(table) == data["status"].size == 12
     components = sum(v.size // 12 for v in data.data_vars.values())
     assert table.shape == (12, components)
 
 
-def test_every_cell_is_the_number_of_its_point(data):
+def test_point_table_cells_equal_the_data_set(data):
     table = ff.point_table(data)
     for place in itertools.product(*(data[d].values for d in data["status"].dims)):
         at = dict(zip(data["status"].dims, place, strict=True))
@@ -45,8 +45,8 @@ def test_every_cell_is_the_number_of_its_point(data):
             np.testing.assert_array_equal(found, expected)
 
 
-def test_components_of_listed_postures_are_columns(tmp_path):
-    """They are not axes: of three postures there are three rows, not nine."""
+def test_pose_components_of_listed_postures_are_columns(tmp_path):
+    """They are no axes: three postures give three rows, not nine."""
     poses = tmp_path / "poses.csv"
     poses.write_text("id,pose.tx,pose.ty\na,0,0.13\nb,0.01,0.14\nc,0.02,0.13\n")
     data = ff.sweep("five_bar", poses=poses, draws=None)
@@ -55,8 +55,8 @@ def test_components_of_listed_postures_are_columns(tmp_path):
     assert list(table["ty", ""]) == [0.13, 0.14, 0.13]
 
 
-def test_table_of_a_robot_without_joints_has_its_rows(tmp_path):
-    """No joint coordinate is a variable of no columns, not of no rows."""
+def test_point_table_of_a_robot_without_joints_has_its_rows(tmp_path):
+    """The joint coordinates then have no columns; the rows remain."""
     (tmp_path / "bar.toml").write_text(
         'platform = "tip"\n[[frame]]\nname = "tip"\nparent = "base"\n'
         "translation = [1.0, 0, 0]\n"
@@ -65,7 +65,7 @@ def test_table_of_a_robot_without_joints_has_its_rows(tmp_path):
     assert list(ff.point_table(data)["energy", ""]) == [0.0]
 
 
-def test_csv_has_units_in_its_heads_and_every_digit(data, tmp_path):
+def test_csv_has_units_in_its_header_and_all_digits(data, tmp_path):
     write_point_table(data, tmp_path / "t.csv")
     rows = read(tmp_path / "t.csv")
     assert [row["id"] for row in rows] == [str(k) for k in range(12)]
@@ -80,14 +80,14 @@ def test_csv_has_units_in_its_heads_and_every_digit(data, tmp_path):
             "compliance.TX.FX [m/N]", "stiffness.FX [N/m]"} <= heads  # fmt: skip
 
 
-def test_a_missing_number_is_an_empty_cell(data, tmp_path):
+def test_missing_number_is_an_empty_csv_cell(data, tmp_path):
     some = data.assign(energy=data["energy"].where(data["tx"] < 0.01))
     write_point_table(some, tmp_path / "t.csv")
     for row in read(tmp_path / "t.csv"):
         assert (row["energy [J]"] == "") == (float(row["tx [m]"]) > 0.01)
 
 
-def test_other_rows_are_named_and_unknown_ones_refused(data):
+def test_table_rows_follow_named_axes_and_unknown_axes_are_refused(data):
     table = ff.point_table(data, ["wrench_component"])
     assert list(table.index) == list(WRENCH)
     with pytest.raises(ff.BadInput, match='table: no axis "txx"; did you mean "tx"'):
@@ -96,7 +96,7 @@ def test_other_rows_are_named_and_unknown_ones_refused(data):
         ff.point_table(data[["energy"]])
 
 
-def test_a_file_becomes_a_table_by_the_command(run, data, tmp_path):
+def test_plot_command_writes_a_csv_table(run, data, tmp_path):
     save_dataset(data, tmp_path / "s.nc")
     file, out = tmp_path / "s.nc", tmp_path / "t.csv"
     assert run("assembly", "plot", file, "--csv", out) == (0, "", "")
@@ -109,8 +109,8 @@ def test_a_file_becomes_a_table_by_the_command(run, data, tmp_path):
     assert out.read_text() == "mine,1\n"
 
 
-def test_draws_and_importance_have_tables_of_their_own(run, tmp_path, monkeypatch):
-    """Axes of the importance multiply with none of the draws'."""
+def test_draws_and_importance_have_separate_tables(run, tmp_path, monkeypatch):
+    """Axes of the importance are not combined with those of the draws."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "errors.toml").write_text(
         '[[errors]]\nframes = ["elbow"]\n'

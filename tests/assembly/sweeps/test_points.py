@@ -1,4 +1,4 @@
-"""What a sweep finds at its points is what one posture at a time gives."""
+"""Points of a sweep equal single postures."""
 
 from dataclasses import replace
 
@@ -52,7 +52,7 @@ def data(robot):
     return sweep_in_memory(Sweep(question, grid_targets(axes)))
 
 
-def test_wrenches_are_those_of_one_posture(robot, data):
+def test_swept_wrenches_equal_those_of_one_posture(robot, data):
     """Both come from multipliers certified to 1e-8 of the energy: 1e-4 of a wrench."""
     answer = solve_assembly(place_robot(robot, pose={"tx": 0.2, "tz": -0.4}))
     found = data.wrench.sel(tx=0.2, tz=-0.4, method="nearest")
@@ -65,7 +65,7 @@ def test_wrenches_are_those_of_one_posture(robot, data):
         )
 
 
-def test_bounds_and_finite_motions_are_those_of_one_posture(robot, data):
+def test_swept_bounds_and_finite_motions_equal_those_of_one_posture(robot, data):
     posture = place_robot(robot, pose={"tx": 0.2, "tz": -0.4})
     there = data.sel(tx=0.2, tz=-0.4, method="nearest")
     bounds = bound_pose_error(solve_assembly(posture), "free")
@@ -76,8 +76,8 @@ def test_bounds_and_finite_motions_are_those_of_one_posture(robot, data):
     assert float(there.linearisation_energy) == pytest.approx(gap.relative_energy)
 
 
-def test_clearance_alone_is_symmetric_where_the_robot_is(data):
-    """Without errors x and -x are one: within the bounds' own gap of 1e-6."""
+def test_error_by_clearances_alone_has_the_symmetry_of_the_robot(data):
+    """Without errors x and -x are equal, to the bounds' gap of 1e-6."""
     for name in ("rotation_error_clearance", "translation_error_clearance"):
         values = data[name].sel(bound="upper").values
         assert values == pytest.approx(values[::-1], abs=2e-6)
@@ -85,7 +85,7 @@ def test_clearance_alone_is_symmetric_where_the_robot_is(data):
     assert (data.rotation_error_clearance < data.rotation_error).all()
 
 
-def test_a_design_that_varies_is_that_robot_bit_for_bit():
+def test_varied_design_is_bit_identical_to_its_robot():
     path = "link_a.link.beam.radius"
     data = sweep("irsbot2", grid=GRID, vary=[f"{path}=0.03,0.05"], assumption="none")
     assert data.energy.dims == (path, "tx", "tz")
@@ -96,7 +96,7 @@ def test_a_design_that_varies_is_that_robot_bit_for_bit():
         assert np.array_equal(there[name], one[name], equal_nan=True), name
 
 
-def test_draws_are_robots_with_those_errors_bit_for_bit(tmp_path):
+def test_swept_draws_are_bit_identical_to_robots_with_those_errors(tmp_path):
     path = tmp_path / "errors.toml"
     path.write_text(ERRORS)
     data = sweep(
@@ -116,7 +116,7 @@ def test_draws_are_robots_with_those_errors_bit_for_bit(tmp_path):
             assert np.array_equal(there[name], one[name], equal_nan=True), name
 
 
-def test_a_list_and_a_grid_of_one_robot_agree(robot, tmp_path):
+def test_list_and_grid_of_the_same_postures_give_equal_energies(robot, tmp_path):
     write_robot(robot, tmp_path / "robot.toml")
     grid = sweep_poses(robot, parse_grid(GRID))
     x, z = np.meshgrid(grid.tx.values, grid.tz.values, indexing="ij")
@@ -134,7 +134,7 @@ def test_a_list_and_a_grid_of_one_robot_agree(robot, tmp_path):
     assert len(figure_of(found).axes) == 6
 
 
-def test_joint_coordinates_lead_to_the_pose_they_command():
+def test_grid_of_joint_coordinates_equals_the_grid_of_their_poses():
     robot = load_robot("five_bar")
     posture = place_robot(robot, pose={"tx": 0.03, "ty": 0.13})
     drives = {
@@ -152,7 +152,7 @@ def test_joint_coordinates_lead_to_the_pose_they_command():
     assert found["q.left.drive"].attrs["units"] == "rad"
 
 
-def test_a_design_that_cannot_close_is_a_status_and_stops_nothing():
+def test_design_that_cannot_close_has_the_status_invalid_robot():
     path = "leg1.elbow_a.translation.y"
     y = float(load_robot("irsbot2").frame("leg1.elbow_a").translation[1])
     data = sweep(
@@ -167,8 +167,8 @@ def test_a_design_that_cannot_close_is_a_status_and_stops_nothing():
     assert summary_of(data)["status"] == {"invalid robot": 2, "ok": 2}
 
 
-def test_a_point_that_breaks_the_algebra_is_a_status_of_its_own(robot, monkeypatch):
-    """The third of five postures raises in the middle of its block."""
+def test_point_with_a_linear_algebra_error_has_its_own_status(robot, monkeypatch):
+    """The third of five postures raises an error in the middle of its block."""
     solve, axes = points.solve_assembly, parse_grid("tx=-0.2:0.2:0.1,tz=-0.5")
     expected = sweep_poses(robot, axes)
     bad = place_robot(robot, pose={"tx": 0.0, "tz": -0.5}).platform[:3, 3]
@@ -211,13 +211,13 @@ def test_a_point_that_breaks_the_algebra_is_a_status_of_its_own(robot, monkeypat
          "sweep: 110001100 points; expected at most 10000000"),
     ],
 )  # fmt: skip
-def test_a_sweep_asked_for_wrongly_is_one_message(options, message):
+def test_invalid_sweep_options_are_refused_with_one_message(options, message):
     with pytest.raises(BadInput) as error:
         ask_sweep("irsbot2", SweepOptions(**options))
     assert message in str(error.value)
 
 
-def test_figures_need_only_the_data_set(tmp_path):
+def test_figures_are_drawn_from_the_data_set_alone(tmp_path):
     path = tmp_path / "errors.toml"
     path.write_text(ERRORS)
     grid = "tx=-0.02:0.02:0.02,ty=0.12:0.14:0.02"
@@ -250,8 +250,8 @@ def test_figures_need_only_the_data_set(tmp_path):
         figure_of(data, {"draw": 1, "tx": 0.0, "ty": 0.12})
 
 
-def test_sweep_across_a_singular_line_marks_it_and_keeps_the_joints():
-    """Above its centre the locked 3-UPU turns; its legs' lengths are Pythagoras'."""
+def test_sweep_across_a_singular_line_marks_its_point_as_singular():
+    """Above its centre the locked 3-UPU turns; leg lengths by Pythagoras."""
     robot = three_upu(seed=1)
     data = sweep_poses(robot, parse_grid("tx=-0.02:0.02:0.02,ty=0,tz=0.45"))
     assert data["status"].values.ravel().tolist() == ["ok", "singular", "ok"]
@@ -261,8 +261,8 @@ def test_sweep_across_a_singular_line_marks_it_and_keeps_the_joints():
     assert length == pytest.approx(expected, abs=1e-9)
 
 
-def test_sweep_names_the_far_side_of_a_singularity():
-    """On the five-bar's axis the far arms are one line at 84.85 mm."""
+def test_sweep_marks_postures_beyond_a_singularity():
+    """On the five-bar's axis the far arms are in line at 84.85 mm."""
     data = sweep_poses(load_robot("five_bar"), parse_grid("tx=0,ty=0.08:0.09:0.01"))
     assert data["status"].values.ravel().tolist() == ["beyond_singularity", "ok"]
     reason = str(data["reason"].values.ravel()[0])
@@ -270,8 +270,8 @@ def test_sweep_names_the_far_side_of_a_singularity():
     assert np.isfinite(data["energy"].values).all()
 
 
-def test_sweep_marks_postures_beyond_the_joints_limits():
-    """Along x the orthoglide's x slide moves as its platform does: p_x - r_x = L."""
+def test_sweep_marks_postures_beyond_joint_limits():
+    """Along x the orthoglide's x slide moves with its platform: p_x - r_x = L."""
     robot = load_robot("orthoglide")
     home = home_posture(robot).coordinates[robot.index("x.slide")]
     frames = tuple(
@@ -288,8 +288,8 @@ def test_sweep_marks_postures_beyond_the_joints_limits():
     assert str(data["reason"].values.ravel()[0]).startswith("x.slide at ")
 
 
-def test_point_that_finite_motions_change_by_half_has_no_first_order_verdict():
-    """A short rod near its dead centre: first order sees none of its energy."""
+def test_point_changed_by_finite_motions_is_marked_as_singular():
+    """A short rod near its dead centre stores energy only by finite motions."""
     rod = BeamLink({"radius": 0.01}, 70e9, 0.33)
     robot = slider_crank(0.3, rod, error=-2e-4)
     reach = sum(SLIDER_CRANK)

@@ -1,4 +1,4 @@
-"""A sweep in one call: in memory or to a file, of a robot named or in memory."""
+"""A sweep by one call: in memory or to a file, of a named robot or an object."""
 
 import pytest
 import xarray
@@ -8,7 +8,7 @@ import forcefit as ff
 GRID = "tx=-0.02:0.02:0.02,ty=0.13:0.14:0.01"
 
 
-def test_a_sweep_to_a_file_gives_what_it_gives_in_memory(tmp_path):
+def test_sweep_to_a_file_equals_the_sweep_in_memory(tmp_path):
     done = []
     written = ff.sweep(
         "five_bar", grid=GRID, output=tmp_path / "map.nc",
@@ -19,7 +19,7 @@ def test_a_sweep_to_a_file_gives_what_it_gives_in_memory(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["map.nc"]
 
 
-def test_a_sweep_of_a_robot_in_memory_is_that_of_its_name():
+def test_sweep_of_a_robot_object_equals_that_of_its_name():
     named = ff.sweep("five_bar", grid=GRID)
     command = named.attrs.pop("command")
     assert command == f"forcefit assembly sweep five_bar --grid {GRID}"
@@ -28,12 +28,12 @@ def test_a_sweep_of_a_robot_in_memory_is_that_of_its_name():
     )
 
 
-def test_a_robot_in_memory_has_no_numbers_to_vary():
+def test_varying_a_robot_object_is_refused():
     with pytest.raises(ff.BadInput, match="--vary: found a robot in memory"):
         ff.sweep(ff.load_robot("five_bar"), grid=GRID, vary=["a.b=1,2"])
 
 
-def test_the_command_of_a_sweep_has_the_options_that_it_was_given():
+def test_sweep_records_its_command_with_all_options():
     data = ff.sweep("five_bar", grid="ty=0.13", wrench_of=["left.elbow"], seed=3)
     expected = "five_bar --grid ty=0.13 --seed 3 --wrench-of left.elbow"
     assert data.attrs["command"] == f"forcefit assembly sweep {expected}"

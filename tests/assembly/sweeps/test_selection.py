@@ -1,4 +1,4 @@
-"""Quantities by name: what is named is stored, with the numbers of the whole sweep."""
+"""Quantities selected by name are stored with the numbers of the whole sweep."""
 
 import pytest
 import xarray
@@ -30,14 +30,14 @@ def whole():
         ("condition,joint_coordinate", {}),
     ],
 )
-def test_variables_named_are_those_of_the_whole_sweep_and_no_others(whole, names, more):
+def test_sweep_stores_only_the_named_variables(whole, names, more):
     data = ff.sweep("five_bar", grid=GRID, quantities=[names], **more)
     assert set(data.data_vars) == {*names.split(","), *TEXTS}
     for name in names.split(","):
         xarray.testing.assert_identical(data[name].drop_vars(()), whole[name])
 
 
-def test_default_stands_for_what_is_stored_without_names(whole):
+def test_default_selects_the_quantities_stored_without_names(whole):
     plain = ff.sweep("five_bar", grid=GRID)
     added = ff.sweep("five_bar", grid=GRID, quantities=["default", "stiffness"])
     assert set(added.data_vars) == {*plain.data_vars, "stiffness"}
@@ -55,13 +55,13 @@ def test_default_stands_for_what_is_stored_without_names(whole):
         ("reading", "--quantities: reading needs effects that change what a device"),
     ],
 )
-def test_quantities_that_cannot_be_are_one_message(names, message):
+def test_invalid_quantities_are_refused_with_one_message(names, message):
     with pytest.raises(ff.BadInput) as error:
         ff.sweep("five_bar", grid=GRID, quantities=[names])
     assert str(error.value).startswith(message)
 
 
-def test_bounds_are_not_asked_of_a_loaded_robot_where_they_are_not_named():
+def test_loaded_sweep_without_bounds_among_its_quantities_is_accepted():
     load = [0, 0, 0, 10.0, 0, 0]
     data = ff.sweep("five_bar", grid=GRID, load=load, quantities=["energy"])
     assert set(data.data_vars) == {"energy", *TEXTS}
@@ -69,7 +69,7 @@ def test_bounds_are_not_asked_of_a_loaded_robot_where_they_are_not_named():
         ff.sweep("five_bar", grid=GRID, load=load)
 
 
-def test_the_command_lists_quantities_and_keeps_those_named(run, tmp_path):
+def test_sweep_command_lists_and_selects_quantities(run, tmp_path):
     status, out, _ = run("assembly", "sweep", "five_bar", "--quantities", "list")
     assert status == 0
     names = [line.split()[0] for line in out.splitlines()]
@@ -86,7 +86,7 @@ def test_the_command_lists_quantities_and_keeps_those_named(run, tmp_path):
     assert (status, err) == (0, "")
 
 
-def test_a_figure_without_usual_quantities_says_so(tmp_path):
+def test_figure_without_usual_quantities_is_refused(tmp_path):
     data = ff.sweep("five_bar", grid=GRID, quantities=["condition"])
     with pytest.raises(ff.BadInput, match="found none of the usual quantities"):
         ff.figure_of(data)

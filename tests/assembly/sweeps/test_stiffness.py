@@ -14,7 +14,7 @@ from assembly.sweeps.sweep import sweep_in_memory
 from forcefit.inputs.table import BadInput
 
 
-def test_each_point_has_the_stiffness_of_its_posture():
+def test_swept_stiffness_equals_that_of_single_postures():
     data = sweep(
         "irsbot2",
         grid="tx=-0.1:0.1:0.1,tz=-0.5:-0.4:0.1",
@@ -41,8 +41,8 @@ def test_each_point_has_the_stiffness_of_its_posture():
     assert "softest eigen-stiffness [N/um]" in titles
 
 
-def test_a_thicker_link_is_stiffer_in_a_sweep_of_designs():
-    """Bending stiffness of a round bar grows with the radius to the fourth."""
+def test_stiffness_increases_with_the_swept_link_radius():
+    """The bending stiffness of a round bar is proportional to radius^4."""
     data = sweep(
         "irsbot2",
         grid="tx=0,tz=-0.5",
@@ -58,8 +58,8 @@ LOAD = (0.0, 0.0, 0.0, 0.0, 0.0, -300.0)
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_a_tangent_is_that_of_the_point_s_errors_load_and_clearances(state):
-    """Of its own errors and of draws; loads and draws change it, the classical not."""
+def test_swept_tangent_includes_errors_load_and_clearances(state):
+    """Errors of the varied design; the load changes the tangent."""
     options = SweepOptions(
         grid="tx=0.1,tz=-0.5", assumption="none", state=state, load=LOAD,
         vary=["leg1.link_a.geometric_error.rx=0,0.02"],
@@ -80,14 +80,14 @@ def test_a_tangent_is_that_of_the_point_s_errors_load_and_clearances(state):
     assert state != "exact" or "internal forces and loads" in data.part.values
 
 
-def test_a_tangent_names_the_motions_that_nothing_resists():
+def test_swept_tangent_reports_free_motions():
     data = sweep("irsbot2", grid="tx=0,tz=-0.5", assumption="none", state="contact",
                  load=LOAD)  # fmt: skip
     assert "nothing resists the platform's motion" in str(data.reason.values.ravel()[0])
     assert float(data.stiffness.sel(wrench_component="FY").squeeze()) == 0.0
 
 
-def test_a_wrong_state_is_refused():
+def test_unknown_state_is_refused():
     options = SweepOptions(grid="tx=0,tz=-0.5", assumption="none", state="exakt")
     with pytest.raises(BadInput, match='--state: found "exakt"'):
         ask_sweep("irsbot2", options)

@@ -14,7 +14,7 @@ from assembly.sweeps.stiffness_slopes import CannotChange, stiffness_slopes
 POSE = {"tx": 0.1, "tz": -0.5}
 
 
-def test_by_young_s_modulus_it_is_minus_the_links_share():
+def test_slope_by_the_modulus_is_minus_the_share_of_the_links():
     """dC/dE = -C_links / E, both links of each leg summed (Castigliano)."""
     path = "link_a.link.young"
     slope = stiffness_slopes(load_design("irsbot2"), [path], POSE)[path]
@@ -32,8 +32,8 @@ def test_by_young_s_modulus_it_is_minus_the_links_share():
     np.testing.assert_allclose(slope * young / size, -sum(links) / size, atol=1e-6)
 
 
-def test_by_a_bar_s_length_it_is_the_textbook_s(tmp_path):
-    """d(L/EA)/dL = 1/EA, d(L^2/2EI)/dL = L/EI of an arm on its own."""
+def test_slope_by_the_length_of_a_bar_equals_the_textbook(tmp_path):
+    """d(L/EA)/dL = 1/EA, d(L^2/2EI)/dL = L/EI of a single arm."""
     path = tmp_path / "bar.toml"
     path.write_text("""
 name = "bar"
@@ -51,8 +51,8 @@ link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }
     assert slope[2, 4] == pytest.approx(0.5 / (7e10 * inertia), rel=1e-6)
 
 
-def test_the_command_gives_them_at_the_exact_equilibrium(run):
-    """The load's own stiffness is in them: they are not those without it."""
+def test_stiffness_command_gives_slopes_at_the_exact_equilibrium(run):
+    """They include the stiffness due to the load, unlike those without load."""
     slopes = {}
     for words in ([], ["--state", "exact", "--load", "fx=-300"]):
         status, out, _ = run(
@@ -67,8 +67,8 @@ def test_the_command_gives_them_at_the_exact_equilibrium(run):
     assert abs(slopes[4][3, 3] / slopes[0][3, 3] - 1) > 1e-4
 
 
-def test_effects_of_the_file_are_in_them(tmp_path):
-    """A drive of 5e4 N m/rad under an arm of L: L^2/k more at its tip, by L 2 L/k."""
+def test_slopes_include_the_effects_of_the_file(tmp_path):
+    """A drive of k = 5e4 N m/rad below an arm L adds L^2/k; its slope is 2 L/k."""
     arm = """
 name = "arm"
 platform = "tip"
@@ -99,7 +99,7 @@ parameters = { drive = 5e4 }
     np.testing.assert_allclose(slopes[1] - slopes[0], difference, atol=1e-11)
 
 
-def test_a_length_of_an_overconstrained_loop_is_named_with_what_stands_for_it(run):
+def test_length_in_an_overconstrained_loop_is_refused_with_its_alternative(run):
     path = "leg1.link_a.translation.x"
     with pytest.raises(CannotChange, match="leg1.link_a.translation.x cannot change"):
         stiffness_slopes(load_design("irsbot2"), [path], POSE)

@@ -22,7 +22,7 @@ def data():
     return sweep_poses(irsbot2_with(NUMBERS["cases"][0]), parse_grid(GRID))
 
 
-def test_every_point_of_a_sweep_is_the_single_solution(data):
+def test_swept_points_equal_single_solutions(data):
     robot = irsbot2_with(NUMBERS["cases"][0])
     for x in (-0.2, 0.2):
         one = solve_assembly(place_robot(robot, pose={"tx": x, "tz": -0.45}))
@@ -36,8 +36,8 @@ def test_every_point_of_a_sweep_is_the_single_solution(data):
     assert float(point.margin_free) == pytest.approx(reference["t_compliant_free"])
 
 
-def test_points_out_of_reach_say_so_and_stop_nothing(data):
-    """(-0.4, -0.65) is 0.83 m from leg 1's centre; its links give 0.758 m."""
+def test_points_out_of_reach_have_their_own_status(data):
+    """(-0.4, -0.65) is 0.83 m from leg 1's centre; its links reach 0.758 m."""
     point = data.sel(tx=-0.4, tz=-0.65, method="nearest")
     assert point.status.item() == "out of reach"
     assert "cannot be reached" in point.reason.item()
@@ -45,7 +45,7 @@ def test_points_out_of_reach_say_so_and_stop_nothing(data):
     assert (data.status == "ok").sum() == 13
 
 
-def test_points_that_cannot_be_assembled_have_an_infinite_margin():
+def test_points_without_clearance_have_an_infinite_margin():
     robot = coaxial_beams(np.array([0, 0, 0, 1e-4, 0, 0]))
     data = sweep_poses(robot, {"tx": np.array([0.5])})
     assert data.status.item() == "ok"
@@ -53,7 +53,7 @@ def test_points_that_cannot_be_assembled_have_an_infinite_margin():
     assert data.energy.item() == pytest.approx(0.5e6 * 1e-8 / 2)
 
 
-def test_a_saved_sweep_reads_back_with_units_and_provenance(data, tmp_path):
+def test_saved_sweep_is_read_with_units_and_provenance(data, tmp_path):
     save_dataset(data, tmp_path / "map.nc")
     assert [p.name for p in tmp_path.iterdir()] == ["map.nc"]
     with xarray.open_dataset(tmp_path / "map.nc") as back:
@@ -66,12 +66,12 @@ def test_a_saved_sweep_reads_back_with_units_and_provenance(data, tmp_path):
         assert np.array_equal(back.energy, data.energy, equal_nan=True)
 
 
-def test_a_folder_that_is_not_there_is_refused(data, tmp_path):
+def test_saving_to_a_missing_folder_is_refused(data, tmp_path):
     with pytest.raises(BadInput, match="no folder .*nowhere; expected one"):
         save_dataset(data, tmp_path / "nowhere" / "map.nc")
 
 
-def test_maps_show_each_quantity_of_the_grid(data):
+def test_maps_show_the_quantities_of_the_grid(data):
     figure = map_figure(data)
     titles = [axes.get_title() for axes in figure.axes]
     assert "minimum assembly energy [J]" in titles
@@ -81,7 +81,7 @@ def test_maps_show_each_quantity_of_the_grid(data):
     assert np.nanmax(shown) == pytest.approx(float(data.energy.max()))
 
 
-def test_pose_errors_are_bounded_where_a_reading_is_asked_for():
+def test_sweep_with_an_assumption_stores_pose_error_bounds():
     robot = irsbot2_with(NUMBERS["cases"][0])
     data = sweep_poses(robot, parse_grid("tx=-0.2:0.2:0.2,tz=-0.9:-0.45:0.45"),
                        assumption="frozen")  # fmt: skip
@@ -96,13 +96,13 @@ def test_pose_errors_are_bounded_where_a_reading_is_asked_for():
     assert np.isnan(data.rotation_error.sel(tz=-0.9, method="nearest")).all()
 
 
-def test_maps_need_two_axes(data):
+def test_map_of_a_single_axis_is_refused(data):
     with pytest.raises(ValueError, match="two axes, this one has 1"):
         map_figure(data.isel(tx=[0]))
 
 
-def test_a_margin_that_fails_is_a_status_of_its_point(monkeypatch):
-    """The solver gives up on one reading of one point: its neighbour is not touched."""
+def test_failed_margin_has_the_status_solver_failed_at_its_point(monkeypatch):
+    """The solver fails at one of two points; the other point keeps its result."""
     solve = points.zone_margin
 
     def spoilt(postures, reading, errors):

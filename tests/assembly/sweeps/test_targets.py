@@ -13,7 +13,7 @@ def robot():
     return load_robot("irsbot2")
 
 
-def test_points_of_a_grid_follow_one_another_in_c_order(robot):
+def test_grid_points_are_in_c_order(robot):
     targets = grid_targets(parse_grid("tx=0:0.2:0.1,tz=-0.5:-0.4:0.1"))
     rows = targets.at(np.arange(6))
     assert targets.shape == (3, 2)
@@ -24,7 +24,7 @@ def test_points_of_a_grid_follow_one_another_in_c_order(robot):
     assert goals[4, [0, 2]] == pytest.approx([0.2, -0.5])
 
 
-def test_joints_not_named_keep_their_position(robot):
+def test_drives_not_named_in_a_grid_keep_their_position(robot):
     targets = grid_targets(parse_grid("q.leg1.drive=0:1:0.5", robot))
     goals = goals_of(targets.names, robot, targets.at(np.arange(3)))
     one, other = robot.index("leg1.drive"), robot.index("leg2.drive")
@@ -33,7 +33,7 @@ def test_joints_not_named_keep_their_position(robot):
     assert np.isnan(np.delete(goals, [one, other], axis=1)).all()
 
 
-def test_a_table_is_a_list_of_postures_in_its_order(robot, tmp_path):
+def test_table_of_postures_is_read_in_its_order(robot, tmp_path):
     path = tmp_path / "poses.csv"
     path.write_text("\ufeffid,pose.tx, pose.tz\r\nb,0.1,-0.5\r\n\r\na,0.2,-0.4\r\n")
     targets = read_targets(path, robot)
@@ -63,7 +63,9 @@ def test_a_table_is_a_list_of_postures_in_its_order(robot, tmp_path):
         ("pose.tx\n1\n" + "0" * 200_000, "line 3: not CSV: field larger than"),
     ],
 )  # fmt: skip
-def test_a_table_with_a_mistake_is_one_message(robot, tmp_path, text, message):
+def test_invalid_table_of_postures_is_refused_with_one_message(
+    robot, tmp_path, text, message
+):
     path = tmp_path / "poses.csv"
     path.write_text(text)
     with pytest.raises(BadInput) as error:
@@ -82,7 +84,7 @@ def test_a_table_with_a_mistake_is_one_message(robot, tmp_path, text, message):
         ("tx=0.5", [0.5]),
     ],
 )
-def test_both_ends_count_when_the_step_fits(text, values):
+def test_grid_includes_both_ends_if_the_step_fits(text, values):
     assert parse_grid(text)["tx"] == pytest.approx(values, abs=1e-15)
 
 
@@ -105,7 +107,7 @@ def test_both_ends_count_when_the_step_fits(text, values):
         ("q.leg1.elbow=0", 'grid: unknown pose component "q.leg1.elbow"'),
     ],
 )  # fmt: skip
-def test_a_bad_grid_is_one_message(robot, text, message):
+def test_invalid_grid_is_refused_with_one_message(robot, text, message):
     with pytest.raises(BadInput) as error:
         parse_grid(text, robot)
     assert str(error.value).startswith(message)

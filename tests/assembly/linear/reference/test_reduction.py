@@ -27,8 +27,8 @@ def rigid_beams(gap):
 
 
 @pytest.mark.parametrize("gap", [1e-11, 1e-6, 1e-2])
-def test_a_rigid_part_is_open_by_its_error_however_small(gap):
-    """The reference length is 1 m: a gap is as large as it is."""
+def test_rigid_closure_stays_open_by_its_error(gap):
+    """The reference length is 1 m, so the relative gap equals the gap in metres."""
     assert reduced(rigid_beams([0, 0, 0, 0, gap, 0])).inconsistent == pytest.approx(gap)
     assert reduced(rigid_beams([gap, 0, 0, 0, 0, 0])).inconsistent == pytest.approx(gap)
 
@@ -43,7 +43,7 @@ def turn_and_slide():
 
 
 @pytest.mark.parametrize("load", [1e-9, 1.0, 1e9])
-def test_a_free_motion_is_named_alike_under_any_load(load):
+def test_free_motion_message_does_not_depend_on_the_size_of_the_load(load):
     """0.3 N m and 2 N: 0.3 rad against 2 m / 10 m; a unit turn shifts by 10 m."""
     with pytest.raises(FreeMotion) as told:
         reduced(turn_and_slide(), load * np.array([0, 0, 2.0, 0, 0, 0.3]))
