@@ -1,4 +1,5 @@
-"""Beams: closed forms against tables, laws and hand-worked rows."""
+"""Compliance and stiffness of beams against published tables, textbooks and hand
+calculation."""
 
 import math
 
@@ -36,7 +37,7 @@ def assert_same(matrix, expected, tol):
 
 
 @pytest.mark.parametrize("theory", PAPER)
-def test_stiffness_of_the_papers_link_is_its_reference_table(theory):
+def test_stiffness_of_the_papers_link_equals_its_published_table(theory):
     diagonal, coupling = PAPER[theory]
     expected = np.diag(diagonal)
     expected[1, 5] = expected[5, 1] = coupling
@@ -90,7 +91,7 @@ def test_turning_the_beam_turns_its_compliance(rng):
     assert_same(turned, A @ straight @ A.T, 1e-13)
 
 
-def test_height_stands_along_up():
+def test_section_height_lies_along_the_up_direction():
     """A plate on edge is stiff against a force along its height."""
     plate = rectangular_section(width=0.01, height=0.1, nu=NU)
     C = beam_compliance(1.0, plate, E, NU, axis=[1, 0, 0], up=[0, 0, 1], theory="euler")
@@ -98,7 +99,7 @@ def test_height_stands_along_up():
     assert C[4, 4] == pytest.approx(C[5, 5] * 100, rel=1e-12)
 
 
-def test_section_axes_default_up_is_y_unless_the_beam_lies_along_it():
+def test_section_axes_take_y_as_up_and_z_for_a_beam_along_y():
     np.testing.assert_array_equal(section_axes([2, 0, 0])[:, 2], [0, 1, 0])
     np.testing.assert_array_equal(section_axes([0, -3, 0])[:, 2], [0, 0, 1])
     axes = section_axes([1, 2, 3], [0.3, 0.1, 1.0])
@@ -106,7 +107,7 @@ def test_section_axes_default_up_is_y_unless_the_beam_lies_along_it():
     assert np.linalg.det(axes) == pytest.approx(1)
 
 
-def test_round_sections_by_hand():
+def test_round_section_constants_equal_hand_calculation():
     bar, tube = round_section(2.0, 0.25), round_section(2.0, 0.25, 1.0)
     assert bar.area == pytest.approx(4 * math.pi)
     assert bar.I_y == bar.I_z == pytest.approx(4 * math.pi)
@@ -152,7 +153,7 @@ def paper_link():
     return LinkStiffness("Timoshenko beam", C, tip=[0.452, 0, 0], base=[0, 0, 0])
 
 
-def test_a_link_is_locked_and_knows_both_matrices():
+def test_link_stiffness_is_read_only_and_the_inverse_of_its_compliance():
     link = paper_link()
     np.testing.assert_allclose(
         scaled(link.stiffness @ link.compliance, np.eye(6)), np.eye(6), atol=1e-8
@@ -198,6 +199,6 @@ def test_wrong_compliance_is_refused(C, message):
 
 
 @pytest.mark.parametrize("vector", [[1.0, math.nan, 0.0], [1.0, 2.0], [1.0] * 4])
-def test_a_direction_is_three_finite_numbers(vector):
+def test_direction_that_is_not_three_finite_numbers_is_refused(vector):
     with pytest.raises(BadInput, match="axis: found .*, expected 3 finite numbers"):
         unit_vector("axis", vector)

@@ -48,8 +48,8 @@ def volume(mesh):
 # --- what the elements cannot follow -------------------------------------------------
 
 
-def test_estimated_errors_are_a_matrix_of_energies():
-    """Symmetric and positive: a Gram matrix, like the true K_h - K."""
+def test_estimated_error_matrix_is_symmetric_and_positive():
+    """It is a Gram matrix, like the true error K_h - K."""
     K, indicated, _ = bar(1, 6).totals()
     assert np.abs(scaled(indicated - indicated.T, indicated)).max() < 1e-12
     assert np.linalg.eigvalsh(scaled(indicated, indicated))[0] > 0
@@ -58,8 +58,8 @@ def test_estimated_errors_are_a_matrix_of_energies():
     assert (lowest > -1e-12 * np.trace(each, axis1=1, axis2=2)).all()
 
 
-def test_rigid_motions_and_constant_strains_leave_no_error():
-    """On bent elements too: these hold linear fields exactly."""
+def test_estimated_error_is_zero_for_rigid_motions_and_constant_strains():
+    """Also on bent elements, which represent linear fields exactly."""
     mesh, K = bar(1, 6).mesh, bar(1, 6).solution.stiffness
     lam, mu = constants(mesh)
     singular = np.ones(len(mesh.cells), dtype=bool)
@@ -80,8 +80,9 @@ def polynomials(x, degree, rng):
 
 
 @pytest.mark.parametrize("singular", [False, True])
-def test_linear_strains_leave_no_error_and_quadratic_ones_do(rng, singular):
-    """Straight elements hold quadratic displacements, whose stresses are linear."""
+def test_estimated_error_is_zero_for_linear_strains_only(rng, singular):
+    """Straight elements represent quadratic displacements, whose stresses are
+    linear."""
     mesh = isoparametric(box_solid((1, 2, 2), (0.5, 0.6, 0.8)))
     lam, mu = constants(mesh)
     where = np.full(len(mesh.cells), singular)
@@ -136,7 +137,7 @@ def shifted(excess, kind="distributing-both"):
 
 
 @pytest.mark.parametrize("excess", [1e-3, -1e-3])
-def test_a_bar_thinner_than_its_shape_is_as_much_softer_as_the_books_say(excess):
+def test_geometry_error_of_a_bar_follows_the_powers_of_its_radius(excess):
     """Free ends: A grows with R^2, I and J with R^4; K_h - K = -4 x the excess of K in
     bending and torsion, -2 x in tension, to first order (1 %: the circle's and the
     square's error)."""
@@ -184,8 +185,8 @@ def test_the_estimate_covers_the_true_error_on_one_mesh(mesh):
     assert abs(K[2, 2] / TORSION - 1) < told[2]
 
 
-def test_indicated_error_is_near_the_true_error():
-    """Bending's error without the safety factor is within 1.5 of the true one."""
+def test_indicated_error_is_within_1_5_times_the_true_error():
+    """Of the bending stiffness, without the safety factor."""
     for mesh in ((1, 6), (1, 12), (2, 12), (2, 24)):
         K, indicated, shape = bar(*mesh).totals()
         true = K[0, 0] / BENDING - 1 - shape[0, 0] / BENDING
@@ -232,7 +233,7 @@ def test_residual_tractions_of_a_unit_cube_have_the_energy_by_hand():
     assert np.abs(estimate - np.diag([estimate[0, 0], 0])).max() == 0
 
 
-def test_error_of_a_twisted_thin_plate_is_covered():
+def test_estimated_error_of_a_twisted_thin_plate_covers_the_true_error():
     """Elements 7 to 15 mm wide on a 2 mm plate, whose layer is 0.6 mm deep at its free
     edges: the true error of twisting is 1.4 and 0.7 %."""
     history = [plate(4, 1, 8), plate(8, 1, 16)]
@@ -244,7 +245,7 @@ def test_error_of_a_twisted_thin_plate_is_covered():
             assert 0.006 < true < told[2] < 6 * true
 
 
-def test_a_layer_takes_most_of_the_error_at_the_clamped_edges():
+def test_layers_at_clamped_edges_at_least_halve_the_bending_error():
     """The same tetrahedra without layers have more than twice the error in bending."""
     solid = split_joining_edges(bar_solid(2, 12, R, L), (0, 1))
     mesh = isoparametric(solid)

@@ -36,14 +36,14 @@ def test_superlu_is_used_without_pypardiso(monkeypatch, chosen):
 
 
 def test_superlu_is_used_if_pypardiso_does_not_load(monkeypatch, chosen):
-    """For example with MKL's library of another architecture."""
+    """For example because the MKL library is of another architecture."""
     monkeypatch.setattr(sparse_solver, "find_spec", lambda _: object())
     monkeypatch.setattr(sparse_solver, "_mkl", lambda: None)
     monkeypatch.setitem(sys.modules, "pypardiso", None)
     assert chosen() == "SuperLU"
 
 
-def test_missing_mkl_gives_no_library(monkeypatch):
+def test_mkl_library_is_none_when_mkl_is_not_installed(monkeypatch):
     def absent(name):
         raise sparse_solver.PackageNotFoundError(name)
 

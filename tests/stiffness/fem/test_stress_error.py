@@ -66,8 +66,8 @@ def test_an_estimated_error_is_proportional_to_the_load(bar, rng):
     )
 
 
-def test_elements_agree_about_a_uniform_strain(rng):
-    """Displacements linear in place: one stress everywhere, up to rounding."""
+def test_estimated_stress_error_of_a_uniform_strain_is_zero(rng):
+    """Displacements linear in place give one stress everywhere, up to rounding."""
 
     def everything(x):
         return np.full(len(x), True)
@@ -83,7 +83,9 @@ def test_elements_agree_about_a_uniform_strain(rng):
     assert estimated_error(level, pull, 7, everywhere, ~everywhere) > 1e-3 * scale
 
 
-def test_a_peak_at_an_inner_edge_has_no_error_because_it_has_no_value():
+def test_peak_at_a_sharp_inner_edge_has_no_error_estimate():
+    """The true stress at such an edge is infinite."""
+
     def keep(x):
         return (x[:, 0] < 0.05) | (np.abs(x[:, 2] - 0.2) > 0.1)
 

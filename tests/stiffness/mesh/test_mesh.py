@@ -25,8 +25,8 @@ def kuhn_cube(n):
 
 
 @pytest.mark.slow
-def test_a_meshed_bar_has_exact_interfaces_and_a_round_side(tmp_path):
-    """24 facets: the polygon lacks 1.1 % of area; the corners lie on the circle."""
+def test_meshed_bar_has_flat_ends_and_corners_on_its_cylinder(tmp_path):
+    """The bar has 24 facets; a second call reads the same mesh from the cache."""
     solid = mesh_solid(bar(facets=24), *FACES, edge=0.02, cache=tmp_path)
     assert solid.volumes().min() > 0
     for number, height in ((0, 0.0), (1, 0.1)):
@@ -61,7 +61,7 @@ DAMAGED = {
 
 
 @pytest.mark.parametrize("damage", DAMAGED)
-def test_a_damaged_mesh_of_the_cache_is_made_again(tmp_path, monkeypatch, damage):
+def test_damaged_mesh_in_the_cache_is_replaced(tmp_path, monkeypatch, damage):
     monkeypatch.setattr(
         mesh_module, "_tetrahedralize", lambda *_: (MADE.points, MADE.cells)
     )
@@ -80,7 +80,7 @@ def test_a_damaged_mesh_of_the_cache_is_made_again(tmp_path, monkeypatch, damage
     [(0, "first\nno inside", "no inside"), (0, "no inside\n", "no inside"),
      (1, "first\nout of memory", "out of memory")],
 )  # fmt: skip
-def test_failed_mesher_is_reported_with_its_last_words(
+def test_failed_mesher_is_reported_with_its_last_output(
     tmp_path, monkeypatch, status, words, told
 ):
     """The mesher finds no solid, or it crashes."""
@@ -165,8 +165,9 @@ def test_coarser_surface_has_fewer_triangles_and_the_same_volume(name):
     assert np.abs(apart).max() < 4e-4
 
 
-def test_a_surface_that_cannot_be_coarser_within_the_tolerance_is_kept():
-    """A 32-gon of r = 20 mm: a corner less is 0.4 mm off, 0.1 mm are allowed."""
+def test_surface_that_cannot_be_decimated_within_the_tolerance_is_kept():
+    """A 32-gon of r = 20 mm: without one corner it deviates by 0.4 mm, and 0.1 mm are
+    allowed."""
     surface = bar()
     points, triangles = coarser_surface(surface, 1e-4)
     assert triangles is surface.triangles

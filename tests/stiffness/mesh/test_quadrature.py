@@ -1,4 +1,4 @@
-"""Rules of integration over triangles and tetrahedra."""
+"""Quadrature rules for triangles and tetrahedra."""
 
 from math import factorial, prod
 

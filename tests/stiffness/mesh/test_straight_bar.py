@@ -23,8 +23,8 @@ SECTIONS = [
 
 
 @pytest.mark.parametrize("section", SECTIONS, ids=lambda section: "-".join(section))
-def test_a_bar_is_closed_and_has_its_volume_and_ends(section):
-    """Exactly, except that chords replace circles."""
+def test_straight_bar_mesh_is_closed_and_has_exact_volume_and_ends(section):
+    """Exact except that chords replace circles."""
     solid = straight_bar(section)
     area = declared_section(section, 0.3).area
     assert (solid.volumes() > 0.0).all()

@@ -27,7 +27,7 @@ FLAT = {"point": POINT, "normal": [0, 3, 4]}
          "bore", POINT, UNIT, 1e-9),
     ],
 )  # fmt: skip
-def test_interface_has_the_place_and_direction_of_its_text(
+def test_interface_has_the_kind_point_and_direction_of_its_text(
     text, kind, point, direction, radius
 ):
     interface = parse_interface(text)
@@ -76,7 +76,7 @@ def test_wrong_interface_is_refused(text, message):
     ("bore=1,2,3/0,3,4/0.5", "bore=1,2,3/0,0.6,0.8/0.5"),
     ("disc=1,2,3/0,3,4/0.5", "disc=1,2,3/0,0.6,0.8/0.5"),
 ])  # fmt: skip
-def test_an_interface_is_written_as_it_is_read(text, written):
+def test_written_interface_is_read_as_the_same_interface(text, written):
     assert str(parse_interface(text)) == written
     assert str(parse_interface(written)) == written
 
@@ -99,7 +99,7 @@ def test_distances_are_from_the_plane_or_the_cylinder(rng):
 
 
 @pytest.mark.parametrize("point", [[0.0, 0.0], [0.0, np.nan, 0.0], [np.inf, 0, 0]])
-def test_a_point_is_three_finite_numbers(point):
+def test_interface_point_that_is_not_three_finite_numbers_is_refused(point):
     words = r"disc: the point must be 3 finite numbers \[m\]"
     with pytest.raises(BadInput, match=words):
         Interface("disc", point, [0, 0, 1], 1.0)

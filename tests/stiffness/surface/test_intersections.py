@@ -1,4 +1,4 @@
-"""Triangles that cross, against edge and triangle as a linear system."""
+"""Intersecting triangles against the linear system of an edge and a triangle."""
 
 import numpy as np
 import pytest
@@ -19,8 +19,8 @@ def crosses(one, other):
 
 
 @pytest.mark.parametrize("along", [0, 1, 2])
-def test_any_order_unit_and_longest_side_give_the_same_pairs(along):
-    """Neighbours share a corner, and do not cross."""
+def test_crossing_pairs_do_not_depend_on_order_unit_or_longest_side(along):
+    """Neighbours share a corner and do not count as crossing."""
     rng = np.random.default_rng(along)
     corners = 0.3 * rng.uniform(-1, 1, (40, 3, 3))
     corners[:, :, along] += 0.05 * rng.permutation(40)[:, None]

@@ -41,7 +41,7 @@ def cube(corner="{k}", line="f {corners}\n"):
         "no last line end",
     ],
 )  # fmt: skip
-def test_every_way_to_name_a_corner_gives_the_same_cube(tmp_path, content):
+def test_obj_corners_in_every_notation_give_the_same_cube(tmp_path, content):
     path = tmp_path / "cube.obj"
     path.write_bytes(content.encode())
     points, faces = read_obj(path)
@@ -78,7 +78,7 @@ def test_a_concave_polygon_is_cut_into_triangles_inside_it(tmp_path):
     ("v 1 2 z", r"cube.obj:9: found 'v 1 2 z', expected v X Y Z"),
     ("f 1 2 400000000", r"found a face of point 400000000, expected 1 to 8"),
 ])  # fmt: skip
-def test_a_line_that_is_not_proper_is_refused_with_its_number(tmp_path, line, message):
+def test_wrong_obj_line_is_refused_with_its_number(tmp_path, line, message):
     path = tmp_path / "cube.obj"
     path.write_text(POINTS + line + "\n")
     with pytest.raises(BadInput, match=message):
