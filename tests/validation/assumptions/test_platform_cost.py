@@ -1,4 +1,4 @@
-"""K_C by virtual joints against the links' finite elements themselves."""
+"""Platform compliance by virtual joints against the finite elements of the links."""
 
 import json
 
@@ -88,7 +88,7 @@ def test_cost_of_a_single_link_is_that_of_the_platform():
     assert costs.by_link == {"tip": pytest.approx(costs.beams)}
 
 
-def test_cost_of_many_poses_equals_that_of_each():
+def test_platform_cost_of_many_poses_equals_that_of_each_pose():
     robot = load_robot("irsbot2")
     postures = [place_robot(robot, {"tx": x, "tz": -0.5}) for x in (0.0, 0.2)]
     both = platform_costs(postures)

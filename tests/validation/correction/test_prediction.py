@@ -92,8 +92,8 @@ def test_predict_refuses_a_missing_covariate(tmp_path, run):
     assert not out.exists()
 
 
-def test_sessions_are_registered_one_by_one(tmp_path):
-    """The tracker stood in two places; the residual is zero."""
+def test_each_session_is_registered_separately(tmp_path):
+    """The tracker has another place in each session; the residual is zero."""
     robot = load_robot("arm6")
     write_robot(robot, tmp_path / "robot.toml")
     rng = np.random.default_rng(1)

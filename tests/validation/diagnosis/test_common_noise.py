@@ -1,4 +1,4 @@
-"""Noise that the points of one measurement have in common, in a diagnosis."""
+"""Diagnosis with noise common to the points of one measurement."""
 
 from dataclasses import replace
 
@@ -76,8 +76,9 @@ def found(columns, readings, seed, device=DEVICE):
     pytest.param(DEVICE, (3e-4, 0.0), marks=pytest.mark.slow),
     pytest.param(0.1 * DEVICE, (0.0, 5e-6), marks=pytest.mark.slow),
 ])  # fmt: skip
-def test_noise_in_common_is_found_with_its_sizes(columns, device, sizes):
-    """60 measurements of three components: 5 % each, and four times that."""
+def test_common_noise_is_found_with_its_sizes(columns, device, sizes):
+    """60 measurements of three components determine a size to 5 %; the tolerance is 25
+    %."""
     rng = np.random.default_rng([7, 1])
     selected = found(columns, moved(CAMPAIGN, sizes, rng), 7, device)
     assert selected.hypotheses == selected.functions == ()
@@ -144,7 +145,7 @@ def diagnosed(robot, wanted, seed, folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
-def test_poor_repeatability_alone_claims_nothing(seed, tmp_path):
+def test_poor_repeatability_alone_leads_to_no_claim(seed, tmp_path):
     robot = with_errors(arm()) if seed % 2 else without_clearance(three_rrr())
     _, diagnosis = diagnosed(robot, {}, seed, tmp_path)
     assert diagnosis.verdict == "none_needed"

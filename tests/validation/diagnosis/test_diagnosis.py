@@ -78,7 +78,7 @@ def left_by_the_truth(name, found, folder):
     return float(np.sqrt(np.nanmean(z[found.held.rows] ** 2)))
 
 
-def test_one_effect_is_named_and_measured(diagnosed, tmp_path):
+def test_single_effect_is_found_with_its_value(diagnosed, tmp_path):
     found = diagnosed("one")
     assert (found.verdict, found.claimed) == ("explained", ("drive_compliance",))
     assert found.probability["drive_compliance"] > 0.9
@@ -141,7 +141,7 @@ def test_model_sequence_leads_from_the_declared_to_the_fitted_model(name, diagno
         assert last.unknowns == pytest.approx(len(found.fit.x), abs=0.01)
 
 
-def test_sound_model_is_not_changed(diagnosed):
+def test_diagnosis_does_not_change_a_correct_model(diagnosed):
     found = diagnosed("none")
     assert (found.verdict, found.claimed) == ("none_needed", ())
     assert found.before == found.after
@@ -150,7 +150,7 @@ def test_sound_model_is_not_changed(diagnosed):
     assert "suffices" in sentence(found)
 
 
-def test_two_effects_are_named_together(diagnosed, tmp_path):
+def test_two_effects_are_found_together_with_their_values(diagnosed, tmp_path):
     found = diagnosed("pair")
     assert found.verdict == "explained"
     assert set(found.claimed) == {"encoder_offset", "thermal_expansion"}
@@ -172,7 +172,7 @@ def test_constant_temperature_makes_expansion_and_length_ambiguous(diagnosed):
 
 
 @pytest.mark.slow
-def test_unexplained_deviation_is_learned(diagnosed):
+def test_deviation_outside_the_library_is_learned_as_functions(diagnosed):
     found = diagnosed("outside")
     assert (found.verdict, found.claimed) == ("learned", ())
     assert found.after.normalised < found.before.normalised
@@ -217,7 +217,7 @@ KEYS = {
 
 
 @pytest.mark.parametrize("name", ["one", "none", "confounded"])
-def test_results_are_in_the_public_format(name, diagnosed):
+def test_diagnosis_results_are_in_the_public_format(name, diagnosed):
     found = diagnosed(name)
     written = json.loads(json.dumps(plain(table(found)), allow_nan=False))
     for key, kind in KEYS.items():
@@ -249,7 +249,7 @@ def test_results_are_in_the_public_format(name, diagnosed):
         assert len(decide["load"]) == 6
 
 
-def test_a_diagnosis_shows_its_verdict_on_a_few_lines(diagnosed):
+def test_repr_of_a_diagnosis_is_short_and_has_its_verdict(diagnosed):
     found = diagnosed("one")
     assert len(repr(found)) < 600
     for said in (found.verdict, *found.claimed, f"{found.after.normalised:.3g} after"):
@@ -260,8 +260,9 @@ def test_a_diagnosis_shows_its_verdict_on_a_few_lines(diagnosed):
 ODD = ("$x^{<b>&_\\$", "a$b_ \\frac{<i>")  # a formula and a tag to other programs
 
 
-def test_a_report_shows_odd_names_as_they_are_written(diagnosed):
-    """A frame, a covariate and an outlying row named as formulas and tags."""
+def test_diagnosis_report_shows_unusual_names_unchanged(diagnosed):
+    """The names of a frame, a covariate and an outlying row look like formulas and
+    tags."""
     found = diagnosed("none")
     first, *others = found.campaign.robot.frames
     named = (

@@ -1,4 +1,4 @@
-"""Difficult campaigns, by what is known of their machines."""
+"""Diagnosis of difficult campaigns against known facts about their machines."""
 
 from dataclasses import replace
 from functools import cache
@@ -44,7 +44,7 @@ def effect(found, name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
-def test_saved_robot_predicts_the_printed_error_and_a_smaller_one_than_declared(
+def test_saved_robot_predicts_the_printed_error_which_is_below_the_declared(
     folder, diagnosed, tmp_path
 ):
     found = diagnosed(folder)

@@ -46,7 +46,7 @@ def test_another_temperature_separates_expansion_from_length():
 
 
 @pytest.mark.parametrize(("power", "worth"), [(1.5, True), (0.9, False)])
-def test_next_measurement_needs_a_power_of_one(power, worth):
+def test_next_measurement_is_suggested_from_a_power_of_one(power, worth):
     """Expansion against length, for an expansion of given power."""
     R, T = 8, 5.0
     heat = {"temperature": np.full(R, T)}
@@ -109,8 +109,9 @@ def test_next_temperature_exceeds_the_range_by_half():
         assert found.covariates == {"temperature": 80.0}
 
 
-def test_next_load_is_half_as_large_again():
-    """A drive that gives under M against one that is turned: by 1.5 M, or -1.5 M."""
+def test_next_load_is_one_and_a_half_times_the_largest():
+    """A compliant drive under M against a drive with an offset: 1.5 M or -1.5 M
+    separates them."""
     M, k = 30.0, 2e5
     campaign = gives_way(M, k)
     here = conditions_of(campaign)

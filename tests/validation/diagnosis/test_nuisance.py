@@ -30,8 +30,9 @@ def of_both_kinds(campaign, conditions, response):
     return small.take(~small.spring), small.take(small.spring)
 
 
-def test_geometry_and_springs_that_readings_show_are_listed_with_their_bounds(loaded):
-    """30 N along z at the end of the bar bend it about x and y of the base."""
+def test_nuisance_parameters_are_the_visible_geometry_and_springs_with_bounds(loaded):
+    """A force of 30 N along z at the end of the bar bends it about x and y of the
+    base."""
     campaign, conditions, response = loaded
     geometry, springs = of_both_kinds(campaign, conditions, response)
     assert not geometry.declared

@@ -56,7 +56,9 @@ def campaign(tmp_path_factory):
         ("modulus_scale", "two", 0.8, 40.0),
     ],
 )
-def test_implausible_parameters_are_named(campaign, effect, name, fair, absurd):
+def test_implausible_parameter_is_reported_by_name(
+    campaign, effect, name, fair, absurd
+):
     def said(value):
         return implausible(campaign, found({effect: {name: value}}))
 
@@ -66,7 +68,7 @@ def test_implausible_parameters_are_named(campaign, effect, name, fair, absurd):
     assert "declared stiffness" in one
 
 
-def test_device_frame_may_be_anywhere(campaign):
+def test_device_frame_at_any_distance_is_plausible(campaign):
     frame, C = device_frame(conditions_of(campaign)), np.eye(6)
     x = np.array([0.0, 0.0, 0.0, 29.0, 0.0, 0.0])
     for device, doubted in ((False, 1), (True, 0)):

@@ -1,4 +1,4 @@
-"""The saved robot has the printed errors."""
+"""Saved robots: their predictions have the printed errors."""
 
 import json
 from dataclasses import asdict, replace
@@ -57,8 +57,8 @@ def test_saved_robot_predicts_the_printed_errors(found, saved):
     assert written["error"]["saved"] == pytest.approx(printed)
 
 
-def test_error_after_is_of_a_fit_without_the_held_out_rows(found):
-    """The same unknowns, fitted to the other rows alone."""
+def test_error_after_comes_from_a_fit_without_the_held_out_rows(found):
+    """The same unknowns are fitted to the other rows alone."""
     assert found.held.how == "split"
     used = ~found.held.rows & ~found.outliers
     blind = np.where(found.held.rows[:, None], np.nan, found.campaign.measured)
@@ -82,7 +82,7 @@ def test_saved_robot_is_fitted_to_all_rows(found, saved):
 
 
 @pytest.mark.parametrize("change", ["noise", "anything"])
-def test_readings_held_out_change_nothing_but_the_errors(found, change):
+def test_held_out_readings_change_only_the_stated_errors(found, change):
     """Effects, functions, probabilities and unknowns are selected without them."""
     rng = np.random.default_rng(8)
     held, readings = found.held.rows, found.campaign.measured.copy()

@@ -38,7 +38,7 @@ def found(columns, readings, seed=0, *, noise=1.0):
 
 
 @pytest.mark.parametrize("noise", [0.5, 1.0, 2.0, 3.0])
-def test_noise_of_any_scale_selects_nothing(columns, noise):
+def test_noise_of_any_scale_leads_to_no_selection(columns, noise):
     selected = found(columns, np.zeros((ROWS, 6)), noise=noise)
     assert selected.hypotheses == selected.functions == ()
     assert max(selected.probability.values(), default=0.0) < 0.1
@@ -99,7 +99,7 @@ def test_joint_scores_of_functions_equal_single_scores(columns):
     assert together == pytest.approx(alone, rel=1e-6)
 
 
-def test_places_seen_by_rounding_alone_are_excluded():
+def test_places_visible_only_by_rounding_are_excluded():
     campaign = bar(link=BEAM, rows=ROWS, spread=0.0, time=TIME)
     measured = np.full((ROWS, 6), np.nan)
     measured[:, 3] = 0.0  # along the bar: turning the drive moves it by rounding

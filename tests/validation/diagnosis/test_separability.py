@@ -21,8 +21,8 @@ def test_cosine_of_two_lines_is_that_of_their_angle():
     assert found.classes() == found.imitated() == found.overlapping() == []
 
 
-def test_planes_that_share_a_line_overlap_and_a_line_in_a_plane_is_imitated():
-    """Half of the square of (e1, e2) is in the plane (e1, e3)."""
+def test_planes_with_a_common_line_overlap_and_a_line_in_a_plane_is_imitated():
+    """Half of the squared length of (e1 + e2) is in the plane (e1, e3)."""
     found = compare_signatures({
         "plane": columns([1, 0, 0], [0, 1, 0]),
         "other": columns([1, 0, 0], [0, 0, 1]),

@@ -74,7 +74,7 @@ def parameters(found, name, session=None):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("known", [True, False])
-def test_zeros_and_tool_are_found_for_each_session(known, tmp_path):
+def test_encoder_offsets_and_tool_are_found_for_each_session(known, tmp_path):
     """A common spring is found together with them, and saved."""
     spring = Hidden("drive_compliance", {"j2": SPRING})
     hidden = {

@@ -59,12 +59,10 @@ def heated(tmp_path_factory):
     return diagnosed(folder, read, covariates), noise
 
 
-def test_causes_are_learned_in_their_simplest_form(heated):
-    """Noise correlated in time makes splines and functions of time likelier.
-
-    The gain of the bed: to five of its standard errors by the noise, 2.5 um, whose
-    correlation leaves of the 180 rows fitted some forty that are independent.
-    """
+def test_causes_are_learned_as_polynomials(heated):
+    """Noise correlated in time would favour splines and functions of time. The
+    tolerance of the bed's gain is five of its standard errors. The noise is 2.5 um, and
+    its correlation leaves about forty independent rows of the 180 rows fitted."""
     diagnosis, _ = heated
     functions = corrected(diagnosis).functions
     assert {v for one in functions for v in one.variables} == {"cov.bed", "cov.frame"}

@@ -92,7 +92,7 @@ def by_least_squares(X, z):
     return 1 - squares[1] / squares[0], f.sf(ratio, extra, freedom)
 
 
-def test_every_trend_is_the_f_test_of_its_name(varied, monkeypatch):
+def test_probability_of_every_trend_equals_an_f_test(varied, monkeypatch):
     monkeypatch.setattr(module, "UNLIKELY", 2.0)
     monkeypatch.setattr(module, "_MOST", 100)
     found = trends(varied, conditions_of(varied), varied.measured * varied.sigma)

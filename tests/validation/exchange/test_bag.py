@@ -93,5 +93,5 @@ def test_missing_rosbags_names_the_package_to_install(tmp_path, monkeypatch):
         read_bag(tmp_path / "lab.bag")
 
 
-def test_overlong_name_is_no_bag():
+def test_overlong_name_is_not_taken_for_a_bag():
     assert not is_bag("x" * 300)

@@ -1,4 +1,4 @@
-"""What a design can and cannot tell, said of designs made to be so."""
+"""Remarks of an inspection, for designs with a known weakness."""
 
 import json
 
@@ -111,7 +111,7 @@ SAYINGS = {
 
 
 @pytest.mark.parametrize("case", SAYINGS)
-def test_weakness_of_a_design_is_remarked(case, rng):
+def test_weakness_of_a_design_is_reported(case, rng):
     changes, sentence = SAYINGS[case]
     assert any(sentence in text for text in texts(sound(rng, **changes)))
 
@@ -207,8 +207,8 @@ def test_unknown_registration_absorbs_the_first_encoder_offset(tmp_path, rng):
     assert 0 < unknown.left[i] < 0.9 < known.left[i]
 
 
-def test_device_that_cannot_be_located_is_remarked(tmp_path):
-    """One angle in two rows."""
+def test_device_frame_that_cannot_be_determined_is_reported(tmp_path):
+    """Two rows measure a single angle."""
     rows = ["a,0.1,0.2,1e-5", "b,0.1,0.2,2e-5"]
     folder = write_campaign(tmp_path, "id,q.one,q.two,meas.rz", rows,
                             toml={"registration": '"unknown"'})  # fmt: skip
@@ -217,8 +217,9 @@ def test_device_that_cannot_be_located_is_remarked(tmp_path):
     assert "The registration cannot be found." in first.text
 
 
-def test_signature_is_the_derivative_by_hand(tmp_path, rng):
-    """The second encoder 1e-5 rad off: the tool turns about the elbow by so much."""
+def test_signature_of_an_encoder_offset_equals_hand_calculation(tmp_path, rng):
+    """An offset of the second encoder by 1e-5 rad turns the tool about the elbow by
+    that angle."""
     campaign = elastic_campaign(tmp_path, rng)
     found = design_signatures(campaign).columns["encoder_offset"]
     elbow, tool = (campaign.transforms[:, campaign.robot.index(n), :3, 3]

@@ -1,4 +1,4 @@
-"""Noise from repeats: textbook variances, drift kept out, outliers named."""
+"""Noise from repeats: textbook variances, removal of drift, outliers."""
 
 from dataclasses import replace
 
@@ -106,8 +106,9 @@ def test_intervals_cover_the_truth_at_the_stated_rate(rng):
     assert suspected / 400 <= 0.025
 
 
-def test_time_without_effect_is_reported_at_the_stated_rate(rng):
-    """Chances of noise alone are uniform: 5 % +- 3 standard deviations of 300."""
+def test_time_without_effect_is_reported_at_the_false_alarm_rate(rng):
+    """Probabilities for noise alone are uniform: 5 % +- 3 standard deviations of
+    300."""
     time = np.arange(60.0)
     below = 0
     for _ in range(300):

@@ -79,8 +79,9 @@ def test_wrench_of_a_bent_spring_is_the_gradient_of_its_energy(size):
     np.testing.assert_allclose(far, near, atol=1e-14 * np.abs(near).max())
 
 
-def test_spring_bent_by_half_a_radian_has_the_stiffness_of_its_energy():
-    """Its shift across the turn times the force is a couple that Exudyn leaves out."""
+def test_tangent_of_a_spring_bent_by_half_a_radian_follows_from_its_energy():
+    """The force times the spring's shift across the rotation is a couple, which Exudyn
+    omits."""
     K = np.diag([40.0, 50.0, 60.0, 300.0, 400.0, 500.0])
     frames = (
         Frame("foot", translation=[0.5, 0, 0], link=MatrixLink(K)),
@@ -114,8 +115,9 @@ def soft_four_bar():
     return home_posture(robot.with_errors(errors))
 
 
-def test_the_weak_springs_of_free_joints_do_not_move_the_robot(monkeypatch):
-    """Joints turn by radians, and springs of 1e-4 N m/rad would bend it elsewhere."""
+def test_weak_springs_of_free_joints_do_not_change_the_tangent(monkeypatch):
+    """Joints turn by radians, and springs of 1e-4 N m/rad would bend the robot
+    elsewhere."""
     weak = (Regularisation(1e8, 1e-4),)
     monkeypatch.setattr(tangent, "_REGULARISATIONS", weak)
     posture = soft_four_bar()
@@ -167,7 +169,7 @@ def test_smaller_load_steps_lead_to_the_stable_equilibrium(monkeypatch):
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-3, 1.0, 3.0, 3.14159265])
-def test_turn_of_recovers_a_rotation_vector(angle):
+def test_rotation_vector_is_recovered_from_its_matrix(angle):
     for axis in np.vstack([np.eye(3), [[0.6, -0.8, 0.0], [-1 / 3, 2 / 3, 2 / 3]]]):
         R = turned(angle * axis)
         np.testing.assert_allclose(turn_of(R), angle * axis, rtol=1e-7, atol=1e-15)

@@ -38,7 +38,7 @@ def test_governing_rows_are_bounds_without_one_imperfection():
     assert [one["rotation"] for one in rows] == pytest.approx([0.0] * 3, abs=1e-12)
 
 
-def test_own_motion_of_a_joint_is_not_a_clearance():
+def test_governing_rows_exclude_the_own_motion_of_a_joint():
     posture = chain((0.0, None), (1e-4, None))
     first, second = posture.robot.frames
     hinge = replace(first, joint="revolute", clearance=Clearance(spin=0.1))
