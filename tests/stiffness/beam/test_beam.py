@@ -1,5 +1,4 @@
-"""Compliance and stiffness of beams against published tables, textbooks and hand
-calculation."""
+"""Compliance and stiffness of beams against tables, textbooks and hand calculation."""
 
 import math
 

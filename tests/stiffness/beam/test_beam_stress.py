@@ -1,5 +1,4 @@
-"""Peak stress of beams against textbooks, a numerical membrane solution and
-symmetries."""
+"""Peak stress of beams against textbooks, a membrane solution and symmetries."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,4 @@
-"""Curved and tapered beams and thin-walled sections against closed forms and
-elements."""
+"""Curved and tapered beams and thin-walled sections against closed forms."""
 
 import math
 

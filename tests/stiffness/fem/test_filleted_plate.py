@@ -1,5 +1,4 @@
-"""Finite elements of a filleted plate with rounded corners, as CAD programs export
-it."""
+"""Finite elements of a filleted plate with rounded corners, as from CAD programs."""
 
 import numpy as np
 import pytest

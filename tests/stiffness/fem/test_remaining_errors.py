@@ -1,5 +1,4 @@
-"""Remaining errors against the formula of their decay, tractions against hand
-calculation."""
+"""Remaining errors against the formula of their decay, tractions by hand."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,4 @@
-"""Curved elements: they follow their shapes, have the exact volume and are not
-inverted."""
+"""Curved elements: they follow their shapes, and none is inverted."""
 
 import numpy as np
 import pytest

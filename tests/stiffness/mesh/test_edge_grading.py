@@ -1,5 +1,4 @@
-"""Layers along singular edges: they are found, conform, keep the volume and are
-nested."""
+"""Layers along singular edges: found, conforming, nested, of the same volume."""
 
 from math import prod
 

@@ -1,5 +1,4 @@
-"""Lagrange polynomials on tetrahedra: values at lattice points, derivatives, shared
-nodes."""
+"""Lagrange polynomials on tetrahedra: lattice values, derivatives, shared nodes."""
 
 from math import prod
 

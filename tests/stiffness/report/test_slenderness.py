@@ -1,5 +1,4 @@
-"""Comparison of beams with finite elements over slenderness, and beams along curve
-files."""
+"""Beams against finite elements over slenderness, and beams along curve files."""
 
 import json
 from dataclasses import replace

@@ -1,5 +1,4 @@
-"""Planes, cones, spheres and tori: distances by hand, fits in any unit, first
-guesses."""
+"""Planes, cones, spheres and tori: distances by hand, fits in any unit."""
 
 import numpy as np
 import pytest

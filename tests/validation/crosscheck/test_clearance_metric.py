@@ -1,5 +1,4 @@
-"""Clearances as contacts: closed forms, and agreement with the cones of the linear
-model."""
+"""Clearances as contacts: closed forms, agreement with the linear model's cones."""
 
 import math
 import time

@@ -1,5 +1,4 @@
-"""Cross-check: linear model and simulation agree to first order, and a broken model
-fails."""
+"""Cross-check: the two models agree to first order, and a broken model fails."""
 
 import math
 from dataclasses import replace

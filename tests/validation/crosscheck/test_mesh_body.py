@@ -1,5 +1,4 @@
-"""Solids in a floating frame: Exudyn's deformation against the condensed stiffness
-K_E."""
+"""Solids in a floating frame against their condensed stiffness K_E."""
 
 from pathlib import Path
 

@@ -84,8 +84,7 @@ def test_visible_effect_without_unknowns_becomes_an_offset():
 
 @pytest.mark.parametrize("x", [0.0, 3e-4, -2e-3])
 def test_tangent_of_a_length_is_the_same_at_any_value(x):
-    """1 / sigma along the bar, and zero elsewhere; also together with another
-    effect."""
+    """1 / sigma along the bar, also about zero and together with another effect."""
     campaign = bar(link=BEAM)
     tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
     expected = whiten(campaign, fit_of(campaign, 1.0))

@@ -1,5 +1,4 @@
-"""Study of a robot in service: load, stiffness, frequencies, and maps over several
-axes."""
+"""Study of a robot in service: load, stiffness, frequencies, maps over several axes."""
 
 import json
 from dataclasses import replace
