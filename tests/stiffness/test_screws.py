@@ -13,7 +13,7 @@ from stiffness.screws import (
 )
 
 
-def test_skew_is_the_cross_product(rng):
+def test_skew_matrix_times_a_vector_is_the_cross_product(rng):
     a, b = rng.normal(size=(2, 7, 3))
     np.testing.assert_allclose(
         np.einsum("nij,nj->ni", skew(a), b), np.cross(a, b), atol=1e-15
@@ -26,8 +26,9 @@ def test_a_turn_about_z_moves_a_point_on_x_along_y():
     np.testing.assert_allclose(moved, [0, 0, 1e-3, 0, 1e-3, 0], atol=0)
 
 
-def test_power_is_the_same_at_every_point(rng):
-    """screw_map.T carries wrenches the other way, in turned axes too."""
+def test_power_of_a_wrench_does_not_depend_on_the_reference_point(rng):
+    """The transpose of screw_map transforms wrenches in the opposite direction, also
+    between rotated axes."""
     A = screw_map(rng.normal(size=3), rotation_matrix(rng.normal(size=3)))
     screw, wrench = rng.normal(size=(2, 6))
     assert (A.T @ wrench) @ screw == pytest.approx(wrench @ (A @ screw), rel=1e-13)
@@ -49,7 +50,7 @@ def test_product_of_two_screw_maps_is_the_map_of_the_composed_motion(rng):
 
 @pytest.mark.parametrize("size", [1e-6, 1e-4, 1.0])
 def test_small_screws_are_derivatives_of_finite_motions(rng, size):
-    """Error of the small screw is of second order: below its squared size."""
+    """The error of the small screw is of second order: below its squared size."""
     turn, point = size * rng.normal(size=3), rng.normal(size=3)
     moved = (rotation_matrix(turn) - np.eye(3)) @ point
     screw = screw_map(-point) @ np.r_[turn, 0, 0, 0]

@@ -47,8 +47,8 @@ def test_stiffness_of_the_papers_link_equals_its_published_table(theory):
 
 
 @pytest.mark.parametrize("cut", [0.1, 0.5, 0.9])
-def test_two_beams_end_to_end_are_one_beam(cut, rng):
-    """C = A C1 A^T + C2 is exact, so only rounding is allowed."""
+def test_two_beams_in_series_have_the_compliance_of_one_beam(cut, rng):
+    """C = A C1 A^T + C2 is exact, so that only rounding is allowed."""
     axis, up = rng.normal(size=3), rng.normal(size=3)
     axis /= np.linalg.norm(axis)
 
@@ -76,7 +76,7 @@ def test_compliance_has_the_entries_of_the_textbook():
     assert C[1, 5] == pytest.approx(-(L**2) / (2 * E * s.I_z), rel=1e-14)
 
 
-def test_euler_is_timoshenko_without_shear():
+def test_euler_compliance_equals_timoshenkos_without_shear():
     euler = beam_compliance(0.5, SECTION, E, NU, theory="euler")
     rigid_in_shear = Section(1.2e-3, 4e-8, 9e-8, 7e-8, 1e12, 1e12)
     assert_same(euler, beam_compliance(0.5, rigid_in_shear, E, NU), 1e-10)

@@ -21,7 +21,7 @@ def constants(section):
 
 
 @pytest.mark.parametrize("section", SECTIONS)
-def test_a_pulled_beam_carries_force_over_area_everywhere(section):
+def test_stress_of_a_beam_in_tension_is_force_over_area(section):
     stress, _ = peak_beam_stress(section, 0.4, [0, 0, 0, -500.0, 0, 0])
     assert stress == pytest.approx(500 / constants(section).area, rel=1e-14)
 
@@ -39,8 +39,10 @@ def test_a_pulled_beam_carries_force_over_area_everywhere(section):
         ),
     ],
 )
-def test_a_bent_beam_has_moment_over_section_modulus(section, modulus_y, modulus_z):
-    """Handbook section moduli; with a long arm shear adds less than 3e-4."""
+def test_stress_of_a_bent_beam_is_moment_over_section_modulus(
+    section, modulus_y, modulus_z
+):
+    """Section moduli of handbooks; for a long beam shear adds less than 3e-4."""
     for moment, modulus in ([7.0, 0.0], modulus_y), ([0.0, 7.0], modulus_z):
         stress, _ = peak_beam_stress(section, 0.0, [0, *moment, 0, 0, 0])
         assert stress == pytest.approx(7 / modulus, rel=1e-12)
@@ -71,8 +73,8 @@ def test_peak_stress_under_shear_alone_equals_textbook_values(section, shape):
         assert where[axis - 3] == pytest.approx(0, abs=1e-12)
 
 
-def test_shear_of_a_box_is_v_q_over_i_b():
-    """Gere's web formula: V (b h^2 - b1 h1^2) / 8 I t over both webs t = 2 walls."""
+def test_shear_stress_of_a_box_equals_the_web_formula():
+    """Gere's formula: V (b h^2 - b1 h1^2) / 8 I t over both webs, t = 2 walls."""
     b, h, b1, h1 = 0.06, 0.04, 0.052, 0.032
     second = (b * h**3 - b1 * h1**3) / 12
     expected = np.sqrt(3) * (b * h**2 - b1 * h1**2) / (8 * second * 0.008)
@@ -103,9 +105,10 @@ def test_peak_stress_of_a_twisted_rectangle_equals_timoshenkos_table(ratio, k):
 
 
 @pytest.mark.parametrize("section", [PLATE, {"width": 0.05, "height": 0.02}])
-def test_stresses_of_a_rectangle_add_up_to_their_forces(section):
-    """Integrals over the section by Simpson's rule.  Torsion, with a kink at the short
-    sides, is to 5e-4.  Outer faces are free of shear across."""
+def test_stresses_of_a_rectangle_integrate_to_the_forces(section):
+    """Integrals over the section by Simpson's rule. The tolerance for torsion is 5e-4,
+    since its stress has a kink at the short sides. Outer faces have no shear normal to
+    them."""
     fibres, influence = section_stress(section)
     y, z = fibres.reshape(33, 33, 2).transpose(2, 0, 1)
     sigma, tau_y, tau_z = influence.reshape(33, 33, 3, 6).transpose(2, 3, 0, 1)
@@ -212,8 +215,8 @@ def test_turning_the_wrench_on_a_round_beam_turns_the_peak_and_keeps_its_stress(
 
 
 @pytest.mark.parametrize("section", SECTIONS)
-def test_a_mirrored_wrench_gives_the_same_peak(section, rng):
-    """z to -z: forces keep x and y, moments keep z."""
+def test_mirrored_wrench_has_the_same_peak_stress(section, rng):
+    """z becomes -z: forces keep x and y, moments keep z."""
     wrench = rng.normal(size=(50, 6))
     mirrored = wrench * [-1, -1, 1, 1, 1, -1]
     one, there = peak_beam_stress(section, 0.2, wrench)
@@ -272,7 +275,7 @@ def test_wrong_stress_input_is_refused(section, length, wrench, message):
 ])  # fmt: skip
 @pytest.mark.parametrize("length", [0.0, 0.02, 1.0])
 def test_a_quarter_turn_of_section_and_wrench_turns_the_peak(section, length):
-    """y becomes z and z becomes -y; also short beams, with shear and torsion."""
+    """y becomes z, and z becomes -y; also for short beams, with shear and torsion."""
     rng = np.random.default_rng(9)
     turned = section | {"width": section["height"], "height": section["width"]}
     quarter = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])

@@ -114,8 +114,8 @@ def test_node_table_with_decimal_commas_is_read_and_a_second_unit_is_refused(sol
         import_link(folder / "full.mtx", nodes=folder / "nodes.txt", unit="mm", **ENDS)
 
 
-def test_mapping_of_six_freedoms_a_node_is_read(tmp_path):
-    """A superelement of two nodes, the second one first."""
+def test_mapping_of_six_freedoms_per_node_is_read(tmp_path):
+    """A superelement of two nodes, with the second node first."""
     B = np.random.default_rng(0).normal(size=(12, 12))
     K = B @ B.T
     rows = np.r_[6:12, 0:6]

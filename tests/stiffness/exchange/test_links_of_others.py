@@ -144,7 +144,8 @@ def test_textbook_beam_imported_from_every_program_has_its_stiffness(
 
 
 def test_dmig_of_four_digits_is_refused_as_unbalanced(tmp_path):
-    """Eight characters hold four digits, so the ends balance to a stiff beam's 1e-4."""
+    """Eight characters hold four digits: the ends then balance only to 1e-4 of a stiff
+    beam."""
     path = tmp_path / "k.pch"
     K = textbook_beam()
     K = np.vectorize(lambda v: float(f"{v:.3E}"))(K)
@@ -157,8 +158,9 @@ def test_dmig_of_four_digits_is_refused_as_unbalanced(tmp_path):
     "to", ["matrix-market", "abaqus", "calculix", "nastran", "numpy"]
 )
 @pytest.mark.parametrize("unit", ["m", "mm"])
-def test_exported_link_is_imported_again(to, unit, tmp_path, rng):
-    """Any stiffness, any offset; ten digits of Nastran's fields, else rounding."""
+def test_exported_link_is_imported_with_the_same_stiffness(to, unit, tmp_path, rng):
+    """For any stiffness and offset; to ten digits in Nastran's fields, to rounding
+    otherwise."""
     L = rng.normal(size=(6, 6))
     size = np.array([3, 2, 1, 1e4, 2e4, 3e4])
     K = (L @ L.T + np.eye(6)) * np.outer(size, size)
@@ -212,8 +214,8 @@ def test_mass_matrix_gives_mass_centre_and_inertia(tmp_path):
     assert link.inertia == pytest.approx(expected, abs=1e-12 * mass)
 
 
-def test_a_chain_of_beams_is_condensed_to_its_ends(tmp_path):
-    """Two half beams in series with a free middle node are one beam."""
+def test_chain_of_two_half_beams_is_condensed_to_one_beam(tmp_path):
+    """Two half beams in series, whose middle node is free."""
     K, part = np.zeros((18, 18)), textbook_beam(LENGTH / 2)
     K[:12, :12] += part
     K[6:, 6:] += part

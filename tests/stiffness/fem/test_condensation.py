@@ -74,9 +74,9 @@ def test_condensed_stiffness_equals_twice_the_energy_of_its_fields(kind):
     np.testing.assert_allclose(means[1], np.eye(6), atol=1e-8)
 
 
-def test_unknowns_exclude_the_held_interfaces():
-    """All nodes of a quadratic 2 by 4 by 4 grid; less base and tip; less the base;
-    less six supports."""
+def test_number_of_unknowns_excludes_held_interfaces():
+    """The nodes of a quadratic 2 by 4 by 4 grid: without base and tip, without the
+    base, and without six supports."""
     mesh = isoparametric(box_solid((1, 2, 2), SIZE), 2)
     layer, count = 3 * 5, 3 * 5 * 5
     unknowns, kinds = [], []

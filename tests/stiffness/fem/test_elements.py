@@ -89,8 +89,9 @@ def test_only_the_six_rigid_motions_store_no_energy(rng, order, layers):
 
 
 @pytest.mark.parametrize(("order", "layers"), MESHES)
-def test_a_linear_field_is_exact_on_any_mesh(rng, order, layers):
-    """The patch test: inner nodes find the linear field that the boundary has."""
+def test_linear_field_is_exact_on_any_mesh(rng, order, layers):
+    """Patch test: with a linear field on the boundary, inner nodes have the same
+    field."""
     solid = split_joining_edges(crooked(rng), (0, 1))
     parts = layered(solid, (0, 1)) if layers else None
     mesh = isoparametric(solid, order, parts)
@@ -109,7 +110,7 @@ def test_a_linear_field_is_exact_on_any_mesh(rng, order, layers):
 
 @pytest.mark.parametrize("curved", [False, True])
 def test_stiffness_matrix_equals_that_of_scikit_fem(curved):
-    """A second code, whose weak form shares nothing with ours but the rule."""
+    """A second program, which shares only the quadrature rule with this one."""
     import skfem
     from scipy.spatial import cKDTree
     from skfem.models.elasticity import linear_elasticity
@@ -162,8 +163,8 @@ def test_strain_energy_of_a_polynomial_field_equals_its_integral(rng, order):
 
 
 @both_orders
-def test_a_mirrored_link_has_the_mirrored_stiffness(order):
-    """x to -x: RX, TY, TZ keep their sign, RY, RZ, TX change it."""
+def test_mirrored_link_has_the_mirrored_stiffness(order):
+    """x becomes -x: RX, TY, TZ keep their sign, RY, RZ, TX change it."""
     solid = box_solid((2, 3, 3), (0.05, 0.08, 0.2))
     flipped = solid.points * [-1, 1, 1]
     cells = outward(flipped, solid.cells)
@@ -220,8 +221,8 @@ def test_stiffness_at_another_tip_follows_from_a_screw_map(order):
 
 
 @pytest.mark.parametrize("name", sorted({"SuperLU", solver_name()}))
-def test_a_singular_matrix_is_reported(name):
-    """SuperLU meets an empty column, PARDISO a negative pivot."""
+def test_singular_matrix_is_reported_with_the_solver(name):
+    """SuperLU finds an empty column, PARDISO a negative pivot."""
     mesh = isoparametric(box_solid((1, 1, 1), (1, 1, 1)))
     upper = assemble(mesh, *constants(mesh))
     wrong = 0 * upper if name == "SuperLU" else -upper
@@ -280,8 +281,8 @@ def test_excess_over_timoshenkos_beam_is_inverse_to_the_length():
 
 
 @both_orders
-def test_a_bar_without_poisson_is_stretched_and_bent_exactly(order):
-    """nu = 0: nothing shrinks, so rigid ends disturb nothing; K_TZ = E A / L."""
+def test_tension_and_bending_of_a_bar_are_exact_at_zero_poissons_ratio(order):
+    """Without lateral contraction rigid ends have no end effect; K_TZ = E A / L."""
     mesh = isoparametric(box_solid((2, 2, 4), (0.03, 0.05, 0.2)), order)
     lam, mu = lame(E, 0.0)
     ones = np.ones(len(mesh.cells))

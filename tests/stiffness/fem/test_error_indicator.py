@@ -99,9 +99,10 @@ def test_estimated_error_is_zero_for_linear_strains_only(rng, singular):
     assert np.diag(estimate[1]).min() > 1e-5 * E
 
 
-def test_indicator_at_a_singular_edge_is_the_nonlinear_energy():
-    """u = (0, 0, z^3 / 3): of the stress of z^2 an element's best linear part is taken
-    off, here by least squares; the share is the same for all, near one."""
+def test_indicator_at_a_singular_edge_is_the_energy_of_the_nonlinear_stress():
+    """u = (0, 0, z^3 / 3) has a stress of z^2, from which the best linear fit of each
+    element is subtracted, here by least squares. The share is the same for all elements
+    and nearly one."""
     mesh = isoparametric(box_solid((2, 1, 3), (0.5, 0.6, 0.8)))
     lam, mu = constants(mesh)
     field = np.zeros((len(mesh.nodes), 3, 1))
@@ -158,8 +159,8 @@ def test_geometry_error_of_a_bar_follows_the_powers_of_its_radius(excess):
 @pytest.mark.parametrize(
     "mesh", [(1, 12), (2, 12), pytest.param((3, 18), marks=pytest.mark.slow)]
 )
-def test_torsion_follows_the_fourth_power_of_the_radius(mesh):
-    """J ~ R^4, the mesh's volume ~ R^2: the relative error is twice the volume's."""
+def test_torsion_error_of_the_geometry_is_twice_the_volume_error(mesh):
+    """J grows with R^4, the mesh's volume with R^2."""
     level = bar(*mesh)
     expected = 2 * (volume(level.mesh) / (np.pi * R**2 * L) - 1)
     estimate = level.totals()[2][2, 2] / TORSION
@@ -172,8 +173,9 @@ def test_torsion_follows_the_fourth_power_of_the_radius(mesh):
 @pytest.mark.parametrize(
     "mesh", [(1, 6), (1, 12), (2, 12), pytest.param((2, 24), marks=pytest.mark.slow)]
 )
-def test_the_estimate_covers_the_true_error_on_one_mesh(mesh):
-    """Bending: from above to 1 032 277 N m/rad, within five times; torsion G J / L."""
+def test_estimate_from_one_mesh_covers_the_true_error(mesh):
+    """In bending K approaches 1 032 277 N m/rad from above, and the estimate is at most
+    five times the error; torsion has G J / L."""
     K, indicated, shape = bar(*mesh).totals()
     error, _ = estimated_error([(K, indicated, shape)])
     true = K[0, 0] / BENDING - 1
@@ -193,7 +195,7 @@ def test_indicated_error_is_within_1_5_times_the_true_error():
         assert 1 / 1.5 < indicated[0, 0] / BENDING / true < 1.5
 
 
-def test_two_meshes_bound_the_error_of_the_finer():
+def test_two_meshes_bound_the_error_of_the_finer_mesh():
     history = [bar(*mesh).totals() for mesh in ((1, 6), (2, 12))]
     error, _ = estimated_error(history)
     K = history[1][0]
@@ -220,9 +222,10 @@ def plate(*counts):
     return solve_level(solid, [Material(E, NU)], centers, "rigid").totals()
 
 
-def test_residual_tractions_of_a_unit_cube_have_the_energy_by_hand():
-    """A shear s over a unit cube leaves s on four faces, whose triangles are 1 by 1:
-    2 s^2 / mu / pi times their height 1 / sqrt 2, by hand; a pull across nothing."""
+def test_residual_traction_energy_of_a_unit_cube_equals_hand_calculation():
+    """A shear s of a unit cube leaves tractions s on four faces, whose triangles are 1
+    by 1: energy 2 s^2 / mu / pi times their height 1 / sqrt 2. A tension across free
+    faces leaves none."""
     mesh = isoparametric(box_solid((1, 1, 1), np.ones(3)))
     lam, mu = constants(mesh)
     fields = np.zeros((len(mesh.nodes), 3, 2))

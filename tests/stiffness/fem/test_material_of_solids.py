@@ -43,8 +43,8 @@ def rod():
     return solved(rod_in_tube(INNER, OUTER, LENGTH), LENGTH, materials)
 
 
-def test_prisms_in_series_follow_the_unit_load_integrals(bar):
-    """L / E A and L / E I add up; a tip force also shears, 6 / 5 of it over G A."""
+def test_compliance_of_prisms_in_series_equals_the_unit_load_integrals(bar):
+    """L / E A and L / E I add up; a tip force adds shear with 6 / 5 of L / G A."""
     A = WIDTH * HEIGHT
     C = inverted(bar.level.solution.stiffness)
     flexible = lambda I: (FAR / STEEL + NEAR / ALUMINIUM) / I  # noqa: E731
@@ -69,8 +69,8 @@ def test_mass_and_centre_include_both_solids(bar):
 
 
 @pytest.mark.slow
-def test_a_rod_glued_into_a_tube_twists_and_stretches_in_parallel(rod):
-    """G J and E A add up, exactly: circles turn as a whole."""
+def test_stiffness_of_a_rod_in_a_tube_is_the_sum_of_both(rod):
+    """G J and E A add up exactly, since circles rotate as a whole."""
     K = rod.level.solution.stiffness
     areas = np.pi * np.array([INNER**2, OUTER**2 - INNER**2])
     J = np.pi / 2 * np.array([INNER**4, OUTER**4 - INNER**4])

@@ -100,7 +100,8 @@ def box_of_stress(tip_scale=1.0):
 
 @pytest.mark.parametrize("scale", [1.0, 1.5, 0.5])
 def test_stresses_near_the_ends_are_excluded(scale):
-    """A stretch of one along z, lam and lam + 2 mu, five times for a unit force."""
+    """A stretch of 1 along z has the stresses lam and lam + 2 mu, times five for a unit
+    force."""
     solved = box_of_stress(scale)
     stress = stress_influence(solved)
     assert stress.away == pytest.approx(0.25 * max(scale, 1.0), rel=1e-9)

@@ -30,7 +30,7 @@ def test_angles_and_quality_of_known_tetrahedra_equal_hand_calculation():
 
 
 def test_flat_tetrahedron_has_low_quality():
-    """Height 0.01 over a triangle of side 1: angles near 0 and near pi."""
+    """A height of 0.01 over a triangle of side 1: angles are near 0 and near pi."""
     flat = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.8, 0], [0.5, 0.3, 0.01]])
     angles = dihedral_angles(one(flat))
     assert angles.min() < 0.05

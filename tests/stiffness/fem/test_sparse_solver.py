@@ -20,8 +20,8 @@ def chosen():
 
 @pytest.mark.parametrize("name", sorted({"SuperLU", solver_name()}))
 @pytest.mark.parametrize("columns", [1, 6])
-def test_the_whole_matrix_is_solved_from_its_upper_triangle(rng, name, columns):
-    """A = B B^T + I, dense by numpy."""
+def test_sparse_solver_needs_only_the_upper_triangle(rng, name, columns):
+    """The matrix is A = B B^T + I; numpy's dense solution is the reference."""
     B = random_array((40, 40), density=0.1, rng=rng).toarray()
     A = B @ B.T + np.eye(40)
     loads = rng.normal(size=(40, columns))

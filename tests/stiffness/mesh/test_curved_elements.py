@@ -76,9 +76,9 @@ def volume(mesh):
     return sum(chunk.w.sum() for chunk in integration(mesh))
 
 
-def test_the_volume_of_a_round_bar_converges_with_the_sixth_power():
-    """Edges and faces deviate to both sides of an arc, so that errors cancel; the
-    quadratic elements' error falls with the fourth."""
+def test_volume_of_a_round_bar_converges_with_the_sixth_power():
+    """Edges and faces deviate to both sides of an arc, so that errors cancel. The error
+    of quadratic elements falls with the fourth power."""
     exact = np.pi * 0.04**2 * 0.2
     for order, power, least in ((2, 4, 1e-5), (3, 6, 1e-7)):
         error = [
@@ -103,8 +103,8 @@ def shell_volume(inner, outer):
     return SOLID_ANGLE * (outer**3 - inner**3) / 3
 
 
-def test_a_spheres_volume_converges_with_the_sixth_power():
-    """Concave and convex faces, with nodes of the outline on both shapes."""
+def test_volume_of_a_sphere_converges_with_the_sixth_power():
+    """Concave and convex faces; nodes of the outline lie on both shapes."""
     error = []
     for n in (1, 2, 4):
         mesh = isoparametric(shell((n, n, n), 0.6, 1.0))
@@ -150,7 +150,7 @@ THIN = [((2, 2, 1), 0.95), ((4, 4, 1), 0.96), ((5, 5, 1), 0.965), ((8, 8, 1), 0.
 @pytest.mark.parametrize(("counts", "inner"), THIN)
 @pytest.mark.parametrize("order", [2, 3])
 def test_elements_of_thin_walls_are_not_inverted(counts, inner, order):
-    """A face that bulges by a quarter of the wall would invert its tetrahedron: such
+    """A face that bulges by a quarter of the wall would invert its tetrahedron. Such
     elements are straightened, and all have the orientation of their corners."""
     solid = shell(counts, inner, 1.0)
     bent = curved_elements(solid, order)

@@ -27,8 +27,8 @@ def area_of(solid, patch):
 
 
 @pytest.mark.parametrize("edge", [0.37, 0.5, 0.52, 0.601])
-def test_a_face_cut_along_a_line_has_the_area_up_to_it(edge):
-    """The foot of a unit box belongs to patch 0 up to x = edge, to patch 3 beyond."""
+def test_face_cut_along_a_line_has_the_area_up_to_the_line(edge):
+    """The bottom of a unit box belongs to patch 0 up to x = edge, to patch 3 beyond."""
     box = box_solid((4, 3, 3), (1.0, 1.0, 1.0))
     middle = box.points[box.faces].mean(axis=1)
     beyond = (box.patch == 0) & (middle[:, 0] > edge)

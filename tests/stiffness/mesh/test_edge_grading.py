@@ -174,8 +174,9 @@ def bent_plate(angle, unit, way):
 
 @pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("way", [1, -1])
-def test_an_inner_edge_of_more_than_35_degrees_is_singular(unit, way):
-    """On the side toward which a plate is bent; on the other it is an outer one."""
+def test_inner_edge_of_more_than_35_degrees_is_singular(unit, way):
+    """An edge is an inner one on the side toward which the plate is bent, else an outer
+    one."""
     for degrees, edges in ((34.0, 0), (36.0, 2), (60.0, 2)):
         solid = bent_plate(np.radians(degrees), unit, way)
         found = singular_edges(solid, ())

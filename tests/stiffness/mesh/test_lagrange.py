@@ -44,8 +44,8 @@ def test_shape_functions_represent_every_polynomial_of_their_degree(
 
 @pytest.mark.parametrize("corners", CORNERS)
 @pytest.mark.parametrize("degree", ORDERS)
-def test_derivatives_are_those_of_central_differences(rng, degree, corners):
-    """Of a cubic they are off by the step squared over 6 times its third derivative,
+def test_derivatives_of_shape_functions_equal_central_differences(rng, degree, corners):
+    """For a cubic the error is the squared step over 6 times the third derivative,
     which is at most 27: 1e-9 at a step of 1e-5."""
     L, step = inside(rng, corners), 1e-5
     _, dN = shape_functions(degree, L)

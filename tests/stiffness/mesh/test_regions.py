@@ -31,8 +31,8 @@ def layer(contrast):
     ("x=0.011..0.02,z=0.02..0.0271", (0.009, 0.03, 0.0071)),
     ("x=0.004..0.0227,y=0.009..0.0203,z=0.013..0.0371", (0.0187, 0.0113, 0.0241)),
 ])  # fmt: skip
-def test_a_mesh_is_cut_along_the_faces_of_a_box(region, size):
-    """The elements of the region fill its own volume, and no other is changed."""
+def test_mesh_is_cut_along_the_faces_of_a_box(region, size):
+    """The elements of the region fill its volume, and no other element changes."""
     regions = regions_of([
         Material(E, 0.3),
         parse_part("--part", f"{region}/young=1e9,poisson=0.3"),

@@ -81,7 +81,7 @@ def test_written_interface_is_read_as_the_same_interface(text, written):
     assert str(parse_interface(written)) == written
 
 
-def test_distances_are_from_the_plane_or_the_cylinder(rng):
+def test_interface_distance_is_measured_from_the_plane_or_the_cylinder(rng):
     """Along the normal, or across the axis beyond the radius; inside and outside."""
     point, d = np.array([1.0, 2.0, 3.0]), np.array([0, 0.6, 0.8])
     u, v = np.array([1.0, 0, 0]), np.array([0, 0.8, -0.6])
@@ -115,7 +115,7 @@ def test_radius_of_a_table_must_be_finite_and_positive(radius):
 
 
 def test_rigid_faces_that_share_an_edge_are_refused():
-    """Two sides of a cube: the stiffness between them has no finite value."""
+    """The stiffness between two sides of a cube has no finite value."""
     surface = check_surface(CUBE, CUBE_TRIANGLES, "cube")
     one, other = parse_interface("y=0"), parse_interface("z=0.1")
     with pytest.raises(BadInput, match=r"cube: base .* and tip .* share an edge near"):

@@ -49,15 +49,15 @@ def test_obj_corners_in_every_notation_give_the_same_cube(tmp_path, content):
     assert faces == [[k - 1 for k in side] for side in SIDES]
 
 
-def test_faces_that_name_absent_texture_coordinates_are_read(tmp_path):
-    """VTK's reader crashes; 1e-3 m^3."""
+def test_obj_faces_with_absent_texture_coordinates_are_read(tmp_path):
+    """VTK's reader crashes on such files; the cube has 1e-3 m^3."""
     path = tmp_path / "cube.obj"
     path.write_text(cube("{k}/{k}"))
     assert read_surface(path).volume == pytest.approx(1e-3, rel=1e-12)
 
 
 def test_a_concave_polygon_is_cut_into_triangles_inside_it(tmp_path):
-    """An L of 0.1 m with arms 0.04 m wide, 0.02 m thick: 0.0064 m^2 x 0.02 m."""
+    """An L shape of 0.1 m with arms 0.04 m wide, 0.02 m thick: 0.0064 m^2 x 0.02 m."""
     outline = [(0, 0), (0.1, 0), (0.1, 0.04), (0.04, 0.04), (0.04, 0.1), (0, 0.1)]
     lines = [f"v {x} {y} {z}" for z in (0, 0.02) for x, y in outline]
     lines += ["f 6 5 4 3 2 1", "f 7 8 9 10 11 12"]
@@ -85,7 +85,7 @@ def test_wrong_obj_line_is_refused_with_its_number(tmp_path, line, message):
         read_surface(path)
 
 
-def test_a_file_without_faces_is_refused(tmp_path):
+def test_obj_file_without_faces_is_refused(tmp_path):
     path = tmp_path / "points.obj"
     path.write_text(POINTS)
     with pytest.raises(BadInput, match="holds no triangles, or is not OBJ"):

@@ -45,8 +45,8 @@ def test_fillets_of_a_rounded_plate_are_recognised_as_cylinders_and_tori(fillet,
             assert (shape.radius, shape.tube) == pytest.approx((0.025 - fillet, fillet))
 
 
-def test_the_volume_of_a_filleted_plate_is_that_of_its_true_shapes():
-    """Against the integral over its height; the facets lack 0.1 % of it."""
+def test_volume_of_a_filleted_plate_is_that_of_its_recognised_shapes():
+    """The reference is the integral over the height; the facets lack 0.1 % of it."""
     surface = filleted_plate()
     true = TrueSurface(surface, find_patches(surface, *ENDS))
     assert surface.volume < 0.9995 * volume_of()
@@ -81,8 +81,8 @@ def chamfered(width, flat, drop):
 
 
 @pytest.mark.parametrize("flat", [0.02, 0.03, 0.036])
-def test_flat_chamfers_stay_flat(flat):
-    """Chamfers of 20 degrees on both sides of a flat top are no cylinder."""
+def test_flat_chamfers_are_not_recognised_as_a_cylinder(flat):
+    """Chamfers of 20 degrees on both sides of a flat top."""
     drop = np.tan(np.radians(20)) * (0.04 - flat) / 2
     surface = chamfered(0.04, flat, drop)
     faces = parse_interface("z=0"), parse_interface("z=0.1")

@@ -26,8 +26,8 @@ def write_stl(path, points, triangles):
 
 
 @pytest.mark.parametrize("kind", ["stl", "ply", "obj", "vtk", "vtp"])
-def test_every_format_gives_the_same_surface(tmp_path, kind):
-    """Single precision of STL and PLY: 1e-7 of the coordinates."""
+def test_every_file_format_has_the_same_surface(tmp_path, kind):
+    """STL and PLY have single precision: 1e-7 of the coordinates."""
     pyvista = pytest.importorskip("pyvista")
     points, triangles = cylinder()
     path = tmp_path / f"bar.{kind}"
@@ -79,8 +79,8 @@ def test_cavity_is_subtracted_from_the_volume_of_a_body():
     assert "cavity was inside out" in surface.repairs[0]
 
 
-def test_nearly_equal_vertices_are_merged_and_named(rng):
-    """Every triangle with its own vertices, each off by 1e-10 m."""
+def test_nearly_equal_vertices_are_merged_and_reported(rng):
+    """Every triangle has its own vertices, each displaced by about 1e-10 m."""
     loose = CUBE[CUBE_TRIANGLES].reshape(-1, 3) + 1e-10 * rng.normal(size=(36, 3))
     surface = check_surface(loose, np.arange(36).reshape(-1, 3), "cube")
     assert len(surface.points) == 8

@@ -51,8 +51,8 @@ def test_surface_digest_depends_on_the_geometry_only():
         (1.001e-3, "mm", None), (0.999e-3, "mm", "m"), (0.999e-3, "m", "m"),
     ],
 )  # fmt: skip
-def test_part_of_implausible_size_is_refused_with_a_unit(size, unit, hint):
-    """A millimetre to twenty metres across."""
+def test_part_of_implausible_size_is_refused_with_a_likely_unit(size, unit, hint):
+    """Plausible sizes are from a millimetre to twenty metres."""
     points = CUBE * size / (0.1 * np.sqrt(3))
     if hint is None:
         check_surface(points, CUBE_TRIANGLES, "part", unit)
@@ -92,7 +92,7 @@ def test_step_file_with_a_wrong_unit_is_refused_with_the_likely_unit(
 
 
 def test_points_of_no_triangle_are_ignored():
-    """Neither NaN nor a distant point."""
+    """Such a point may be NaN or far away."""
     points = np.concatenate([[[np.nan] * 3, [1e6, 0, 0]], CUBE])
     surface = check_surface(points, CUBE_TRIANGLES + 2, "cube")
     assert surface.volume == pytest.approx(1e-3)
@@ -101,7 +101,7 @@ def test_points_of_no_triangle_are_ignored():
 
 
 @pytest.mark.parametrize("pair", [[0, 0, 1], [0, 1, 1], [1, 0, 1]])
-def test_a_triangle_of_two_corners_is_dropped_and_named(pair):
+def test_triangle_of_two_corners_is_dropped_and_reported(pair):
     triangles = np.concatenate([CUBE_TRIANGLES, [pair]])
     surface = check_surface(CUBE, triangles, "cube")
     assert len(surface.triangles) == 12
@@ -110,7 +110,7 @@ def test_a_triangle_of_two_corners_is_dropped_and_named(pair):
 
 @pytest.mark.parametrize("turned", [1, 5, 7, 11])
 @pytest.mark.parametrize("hollow", [False, True])
-def test_turned_triangles_are_repaired_and_named(rng, turned, hollow):
+def test_reversed_triangles_are_repaired_and_reported(rng, turned, hollow):
     """The smaller number of triangles is turned, then a shell that is inside out."""
     mixed = CUBE_TRIANGLES.copy()
     some = rng.choice(12, turned, replace=False)

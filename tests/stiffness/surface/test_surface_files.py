@@ -245,7 +245,7 @@ def test_a_file_that_crashes_its_reader_is_refused(tmp_path, kept):
 
 
 def test_reader_is_stopped_at_its_time_limit(tmp_path, monkeypatch):
-    """The time limit of the reader's process; none reads a file within 1 ms."""
+    """The time limit is that of the reader's process, which needs more than 1 ms."""
     path = tmp_path / "part.vtk"
     path.write_text("# vtk DataFile Version 3.0\n")
     monkeypatch.setattr(surface_files, "_TIME_LIMIT", 0.001)

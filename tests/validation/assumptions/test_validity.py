@@ -177,7 +177,8 @@ def test_energy_of_simulated_elements_equals_that_of_ends_plus_between_ends(elem
 
 
 def test_link_cost_is_zero_for_equal_stiffness(posture):
-    """The beam's K_E as a matrix; twice as soft costs much."""
+    """The beam's K_E given as a matrix costs nothing; half of that stiffness costs
+    much."""
     beams = {
         f.name: np.linalg.inv(link_compliance(f))
         for f in posture.robot.frames
@@ -228,7 +229,7 @@ def test_thick_bar_with_held_ends_is_stiffer_than_its_beam_in_bending_only(postu
 
 
 def test_costs_are_unknown_without_errors_and_load(tmp_path):
-    """Both models store rounding: their ratio is not a cost."""
+    """Both models then store energies of rounding, whose ratio is not a cost."""
     target = tmp_path / "costs.json"
     words = ["validity", "irsbot2", "--pose", "tx=0,tz=-0.5", "--json", str(target)]
     outcome = CliRunner().invoke(app, words)
@@ -255,7 +256,8 @@ def test_position_cost_is_known_without_stored_energy():
 
 
 def test_validity_command_reports_which_assumptions_matter(tmp_path):
-    """Disc and cone matter on the paper's robot; other costs state a reason."""
+    """Disc and cone matter for the paper's robot; costs that are unknown have a
+    reason."""
     target, file = tmp_path / "costs.json", tmp_path / "robot.toml"
     write_robot(irsbot2_with(NUMBERS["cases"][0]), file)
     words = ["validity", str(file), "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100"]

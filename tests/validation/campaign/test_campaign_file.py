@@ -90,8 +90,8 @@ def test_labels_in_any_script_and_spaces_are_read(tmp_path):
     assert read_campaign(write_campaign(tmp_path, rows=rows)).ids[0].startswith("Ü")
 
 
-def test_declared_semicolons_decimal_commas_and_units_are_understood(tmp_path):
-    """The same numbers in another dialect are the same campaign."""
+def test_declared_semicolons_decimal_commas_and_units_are_read(tmp_path):
+    """The same numbers in another notation are the same campaign."""
     plain = read_campaign(write_campaign(tmp_path / "plain"))
     in_mm = [
         "m1;5,729577951308232;11,459155902616464;0;0;0,01;0,02;0,03;1,5;0;1",
@@ -144,7 +144,7 @@ def test_sigma_of_a_row_replaces_the_sigma_of_the_device(tmp_path):
     np.testing.assert_array_equal(sigma[:, 3:5], [[3e-6, 5e-6], [5e-6, 5e-6]])
 
 
-def test_unknown_registration_allows_large_positions_not_rotations(tmp_path):
+def test_unknown_registration_allows_large_positions_but_not_rotations(tmp_path):
     rows = ["a,0,0,1,2,3,-5.5,10,2,0,0,1"]
     head = "id,q.one,q.two,meas.rx,meas.ry,meas.rz,meas.tx,meas.ty,meas.tz,"
     head += "cov.temperature,cov.time,cov.approach"
@@ -301,7 +301,8 @@ def test_wrong_robot_file_of_a_campaign_is_refused_by_name(tmp_path):
 
 
 def test_campaign_files_of_the_docs_are_read(tmp_path):
-    """All blocks together: irsbot2 at 100 mm, 10 N written as 0,01 kN."""
+    """All blocks of the page together: irsbot2 at 100 mm, with 10 N written as 0,01
+    kN."""
     docs = Path(__file__).parents[3] / "docs" / "campaigns.md"
     blocks = re.findall(r"```toml\n(.*?)```", docs.read_text("utf-8"), flags=re.S)
     assert len(blocks) == 3

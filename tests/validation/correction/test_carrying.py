@@ -125,7 +125,7 @@ def test_set_up_rows_of_a_single_place_do_not_suffice(machine, run):
 
 
 def test_saved_robot_predicts_its_own_sessions(machine, run):
-    """The device stood elsewhere each day; the residual is noise."""
+    """The device has another place in each session; the residual is noise."""
     tight = load_robot(machine / "declared.toml")
     tight = replace(
         tight, frames=tuple(replace(f, clearance=None) for f in tight.frames)
@@ -150,7 +150,7 @@ def test_robot_is_carried_to_each_session_separately(machine, run):
 
 
 def test_drift_is_not_carried_over_without_a_clock(machine, run):
-    """The wave of another day, 15 sigma, is not written to the carried file."""
+    """The drift of another day, 15 sigma, is not written to the carried file."""
     folder = measured(machine, 60, 0.8)
     with_a_wave(machine, 3e-4, 1e-4)
     code, said, (day,), out = carried(run, machine, folder, "--setup", "12")
@@ -164,7 +164,7 @@ def test_drift_is_not_carried_over_without_a_clock(machine, run):
 
 
 def test_drift_is_fitted_again_to_set_up_rows(machine, run):
-    """Every fourth row determines today's wave to a third of sigma."""
+    """Every fourth row determines the drift of the new session to a third of sigma."""
     folder = measured(machine, 80, 0.8, wave=(-2e-4, 1e-4))
     with_a_wave(machine, 3e-4, 1e-4)
     rows = ",".join(map(str, range(1, 81, 4)))

@@ -74,7 +74,7 @@ def test_compensation_of_a_longer_link_and_an_offset_equals_hand_calculation(
 
 
 def test_compensation_keeps_joints_within_their_limits(tmp_path, run):
-    """The second joint is at its limit: the first angle gives the least distance."""
+    """The second joint is at its limit: the first angle minimises the distance."""
     text = LONGER.replace("position = 0.5", "position = 0.5\nlimits = [0.0, 0.9]")
     robot, table = written(tmp_path, text, ["a,0.3,0.9"])
     found = compensate(read_commands(table, load_robot(robot)))
@@ -122,7 +122,7 @@ std = { "1.sine" = 2e-4 }
 
 @pytest.mark.parametrize("name", ["arm6", "delta", "hexapod"])
 def test_compensation_brings_a_simulated_machine_to_its_target(name, tmp_path):
-    """The machine is simulated by another program.
+    """Another program simulates the machine.
 
     The residual is of second order: the square of the errors over the size of the
     robot, some nanometres here.

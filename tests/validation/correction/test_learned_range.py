@@ -53,7 +53,7 @@ def test_learned_range_has_a_margin_of_five_per_cent(tmp_path):
 def test_full_turn_of_a_joint_stays_in_the_learned_range(
     variables, form, name, outside, tmp_path
 ):
-    """Except for functions of its angle that are not periodic."""
+    """Except for functions of the angle that are not periodic."""
     robot = read_robot(robot_file(tmp_path))
     if variables:
         one = Function("base", ("tx",), variables, form, {name: 1e-6})

@@ -129,8 +129,8 @@ def test_machine_parameters_exclude_those_of_a_session(tmp_path):
     assert len(own) == 2
 
 
-def test_compliance_stays_positive():
-    """At least a thousandth of the compliance stays; a rigid joint stays rigid."""
+def test_carried_compliance_stays_positive():
+    """At least a thousandth of the compliance remains; a rigid joint stays rigid."""
     robot = campaign_of(np.zeros((1, 6))).robot
     K = np.diag([np.inf, np.inf, np.inf, 1e6, np.inf, np.inf])
     soft = replace(robot, frames=(replace(robot.frames[0], joint_stiffness=K),))
@@ -146,8 +146,8 @@ def test_compliance_stays_positive():
     ("base", "ry", "screw"), ("reading", "ry", "screw"), ("reading", "tz", "screw"),
     ("j2", "rz", "screw"), ("j2", "rz", "compliance"),
 ])  # fmt: skip
-def test_slopes_of_functions_are_finite_differences(where, component, kind, tmp_path):
-    """By differences of the prediction, under load, with a registered device."""
+def test_slopes_of_functions_equal_finite_differences(where, component, kind, tmp_path):
+    """Differences of the prediction, under load, with a registered device."""
     robot, rng = with_errors(arm()), np.random.default_rng(2)
     lines = ["id,q.j1,q.j2,q.j3,load.fx,load.fz,load.mz"]
     for i, q in enumerate(rng.uniform(-1, 1, (5, 6))):

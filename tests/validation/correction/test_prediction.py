@@ -35,7 +35,7 @@ def rows_of(path):
 
 
 def test_predict_reads_a_table_of_commands(tmp_path, run):
-    """A turn of the first joint by a sin q swings the tool about the base."""
+    """A rotation of the first joint by a sin q moves the tool about the base."""
     table = tmp_path / "new.csv"
     table.write_text("id,q.one,q.two\na,0.3,0.0\nb,-0.4,0.5\n")
     out = tmp_path / "readings.csv"

@@ -26,7 +26,7 @@ def saved():
 
 
 def test_without_session_drops_registration_and_functions_of_time(saved):
-    """The tool stays with the robot, functions of a session stay in that session."""
+    """The robot keeps its tool; functions of a session stay in that session."""
     alone = without_session(saved)
     assert alone.effects == {"registration": {"tool.tx": 0.02}}
     assert alone.functions == (SPRING, OTHER_DAY)

@@ -53,10 +53,8 @@ def push(cone, screw, width):
 
 @pytest.mark.parametrize("arm", [0.0, 0.04, -0.04])
 def test_contact_force_is_the_gradient_of_its_energy(arm):
-    """Central differences of half a nanometre; inside, at the bound, outside.
-
-    With an arm of 40 mm a pin tilted by r / arm touches as one shifted by r does.
-    """
+    """Central differences of half a nanometre inside, at and outside the bound. With an
+    arm of 40 mm, a pin tilted by r / arm touches like one shifted by r."""
     disc = replace(DISC, arm=arm)
     unit = np.array([0.04, 0.04, 1, 1, 1, 1])  # [m] for a rad
     for r in (0.0, 1e-5, 2.999e-5, 3.001e-5, 3.3e-5):
@@ -226,8 +224,9 @@ def heavy(length=0.4):
 
 
 @pytest.mark.parametrize("links", ["beam", "spring"])
-def test_weight_acts_together_with_clearance(links):
-    """A hundredfold weight exceeds the clearance: energy, springs, gap hold.
+def test_crosscheck_passes_for_weight_together_with_clearance(links):
+    """A hundredfold weight exceeds the clearance: checks of energy, springs and gap
+    pass.
 
     With beams the simulation also stores q^2 L^5 / 1440 EI each between their ends.
     """
@@ -275,7 +274,7 @@ def drawn(name, size, pose=None):
                   marks=pytest.mark.slow)],
 )  # fmt: skip
 def test_errors_within_the_clearance_store_no_energy(name, size, pose, said):
-    """Without load, errors within the clearance store no energy.
+    """There is no load.
 
     This is a check of overconstrained robots only: the others close without energy
     whatever their clearance.

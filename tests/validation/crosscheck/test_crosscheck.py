@@ -151,8 +151,8 @@ def test_exact_model_and_simulation_agree_under_weight_and_moment(name):
     assert max(check.metric.unexplained.values()) < 1e-4
 
 
-def test_wrong_weight_in_the_exact_model_fails(monkeypatch):
-    """Five per cent too heavy, in the model with finite motions alone."""
+def test_crosscheck_fails_for_a_wrong_weight_in_the_exact_model(monkeypatch):
+    """The weight is 5 % too large in the model with finite motions only."""
     import assembly.exact.exact
 
     right = assembly.exact.exact.dead_loads

@@ -45,8 +45,8 @@ def compared(scales, wrong, second=0.05, third=0.03):
     return compare_scales(scales, solve, Found)
 
 
-def test_right_model_passes_from_two_scales():
-    """Slope 1.76 and limit 0.015 on the two scales alone."""
+def test_correct_model_passes_from_two_requested_scales():
+    """The slope of 1.76 and the limit of 0.015 on two scales alone would not pass."""
     s = np.array([1.0, 0.5])
     assert abs(difference_slope(s, 0.05 * s**2 + 0.03 * s**3, 0) - 2) > 0.1
     comparison = compared((1.0, 0.5), wrong=0.0)

@@ -81,7 +81,7 @@ def test_effect_at_its_bound_is_not_supported():
 
 @pytest.mark.parametrize(("value", "claimed"), [(1.5, True), (1.05, False)])
 def test_exponent_at_its_bound_is_not_supported(value, claimed):
-    """The exponent of a contact must not be at its bound."""
+    """The exponent is that of a contact."""
     slots = (
         Slot(("drive.give",), Unknown("give", 1e-6, 0.0, 1.0), 0.0),
         Slot(("drive.exponent",), Unknown("exponent", 0.5, 1.05, 6.0), 1.5, True),
@@ -153,7 +153,7 @@ def test_negative_compliance_is_bounded_at_zero():
     assert np.array_equal(declared, found)
 
 
-def test_nuisance_parameters_follow_ridge_regression():
+def test_nuisance_parameters_equal_ridge_regression():
     """The mean of eight readings along the bar, shrunk by its prior."""
     size, std = 3e-6, 2e-6
     plain = bar(link=BEAM)

@@ -105,7 +105,8 @@ def test_length_is_found_next_to_common_noise(columns, seed):
 
 
 def test_fit_counts_common_noise_once_per_measurement():
-    """Of a length: (c^2 + sigma^2/3) / measurements, for a shift c of all points."""
+    """The variance of a length is (c^2 + sigma^2 / 3) / measurements, for a common
+    shift c."""
     c = 3 * DEVICE
     common = np.zeros((len(CAMPAIGN), 6, 3))
     common[:, 3:] = c * np.eye(3)
@@ -118,7 +119,7 @@ def test_fit_counts_common_noise_once_per_measurement():
 
 @pytest.mark.parametrize("repeats", [True, False])
 def test_deviation_equal_in_repeats_is_a_lack_of_fit(repeats):
-    """A motion that is equal in all repeats of a command."""
+    """The deviation is a motion that is equal in all repeats of a command."""
     rng = np.random.default_rng(3)
     campaign = three_points(80)
     visit = campaign.measured_at_once
@@ -161,7 +162,8 @@ def test_poor_repeatability_alone_leads_to_no_claim(seed, tmp_path):
 
 @pytest.mark.slow
 def test_intervals_cover_the_truth_next_to_common_noise(tmp_path):
-    """An encoder's offset in twelve campaigns: 90 % intervals, 8 of 12 in 99 %."""
+    """An encoder's offset in twelve campaigns: at least 8 of the 90 % intervals cover
+    it."""
     covers, hidden = 0, [(Hidden("encoder_offset", {"j2": 1e-4}), 5.0)]
     for seed in range(12):
         made, diagnosis = diagnosed(

@@ -108,7 +108,7 @@ def test_correlated_noise_widens_standard_deviations(diagnosed, tmp_path):
 
 
 def test_noise_above_sigma_is_reported_without_a_cause(diagnosed, tmp_path):
-    """Three times the stated sigma, in which errors are reported."""
+    """The noise is three times the stated sigma, in which errors are reported."""
     exact = measured(tmp_path, noise=0.0, force=0.0, temperature=0.0)
     noise = 3.0 * SIGMA * np.random.default_rng(6).normal(size=(len(exact), 6))
     found = diagnose(replace(exact, measured=exact.measured + noise))
@@ -126,7 +126,8 @@ def test_noise_above_sigma_is_reported_without_a_cause(diagnosed, tmp_path):
 
 @pytest.mark.parametrize("name", ["none", "one", "pair"])
 def test_model_sequence_leads_from_the_declared_to_the_fitted_model(name, diagnosed):
-    """Only steps that the machine has; the last row is the error after."""
+    """It has only the steps of this machine; its last row is the error after the
+    fit."""
     found = diagnosed(name)
     terms = {"none": []}.get(name, ["library effects"])
     assert [step.term for step in found.sequence] == ["declared", *terms]
@@ -195,7 +196,7 @@ def test_unknown_registration_with_outliers_and_gaps_is_explained(diagnosed):
 
 @pytest.mark.slow
 def test_model_selected_on_a_subset_is_fitted_to_all_rows(tmp_path, monkeypatch):
-    """Parameters are narrower than from the subset; all outliers are found."""
+    """Parameters are more certain than from the subset; all outliers are found."""
     campaign = measured(tmp_path / "device", seed=1, **CASES["device"])
     monkeypatch.setattr(trace, "_SEARCHED", 30)
     found = diagnose(campaign)
@@ -310,10 +311,9 @@ def test_simulated_campaigns_get_an_accepted_verdict(name):
 
 @pytest.mark.slow
 def test_practice_campaigns_of_another_program_score_without_error(tmp_path):
-    """Scored by the program that came with them: parameters within 3 std.
-
-    After / perfect model: 1.15 is 2.6 standard deviations of the rms of 25 rows' noise.
-    """
+    """The program that came with them computes the score: parameters within 3 std. The
+    error after is at most 1.15 of that of a perfect model, which is 2.6 standard
+    deviations of the rms of 25 rows of noise."""
     try:
         practice = data_folder("practice")
     except BadInput as error:

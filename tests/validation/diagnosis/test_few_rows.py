@@ -54,7 +54,7 @@ def test_diagnosis_with_the_requested_number_of_rows_finds_the_effect():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [4, 5])
-def test_random_readings_are_never_explained(seed):
+def test_random_readings_are_not_explained(seed):
     """Random readings of a hundred sigma, in 8 or 16 rows."""
     for rows in (8, 16):
         found = diagnose(seen(rows, seed, unlike=100.0))

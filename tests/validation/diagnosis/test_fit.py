@@ -40,7 +40,7 @@ def test_fitted_length_is_the_mean_of_the_readings_along_the_bar(start):
 
 
 def test_uncertainty_of_a_stiffness_follows_from_that_of_its_compliance():
-    """Turn M/k and arc M L/k in every row; std k = k^2 std(1/k)."""
+    """Rotation M / k and shift M L / k in every row; std k = k^2 std(1 / k)."""
     M, k = 30.0, 2e5
     campaign = gives_way(M, k)
     fit = machine(campaign, SOFTER, start=1e-6)
@@ -100,7 +100,8 @@ def test_fitted_offset_is_exact_for_a_large_deflection():
 
 
 def test_finite_model_needs_no_geometric_stiffening():
-    """K a = F L cos(q + a): a quarter turn of the load's arm is no first order."""
+    """K a = F L cos(q + a): the load's arm turns so far that first order is not
+    enough."""
     K, F, rows = 2e3, 150.0, 20
     spring = np.diag([np.inf, np.inf, K, np.inf, np.inf, np.inf])
     plain = bar([0, 0, 0, 0, F, 0], rows=rows, spring=spring)

@@ -132,7 +132,7 @@ def test_joint_with_two_compliances_is_found_with_its_knee(hidden, below, above)
     assert_near(values, std, {k: true[f"j2.{v}"] for k, v in truth.items()})
 
 
-def test_backlash_on_the_side_of_the_load_is_found(hidden):
+def test_backlash_whose_side_follows_the_load_is_found_with_its_size(hidden):
     found, true = hidden(arm(), "_torque_backlash", {"j2": 5e-5})
     values, std = only(found, where="j2", form="knee", of=["wrench.j2.mz"])
     assert_near(values, std, {"size": true["j2"]})
@@ -157,7 +157,7 @@ def test_heavier_body_is_found_with_its_mass_and_moments(hidden):
 @pytest.mark.parametrize(("name", "where"), [
     ("thermal_expansion", ["j2", "j3", "tool"]), ("link_length", ["j3"])
 ])  # fmt: skip
-def test_bodies_without_beams_that_grow_are_found(hidden, name, where):
+def test_bodies_without_beams_that_grow_are_found_with_their_rates(hidden, name, where):
     found, true = hidden(arm(link=None), name, dict.fromkeys(where, 2e-5))
     assert_near(*claimed(found, name, where), true)
 

@@ -46,7 +46,8 @@ def design(campaign, rng):
 
 @pytest.mark.parametrize("sessions", [None, np.repeat([0, 1], ROWS // 2)])
 def test_covariance_is_that_of_least_squares_under_known_noise(sessions, rng):
-    """H G'R G H with the full R; generalised least squares has a smaller covariance.
+    """H G'R G H with the full R; generalised least squares would have a smaller
+    covariance.
 
     (Gauss-Markov.)  With R = 1 the covariance is unchanged.
     """
@@ -145,7 +146,7 @@ def test_likelihood_equals_that_of_the_full_covariance_matrix(sessions, rng):
 
 
 def test_noise_in_time_is_independent_between_points(rng):
-    """Two points, read in turns, are two independent series."""
+    """Two points that are read alternately are two independent series."""
     one, both = session(40), session(80)
     both.point = np.tile(["p", "q"], 40)
     both.covariates["time"] = np.repeat(one.covariates["time"], 2)

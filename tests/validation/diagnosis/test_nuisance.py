@@ -76,8 +76,8 @@ def test_unloaded_or_unread_directions_have_no_unknowns():
     assert geometry.columns.shape == (8, 4)
 
 
-def test_columns_sum_to_the_readings_of_a_changed_robot(loaded):
-    """Small errors and springs, built into the robot."""
+def test_nuisance_columns_sum_to_the_readings_of_a_changed_robot(loaded):
+    """The robot is built with small errors and springs."""
     campaign, conditions, response = loaded
     geometry, springs = of_both_kinds(campaign, conditions, response)
     rng = np.random.default_rng(1)
@@ -99,7 +99,7 @@ def test_springs_of_no_compliance_stay_as_declared():
 
 
 def test_springs_of_passive_joints_leave_their_own_motion_free():
-    """1e-7 m/N in series with a rigid bearing that is free to rotate."""
+    """A compliance of 1e-7 m/N in series with a rigid bearing that rotates freely."""
     hinge = Frame("hinge", "base", joint="revolute")
     robot = Robot("a", "tip", (hinge, Frame("tip", "hinge")))
     first, axes = np.zeros(2, int), np.array([2, 4])

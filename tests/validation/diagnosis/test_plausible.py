@@ -79,12 +79,12 @@ def test_device_frame_at_any_distance_is_plausible(campaign):
 
 
 def test_geometric_errors_of_a_fiftieth_of_the_robot_are_implausible(campaign):
-    """An arm of about 1 m: frames that are all off by 5 cm were not made like that."""
+    """For an arm of about 1 m, errors of 5 cm in all frames are implausible."""
     for size, doubted in ((2e-3, 0), (5e-2, 1)):
         assert len(implausible(campaign, made_badly(1e-3, size))) == doubted
 
 
-def test_temperatures_far_from_the_median_are_flagged(campaign):
+def test_temperatures_far_from_the_median_are_reported(campaign):
     """150 K from the median, in kelvin or degrees."""
     for usual in (0.0, 293.0):
         heat = np.full(len(campaign), usual)

@@ -51,9 +51,9 @@ def test_registration_ignores_rows_with_a_missing_cell(cell):
     assert list(guess.values()) == pytest.approx([*TURN, *SHIFT], abs=1e-9)
 
 
-def test_device_rotation_is_found_next_to_a_turned_model():
-    """R = D M: the device's rotation D follows from R and the model's rotation M;
-    of several that differ, the mean."""
+def test_device_rotation_is_found_from_a_rotated_model():
+    """R = D M: the device's rotation D follows from R and the model's rotation M. It is
+    the mean where rows differ."""
     model = np.array([0.02, -0.03, 0.04])
     own = Rotation.from_rotvec(model)
     spread = Rotation.from_rotvec(np.outer([-1, 1] * 4, [0, 2e-3, 1e-3]))
@@ -115,7 +115,7 @@ def test_device_frame_far_from_the_base_is_found_exactly(turn, cells):
 
 
 def test_collinear_points_do_not_determine_the_device_rotation():
-    """Five places of a slide half a metre from the base, without rotations."""
+    """Five positions of a slide half a metre from the base, without rotations."""
     robot = Robot("slide", "tip", (
         Frame("rail", translation=[0.3, 0.5, -0.2], rotation=[0.4, 0.2, 0]),
         Frame("slide", "rail", joint="prismatic", actuated=True),

@@ -20,7 +20,7 @@ def noisy(rng, rows=40, sets=10, size=1.0):
     return campaign_of(z * SIGMA, SIGMA, np.arange(rows) % sets)
 
 
-def test_probabilities_of_noise_are_uniform(rng):
+def test_lack_of_fit_probabilities_of_noise_are_uniform(rng):
     """The rate of false alarms is the stated one."""
     found = []
     for _ in range(300):
@@ -47,7 +47,7 @@ def test_scatter_between_repeats_equals_hand_calculation():
 
 
 def test_equal_repeats_make_any_residual_a_lack_of_fit():
-    """Repeats of a device that rounds: any residual is a lack of fit."""
+    """The device rounds its readings, so that repeats are equal."""
     seen = np.full((4, 6), np.nan)
     seen[:, 4] = [1.0, 1.0, 3.0, 3.0]
     campaign = campaign_of(seen, repeat=[0, 0, 1, 1])

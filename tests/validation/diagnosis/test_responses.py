@@ -52,7 +52,8 @@ def test_responses_equal_hand_calculation_for_screws_and_wrenches(rows):
 
 
 def test_readings_of_small_screws_follow_the_device_frame():
-    """R (t + r x arm), with the arm to the measured point; rotations by Rodrigues."""
+    """R (t + r x arm), where the arm ends at the measured point; rotations by
+    Rodrigues."""
     campaign, conditions = loaded()
     b, point, tool = np.array([0.4, -0.9, 0.7]), [0.1, -0.2, 0.3], [0.05, 0.02, -0.1]
     conditions = replace(

@@ -72,7 +72,7 @@ def test_prediction_with_the_known_gain_of_a_motion_has_the_error_of_noise(rocki
     assert predict(with_gain(rocking, 1.0)).error.normalised > 2
 
 
-def test_an_unknown_gain_is_learned(rocking):
+def test_unknown_gain_of_a_measured_motion_is_learned(rocking):
     """240 readings of rotations of 1 mrad determine the gain to a few thousandths."""
     found = diagnose(rocking)
     assert found.verdict == "learned"

@@ -49,7 +49,7 @@ def saved(found, tmp_path_factory):
 
 
 def test_saved_robot_predicts_the_printed_errors(found, saved):
-    """To the ten digits of the file, over all rows but outliers."""
+    """To the ten digits of the file, over all rows except outliers."""
     again = predict(replace(found.campaign, robot=saved).take(~found.outliers))
     printed = asdict(found.saved)
     assert asdict(again.error) == pytest.approx(printed, rel=1e-6)
@@ -135,7 +135,7 @@ def test_folds_are_fitted_without_their_held_out_readings(monkeypatch):
 
 
 def test_saved_robot_keeps_the_measured_point(found, saved):
-    """Predictions at another point name the point of identification."""
+    """Predictions at another point report the point of identification."""
     point = tuple(found.campaign.reference_point.tolist())
     assert saved.reference_point == pytest.approx(point)
     same = predict(replace(found.campaign, robot=saved)).table()
@@ -176,7 +176,7 @@ def test_table_without_campaign_uses_the_point_of_the_saved_robot(found, tmp_pat
 
 
 def test_predicted_intervals_cover_nine_readings_in_ten(found, saved):
-    """120 new rows: intervals of covariance and noise.
+    """For 120 new rows; intervals include covariance and noise.
 
     720 readings whose errors of the model are common: five standard errors of 0.011.
     """
@@ -190,7 +190,7 @@ def test_predicted_intervals_cover_nine_readings_in_ten(found, saved):
 
 
 def test_saved_robot_has_the_covariance_of_its_parameters(found, saved):
-    """Of every fitted parameter."""
+    """The covariance includes every fitted parameter."""
     known = read_covariance(saved)
     assert len(known.numbers) == len(found.fit.x)
     assert np.linalg.eigvalsh(known.covariance).min() > -1e-20
@@ -198,8 +198,8 @@ def test_saved_robot_has_the_covariance_of_its_parameters(found, saved):
     assert any(kind == "geometric_error" for kind, _ in names)
 
 
-def test_unmeasured_components_are_named_and_uncertain(tmp_path):
-    """Heights alone are measured: x and y are uncertain by the errors of frames."""
+def test_unmeasured_components_are_reported_as_uncertain(tmp_path):
+    """Only heights are measured: x and y are uncertain by the errors of frames."""
     seen = read(commanded(arm(), 24))
     blind = seen.measured.copy()
     blind[:, :5] = np.nan

@@ -65,7 +65,7 @@ def test_waves_of_a_gear_are_found_with_their_number(columns):
     assert one.probability > 0.9
 
 
-def test_growth_with_time_is_not_a_drift_of_the_reading(columns):
+def test_growth_with_time_is_learned_at_a_body_instead_of_the_reading(columns):
     sigma = CAMPAIGN.sigma[0, 3]
     grown = 12 * sigma * (TIME / TIME.max())[:, None] * along(CAMPAIGN)
     selected = found(columns, np.hstack([np.zeros((ROWS, 3)), grown]))

@@ -79,7 +79,7 @@ def test_causes_are_learned_as_polynomials(heated):
 
 
 def test_held_out_spans_of_time_are_predicted_to_the_noise(heated):
-    """Some sixty independent rows: within 1.5 times their noise."""
+    """About sixty independent rows: the error is below 1.5 times the noise."""
     diagnosis, noise = heated
     kept = diagnosis.held.rows
     left = np.sqrt(np.mean(noise[kept] ** 2))
@@ -88,7 +88,7 @@ def test_held_out_spans_of_time_are_predicted_to_the_noise(heated):
 
 
 def test_many_outliers_do_not_prevent_learning(tmp_path):
-    """Eleven outliers, each two thirds of the one before."""
+    """Eleven outliers, each two thirds as large as the one before."""
     rng = np.random.default_rng(9)
     warm = np.sin(np.linspace(0, 20, 320))
     read = 80e-6 * warm**2 + 1e-6 * rng.normal(size=320)

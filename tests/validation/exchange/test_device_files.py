@@ -210,7 +210,7 @@ def test_motive_rigid_body_is_read_without_its_markers(lab, run):
     assert_exact(lab, 13)
 
 
-def test_unit_stated_in_the_file_and_another_declared_are_refused(lab, run):
+def test_declared_unit_that_contradicts_the_file_is_refused(lab, run):
     line = refused(lab, run, "Units: Inches\nname;x;y;z\nA;1;2;3")
     assert 'line 1: found the unit "in", the targets file says "mm"' in line
 
@@ -483,7 +483,7 @@ def test_orientations_without_stated_noise_are_ignored(lab, run):
 
 
 def test_orientation_of_one_target_is_that_of_the_platform(lab, run):
-    """Wide: A has a quaternion, B and C are points."""
+    """In a wide table A has a quaternion, B and C are points."""
     head = "A x,A y,A z,A qw,A qx,A qy,A qz,B x,B y,B z,C x,C y,C z"
     lab.targets(noise_rotation=1e-4)
     body = []

@@ -42,7 +42,7 @@ def cantilever(link, length=0.5, **more):
     ("row", "stiffness"), [(0, G * 2 * SECOND / 0.8), (3, E * AREA / 0.8)]
 )
 def test_an_axial_or_twist_misfit_stores_half_g_squared_k(row, stiffness):
-    """E = g^2 EA / (2 (2 L)), and GJ for a twist: exact at any size of g."""
+    """E = g^2 EA / (2 (2 L)), with GJ for a twist: exact for any size of g."""
     error = np.zeros(6)
     error[row] = 1e-3
     assembly = simulate_assembly(coaxial(error))
@@ -94,7 +94,8 @@ def test_corrected_beam_element_bends_exactly(elements, theory):
 
 
 def test_an_end_moment_bends_a_beam_to_an_arc():
-    """Curvature M/EI is constant, so the tip is at (sin a, 1 - cos a) L / a: a = 1."""
+    """The curvature M / EI is constant: the tip is at (sin a, 1 - cos a) L / a, with a
+    = 1."""
     L = 0.5
     moment = E * SECOND / L
     assembly = simulate_assembly(cantilever(ROUND), load=[0, 0, moment, 0, 0, 0])
@@ -126,7 +127,7 @@ def test_body_with_a_full_stiffness_matrix_deforms_by_its_inverse(rng, kind):
 
 @pytest.mark.parametrize("links", ["beam", "spring"])
 @pytest.mark.parametrize("elements", [1, 3])
-def test_a_cantilever_sags_under_its_weight(links, elements):
+def test_sag_of_a_heavy_cantilever_equals_its_closed_form(links, elements):
     """q L^4 / 8EI + q L^2 / 2GA, for elements and for a 6 by 6 spring.
 
     Scaled down to 1e-4 m/s^2, where the sag is linear to 1e-9.
@@ -204,7 +205,8 @@ def test_infinite_joint_stiffness_locks_its_axis():
 
 @pytest.mark.parametrize("clearance", [None, Clearance(radial=1e-5)])
 def test_bearing_turns_freely_and_is_elastic_otherwise(clearance):
-    """A bar from a bearing to a wall that is askew by up to 3e-3 rad and 0.2 mm.
+    """A bar between a bearing and a wall that is misaligned by up to 3e-3 rad and 0.2
+    mm.
 
     Finite rotations change 1e-3 of it, contacts yield 1e-3 of their size.
     """
@@ -234,8 +236,9 @@ def test_bearing_turns_freely_and_is_elastic_otherwise(clearance):
     assert assembly.clearance_screws[0][2] == pytest.approx(turned, rel=1e-3)
 
 
-def test_a_serial_chain_composes_its_errors_exactly():
-    """Placement, error, own motion, frame by frame; errors of 0.3 rad, not small."""
+def test_serial_chain_composes_its_errors_exactly():
+    """Placement, error and own motion, frame by frame; the errors of 0.3 rad are not
+    small."""
     error = np.array([0.3, -0.2, 0.1, 0.01, 0.02, -0.03])
     frames = (
         Frame("turn", translation=[0, 0, 1], rotation=[0.2, 0, 0], joint="revolute",

@@ -207,7 +207,8 @@ def resident():
 
 @pytest.mark.slow
 def test_repeated_simulations_do_not_leak_memory(rng):
-    """Resident memory after the first fifty, in MiB; a leaked model is half of one."""
+    """Resident memory in MiB after the first fifty simulations; a leaked model takes
+    half a MiB."""
     posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     for _ in range(50):
         simulate_assembly(posture)

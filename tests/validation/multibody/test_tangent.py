@@ -42,7 +42,7 @@ def test_tangent_without_load_is_the_nominal_compliance(name, links):
 
 @pytest.mark.parametrize("share", [-0.8, 0.5, 0.9])
 def test_loaded_bar_on_a_torsion_spring_has_stiffness_k_minus_force(share):
-    """A rigid bar of 1 m, pulled or pushed: 1 / C_yy = k - F."""
+    """A rigid bar of 1 m in tension or compression: 1 / C_yy = k - F."""
     k = 50.0
     link = MatrixLink(np.diag([1e9, 1e9, k, 1e9, 1e9, 1e9]))
     frames = (Frame("foot", link=link), Frame("tip", "foot", [1.0, 0, 0]))
@@ -57,7 +57,7 @@ def test_loaded_bar_on_a_torsion_spring_has_stiffness_k_minus_force(share):
 
 @pytest.mark.parametrize("size", [1e-3, 0.05, 0.3])
 def test_wrench_of_a_bent_spring_is_the_gradient_of_its_energy(size):
-    """On both of its ends, along six twists of the far one."""
+    """At both ends, along six twists of the far end."""
     rng = np.random.default_rng(3)
     B = rng.normal(size=(6, 6))
     K = B @ B.T + np.eye(6)
@@ -141,7 +141,7 @@ def loaded_orthoglide(share):
 
 
 def test_a_closure_of_finite_stiffness_keeps_its_wrench():
-    """It deforms by a millimetre under 1e5 N."""
+    """The closure deforms by a millimetre under 1e5 N."""
     equilibrium, load = loaded_orthoglide(0.5)
     posture = equilibrium.posture
     model = link_models(posture.robot, "spring")

@@ -73,7 +73,7 @@ def test_perfect_robot_without_load_has_no_deviation(point):
 
 
 def test_declared_error_is_read_exactly():
-    """A turn by e about the drive's axis: the tip goes to L (cos, sin)(q + e)."""
+    """A rotation by e about the drive's axis moves the tip to L (cos, sin)(q + e)."""
     q, e = 0.3, 0.02
     contribution = simulate_readings(
         one_link(error=np.array([0, 0, e, 0, 0, 0])), np.zeros(3), [row(q)]
@@ -84,7 +84,10 @@ def test_declared_error_is_read_exactly():
 
 @pytest.mark.parametrize("g", [9.81, 3.0])
 def test_deflection_of_a_heavy_beam_with_a_tip_mass_equals_its_closed_form(added, g):
-    """w L^4/8EI + w L^2/2kGA for the beam, m g L^3/3EI + m g L/kGA for the body."""
+    """w L^4/8EI + w L^2/2kGA for the beam, m g L^3/3EI + m g L/kGA for the body.
+
+    A bent beam is also shorter, by less than s^2/L = 2.4e-8 m: second order.
+    """
     w, m = RHO * AREA * g, 1.3
     sag = w * L**4 / (8 * E * SECOND) + w * L**2 / (2 * SHEAR)
     sag += m * g * (L**3 / (3 * E * SECOND) + L / SHEAR)
@@ -177,7 +180,7 @@ def test_load_shifts_a_joint_by_its_clearance(added, side):
     close(contribution, [0, 0, 0, 3e-5 * side, 0, 0], 2e-3, 1e-8)
 
 
-def test_clearance_without_load_moves_nothing(added):
+def test_clearance_without_load_has_no_deviation(added):
     clearance = {"drive.radial": 3e-5, "drive.axial": 1e-5, "drive.tilt": 1e-4}
     assert np.abs(added("joint_clearance", clearance, row())).max() < 1e-9
 
@@ -218,7 +221,7 @@ def test_drift_rises_exponentially(added):
 
 @pytest.mark.parametrize("program", ["multibody", "springs"])
 def test_geometric_stiffening_adds_the_finite_rotation(program):
-    """A turn by e: L (cos e - 1) along the beam, L (sin e - e) across."""
+    """For a rotation by e: L (cos e - 1) along the beam, L (sin e - e) across."""
     e = 0.02
     robot = one_link(error=np.array([0, 0, e, 0, 0, 0]))
     design = CampaignDesign(configurations=2, rows=2, load=0.0)
@@ -234,7 +237,8 @@ def test_geometric_stiffening_adds_the_finite_rotation(program):
 
 
 def test_effects_outside_the_library_follow_their_formulas(added):
-    """A drive's softness (1 + cos 3q)/2, swelling, T^2, a stand, a sagging target."""
+    """A drive's compliance times (1 + cos 3q) / 2, swelling, T^2, a stand, a sagging
+    target."""
     q, F = 0.3, 10.0
     pushed = row(q, load=(0, 0, 0, -F * math.sin(q), F * math.cos(q), 0))
     turn = F * L / 1e5 * (1 + math.cos(3 * q)) / 2
