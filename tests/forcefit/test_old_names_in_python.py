@@ -92,8 +92,8 @@ def test_old_argument_reading_of_a_pose_error_works_as_assumption(posture):
 
 
 def test_sweep_by_the_names_of_the_last_release_has_equal_results(tmp_path):
-    """By separate functions for options, request and result; file and memory are
-    equal."""
+    """By separate functions for options, request and result;
+    file and memory are equal."""
     new = ff.sweep(
         "five_bar", grid="tx=0:0.02:0.02,ty=0.13", assumption="free",
         wrench_of=["left.elbow"], state="contact",

@@ -172,8 +172,8 @@ def test_every_package_of_an_extra_is_named_with_its_extra():
     ],
 )
 def test_solving_one_posture_requires_five_packages(tmp_path, words):
-    """These are the packages of LEAST and their requirements; results are the same as
-    with all packages."""
+    """These are the packages of LEAST and their requirements;
+    results are the same as with all packages."""
     ff.write_robot(ff.load_robot("irsbot2"), tmp_path / "robot.toml")
     shown = modules_of(*LEAST) | {*OURS}
     assert not {"xarray", "cvxpy", "pyvista", "exudyn", "threadpoolctl"} & shown

@@ -27,8 +27,8 @@ def test_a_turn_about_z_moves_a_point_on_x_along_y():
 
 
 def test_power_of_a_wrench_does_not_depend_on_the_reference_point(rng):
-    """The transpose of screw_map transforms wrenches in the opposite direction, also
-    between rotated axes."""
+    """The transpose of screw_map transforms wrenches in the opposite direction,
+    also between rotated axes."""
     A = screw_map(rng.normal(size=3), rotation_matrix(rng.normal(size=3)))
     screw, wrench = rng.normal(size=(2, 6))
     assert (A.T @ wrench) @ screw == pytest.approx(wrench @ (A @ screw), rel=1e-13)

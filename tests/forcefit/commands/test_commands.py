@@ -149,8 +149,10 @@ link = { beam = { radius = 0.005 }, young = 7e10, poisson = 0.3, pieces = 4 }
 
 
 def test_exact_solution_reports_a_state_beyond_a_critical_load(run, tmp_path):
-    """Euler's load is 84.8 N, with 4 pieces 82.7 N. Above it the straight column is
-    unstable, the bent one stable."""
+    """Euler's load is 84.8 N, with 4 pieces 82.7 N.
+
+    Above it the straight column is unstable, the bent one stable.
+    """
     column = tmp_path / "column.toml"
     column.write_text(COLUMN)
     for load, status, said in (
@@ -272,8 +274,8 @@ def test_a_group_without_a_command_prints_its_help_line_by_line(run, group):
 
 @pytest.mark.parametrize("words", EVERY_COMMAND, ids=" ".join)
 def test_help_prints_every_unit_in_brackets_and_whole_sentences(run, words):
-    """No part of a text is taken for markup, and lists of commands are not
-    truncated."""
+    """No part of a text is taken for markup,
+    and lists of commands are not truncated."""
     _, out, _ = run(*words, "--help")
     printed = " ".join(out.split())
     command = EVERY_COMMAND[words]

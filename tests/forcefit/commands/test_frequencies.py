@@ -29,8 +29,8 @@ def test_frequencies_of_a_robot_without_mass_are_refused(run):
 
 
 def test_nominal_frequencies_report_that_gravity_is_left_out(run, tmp_path):
-    """A compound pendulum has the frequency sqrt(m g l / I) / (2 pi); nominally it has
-    none."""
+    """A compound pendulum has the frequency sqrt(m g l / I) / (2 pi);
+    nominally it has none."""
     pendulum = Robot("pendulum", "tip", (
         Frame("pivot", joint="revolute", rotation=[np.pi / 2, 0, 0]),
         Frame("tip", "pivot", [0, -1.0, 0], mass=2.0,

@@ -82,8 +82,8 @@ def test_load_that_nothing_resists_has_exit_status_1_and_names_the_motion(
 
 
 def test_sweep_names_the_free_motion(tmp_path):
-    """Also at singular postures of a workspace, where other directions have their
-    stiffness."""
+    """Also at singular postures of a workspace,
+    where other directions have their stiffness."""
     (tmp_path / "slider.toml").write_text(SLIDER)
     asked = ask_sweep(
         str(tmp_path / "slider.toml"),
@@ -126,8 +126,8 @@ def test_stiffness_command_writes_its_chart(run, tmp_path):
 
 
 def test_stiffness_along_a_direction_has_its_value_and_shares(run):
-    """Along tz it equals the value of that axis; the length of the vector has no
-    effect."""
+    """Along tz it equals the value of that axis;
+    the length of the vector has no effect."""
     status, out, _ = run(
         "assembly", "stiffness", "orthoglide", "--along", "tz=-2", "--json", "-"
     )
@@ -179,8 +179,8 @@ def test_load_without_an_equilibrium_has_exit_status_1(run):
 
 
 def test_stiffness_reports_a_platform_far_from_its_nominal_pose(run):
-    """10 MN move it from 0.5 m below the base to above it; 300 N move it by
-    micrometres."""
+    """10 MN move it from 0.5 m below the base to above it;
+    300 N move it by micrometres."""
     for load, far in (("fz=1e7", True), ("fz=-300", False)):
         _, out, _ = run(
             "assembly",

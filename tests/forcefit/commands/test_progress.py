@@ -51,8 +51,8 @@ def test_every_load_of_a_curve_is_reported():
 def test_progress_shows_the_links_solved_while_a_robot_is_read(
     terminal, monkeypatch, capsys
 ):
-    """A line for each link whose finite elements run; on a terminal a bar for all
-    three."""
+    """A line for each link whose finite elements run;
+    on a terminal a bar for all three."""
     monkeypatch.setenv("FORCE_COLOR" if terminal else "NO_COLOR", "1")
     log = logging.getLogger("assembly.files.solved_links")
     before = log.level, log.handlers

@@ -199,9 +199,10 @@ def test_fea_writes_the_keys_of_the_format(tmp_path):
 @pytest.mark.slow
 def test_fea_of_two_materials_in_series_adds_their_compliances():
     """Without Poisson's effect plane sections stay plane, and compliances add up: h/EI
-    for pure bending, h/GJ with G = E/2 for torsion, h/EA for tension. The accuracy is 1
-    %. The faces between the materials are those of elements, not the plane, which
-    changes the mass by at most half a per cent."""
+    for pure bending, h/GJ with G = E/2 for torsion, h/EA for tension. The accuracy
+    is 1 %. The faces between the materials are those of elements, not the plane,
+    which changes the mass by at most half a per cent.
+    """
     text = run(
         "fea", *PLAIN, "--young", "6e10", "--poisson", "0", "--density", "2700",
         "--part", "z=0.226..1/young=1.8e11,poisson=0,density=7800",
@@ -241,8 +242,8 @@ def links():
 
 
 def test_comparison_reports_a_link_that_is_two_per_cent_stiffer():
-    """K is 2 % larger at L / r = 20: the end effect c of 1 + c r / L is 0.4
-    everywhere."""
+    """K is 2 % larger at L / r = 20:
+    the end effect c of 1 + c r / L is 0.4 everywhere."""
     comparison = compare_link(*links(), size=0.02)
     np.testing.assert_allclose(np.diag(comparison.difference), 0.02, rtol=1e-9)
     np.testing.assert_allclose(comparison.end_effect, 0.4, rtol=1e-9)

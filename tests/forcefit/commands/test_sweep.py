@@ -281,8 +281,8 @@ def test_sweep_replaces_a_file_of_an_earlier_sweep(run, tmp_path):
 
 @pytest.mark.parametrize("kind", [SystemError, ValueError, KeyboardInterrupt])
 def test_ctrl_c_in_compiled_code_has_exit_status_130(kind, run, monkeypatch):
-    """Compiled code turns the interrupt into errors of its own; those of matplotlib are
-    ValueErrors."""
+    """Compiled code turns the interrupt into errors of its own;
+    those of matplotlib are ValueErrors."""
 
     def interrupted(**_):
         try:
@@ -311,8 +311,8 @@ def test_error_without_ctrl_c_is_raised_unchanged(run, monkeypatch):
 
 
 def test_damaged_sweep_file_gives_one_message(run, tmp_path, monkeypatch):
-    """HDF5 opens some of these files, and h5netcdf then fails while the file is half
-    open."""
+    """HDF5 opens some of these files,
+    and h5netcdf then fails while the file is half open."""
     from forcefit.commands import sweep
 
     monkeypatch.setattr(sweep, "save_figure", lambda *_: None)  # slow, after reading

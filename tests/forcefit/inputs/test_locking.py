@@ -70,8 +70,10 @@ main()
     ],
 )
 def test_commands_run_without_posix_modules(tmp_path, words):
-    """Without modules and functions that Windows lacks, results are the same. Only the
-    command's own process is tested."""
+    """Without modules and functions that Windows lacks, results are the same.
+
+    Only the command's own process is tested.
+    """
     search = {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])}
     answers = []
     for name, before in (("a", WITHOUT_POSIX), ("b", "")):

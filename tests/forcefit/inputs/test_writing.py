@@ -227,8 +227,8 @@ def write_many(path, mark, count):
 
 
 def test_two_programs_writing_at_once_leave_one_complete_file(tmp_path):
-    """Each waits for the other: the file is never a mixture, and no other file
-    remains."""
+    """Each waits for the other:
+    the file is never a mixture, and no other file remains."""
     path, fork = tmp_path / "x.txt", multiprocessing.get_context("fork")
     both = [fork.Process(target=write_many, args=(path, mark, 30)) for mark in "ab"]
     for one in both:

@@ -106,9 +106,11 @@ def test_peak_stress_of_a_twisted_rectangle_equals_timoshenkos_table(ratio, k):
 
 @pytest.mark.parametrize("section", [PLATE, {"width": 0.05, "height": 0.02}])
 def test_stresses_of_a_rectangle_integrate_to_the_forces(section):
-    """Integrals over the section by Simpson's rule. The tolerance for torsion is 5e-4,
-    since its stress has a kink at the short sides. Outer faces have no shear normal to
-    them."""
+    """Integrals over the section by Simpson's rule.
+
+    The tolerance for torsion is 5e-4, since its stress has a kink at the short sides.
+    Outer faces have no shear normal to them.
+    """
     fibres, influence = section_stress(section)
     y, z = fibres.reshape(33, 33, 2).transpose(2, 0, 1)
     sigma, tau_y, tau_z = influence.reshape(33, 33, 3, 6).transpose(2, 3, 0, 1)
@@ -305,8 +307,8 @@ SUPPORTS = {
 
 @pytest.mark.parametrize("name", SUPPORTS)
 def test_peak_stress_of_a_heavy_beam_equals_textbook_values(name):
-    """Timoshenko, Strength of Materials I: largest moments q L^2 / 2, / 8, / 8 and /
-    12."""
+    """Timoshenko, Strength of Materials I:
+    largest moments q L^2 / 2, / 8, / 8 and / 12."""
     wrench, moment, place = SUPPORTS[name]
     stress, where = peak_beam_stress(PLATE, LENGTH, wrench, [0, 0, -W])
     sigma = 6 * moment / (0.02 * 0.05**2)

@@ -73,8 +73,8 @@ def test_compliance_of_a_quarter_circle_equals_castiglianos_solution():
 
 
 def test_compliance_of_a_cone_equals_closed_forms():
-    """Axial L / (E pi r0 r1); torsion 2 L (r0^2 + r0 r1 + r1^2) / (3 pi G r0^3
-    r1^3)."""
+    """Axial L / (E pi r0 r1);
+    torsion 2 L (r0^2 + r0 r1 + r1^2) / (3 pi G r0^3 r1^3)."""
     L, r0, r1 = 0.35, 0.045, 0.025
     cone = straight_piece(
         [0, 0, 0], [0, 0, L], lambda t: round_section(r0 + (r1 - r0) * t, NU)

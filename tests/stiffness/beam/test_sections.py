@@ -142,8 +142,8 @@ def thin_shear_factor(h, b, web, flange, webs, nu):
 @pytest.mark.parametrize("nu", [0.0, 0.3, -0.4])
 @pytest.mark.parametrize(("b", "h"), [(0.06, 0.1), (0.2, 0.05), (0.1, 0.1)])
 def test_shear_factors_of_thin_sections_equal_cowpers_integral(b, h, nu):
-    """A box in both directions; an I along its web, and across it from its two flanges,
-    which are rectangles."""
+    """A box in both directions;
+    an I along its web, and across it from its two flanges, which are rectangles."""
     wall, web, flange = 0.002, 0.003, 0.005
     box = box_section(b + wall, h + wall, wall, nu)
     across, along = (

@@ -70,8 +70,8 @@ def solid(tmp_path):
 
 @pytest.mark.parametrize("symmetry", ["symmetric", "general"])
 def test_matrix_market_rows_follow_the_vector_of_nodes(solid, symmetry):
-    """One half is stored, whatever the header states; rows are grouped by node in the
-    order of the vector."""
+    """One half is stored, whatever the header states;
+    rows are grouped by node in the order of the vector."""
     folder, K, order = solid
     expected = import_link(folder / "k.mtx", nodes=folder / "nodes.csv", **ENDS)
     (folder / "full.mmf").write_text(matrix_market(K, symmetry))

@@ -156,8 +156,8 @@ def test_nastran_grid_in_another_coordinate_system_is_refused(tmp_path):
 
 
 def test_stiffness_and_mass_are_selected_among_the_matrices_of_a_punch_file(tmp_path):
-    """Both are square; the file also has a rectangular matrix whose name begins with
-    M."""
+    """Both are square;
+    the file also has a rectangular matrix whose name begins with M."""
     path = tmp_path / "part.pch"
     path.write_text(
         "DMIG    KAAX           0       6       2       0\n"

@@ -134,8 +134,8 @@ def dmig_small(K):
 def test_textbook_beam_imported_from_every_program_has_its_stiffness(
     name, write, tolerance, tmp_path
 ):
-    """The file is in millimetres, the link in SI units; the base is 0.5 m behind the
-    tip."""
+    """The file is in millimetres, the link in SI units;
+    the base is 0.5 m behind the tip."""
     path = tmp_path / name
     write(path, textbook_beam())
     link = import_link(path, unit="mm")
@@ -144,8 +144,8 @@ def test_textbook_beam_imported_from_every_program_has_its_stiffness(
 
 
 def test_dmig_of_four_digits_is_refused_as_unbalanced(tmp_path):
-    """Eight characters hold four digits: the ends then balance only to 1e-4 of a stiff
-    beam."""
+    """Eight characters hold four digits:
+    the ends then balance only to 1e-4 of a stiff beam."""
     path = tmp_path / "k.pch"
     K = textbook_beam()
     K = np.vectorize(lambda v: float(f"{v:.3E}"))(K)
@@ -159,8 +159,8 @@ def test_dmig_of_four_digits_is_refused_as_unbalanced(tmp_path):
 )
 @pytest.mark.parametrize("unit", ["m", "mm"])
 def test_exported_link_is_imported_with_the_same_stiffness(to, unit, tmp_path, rng):
-    """For any stiffness and offset; to ten digits in Nastran's fields, to rounding
-    otherwise."""
+    """For any stiffness and offset;
+    to ten digits in Nastran's fields, to rounding otherwise."""
     L = rng.normal(size=(6, 6))
     size = np.array([3, 2, 1, 1e4, 2e4, 3e4])
     K = (L @ L.T + np.eye(6)) * np.outer(size, size)
@@ -201,8 +201,8 @@ def test_matrix_of_six_rows_is_the_stiffness_at_the_tip(tmp_path):
 
 
 def test_mass_matrix_gives_mass_centre_and_inertia(tmp_path):
-    """Two lumps at the ends: the centre is in the middle, the inertia about it m L^2 /
-    4."""
+    """Two lumps at the ends:
+    the centre is in the middle, the inertia about it m L^2 / 4."""
     path = tmp_path / "k.mtx"
     path.write_text(user_element(textbook_beam(), beam_mass()))
     link = import_link(path, mass=path, unit="mm")

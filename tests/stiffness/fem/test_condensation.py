@@ -43,8 +43,8 @@ def scaled_screw(screw):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_condensed_stiffness_equals_twice_the_energy_of_its_fields(kind):
-    """K from the whole assembled matrix; the base rests, the tip's mean motion is the
-    screw, and forces act at the interfaces alone."""
+    """K from the whole assembled matrix; the base rests,
+    the tip's mean motion is the screw, and forces act at the interfaces alone."""
     mesh = isoparametric(box_solid((1, 2, 2), SIZE), 2)
     solution = condense(mesh, *constants(mesh), CENTERS, kind)
     upper = assemble(mesh, *constants(mesh)).toarray()
@@ -75,8 +75,8 @@ def test_condensed_stiffness_equals_twice_the_energy_of_its_fields(kind):
 
 
 def test_number_of_unknowns_excludes_held_interfaces():
-    """The nodes of a quadratic 2 by 4 by 4 grid: without base and tip, without the
-    base, and without six supports."""
+    """The nodes of a quadratic 2 by 4 by 4 grid:
+    without base and tip, without the base, and without six supports."""
     mesh = isoparametric(box_solid((1, 2, 2), SIZE), 2)
     layer, count = 3 * 5, 3 * 5 * 5
     unknowns, kinds = [], []

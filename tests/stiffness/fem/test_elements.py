@@ -90,8 +90,7 @@ def test_only_the_six_rigid_motions_store_no_energy(rng, order, layers):
 
 @pytest.mark.parametrize(("order", "layers"), MESHES)
 def test_linear_field_is_exact_on_any_mesh(rng, order, layers):
-    """Patch test: with a linear field on the boundary, inner nodes have the same
-    field."""
+    """Patch test: inner nodes have the linear field that the boundary has."""
     solid = split_joining_edges(crooked(rng), (0, 1))
     parts = layered(solid, (0, 1)) if layers else None
     mesh = isoparametric(solid, order, parts)
@@ -237,8 +236,9 @@ def test_distributing_interfaces_reproduce_the_compliance_of_a_round_beam(
     order, rings, layers, rel
 ):
     """Tractions are linear over the face: for moments, tension and torsion of a round
-    bar the exact solution is the beam's, without an end effect. The remaining error is
-    the circle's: h^4 for quadratic elements and h^6 for cubic ones."""
+    bar the exact solution is the beam's, without an end effect. The remaining error
+    is the circle's: h^4 for quadratic elements and h^6 for cubic ones.
+    """
     solid = bar_solid(rings, layers, 0.04, 0.2)
     _, solution = solved(solid, order, "distributing-both")
     C = inverted(solution.stiffness)
@@ -257,16 +257,15 @@ def test_each_distributing_interface_lowers_the_stiffness(order):
 
 
 def test_papers_bar_with_a_distributing_tip_agrees_with_its_converged_stiffness():
-    """The converged value is 1 020 060 N m/rad, approached from above; this mesh is
-    5e-4 off."""
+    """The converged value is 1 020 060 N m/rad, approached from above;
+    this mesh is 5e-4 off."""
     _, solution = solved(bar_solid(2, 16, 0.04, 0.452), 3, "distributing")
     assert 0 < solution.stiffness[0, 0] / 1020060 - 1 < 1e-3
 
 
 @pytest.mark.slow
 def test_excess_over_timoshenkos_beam_is_inverse_to_the_length():
-    """The end effect c r / L is halved when the length doubles (slope -1 within
-    0.05)."""
+    """The end effect c r / L halves when the length doubles (slope -1 within 0.05)."""
     excess = []
     lengths = np.array([0.4, 0.8, 1.6])
     for length in lengths:
@@ -361,7 +360,8 @@ def flat_and_bent(order, bulge):
 def test_normals_point_out_of_flat_and_bent_elements(order, bulge):
     """Gauss's theorem: the integral of n is zero, that of x . n is three times the
     volume. The middle of a flat element is beyond the tangent planes of a face that
-    bends in."""
+    bends in.
+    """
     mesh = flat_and_bent(order, bulge)
     places, normal, area, _ = gradients_on_faces(mesh, np.arange(4))
     volume = sum(chunk.w.sum() for chunk in integration(mesh))

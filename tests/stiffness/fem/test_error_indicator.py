@@ -81,8 +81,8 @@ def polynomials(x, degree, rng):
 
 @pytest.mark.parametrize("singular", [False, True])
 def test_estimated_error_is_zero_for_linear_strains_only(rng, singular):
-    """Straight elements represent quadratic displacements, whose stresses are
-    linear."""
+    """Straight elements represent quadratic displacements,
+    whose stresses are linear."""
     mesh = isoparametric(box_solid((1, 2, 2), (0.5, 0.6, 0.8)))
     lam, mu = constants(mesh)
     where = np.full(len(mesh.cells), singular)
@@ -101,8 +101,9 @@ def test_estimated_error_is_zero_for_linear_strains_only(rng, singular):
 
 def test_indicator_at_a_singular_edge_is_the_energy_of_the_nonlinear_stress():
     """u = (0, 0, z^3 / 3) has a stress of z^2, from which the best linear fit of each
-    element is subtracted, here by least squares. The share is the same for all elements
-    and nearly one."""
+    element is subtracted, here by least squares. The share is the same for all
+    elements and nearly one.
+    """
     mesh = isoparametric(box_solid((2, 1, 3), (0.5, 0.6, 0.8)))
     lam, mu = constants(mesh)
     field = np.zeros((len(mesh.nodes), 3, 1))
@@ -174,8 +175,8 @@ def test_torsion_error_of_the_geometry_is_twice_the_volume_error(mesh):
     "mesh", [(1, 6), (1, 12), (2, 12), pytest.param((2, 24), marks=pytest.mark.slow)]
 )
 def test_estimate_from_one_mesh_covers_the_true_error(mesh):
-    """In bending K approaches 1 032 277 N m/rad from above, and the estimate is at most
-    five times the error; torsion has G J / L."""
+    """In bending K approaches 1 032 277 N m/rad from above,
+    and the estimate is at most five times the error; torsion has G J / L."""
     K, indicated, shape = bar(*mesh).totals()
     error, _ = estimated_error([(K, indicated, shape)])
     true = K[0, 0] / BENDING - 1
@@ -225,7 +226,8 @@ def plate(*counts):
 def test_residual_traction_energy_of_a_unit_cube_equals_hand_calculation():
     """A shear s of a unit cube leaves tractions s on four faces, whose triangles are 1
     by 1: energy 2 s^2 / mu / pi times their height 1 / sqrt 2. A tension across free
-    faces leaves none."""
+    faces leaves none.
+    """
     mesh = isoparametric(box_solid((1, 1, 1), np.ones(3)))
     lam, mu = constants(mesh)
     fields = np.zeros((len(mesh.nodes), 3, 2))

@@ -40,8 +40,10 @@ PLANES = (parse_interface("z=0"), parse_interface("z=0.452"))
 @pytest.mark.slow
 def test_papers_bar_from_its_surface_agrees_within_its_estimated_error(cache):
     """The converged bending stiffness is 1 032 277 N m/rad, that of torsion G J / L.
+
     The requested accuracy is 0.5 %, and the estimate must cover the true error. The
-    mesh's own stiffness is above the true one, by no more than twice the estimate."""
+    mesh's own stiffness is above the true one, by no more than twice the estimate.
+    """
     solution = solve_link(
         bar_surface(),
         *PLANES,
@@ -141,8 +143,8 @@ def test_first_mesh_above_the_budget_is_refused(budget):
 def test_failed_first_mesh_is_retried_with_smaller_edges_while_time_remains(
     monkeypatch,
 ):
-    """Edges of a tenth of the diagonal, then half and a fifth of that; one try without
-    time."""
+    """Edges of a tenth of the diagonal, then half and a fifth of that;
+    one try without time."""
     surface, edges = bar_surface(), []
 
     def fail(*_, edge, **__):

@@ -21,8 +21,8 @@ def test_wrong_density_is_refused(density):
 
 
 def test_element_has_the_last_material_that_contains_its_centre():
-    """Lame's constants at the mean of the four corners, for curved and straight
-    elements."""
+    """Lame's constants at the mean of the four corners,
+    for curved and straight elements."""
     solid = box_solid((2, 1, 3), np.array([0.1, 0.1, 0.1]))
     mesh = isoparametric(solid, 3, layered(solid, (0, 1)))
     asked = []

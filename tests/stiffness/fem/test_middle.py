@@ -38,8 +38,8 @@ def test_middle_stiffness_subtracts_half_of_a_small_error():
 
 @given(st.integers(0, 10**6), st.floats(1e-6, 30.0))
 def test_stated_error_covers_the_whole_interval(seed, size):
-    """From K_h down to K_h - c E for any c in 0 to 1, also where E is larger than
-    K_h."""
+    """From K_h down to K_h - c E for any c in 0 to 1,
+    also where E is larger than K_h."""
     K_h, E = random_definite(seed), random_definite(seed + 1, size)
     middle, told = middle_stiffness(K_h, E, NONE)
     for share in (0.0, 0.3, 1.0):
@@ -49,8 +49,8 @@ def test_stated_error_covers_the_whole_interval(seed, size):
 
 @given(st.integers(0, 10**6), st.floats(1e-6, 1e4))
 def test_middle_stiffness_is_at_least_half_of_the_meshs_in_every_motion(seed, size):
-    """However large the error of a coarse mesh is; where E nowhere exceeds K_h, the
-    result is the middle exactly."""
+    """However large the error of a coarse mesh is;
+    where E nowhere exceeds K_h, the result is the middle exactly."""
     K_h, E = random_definite(seed), random_definite(seed + 1, size)
     middle, _ = middle_stiffness(K_h, E, NONE)
     least = np.linalg.eigvals(np.linalg.solve(K_h, middle)).real.min()
@@ -69,8 +69,8 @@ def test_geometry_error_adds_to_the_stated_error_and_keeps_the_middle():
 
 
 def test_middle_stiffness_does_not_depend_on_units():
-    """Millimetres in place of metres, also where less than half of the error is
-    subtracted."""
+    """Millimetres in place of metres,
+    also where less than half of the error is subtracted."""
     units = np.outer(np.repeat([1.0, 1e3], 3), np.repeat([1.0, 1e3], 3))
     for size in (1e-3, 10.0):
         K, E, g = random_definite(6), random_definite(7, size), random_definite(8, 0.1)

@@ -100,8 +100,8 @@ def box_of_stress(tip_scale=1.0):
 
 @pytest.mark.parametrize("scale", [1.0, 1.5, 0.5])
 def test_stresses_near_the_ends_are_excluded(scale):
-    """A stretch of 1 along z has the stresses lam and lam + 2 mu, times five for a unit
-    force."""
+    """A stretch of 1 along z has the stresses lam and lam + 2 mu,
+    times five for a unit force."""
     solved = box_of_stress(scale)
     stress = stress_influence(solved)
     assert stress.away == pytest.approx(0.25 * max(scale, 1.0), rel=1e-9)
@@ -131,8 +131,8 @@ def one_element(rng, order, bend):
 def test_nodal_gradients_of_fields_within_the_elements_space_are_exact(
     rng, order, bend
 ):
-    """Linear fields on a distorted element; polynomials of its degree on a straight
-    one."""
+    """Linear fields on a distorted element;
+    polynomials of its degree on a straight one."""
     mesh = one_element(rng, order, bend)
     ((part, G),) = node_gradients(mesh)
     assert part.tolist() == [0]

@@ -23,8 +23,8 @@ def bar(request):
 def test_bending_stress_of_a_heavy_cantilever_follows_the_weight_beyond_each_section(
     bar,
 ):
-    """The moment is rho g A (L - z)^2 / 2, the stress linear over the section; shear
-    adds 1e-3."""
+    """The moment is rho g A (L - z)^2 / 2, the stress linear over the section;
+    shear adds 1e-3."""
     field = stress_influence(with_own_weight(bar), 0.1)
     stress = field.stresses(np.r_[np.zeros(6), 0.0, -G, 0.0])[:, 2]
     x, y, z = field.places.T
@@ -56,8 +56,7 @@ def test_weight_along_the_bar_gives_a_linear_axial_stress(bar):
 
 
 def test_a_wrench_and_the_weight_superpose(bar):
-    """A force at the tip that carries half of the weight leaves no moment at the
-    wall."""
+    """A tip force that carries half of the weight leaves no moment at the wall."""
     lift = DENSITY * G * SIDE**2 / 2
     field = stress_influence(with_own_weight(bar), 0.1)
     stress = field.stresses([0, 0, 0, 0, lift, 0, 0, -G, 0])[:, 2]

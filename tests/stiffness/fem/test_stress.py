@@ -61,16 +61,18 @@ def test_von_mises_stress_equals_hand_calculation():
     ([0, 0, 1e3, 0, 0, 0], np.sqrt(3) * 1e3 * R / (2 * SECOND)),
 ])  # fmt: skip
 def test_stress_in_the_middle_of_a_bar_equals_textbook_values(solved, wrench, expected):
-    """Four radii from both ends the end effects have decayed (e^-4 a radius). The
-    tolerance of 0.3 % is the mesh's (averaged at nodes, elements of half the
-    radius)."""
+    """Four radii from both ends the end effects have decayed (e^-4 a radius).
+
+    The tolerance of 0.3 % is the mesh's (averaged at nodes, elements of half the
+    radius).
+    """
     stress = stress_influence(solved, away=4 * R)
     assert stress.peak(wrench)[0] == pytest.approx(expected, rel=3e-3)
 
 
 def test_stress_of_a_bar_in_tension_is_axial_only(solved):
-    """Components, since the von Mises stress does not see a pressure: zz = F / A, xx =
-    yy = 0."""
+    """Components, since the von Mises stress does not see a pressure:
+    zz = F / A, xx = yy = 0."""
     stress = stress_influence(solved, away=4 * R).stresses([0, 0, 0, 0, 0, 1e3])
     np.testing.assert_allclose(stress[:, 2], 1e3 / AREA, rtol=3e-3)
     assert np.abs(stress[:, :2]).max() < 1e-3 * 1e3 / AREA

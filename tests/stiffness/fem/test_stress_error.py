@@ -46,8 +46,8 @@ def bar(request):
     ([0, 0, 1e3, 0, 0, 0], np.sqrt(3) * 1e3 * R / (2 * SECOND)),
 ])  # fmt: skip
 def test_stress_of_a_bar_agrees_within_the_estimated_error(bar, wrench, expected):
-    """F / A, M R / I and T R / J at four radii from the ends, where the end effect is
-    0.1 %."""
+    """F / A, M R / I and T R / J at four radii from the ends,
+    where the end effect is 0.1 %."""
     peak = peak_stress(bar, wrench, away=4 * R)
     assert abs(peak.von_mises - expected) <= peak.error + 1e-3 * expected
     assert peak.error < 0.25 * expected

@@ -59,8 +59,8 @@ def side_errors(mesh):
 
 
 def test_nodes_of_curved_elements_lie_on_the_cylinder_to_fourth_order():
-    """The error of cubic elements falls with the fourth power of their size, with or
-    without layers."""
+    """The error of cubic elements falls with the fourth power of their size,
+    with or without layers."""
     errors = {rings: layers_of_bar(rings, 2 * rings, 3) for rings in (2, 4)}
     for k in range(2):
         coarse, fine = (side_errors(errors[rings][k]).max() for rings in (2, 4))
@@ -77,8 +77,10 @@ def volume(mesh):
 
 
 def test_volume_of_a_round_bar_converges_with_the_sixth_power():
-    """Edges and faces deviate to both sides of an arc, so that errors cancel. The error
-    of quadratic elements falls with the fourth power."""
+    """Edges and faces deviate to both sides of an arc, so that errors cancel.
+
+    The error of quadratic elements falls with the fourth power.
+    """
     exact = np.pi * 0.04**2 * 0.2
     for order, power, least in ((2, 4, 1e-5), (3, 6, 1e-7)):
         error = [
@@ -150,8 +152,10 @@ THIN = [((2, 2, 1), 0.95), ((4, 4, 1), 0.96), ((5, 5, 1), 0.965), ((8, 8, 1), 0.
 @pytest.mark.parametrize(("counts", "inner"), THIN)
 @pytest.mark.parametrize("order", [2, 3])
 def test_elements_of_thin_walls_are_not_inverted(counts, inner, order):
-    """A face that bulges by a quarter of the wall would invert its tetrahedron. Such
-    elements are straightened, and all have the orientation of their corners."""
+    """A face that bulges by a quarter of the wall would invert its tetrahedron.
+
+    Such elements are straightened, and all have the orientation of their corners.
+    """
     solid = shell(counts, inner, 1.0)
     bent = curved_elements(solid, order)
     assert bent.inverted.any()

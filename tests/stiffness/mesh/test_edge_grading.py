@@ -131,8 +131,11 @@ def test_layers_of_any_union_of_boxes_conform_and_keep_the_volume(kept, held):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_richer_finite_element_space_lowers_the_stiffness(kind):
-    """On a box the geometry is exact. Quadratic fields are a subset of cubic ones, and
-    fields of whole elements of those of their parts; K falls in every direction."""
+    """On a box the geometry is exact.
+
+    Quadratic fields are a subset of cubic ones, and fields of whole elements of those
+    of their parts; K falls in every direction.
+    """
     held = (0, 1)
     solid = split_joining_edges(box_solid((2, 2, 3), (0.05, 0.08, 0.2)), held)
     parts = layered(solid, held)
@@ -175,8 +178,8 @@ def bent_plate(angle, unit, way):
 @pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("way", [1, -1])
 def test_inner_edge_of_more_than_35_degrees_is_singular(unit, way):
-    """An edge is an inner one on the side toward which the plate is bent, else an outer
-    one."""
+    """An edge is an inner one on the side toward which the plate is bent,
+    else an outer one."""
     for degrees, edges in ((34.0, 0), (36.0, 2), (60.0, 2)):
         solid = bent_plate(np.radians(degrees), unit, way)
         found = singular_edges(solid, ())

@@ -27,8 +27,10 @@ def test_quadrature_rules_integrate_monomials_exactly(degree, corners):
 @pytest.mark.parametrize("corners", CORNERS)
 @pytest.mark.parametrize("degree", range(1, 7))
 def test_quadrature_rules_have_positive_weights_at_points_inside(degree, corners):
-    """Points may lie on the surface. The energy of a positive density is then
-    positive."""
+    """Points may lie on the surface.
+
+    The energy of a positive density is then positive.
+    """
     L, weights = quadrature(degree, corners)
     assert (weights > 0).all()
     assert (L >= 0).all()

@@ -64,8 +64,8 @@ def test_torsion_of_round_bars_and_tubes_equals_the_textbook_value(section):
 
 
 def test_square_bar_bends_equally_about_both_axes_within_its_estimated_error():
-    """A mesh for a tenth of the accuracy: K falls by no more than the estimated
-    error."""
+    """A mesh for a tenth of the accuracy:
+    K falls by no more than the estimated error."""
     coarse, fine = (
         solve_bar(
             {"width": 0.2, "height": 0.2}, Material(1.0, 0.3),

@@ -89,8 +89,8 @@ def test_two_processes_build_all_library_entries(spec):
 
 
 def test_stated_error_between_grid_points_covers_the_true_error(spec, rng):
-    """The stiffness is nearly a power of the lengths: a grid of three points gives 2
-    %."""
+    """The stiffness is nearly a power of the lengths:
+    a grid of three points gives 2 %."""
     build_library(spec)
     entries = read_library(spec.folder)
     for _ in range(20):
@@ -318,7 +318,8 @@ def meshed_bar(length):
 def test_stated_error_between_finite_element_entries_covers_a_direct_mesh(length):
     """The direct answer is meshed where the library has no entry, and has an estimated
     error of its own. Between three lengths interpolation itself leaves less than 1
-    %."""
+    %.
+    """
     entries = [meshed_bar(v) for v in (0.195, 0.3, 0.45)]
     table, error = look_up(entries, {"length": length})
     direct = meshed_bar(length)
@@ -369,8 +370,11 @@ def test_stated_error_between_shipped_entries_covers_an_independent_stiffness(
 
 @pytest.mark.parametrize("shape", ["rectangle", "box"])
 def test_shipped_square_links_are_slightly_stiffer_than_their_beams(shape):
-    """Held ends add up to 0.3 b / L in bending. No entry is softer than Timoshenko's
-    beam but a box in torsion, whose corners Bredt's formula leaves out."""
+    """Held ends add up to 0.3 b / L in bending.
+
+    No entry is softer than Timoshenko's beam but a box in torsion, whose corners
+    Bredt's formula leaves out.
+    """
     K, _ = look_up(read_library(SHIPPED / shape), {"length": 0.37})
     lengths = read_spec(SHIPPED / f"{shape}.toml").grid
     lengths = {k: lengths[k][0] for k in SHAPES[shape]} | {"length": 0.37}

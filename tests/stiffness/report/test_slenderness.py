@@ -51,8 +51,8 @@ def test_end_effect_fit_recovers_the_simulated_coefficients():
 
 
 def test_modulus_error_stays_in_the_residual_of_the_end_effect_fit():
-    """A modulus 1 % too high is not an end effect, since it does not fade with
-    length."""
+    """A modulus 1 % too high is not an end effect,
+    since it does not fade with length."""
     comparisons = []
     for ratio in (5, 10, 20, 40):
         one = made_up(ratio, 0.2, 0.0)
@@ -94,8 +94,10 @@ ENDS = {
 
 @pytest.mark.slow
 def test_end_effect_of_a_round_bar_agrees_with_an_independent_solution():
-    """Each mesh is stiffer than that solution, by no more than its stated error. The
-    same fit of the exact values has c = 0.212, 0.254, 0.102 and zero in torsion."""
+    """Each mesh is stiffer than that solution, by no more than its stated error.
+
+    The same fit of the exact values has c = 0.212, 0.254, 0.102 and zero in torsion.
+    """
     sweep = sweep_slenderness({"radius": 0.02}, 6e10, 0.3, list(ENDS), accuracy=0.004)
     for comparison, exact in zip(sweep.comparisons, ENDS.values(), strict=True):
         comparisons = np.diag(comparison.difference)
@@ -182,8 +184,11 @@ def curve_file(tmp_path: Path, content: str) -> Path:
 
 
 def test_curve_file_of_an_l_shape_gives_the_compliance_by_hand(tmp_path):
-    """The command prints the result of the function; the length is 0.35 m. Castigliano
-    by hand for a force along y at the tip: both legs bend, the first twists."""
+    """The command prints the result of the function; the length is 0.35 m.
+
+    Castigliano by hand for a force along y at the tip: both legs bend, the first
+    twists.
+    """
     path = curve_file(tmp_path, L_BRACKET)
     result = CliRunner().invoke(
         app, ["beam", str(path), *MATERIAL, "--theory", "euler", "--json", "-"]
@@ -201,8 +206,8 @@ def test_curve_file_of_an_l_shape_gives_the_compliance_by_hand(tmp_path):
 
 
 def test_curve_file_of_tapers_and_arcs_gives_closed_forms(tmp_path):
-    """The axial compliance of a cone is L / (E pi r1 r2); a quarter circle ends on its
-    axis."""
+    """The axial compliance of a cone is L / (E pi r1 r2);
+    a quarter circle ends on its axis."""
     cone = """
 [[piece]]
 end = [0.3, 0, 0]

@@ -15,8 +15,8 @@ def side(radius, facets):
 
 @pytest.mark.parametrize("radius", [1e-3, 1.0, 1e3])
 def test_lifted_facets_deviate_by_the_fourth_power_of_the_angle(radius):
-    """A flat facet of half-angle a deviates by a^2 / 2 of the radius, a lifted one by
-    a^4."""
+    """A flat facet of half-angle a deviates by a^2 / 2 of the radius,
+    a lifted one by a^4."""
     facets, a = 24, np.pi / 24
     patch = side(radius, facets)
     spokes = patch.points[:, :2] / radius
@@ -33,8 +33,7 @@ def test_lifted_facets_deviate_by_the_fourth_power_of_the_angle(radius):
 
 @pytest.mark.parametrize("unit", [1e-6, 1e6])
 def test_lifted_facets_do_not_depend_on_the_unit(unit):
-    """The triangles are unequal, so that the angles of their corners weigh the
-    normals."""
+    """The triangles are unequal, so that angles at corners weigh the normals."""
     rng = np.random.default_rng(2)
     x, y = (v.ravel() for v in np.meshgrid([0, 0.1, 0.5, 1.2], [0, 0.7, 0.8]))
     points = np.column_stack([x, y, 0.1 * rng.normal(size=12)])

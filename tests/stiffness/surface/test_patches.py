@@ -142,8 +142,8 @@ def test_facets_of_an_unknown_shape_are_lifted_toward_the_true_surface():
 
 @pytest.mark.slow
 def test_mesh_of_a_barrel_has_the_volume_of_the_smooth_shape(tmp_path):
-    """Its facets lack more than 0.6 % of the volume, the curved mesh less than 0.03
-    %."""
+    """Its facets lack more than 0.6 % of the volume,
+    the curved mesh less than 0.03 %."""
     surface, exact = barrel()
     faces = parse_interface("z=0"), parse_interface("z=0.1")
     solid = mesh_solid(surface, *faces, edge=0.012, envelope=1e-3, cache=tmp_path)

@@ -47,8 +47,8 @@ FITS = {"plane": fit_plane, "cone": fit_cone, "sphere": fit_sphere, "torus": fit
 
 @pytest.mark.parametrize("name", CASES)
 def test_signed_distance_equals_the_offset_along_the_normal(name):
-    """On the shape the distance is zero; 0.1 outside it is 0.1, 0.1 inside it is
-    -0.1."""
+    """On the shape the distance is zero;
+    0.1 outside it is 0.1, 0.1 inside it is -0.1."""
     shape, points = CASES[name]
     distances, normals = shape.signed(points)
     np.testing.assert_allclose(distances, 0, atol=1e-14)
@@ -96,8 +96,8 @@ def test_projection_of_no_points_is_empty():
 
 @pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
 def test_projection_onto_two_round_shapes_ends_on_their_common_line(unit):
-    """To rounding, by Newton's method: after the first step a tenth of the distance
-    remains."""
+    """To rounding, by Newton's method:
+    after the first step a tenth of the distance remains."""
     sphere = Sphere(unit * CENTER, 2.0 * unit)
     cylinder = Cone(unit * (CENTER + [0.3, 0.0, 0.0]), AXIS, 1.0 * unit)
     points = ring_points([1.3, 0.9], [1.6, -1.9])

@@ -92,8 +92,8 @@ def test_flat_chamfers_are_not_recognised_as_a_cylinder(flat):
 
 
 def test_flat_side_between_fillets_stays_flat():
-    """The side consists of two triangles, 150 x 6 mm, and meets fillets on three
-    edges."""
+    """The side consists of two triangles, 150 x 6 mm,
+    and meets fillets on three edges."""
     surface = filleted_plate()
     true = TrueSurface(surface, find_patches(surface, *ENDS))
     middle = np.array([[0.01, 0.15, 0.009], [0.0, -0.15, 0.008]])
@@ -122,8 +122,11 @@ def domed_bar():
 
 
 def test_cylinders_beside_a_hump_are_recognised_separately():
-    """The facets lack 0.44 % of the integral of pi r^2. The smoothed surface lacks less
-    than its stated uncertainty, and the long cylinders are no part of the hump."""
+    """The facets lack 0.44 % of the integral of pi r^2.
+
+    The smoothed surface lacks less than its stated uncertainty, and the long cylinders
+    are no part of the hump.
+    """
     surface = domed_bar()
     faces = parse_interface("z=0"), parse_interface("z=0.1")
     patches = find_patches(surface, *faces)

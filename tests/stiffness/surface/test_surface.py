@@ -95,8 +95,7 @@ def test_units_of_length_equal_those_of_scipy():
 
 
 def test_signed_volume_does_not_change_far_from_the_origin():
-    """About 40 km away, where products of coordinates have no digit left for 1
-    litre."""
+    """Some 40 km away, products of coordinates have no digit left for 1 litre."""
     far = CUBE + np.array([1e4, -2e4, 3e4])
     for points, tolerance in ((CUBE, 1e-12), (far, 1e-8)):
         volume = signed_volume(points, CUBE_TRIANGLES)

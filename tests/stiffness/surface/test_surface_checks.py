@@ -32,8 +32,8 @@ def test_area_vector_of_a_triangle_is_its_area_along_its_normal():
 
 
 def test_surface_digest_depends_on_the_geometry_only():
-    """It depends on every bit of coordinates and corners, not on name or memory
-    layout."""
+    """It depends on every bit of coordinates and corners,
+    not on name or memory layout."""
     one = Surface(CUBE, CUBE_TRIANGLES, "one")
     same = Surface(np.asfortranarray(CUBE), CUBE_TRIANGLES.astype(np.int32), "other")
     assert one.digest() == same.digest()

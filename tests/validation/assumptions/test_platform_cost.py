@@ -127,8 +127,8 @@ def test_validity_command_names_the_link_of_largest_cost(run, tmp_path):
 
 
 def test_validity_over_poses_reports_median_and_largest_cost(run, tmp_path):
-    """One of three poses is out of reach; a list of the same poses has the same
-    result."""
+    """One of three poses is out of reach;
+    a list of the same poses has the same result."""
     listed = tmp_path / "poses.csv"
     listed.write_text("id,pose.tx,pose.tz\na,0,-0.5\nb,0.2,-0.5\nc,3,-0.5\n")
     words = ["validation", "validity", "irsbot2", "--solids", "--json", "-"]

@@ -73,8 +73,8 @@ def test_margin_of_two_bushes_is_the_sum_of_the_shares_of_disc_and_cone(shift, t
 
 
 def test_margin_of_two_bushes_for_a_shift_across_the_tilt_is_a_root_of_squares():
-    """(TX + h RY, TY - h RX) = (r, h theta) here, so the margin is a root of summed
-    squares."""
+    """(TX + h RY, TY - h RX) = (r, h theta) here,
+    so the margin is a root of summed squares."""
     at = pin([3e-4, 0, 0, 2e-5, 0, 0])
     expected = math.hypot(2e-5 / 3e-5, 3e-4 / 7.5e-4)
     assert bush_margin(at) == pytest.approx(expected, rel=1e-9)
@@ -131,8 +131,8 @@ def test_simulation_with_two_bushes_gives_the_same_energy_ratio(posture):
 
 
 def test_half_weights_overestimate_the_sag_of_a_cantilever_by_a_third():
-    """q L^4 / 6 EI instead of q L^4 / 8 EI, with equal shear; slopes q L^3 / 4 EI
-    instead of q L^3 / 6 EI."""
+    """q L^4 / 6 EI instead of q L^4 / 8 EI, with equal shear;
+    slopes q L^3 / 4 EI instead of q L^3 / 6 EI."""
     L, g = 0.5, 9.81
     link = replace(FLAT, theory="euler")
     cost = halves_cost(cantilever(link), [0, 0, -g])
@@ -146,8 +146,8 @@ def test_half_weights_overestimate_the_sag_of_a_cantilever_by_a_third():
 
 
 def test_energy_of_a_heavy_cantilever_is_that_of_its_ends_plus_that_between():
-    """The sum is q^2 L^5 / 40 EI, of which q^2 L^5 / 1440 EI is stored between the
-    ends."""
+    """The sum is q^2 L^5 / 40 EI,
+    of which q^2 L^5 / 1440 EI is stored between the ends."""
     L, g = 0.5, 9.81
     at = cantilever(replace(FLAT, theory="euler"))
     second, q = 0.02**3 * 0.05 / 12, RHO * 1e-3 * g
@@ -161,8 +161,11 @@ def test_energy_of_a_heavy_cantilever_is_that_of_its_ends_plus_that_between():
 @pytest.mark.exudyn
 @pytest.mark.parametrize("elements", [1, 2, 8])
 def test_energy_of_simulated_elements_equals_that_of_ends_plus_between_ends(elements):
-    """In all directions, with shear. Exudyn has no energy within an element. The weight
-    is scaled down to 1e-3 m/s^2, where bending is linear to 1e-8."""
+    """In all directions, with shear.
+
+    Exudyn has no energy within an element. The weight is scaled down to 1e-3 m/s^2,
+    where bending is linear to 1e-8.
+    """
     from validation.multibody.simulation import SimulationModel, simulate_assembly
 
     at, g = cantilever(), 1e-3 * np.array([3.0, -5.0, 8.0])
@@ -177,8 +180,8 @@ def test_energy_of_simulated_elements_equals_that_of_ends_plus_between_ends(elem
 
 
 def test_link_cost_is_zero_for_equal_stiffness(posture):
-    """The beam's K_E given as a matrix costs nothing; half of that stiffness costs
-    much."""
+    """The beam's K_E given as a matrix costs nothing;
+    half of that stiffness costs much."""
     beams = {
         f.name: np.linalg.inv(link_compliance(f))
         for f in posture.robot.frames
@@ -242,8 +245,8 @@ def test_costs_are_unknown_without_errors_and_load(tmp_path):
 
 
 def test_position_cost_is_known_without_stored_energy():
-    """A serial bar turned by t at its base: the tip's position has an error of l t^2 /
-    2."""
+    """A serial bar turned by t at its base:
+    the tip's position has an error of l t^2 / 2."""
     frames = (
         Frame("a", geometric_error=[0, 0, 0.01, 0, 0, 0]),
         Frame("b", "a", translation=[0.5, 0, 0]),
@@ -256,8 +259,8 @@ def test_position_cost_is_known_without_stored_energy():
 
 
 def test_validity_command_reports_which_assumptions_matter(tmp_path):
-    """Disc and cone matter for the paper's robot; costs that are unknown have a
-    reason."""
+    """Disc and cone matter for the paper's robot;
+    costs that are unknown have a reason."""
     target, file = tmp_path / "costs.json", tmp_path / "robot.toml"
     write_robot(irsbot2_with(NUMBERS["cases"][0]), file)
     words = ["validity", str(file), "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100"]

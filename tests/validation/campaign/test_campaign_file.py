@@ -301,8 +301,8 @@ def test_wrong_robot_file_of_a_campaign_is_refused_by_name(tmp_path):
 
 
 def test_campaign_files_of_the_docs_are_read(tmp_path):
-    """All blocks of the page together: irsbot2 at 100 mm, with 10 N written as 0,01
-    kN."""
+    """All blocks of the page together:
+    irsbot2 at 100 mm, with 10 N written as 0,01 kN."""
     docs = Path(__file__).parents[3] / "docs" / "campaigns.md"
     blocks = re.findall(r"```toml\n(.*?)```", docs.read_text("utf-8"), flags=re.S)
     assert len(blocks) == 3
@@ -326,8 +326,8 @@ POINTS = "[points]\nA = [0.1, 0, 0]\nB = [0, 0.2, 0]\n"
 
 
 def test_row_of_several_points_becomes_a_row_for_each_point(tmp_path):
-    """A point of the tool moves with it: its nominal place equals that of the pose by
-    hand."""
+    """A point of the tool moves with it:
+    its nominal place equals that of the pose by hand."""
     head = "id,q.one,q.two,session,meas.A.tx,meas.A.ty,meas.B.tx,meas.tz"
     rows = ["m1,0.1,0.2,a,1e-5,2e-5,3e-5,4e-5", "m2,0.1,0.2,b,,,5e-5,"]
     campaign = read_campaign(write_campaign(tmp_path, head, rows, extra=POINTS))

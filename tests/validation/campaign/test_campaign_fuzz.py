@@ -153,8 +153,8 @@ def test_table_of_any_dialect_is_read_or_refused_in_one_line(
     bom, end, delimiter, quote, decimal, encoding, declared, comma, columns, cut,
     tmp_path,
 ):  # fmt: skip
-    """Line endings, byte order marks, encodings, repeated columns, a truncated last
-    row."""
+    """Line endings, byte order marks, encodings,
+    repeated columns, a truncated last row."""
     table = [line.split(",") for line in TEXT.splitlines()]
     table = [[*row, *(row[k] for k in columns)] for row in table]
     table[1][0] = "é1"

@@ -99,8 +99,7 @@ def test_registration_is_compensated_only_on_request(tmp_path):
 
 
 def test_compensation_spread_includes_tolerances_and_fitted_parameters(tmp_path):
-    """A zero position known to 1e-4 rad moves the tip by that angle times its
-    distance."""
+    """A zero uncertain by 1e-4 rad moves the tip by that angle times its distance."""
     text = ARM.replace(
         'name = "one"', 'name = "one"\ntolerance = [0, 0, 1e-4, 0, 0, 0]'
     )

@@ -53,8 +53,10 @@ def push(cone, screw, width):
 
 @pytest.mark.parametrize("arm", [0.0, 0.04, -0.04])
 def test_contact_force_is_the_gradient_of_its_energy(arm):
-    """Central differences of half a nanometre inside, at and outside the bound. With an
-    arm of 40 mm, a pin tilted by r / arm touches like one shifted by r."""
+    """Central differences of half a nanometre inside, at and outside the bound.
+
+    With an arm of 40 mm, a pin tilted by r / arm touches like one shifted by r.
+    """
     disc = replace(DISC, arm=arm)
     unit = np.array([0.04, 0.04, 1, 1, 1, 1])  # [m] for a rad
     for r in (0.0, 1e-5, 2.999e-5, 3.001e-5, 3.3e-5):
@@ -79,8 +81,10 @@ def test_narrow_contact_has_no_force_inside_and_a_spring_force_outside():
 
 
 def test_pin_in_two_bushes_touches_where_its_axis_reaches_the_radius():
-    """A tilt by c / h, or a shift by c, just touches; both together press. At z = h the
-    axis is at (TX + h RY, TY - h RX)."""
+    """A tilt by c / h, or a shift by c, just touches; both together press.
+
+    At z = h the axis is at (TX + h RY, TY - h RX).
+    """
     clearance = Clearance(radial=3e-5, tilt=7.5e-4, axial=1e-5)
     bushes = joint_clearance(Frame("f", clearance=clearance), bushes=True)
     assert [(c.rows, c.size, c.arm) for c in bushes.cones] == [
@@ -97,8 +101,8 @@ def test_pin_in_two_bushes_touches_where_its_axis_reaches_the_radius():
 
 
 def test_joint_clearance_follows_the_robot_file():
-    """An absent bound is zero; the own motion of a passive joint is free or bounded by
-    spin."""
+    """An absent bound is zero;
+    the own motion of a passive joint is free or bounded by spin."""
     clearance = Clearance(radial=1e-5, tilt=2e-4, spin=0.01)
     fixed = joint_clearance(Frame("f", clearance=clearance), scale=0.5)
     assert [(c.rows, c.size) for c in fixed.cones] == [
@@ -186,8 +190,8 @@ def irsbot2():
 
 @pytest.mark.slow
 def test_crosscheck_of_the_papers_robot_with_clearances_passes(irsbot2):
-    """The models agree within 2 % as errors vanish; the optimality gap falls with the
-    square."""
+    """The models agree within 2 % as errors vanish;
+    the optimality gap falls with the square."""
     check = crosscheck(
         place_robot(irsbot2, {"tx": 0.0, "tz": -0.5}), (1.0, 0.5, 0.25), clearances=True
     )
@@ -199,8 +203,10 @@ def test_crosscheck_of_the_papers_robot_with_clearances_passes(irsbot2):
 
 @pytest.mark.slow
 def test_energy_with_clearances_agrees_with_the_exact_model(irsbot2):
-    """Contacts against cones, springs as links, at the paper's full errors. Contacts
-    differ by at most 0.3 %; the linear energy differs by more than 1 %."""
+    """Contacts against cones, springs as links, at the paper's full errors.
+
+    Contacts differ by at most 0.3 %; the linear energy differs by more than 1 %.
+    """
     posture = place_robot(irsbot2, {"tx": 0.1, "tz": -0.15})
     check = crosscheck(posture, (1.0, 0.5), links="spring", clearances=True)
     assert check.passed, check.checks
@@ -225,8 +231,8 @@ def heavy(length=0.4):
 
 @pytest.mark.parametrize("links", ["beam", "spring"])
 def test_crosscheck_passes_for_weight_together_with_clearance(links):
-    """A hundredfold weight exceeds the clearance: checks of energy, springs and gap
-    pass.
+    """A hundredfold weight exceeds the clearance:
+    checks of energy, springs and gap pass.
 
     With beams the simulation also stores q^2 L^5 / 1440 EI each between their ends.
     """
@@ -292,8 +298,10 @@ def test_errors_within_the_clearance_store_no_energy(name, size, pose, said):
      ("five_bar", [0, 0, 0, 0, -20, 0])],
 )  # fmt: skip
 def test_optimality_gap_under_a_load_is_relative_to_the_stored_energy(name, load):
-    """Without errors closing needs no energy: the reference is the load's energy. Parts
-    of the five-bar stay free under its load."""
+    """Without errors closing needs no energy: the reference is the load's energy.
+
+    Parts of the five-bar stay free under its load.
+    """
     check = crosscheck(
         home_posture(load_robot(name)), (1.0, 0.5), load=load, clearances=True
     )

@@ -75,8 +75,8 @@ def test_exact_model_explains_the_difference_between_linear_model_and_simulation
 def test_crosscheck_fails_for_a_difference_that_finite_rotations_do_not_explain(
     posture, monkeypatch
 ):
-    """The exact model gets errors that are one per cent too large; the two others
-    agree."""
+    """The exact model gets errors that are one per cent too large;
+    the two others agree."""
     import validation.crosscheck.pair
 
     right = validation.crosscheck.pair.solve_exact
@@ -104,8 +104,8 @@ def test_a_load_is_scaled_with_the_errors(irsbot2):
 
 @pytest.mark.parametrize("links", ["beam", "spring"])
 def test_crosscheck_with_weight_passes(links):
-    """A slender, heavy pair of bars, and a body whose centre is off its frame's
-    origin."""
+    """A slender, heavy pair of bars,
+    and a body whose centre is off its frame's origin."""
     posture = triangle([1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4])
     heavy = replace(STEEL, density=7800.0)
     frames = tuple(
@@ -140,10 +140,12 @@ def erring(name, density):
 
 @pytest.mark.parametrize("name", ["3rrr", "arm6"])
 def test_exact_model_and_simulation_agree_under_weight_and_moment(name):
-    """Weight on beams with errors, and a couple of dead forces together with a force.
+    """Weight on beams with errors,
+    and a couple of dead forces together with a force.
+
     The bound is relative to the difference from the linear model. A weight that starts
-    at its nominal place would leave 7e-3, a moment of constant direction 58 per
-    cent."""
+    at its nominal place would leave 7e-3, a moment of constant direction 58 per cent.
+    """
     posture = erring(name, 2700.0)
     load = [1, 2, 3, 50, 20, -30]
     check = crosscheck(posture, links="spring", load=load, gravity=[2, -3, -9.81])
@@ -201,8 +203,7 @@ def test_crosscheck_of_a_delta_with_errors_of_3_mrad_passes(seed, load):
 
 
 def test_smaller_scales_are_added_until_limits_are_known(irsbot2):
-    """With the two requested scales the limits are uncertain by more than a
-    thousandth."""
+    """From the two requested scales limits are uncertain by over a thousandth."""
     at = place_robot(
         with_papers_errors(load_robot("irsbot2"), 0, signed=True), {"tx": 0, "tz": -0.5}
     )

@@ -64,8 +64,8 @@ def test_smallest_detected_error_change_follows_from_the_energy():
 
 
 def test_smallest_detected_stiffness_change_is_twice_the_bound():
-    """Each of two equal springs in series stores half of the energy: 2 b for the bound
-    b."""
+    """Each of two equal springs in series stores half of the energy:
+    2 b for the bound b."""
     for clearance, metric, bound in (
         (CLEARANCE, with_clearances, TOLERANCE),
         (None, without, LIMIT_TOLERANCE),

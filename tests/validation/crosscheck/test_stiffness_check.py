@@ -31,8 +31,10 @@ def test_stiffness_of_robots_without_errors_agrees_with_the_simulation(name, lin
 
 @pytest.mark.slow
 def test_stiffness_of_a_forced_assembly_agrees_with_the_simulation():
-    """At the paper's full errors the nominal matrix is off by 5 %. The load has a
-    moment, of dead forces in both models."""
+    """At the paper's full errors the nominal matrix is off by 5 %.
+
+    The load has a moment, of dead forces in both models.
+    """
     case = NUMBERS["cases"][1]
     posture = place_robot(irsbot2_with(case), {"tx": 0.1, "tz": -0.5})
     answer = check_stiffness(posture, [20, 10, -5, 100, 50, -300])

@@ -89,8 +89,8 @@ def test_undecided_check_is_reported_after_six_scales():
 
 
 def test_comparison_of_noise_has_the_verdict_no_signal():
-    """Simulations resolve a hundredth of the floor; extrapolation multiplies that by
-    15."""
+    """Simulations resolve a hundredth of the floor;
+    extrapolation multiplies that by 15."""
 
     def solve(s):
         return Scale(s, 0.0, 1e-14)

@@ -107,8 +107,7 @@ def test_sensitivity_of_a_component_depends_on_its_place(axis):
 
 
 def test_variables_are_varied_and_known_in_every_row():
-    """Constant loads, temperatures missing in a row and times of zero are no
-    variables."""
+    """Constant loads, incomplete temperatures and times of zero are no variables."""
     varying = np.linspace(-1.0, 0.5, 8)
     lacking = np.where(np.arange(8) == 3, np.nan, varying)
     conditions = conditions_of(bar(

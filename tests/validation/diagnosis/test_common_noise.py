@@ -77,8 +77,8 @@ def found(columns, readings, seed, device=DEVICE):
     pytest.param(0.1 * DEVICE, (0.0, 5e-6), marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_common_noise_is_found_with_its_sizes(columns, device, sizes):
-    """60 measurements of three components determine a size to 5 %; the tolerance is 25
-    %."""
+    """60 measurements of three components determine a size to 5 %;
+    the tolerance is 25 %."""
     rng = np.random.default_rng([7, 1])
     selected = found(columns, moved(CAMPAIGN, sizes, rng), 7, device)
     assert selected.hypotheses == selected.functions == ()
@@ -105,8 +105,8 @@ def test_length_is_found_next_to_common_noise(columns, seed):
 
 
 def test_fit_counts_common_noise_once_per_measurement():
-    """The variance of a length is (c^2 + sigma^2 / 3) / measurements, for a common
-    shift c."""
+    """The variance of a length is (c^2 + sigma^2 / 3) / measurements,
+    for a common shift c."""
     c = 3 * DEVICE
     common = np.zeros((len(CAMPAIGN), 6, 3))
     common[:, 3:] = c * np.eye(3)
@@ -162,8 +162,8 @@ def test_poor_repeatability_alone_leads_to_no_claim(seed, tmp_path):
 
 @pytest.mark.slow
 def test_intervals_cover_the_truth_next_to_common_noise(tmp_path):
-    """An encoder's offset in twelve campaigns: at least 8 of the 90 % intervals cover
-    it."""
+    """An encoder's offset in twelve campaigns:
+    at least 8 of the 90 % intervals cover it."""
     covers, hidden = 0, [(Hidden("encoder_offset", {"j2": 1e-4}), 5.0)]
     for seed in range(12):
         made, diagnosis = diagnosed(

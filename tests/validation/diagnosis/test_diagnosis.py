@@ -126,8 +126,8 @@ def test_noise_above_sigma_is_reported_without_a_cause(diagnosed, tmp_path):
 
 @pytest.mark.parametrize("name", ["none", "one", "pair"])
 def test_model_sequence_leads_from_the_declared_to_the_fitted_model(name, diagnosed):
-    """It has only the steps of this machine; its last row is the error after the
-    fit."""
+    """It has only the steps of this machine;
+    its last row is the error after the fit."""
     found = diagnosed(name)
     terms = {"none": []}.get(name, ["library effects"])
     assert [step.term for step in found.sequence] == ["declared", *terms]
@@ -262,8 +262,7 @@ ODD = ("$x^{<b>&_\\$", "a$b_ \\frac{<i>")  # a formula and a tag to other progra
 
 
 def test_diagnosis_report_shows_unusual_names_unchanged(diagnosed):
-    """The names of a frame, a covariate and an outlying row look like formulas and
-    tags."""
+    """Names of a frame, a covariate and an outlying row look like formulas and tags."""
     found = diagnosed("none")
     first, *others = found.campaign.robot.frames
     named = (
@@ -311,9 +310,11 @@ def test_simulated_campaigns_get_an_accepted_verdict(name):
 
 @pytest.mark.slow
 def test_practice_campaigns_of_another_program_score_without_error(tmp_path):
-    """The program that came with them computes the score: parameters within 3 std. The
-    error after is at most 1.15 of that of a perfect model, which is 2.6 standard
-    deviations of the rms of 25 rows of noise."""
+    """The program that came with them computes the score: parameters within 3 std.
+
+    The error after is at most 1.15 of that of a perfect model, which is 2.6 standard
+    deviations of the rms of 25 rows of noise.
+    """
     try:
         practice = data_folder("practice")
     except BadInput as error:

@@ -100,8 +100,8 @@ def test_fitted_offset_is_exact_for_a_large_deflection():
 
 
 def test_finite_model_needs_no_geometric_stiffening():
-    """K a = F L cos(q + a): the load's arm turns so far that first order is not
-    enough."""
+    """K a = F L cos(q + a):
+    the load's arm turns so far that first order is not enough."""
     K, F, rows = 2e3, 150.0, 20
     spring = np.diag([np.inf, np.inf, K, np.inf, np.inf, np.inf])
     plain = bar([0, 0, 0, 0, F, 0], rows=rows, spring=spring)

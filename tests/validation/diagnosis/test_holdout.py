@@ -17,8 +17,8 @@ def held_in(campaign):
     (59, "folds", 59), (9, "folds", 9),
 ])  # fmt: skip
 def test_whole_configurations_are_held_out(configurations, how, judge):
-    """A quarter, but at most 60, or a tenth of many; all of them, in folds, if there
-    are few."""
+    """A quarter, but at most 60, or a tenth of many;
+    all of them, in folds, if there are few."""
     repeat = np.random.default_rng(0).permutation(np.repeat(range(configurations), 2))
     campaign = campaign_of(np.ones((len(repeat), 6)), repeat=repeat)
     held = hold_out(campaign)

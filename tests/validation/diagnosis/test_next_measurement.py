@@ -97,8 +97,8 @@ def test_next_configuration_lies_between_the_measured_ones():
 
 
 def test_next_temperature_exceeds_the_range_by_half():
-    """For 20 to 60 K the candidates are low, middle and 20 + 1.5 times 40, the most
-    distant."""
+    """For 20 to 60 K the candidates are low,
+    middle and 20 + 1.5 times 40, the most distant."""
     heat = {"temperature": np.linspace(20.0, 60.0, 8)}
     plain = bar(link=BEAM, **heat)
     seen = fit_of(plain, 2e-6 * LENGTH) * heat["temperature"][:, None]
@@ -111,8 +111,8 @@ def test_next_temperature_exceeds_the_range_by_half():
 
 
 def test_next_load_is_one_and_a_half_times_the_largest():
-    """A compliant drive under M against a drive with an offset: 1.5 M or -1.5 M
-    separates them."""
+    """A compliant drive under M against a drive with an offset:
+    1.5 M or -1.5 M separates them."""
     M, k = 30.0, 2e5
     campaign = gives_way(M, k)
     here = conditions_of(campaign)

@@ -46,8 +46,8 @@ def design(campaign, rng):
 
 @pytest.mark.parametrize("sessions", [None, np.repeat([0, 1], ROWS // 2)])
 def test_covariance_is_that_of_least_squares_under_known_noise(sessions, rng):
-    """H G'R G H with the full R; generalised least squares would have a smaller
-    covariance.
+    """H G'R G H with the full R;
+    generalised least squares would have a smaller covariance.
 
     (Gauss-Markov.)  With R = 1 the covariance is unchanged.
     """
@@ -79,7 +79,8 @@ def test_intervals_of_90_per_cent_cover_the_truth_under_correlated_noise(rng):
     """The share and the time constant are estimated; intervals for white noise would
     cover little more than half. For 200 campaigns of three independent unknowns the
     rate is 0.9 +- 0.012. The fit removes part of the correlation, so that a slightly
-    lower rate is expected."""
+    lower rate is expected.
+    """
     campaign = session()
     G = design(campaign, rng)
     H = np.linalg.inv(G.T @ G)

@@ -31,8 +31,7 @@ def of_both_kinds(campaign, conditions, response):
 
 
 def test_nuisance_parameters_are_the_visible_geometry_and_springs_with_bounds(loaded):
-    """A force of 30 N along z at the end of the bar bends it about x and y of the
-    base."""
+    """A force of 30 N along z at the end of the bar bends it about x and y."""
     campaign, conditions, response = loaded
     geometry, springs = of_both_kinds(campaign, conditions, response)
     assert not geometry.declared

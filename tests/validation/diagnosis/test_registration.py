@@ -52,8 +52,10 @@ def test_registration_ignores_rows_with_a_missing_cell(cell):
 
 
 def test_device_rotation_is_found_from_a_rotated_model():
-    """R = D M: the device's rotation D follows from R and the model's rotation M. It is
-    the mean where rows differ."""
+    """R = D M: the device's rotation D follows from R and the model's rotation M.
+
+    It is the mean where rows differ.
+    """
     model = np.array([0.02, -0.03, 0.04])
     own = Rotation.from_rotvec(model)
     spread = Rotation.from_rotvec(np.outer([-1, 1] * 4, [0, 2e-3, 1e-3]))

@@ -35,8 +35,8 @@ def test_lack_of_fit_probabilities_of_noise_are_uniform(rng):
 
 
 def test_scatter_between_repeats_equals_hand_calculation():
-    """Readings 1 and 3: squared deviations of 2 about their mean, one degree of
-    freedom."""
+    """Readings 1 and 3:
+    squared deviations of 2 about their mean, one degree of freedom."""
     seen = np.full((3, 6), np.nan)
     seen[:, 4] = [1.0, 3.0, 50.0]
     campaign = campaign_of(seen, repeat=[0, 0, 1])
@@ -70,8 +70,8 @@ def test_campaign_without_repeats_has_no_repeat_scatter():
 
 @pytest.mark.parametrize("from_zero", [-40.0, 0.0, 300.0])
 def test_same_command_at_another_temperature_is_not_a_repeat(from_zero):
-    """A difference within a thirtieth of the range counts as a repeat, from any zero of
-    the scale; time does not count."""
+    """A difference within a thirtieth of the range counts as a repeat,
+    from any zero of the scale; time does not count."""
     seen = np.full((4, 6), np.nan)
     seen[:, 4] = [1.0, 3.0, 50.0, 7.0]
     temperature = from_zero + np.array([0.0, 0.2, 9.0, 10.0])
@@ -133,8 +133,8 @@ def varied(rng, rows=120):
 
 
 def test_false_alarm_rate_of_trends_is_the_stated_one(rng, monkeypatch):
-    """Over all trends; tested at 5 % instead of 0.1 %, for which 100 campaigns
-    suffice."""
+    """Over all trends;
+    tested at 5 % instead of 0.1 %, for which 100 campaigns suffice."""
     monkeypatch.setattr(module, "UNLIKELY", 0.05)
     alarms = 0
     for _ in range(100):

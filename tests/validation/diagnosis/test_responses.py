@@ -31,9 +31,11 @@ def turns_of(campaign):
 
 @pytest.mark.parametrize("rows", [1, 50, 51, 120])
 def test_responses_equal_hand_calculation_for_screws_and_wrenches(rows):
-    """For any number and order of postures. The screw of a drive rotates the whole bar,
-    in base axes; the tip's screw is in the axes of the bar. The wrench at the drive has
-    the moment of the forces at the tip."""
+    """For any number and order of postures.
+
+    The screw of a drive rotates the whole bar, in base axes; the tip's screw is in the
+    axes of the bar. The wrench at the drive has the moment of the forces at the tip.
+    """
     campaign, once = loaded(rows)
     order = np.append(np.arange(rows)[::-1], np.arange(0, rows, 3))
     found = responses(once.take(order))
@@ -52,8 +54,8 @@ def test_responses_equal_hand_calculation_for_screws_and_wrenches(rows):
 
 
 def test_readings_of_small_screws_follow_the_device_frame():
-    """R (t + r x arm), where the arm ends at the measured point; rotations by
-    Rodrigues."""
+    """R (t + r x arm), where the arm ends at the measured point;
+    rotations by Rodrigues."""
     campaign, conditions = loaded()
     b, point, tool = np.array([0.4, -0.9, 0.7]), [0.1, -0.2, 0.3], [0.05, 0.02, -0.1]
     conditions = replace(
@@ -97,8 +99,10 @@ def test_row_without_a_solution_has_zero_response():
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("closed", [False, True])
 def test_clearance_closed_by_the_load_changes_no_response(held, closed):
-    """To first order the joint stays where the load has shifted it. For an open and a
-    closed chain."""
+    """To first order the joint stays where the load has shifted it.
+
+    For an open and a closed chain.
+    """
     if closed:
         robot, loose = five_bar(), "right.elbow"
         load = [0, 0, 0, 5.0, 20.0, 0]

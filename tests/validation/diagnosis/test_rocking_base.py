@@ -65,8 +65,8 @@ def with_gain(campaign, gain):
 
 
 def test_prediction_with_the_known_gain_of_a_motion_has_the_error_of_noise(rocking):
-    """1 mrad at 0.7 m is about twenty sigma, a gain that is too large by 0.2 about four
-    sigma."""
+    """1 mrad at 0.7 m is about twenty sigma,
+    a gain that is too large by 0.2 about four sigma."""
     assert predict(rocking).error.normalised > 8
     assert 0.85 < predict(with_gain(rocking, GAIN)).error.normalised < 1.15
     assert predict(with_gain(rocking, 1.0)).error.normalised > 2

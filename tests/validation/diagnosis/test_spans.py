@@ -60,9 +60,11 @@ def heated(tmp_path_factory):
 
 
 def test_causes_are_learned_as_polynomials(heated):
-    """Noise correlated in time would favour splines and functions of time. The
-    tolerance of the bed's gain is five of its standard errors. The noise is 2.5 um, and
-    its correlation leaves about forty independent rows of the 180 rows fitted."""
+    """Noise correlated in time would favour splines and functions of time.
+
+    The tolerance of the bed's gain is five of its standard errors. The noise is 2.5 um,
+    and its correlation leaves about forty independent rows of the 180 rows fitted.
+    """
     diagnosis, _ = heated
     functions = corrected(diagnosis).functions
     assert {v for one in functions for v in one.variables} == {"cov.bed", "cov.frame"}

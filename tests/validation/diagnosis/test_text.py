@@ -60,8 +60,8 @@ def shown(monkeypatch):
 
 
 def test_diagnosis_text_omits_absent_sections(shown):
-    """The header, sets by probability, errors before and after, and every step
-    remain."""
+    """The header, sets by probability, errors before and after,
+    and every step remain."""
     said = shown()
     assert said[:2] == ["arm: none_needed", "Enough."]
     at = said.index("sets of effects, by probability:")

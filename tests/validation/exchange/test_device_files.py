@@ -177,8 +177,7 @@ def test_export_of_a_device_program_is_read_exactly(lab, run, name):
 
 @pytest.mark.parametrize("before", [None, "{k}", "{k}.5"])
 def test_rows_without_names_are_assigned_to_targets_in_order(lab, run, before):
-    """A counter or a time before them is recognised by the distances between
-    targets."""
+    """A preceding counter or time is recognised by the distances between targets."""
     body = [row + ",35.1,-2.5,0.4" for row in rows(line=before)]
     assert imported(lab, run, "\n".join(body))["readings"] == 39
     assert_exact(lab, 39)

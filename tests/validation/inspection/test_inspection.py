@@ -237,8 +237,8 @@ def test_signature_of_an_encoder_offset_equals_hand_calculation(tmp_path, rng):
 
 @pytest.mark.parametrize("registration", ["known", "unknown"])
 def test_expansion_does_not_enter_the_noise_estimate(registration, tmp_path, rng):
-    """12 sigma of expansion, in the axes of a device that is rotated by 2 rad and 5 m
-    away."""
+    """12 sigma of expansion,
+    in the axes of a device that is rotated by 2 rad and 5 m away."""
     device = None
     if registration == "unknown":
         device = Rotation.from_rotvec([0.5, -1.2, 1.5]), np.array([3.0, -4.0, 1.0])

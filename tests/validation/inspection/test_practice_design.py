@@ -33,8 +33,8 @@ def inspections():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_noise_from_repeats_agrees_with_the_simulated_noise(name, inspections):
-    """The true ratio is 1; the bounds are chi-square tails of 1/1000 each, for six
-    campaigns."""
+    """The true ratio is 1;
+    the bounds are chi-square tails of 1/1000 each, for six campaigns."""
     noise = inspections[name].noise
     squares = noise.degrees * noise.ratio**2
     assert 1e-3 < chi2.cdf(squares, noise.degrees) < 1 - 1e-3

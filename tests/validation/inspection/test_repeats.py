@@ -52,8 +52,8 @@ def test_rows_without_repeats_give_no_noise():
 
 
 def test_noise_equals_that_of_a_joint_least_squares_fit(rng):
-    """The reference has a column for every set and a general solver; some cells are
-    missing."""
+    """The reference has a column for every set and a general solver;
+    some cells are missing."""
     repeat = interleaved(rng, 40, 15)
     measured = rng.normal(size=(40, 6))
     measured[rng.random((40, 6)) < 0.2] = np.nan
@@ -108,8 +108,8 @@ def test_intervals_cover_the_truth_at_the_stated_rate(rng):
 
 
 def test_time_without_effect_is_reported_at_the_false_alarm_rate(rng):
-    """Probabilities for noise alone are uniform: 5 % +- 3 standard deviations of
-    300."""
+    """Probabilities for noise alone are uniform:
+    5 % +- 3 standard deviations of 300."""
     time = np.arange(60.0)
     below = 0
     for _ in range(300):
@@ -163,8 +163,8 @@ def test_revisits_classify_the_order_of_repeats(rng):
 
 
 def test_points_read_at_once_count_as_one_visit():
-    """Twenty configurations are visited three times, with three points read at each
-    visit."""
+    """Twenty configurations are visited three times,
+    with three points read at each visit."""
     ids = tuple(f"m{i}{end}" for i in range(60) for end in ("", ":left", ":right"))
     points = {"left": np.array([0, 0.1, 0]), "right": np.array([0, -0.1, 0])}
     configuration = np.repeat(np.tile(np.arange(20), 3), 3)

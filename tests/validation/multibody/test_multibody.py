@@ -94,8 +94,8 @@ def test_corrected_beam_element_bends_exactly(elements, theory):
 
 
 def test_an_end_moment_bends_a_beam_to_an_arc():
-    """The curvature M / EI is constant: the tip is at (sin a, 1 - cos a) L / a, with a
-    = 1."""
+    """The curvature M / EI is constant:
+    the tip is at (sin a, 1 - cos a) L / a, with a = 1."""
     L = 0.5
     moment = E * SECOND / L
     assembly = simulate_assembly(cantilever(ROUND), load=[0, 0, moment, 0, 0, 0])
@@ -237,8 +237,8 @@ def test_bearing_turns_freely_and_is_elastic_otherwise(clearance):
 
 
 def test_serial_chain_composes_its_errors_exactly():
-    """Placement, error and own motion, frame by frame; the errors of 0.3 rad are not
-    small."""
+    """Placement, error and own motion, frame by frame;
+    the errors of 0.3 rad are not small."""
     error = np.array([0.3, -0.2, 0.1, 0.01, 0.02, -0.03])
     frames = (
         Frame("turn", translation=[0, 0, 1], rotation=[0.2, 0, 0], joint="revolute",
@@ -265,8 +265,10 @@ def test_serial_chain_composes_its_errors_exactly():
 
 
 def test_four_bar_with_a_long_coupler_closes_at_the_intersection_of_two_circles():
-    """Rigid bars, free pins: crank 1 at 90 deg, coupler 2 + 0.02, rocker 2, base 2. The
-    rocker's end is where circles about (0, 1) and (2, 0) meet."""
+    """Rigid bars, free pins: crank 1 at 90 deg, coupler 2 + 0.02, rocker 2, base 2.
+
+    The rocker's end is where circles about (0, 1) and (2, 0) meet.
+    """
 
     def meeting(coupler):
         chord = math.sqrt(5)

@@ -52,8 +52,8 @@ def overconstrained(rng, errors):
 
 
 def test_wrench_of_every_spring_balances_the_closures_beyond_it(rng):
-    """Statics at the deformed pose: a wrench is the sum of the closure wrenches beyond
-    it."""
+    """Statics at the deformed pose:
+    a wrench is the sum of the closure wrenches beyond it."""
     posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     load = np.array([3.0, -2.0, 5.0, 40.0, 30.0, -100.0])
     assembly = simulate_assembly(posture, load=load)
@@ -207,8 +207,8 @@ def resident():
 
 @pytest.mark.slow
 def test_repeated_simulations_do_not_leak_memory(rng):
-    """Resident memory in MiB after the first fifty simulations; a leaked model takes
-    half a MiB."""
+    """Resident memory in MiB after the first fifty simulations;
+    a leaked model takes half a MiB."""
     posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     for _ in range(50):
         simulate_assembly(posture)

@@ -80,8 +80,8 @@ def test_wrench_of_a_bent_spring_is_the_gradient_of_its_energy(size):
 
 
 def test_tangent_of_a_spring_bent_by_half_a_radian_follows_from_its_energy():
-    """The force times the spring's shift across the rotation is a couple, which Exudyn
-    omits."""
+    """The force times the spring's shift across the rotation is a couple,
+    which Exudyn omits."""
     K = np.diag([40.0, 50.0, 60.0, 300.0, 400.0, 500.0])
     frames = (
         Frame("foot", translation=[0.5, 0, 0], link=MatrixLink(K)),
@@ -116,8 +116,8 @@ def soft_four_bar():
 
 
 def test_weak_springs_of_free_joints_do_not_change_the_tangent(monkeypatch):
-    """Joints turn by radians, and springs of 1e-4 N m/rad would bend the robot
-    elsewhere."""
+    """Joints turn by radians,
+    and springs of 1e-4 N m/rad would bend the robot elsewhere."""
     weak = (Regularisation(1e8, 1e-4),)
     monkeypatch.setattr(tangent, "_REGULARISATIONS", weak)
     posture = soft_four_bar()

@@ -77,8 +77,8 @@ def campaign(tmp_path, rows):
 
 
 def test_iso_command_reports_the_figures_of_the_standards(run, tmp_path):
-    """The arm of 1 m and 0.8 m, stretched along x and along y: poses 1.8 sqrt(2) m
-    apart."""
+    """The arm of 1 m and 0.8 m, stretched along x and along y:
+    poses 1.8 sqrt(2) m apart."""
     quarter = repr(np.pi / 2)
     rows = [
         f"{name}{k}{side},{angle},0,{x + side * 1e-5 + k * 1e-6},0,0,{t},{side}"
@@ -166,8 +166,8 @@ def test_distance_accuracy_pairs_poses_of_one_session_only(tmp_path):
 
 
 def test_positioning_of_an_axis_is_separate_for_each_load(tmp_path):
-    """A deflection of 1 mm under a load is not a deviation along the axis: E = 20
-    um."""
+    """A deflection of 1 mm under a load is not a deviation along the axis:
+    E = 20 um."""
     rows = [
         f"{name}{fx}{side}{k},{angle},0,{1e-5 * (fx + side)},0,0,{side},{fx}"
         for name, angle in TWO_POSES

@@ -23,8 +23,8 @@ def chain(*parts):
 
 
 def test_governing_rows_are_bounds_without_one_imperfection():
-    """Errors 3 and -1 along x and clearances 4 along z: sqrt(2^2 + 4^2) times 0.1
-    mm."""
+    """Errors 3 and -1 along x and clearances 4 along z:
+    sqrt(2^2 + 4^2) times 0.1 mm."""
     rows = governing(chain((3e-4, None), (-1e-4, None), (0.0, 4e-4)))
     seen = [(one["part"], one["what"], one["translation"]) for one in rows]
     expected = [

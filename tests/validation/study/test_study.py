@@ -270,8 +270,8 @@ def test_study_whose_reference_has_no_answer_does_not_pass(tmp_path, monkeypatch
 
 
 def test_headline_is_the_worst_clearance_over_the_map(tmp_path):
-    """At a pose it is the bound of ``assembly error``, over the map the largest of
-    these bounds."""
+    """At a pose it is the bound of ``assembly error``,
+    over the map the largest of these bounds."""
     text = 'robot = "five_bar"\ngrid = "tx=-0.01:0.01:0.01,ty=0.15"\n'
     text += QUIET + "crosscheck = false\nreference = false\n"
     text += "[pose]\ntx = 0.0\nty = 0.15\n"

@@ -110,8 +110,8 @@ def test_longer_or_warmer_beam_moves_the_tip_along_the_beam(
 
 
 def test_deflection_of_a_longer_beam_equals_its_closed_form(added):
-    """P (L + d)^3 / 3EI + P (L + d) / kGA minus the same with d = 0, across the
-    beam."""
+    """P (L + d)^3 / 3EI + P (L + d) / kGA minus the same with d = 0,
+    across the beam."""
     P, d = 1.0, 1e-2
     contribution = added("link_length", {"tip": d}, row(load=(0, 0, 0, 0, 0, -P)))
     more = ((L + d) ** 3 - L**3) / (3 * E * SECOND) + d / SHEAR
@@ -237,8 +237,8 @@ def test_geometric_stiffening_adds_the_finite_rotation(program):
 
 
 def test_effects_outside_the_library_follow_their_formulas(added):
-    """A drive's compliance times (1 + cos 3q) / 2, swelling, T^2, a stand, a sagging
-    target."""
+    """A drive's compliance times (1 + cos 3q) / 2, swelling,
+    T^2, a stand, a sagging target."""
     q, F = 0.3, 10.0
     pushed = row(q, load=(0, 0, 0, -F * math.sin(q), F * math.cos(q), 0))
     turn = F * L / 1e5 * (1 + math.cos(3 * q)) / 2

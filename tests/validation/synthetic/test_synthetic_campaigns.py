@@ -65,8 +65,8 @@ def quick(wanted, robot=None, **given):
 
 
 def test_plan_interleaves_configurations_with_repeats_and_zero_loads():
-    """Each pass visits every configuration once; some loads are repeated, some are
-    0."""
+    """Each pass visits every configuration once;
+    some loads are repeated, some are 0."""
     plan = plan_campaign(two_axes(), SMALL, np.random.default_rng(0))
     passes = plan.configuration.reshape(5, 8)
     assert all(sorted(p) == list(range(8)) for p in passes.tolist())
@@ -89,8 +89,8 @@ def test_every_simulated_effect_has_the_requested_strength(name):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_effect_that_the_loads_do_not_excite_is_drawn_again(seed):
-    """Forces at a point on the wrist's axis do not twist it: another drive gets the
-    compliance."""
+    """Forces at a point on the wrist's axis do not twist it:
+    another drive gets the compliance."""
     arm = two_axes()
     wrist = Frame("j3", "tool", joint="revolute", actuated=True, joint_stiffness=SPRING)
     robot = Robot("wristed", "j3", (*arm.frames, wrist))
@@ -103,8 +103,8 @@ def test_effect_that_the_loads_do_not_excite_is_drawn_again(seed):
 
 
 def test_simulated_noise_has_the_requested_standard_deviation():
-    """240 x 6 readings: their rms is 1 within 3 / sqrt(2 x 1440) = 0.06, three standard
-    deviations."""
+    """240 x 6 readings:
+    their rms is 1 within 3 / sqrt(2 x 1440) = 0.06, three standard deviations."""
     design = replace(SMALL, rows=240)
     campaign = quick({}, design=design, noise=Noise(3e-5, 2e-6), seed=2)
     noise = (campaign.readings - campaign.exact) / np.repeat([3e-5, 2e-6], 3)
@@ -141,8 +141,8 @@ def test_multibody_and_spring_programs_give_the_same_readings(name):
 
 @pytest.mark.parametrize("name", ["3rrr", "hexapod", "arm6"])
 def test_spring_program_and_exact_equilibrium_agree_for_large_errors(name):
-    """Two programs of one model: finite motions, and a load that moves with its
-    point."""
+    """Two programs of one model:
+    finite motions, and a load that moves with its point."""
     rng = np.random.default_rng(6)
     robot = without_clearance(load_robot(name))
     robot = robot.with_errors(2e-3 * rng.uniform(-1, 1, (len(robot.frames), 6)))
@@ -225,7 +225,8 @@ def test_truth_has_the_keys_of_the_practice_campaigns():
 
 @pytest.mark.parametrize("name", sorted(TRUTH))
 def test_committed_campaigns_agree_with_their_truth(name):
-    """The multibody simulation made them, and springs explain them down to the noise.
+    """The multibody simulation made them,
+    and springs explain them down to the noise.
 
     The rms of the noise is the truth's within 1e-3.  Without the hidden effects the rms
     is the truth's error before, also within 1e-3.
@@ -313,8 +314,8 @@ def test_effect_that_the_robot_cannot_have_is_refused():
 
 
 def test_strengthened_effects_keep_shape_parameters():
-    """Springs become softer and errors larger; phases, exponents and time constants
-    stay."""
+    """Springs become softer and errors larger;
+    phases, exponents and time constants stay."""
     given = {"a.coefficient": 1e6, "a.exponent": 1.5}
     stronger = strengthened(Hidden("contact_stiffening", given), 4.0).parameters
     assert stronger == {"a.coefficient": 1e6 / 8, "a.exponent": 1.5}
