@@ -121,7 +121,7 @@ def domed_bar():
     return check_surface(points, np.concatenate(triangles), "domed bar")
 
 
-def test_cylinders_beside_a_hump_are_recognised_separately():
+def test_cylinders_next_to_a_hump_are_recognised_separately():
     """The facets lack 0.44 % of the integral of pi r^2.
 
     The smoothed surface lacks less than its stated uncertainty, and the long cylinders

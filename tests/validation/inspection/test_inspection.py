@@ -116,7 +116,7 @@ def test_weakness_of_a_design_is_reported(case, rng):
     assert any(sentence in text for text in texts(sound(rng, **changes)))
 
 
-def test_sound_design_has_one_remark(rng):
+def test_design_without_weaknesses_has_one_remark(rng):
     """The only remark is that each configuration has one load."""
     found = [t for t in texts(sound(rng)) if " fine: " not in t]
     assert found == [
