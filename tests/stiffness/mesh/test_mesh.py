@@ -96,7 +96,7 @@ def test_failed_mesher_is_reported_with_its_last_output(
 
 
 def test_mesher_is_stopped_at_its_time_limit(tmp_path):
-    """A Python process needs more than 0.05 s to start."""
+    """0.05 s is less than a Python process needs to start."""
     with pytest.raises(MeshFailed, match=r"no mesh after 0.05 s"):
         mesh_solid(bar(), *FACES, time_limit=0.05, cache=tmp_path)
     assert list(tmp_path.iterdir()) == []
