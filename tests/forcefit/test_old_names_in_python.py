@@ -21,7 +21,7 @@ def posture():
 
 
 @pytest.mark.parametrize("old", sorted(ff._RENAMED))
-def test_an_old_public_name_works_and_names_the_new_one(old):
+def test_old_public_name_works_and_warns_with_the_new_one(old):
     new, *elsewhere = ff._RENAMED[old]
     with pytest.warns(FutureWarning, match=rf"forcefit\.{old} is now forcefit\.{new}"):
         found = getattr(ff, old)
@@ -32,7 +32,7 @@ def test_an_old_public_name_works_and_names_the_new_one(old):
 
 
 @pytest.mark.parametrize("name", sorted(ff._MOVED_TO))
-def test_a_name_that_left_the_public_ones_works_and_says_where_it_is(name):
+def test_name_that_is_no_longer_public_works_and_warns_with_its_module(name):
     with pytest.warns(FutureWarning, match=rf"forcefit\.{name} is now [\w.]+\.{name}$"):
         found = getattr(ff, name)
     assert callable(found)
@@ -43,7 +43,7 @@ def test_a_name_that_left_the_public_ones_works_and_says_where_it_is(name):
 @pytest.mark.parametrize(
     ("old", "new"), [("without clearance", "nominal"), ("in contact", "contact")]
 )
-def test_an_old_state_is_the_new_one(posture, old, new):
+def test_old_state_has_the_results_of_the_new_one(posture, old, new):
     with pytest.warns(FutureWarning, match=f"state='{old}' is now state='{new}'"):
         found = ff.platform_stiffness(posture, old, LOAD)
     expected = ff.platform_stiffness(posture, new, LOAD)
@@ -51,7 +51,7 @@ def test_an_old_state_is_the_new_one(posture, old, new):
     np.testing.assert_array_equal(found.compliance, expected.compliance)
 
 
-def test_modes_of_the_exact_state_by_the_old_flag():
+def test_old_exact_flag_of_modes_has_the_results_of_the_exact_state():
     posture = ff.place_robot(ff.load_robot("delta"))
     with pytest.warns(FutureWarning, match="state='exact'") as caught:
         found = ff.natural_modes(posture, 2, LOAD, exact=True)
@@ -60,7 +60,7 @@ def test_modes_of_the_exact_state_by_the_old_flag():
     np.testing.assert_array_equal(found.frequencies, expected.frequencies)
 
 
-def test_a_deflection_curve_of_the_exact_state_by_the_old_flag():
+def test_old_exact_flag_of_a_deflection_curve_has_the_results_of_the_exact_state():
     posture = ff.place_robot(ff.load_robot("four_bar"))
     with pytest.warns(FutureWarning, match="state='exact'"):
         found = ff.deflection_curve(posture, 3, [0.0, 10.0], exact=True)
@@ -70,7 +70,7 @@ def test_a_deflection_curve_of_the_exact_state_by_the_old_flag():
         ff.deflection_curve(posture, 3, [0.0, 10.0], state="nominal")
 
 
-def test_a_data_set_of_an_older_release_has_the_present_names(tmp_path):
+def test_data_set_of_an_older_release_is_read_with_the_present_names(tmp_path):
     variables = {"translation_error_play": ("x", [1.0, 2.0]), "energy": ("x", [3.0, 4])}
     old = xarray.Dataset(variables, attrs={"play": "worst", "reading": "free"})
     old.to_netcdf(tmp_path / "old.nc", engine="h5netcdf")
@@ -80,7 +80,7 @@ def test_a_data_set_of_an_older_release_has_the_present_names(tmp_path):
     assert data.attrs == {"clearance": "worst", "assumption": "free"}
 
 
-def test_a_pose_error_by_the_old_word_for_its_assumption(posture):
+def test_old_argument_reading_of_a_pose_error_works_as_assumption(posture):
     forced = ff.solve_assembly(posture)
     with pytest.warns(FutureWarning, match="bound_pose_error.assumption='free'"):
         found = ff.bound_pose_error(forced, reading="free")
@@ -91,8 +91,9 @@ def test_a_pose_error_by_the_old_word_for_its_assumption(posture):
     np.testing.assert_array_equal(found.rotation_error, expected.rotation_error)
 
 
-def test_a_sweep_in_the_words_of_the_last_release(tmp_path):
-    """Options, question and answer apart; the file has what memory has."""
+def test_sweep_by_the_names_of_the_last_release_has_equal_results(tmp_path):
+    """By separate functions for options, request and result;
+    file and memory are equal."""
     new = ff.sweep(
         "five_bar", grid="tx=0:0.02:0.02,ty=0.13", assumption="free",
         wrench_of=["left.elbow"], state="contact",
@@ -117,7 +118,9 @@ def test_a_sweep_in_the_words_of_the_last_release(tmp_path):
     assert SweepOptions(stiffness=False).state is None
 
 
-def test_an_experiment_by_the_old_word_for_its_clearance(posture, tmp_path):
+def test_old_argument_clearance_model_of_an_experiment_works_as_clearance(
+    posture, tmp_path
+):
     file = tmp_path / "errors.toml"
     file.write_text(ERRORS)
     sources = ff.read_sources(file, posture.robot)

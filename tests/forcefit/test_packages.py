@@ -1,4 +1,4 @@
-"""What is installed with forcefit: extras, the least there must be, and namesakes."""
+"""Installed packages: extras, the minimal installation, packages of the same name."""
 
 import json
 import os
@@ -79,10 +79,10 @@ def files(tmp_path):
           ROOT / "examples/irsbot2_errors.toml")),
     ],
 )  # fmt: skip
-def test_a_command_without_its_package_says_what_to_install(
+def test_command_without_its_package_states_what_to_install(
     files, hidden, distribution, cure, words
 ):
-    """And it says so before the work: nothing is written."""
+    """It does so before any work, and writes nothing."""
     before = sorted(files.iterdir())
     status, out, err = run_without(files, hidden, *words)
     said = err.strip().splitlines()[-1]
@@ -108,14 +108,16 @@ FEA = ("--base", "z=0", "--tip", "z=1", "--young", "1e9", "--poisson", "0.3")
          ("convert", "a.urdf", "--loops", "a.yaml", "-o", "b.toml")),
     ],
 )  # fmt: skip
-def test_a_file_without_its_reader_says_what_to_install(files, hidden, said, words):
+def test_file_without_its_reader_is_refused_with_the_package_to_install(
+    files, hidden, said, words
+):
     status, out, err = run_without(files, hidden, *words)
     assert err.strip().splitlines()[-1] == f"forcefit: {said}"
     assert (status, out) == (2, "")
 
 
-def test_without_mujoco_a_conversion_says_that_nothing_was_compared(tmp_path):
-    """It is a second reader; the conversion itself does not need it."""
+def test_conversion_without_mujoco_reports_that_nothing_was_compared(tmp_path):
+    """MuJoCo is a second reader; the conversion itself does not need it."""
     status, out, err = run_without(tmp_path, "mujoco", "convert", "arm6", "-o", "b.xml")
     assert (status, err) == (0, "")
     assert "b.xml was compared with no other program: MuJoCo is not installed" in out
@@ -123,8 +125,8 @@ def test_without_mujoco_a_conversion_says_that_nothing_was_compared(tmp_path):
 
 
 @pytest.mark.slow
-def test_without_mkl_finite_elements_give_the_same(tmp_path):
-    """SciPy's factorisation of the same mesh: only rounding is another."""
+def test_finite_elements_without_mkl_have_equal_results(tmp_path):
+    """SciPy's factorisation of the same mesh: results differ by rounding only."""
     surface = ROOT / "meshes/distal_plain.stl"
     held = ("--base", "z=0", "--tip", "z=0.452", *FEA[4:], "--accuracy", "0.05")
     found = []
@@ -139,14 +141,14 @@ def test_without_mkl_finite_elements_give_the_same(tmp_path):
     assert np.abs((other - one) / scale).max() < 1e-9
 
 
-def test_another_missing_module_is_an_error_of_the_program():
-    """It is not the user who can cure it."""
+def test_missing_module_of_the_program_itself_is_raised_unchanged():
+    """The user cannot repair it."""
     with pytest.raises(ModuleNotFoundError), naming_packages():
         raise ModuleNotFoundError("No module named 'forcefit.x'", name="forcefit.x")
 
 
-def test_every_package_of_an_extra_is_known():
-    """A package that pyproject.toml adds to an extra is named with that extra."""
+def test_every_package_of_an_extra_is_named_with_its_extra():
+    """Also a package that is added to an extra in pyproject.toml later."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
     for extra in set(extras) - {"all", "dev", "docs", "examples", "benchmarks"}:
@@ -169,8 +171,9 @@ def test_every_package_of_an_extra_is_known():
         ("stiffness", "beam", "--length", "1", "--radius", "0.1", *FEA[4:]),
     ],
 )
-def test_one_posture_needs_five_packages(tmp_path, words):
-    """Those of LEAST and what they require; the answers are the same as with all."""
+def test_solving_one_posture_requires_five_packages(tmp_path, words):
+    """These are the packages of LEAST and their requirements;
+    results are the same as with all packages."""
     ff.write_robot(ff.load_robot("irsbot2"), tmp_path / "robot.toml")
     shown = modules_of(*LEAST) | {*OURS}
     assert not {"xarray", "cvxpy", "pyvista", "exudyn", "threadpoolctl"} & shown
@@ -196,7 +199,7 @@ def imported(folders, code="import forcefit"):
 
 @pytest.mark.parametrize("name", OURS[1:])
 @pytest.mark.parametrize("file", ["{}.py", "{}/__init__.py"])
-def test_a_namesake_before_ours_on_the_path_is_named(tmp_path, name, file):
+def test_package_of_the_same_name_earlier_on_the_path_is_reported(tmp_path, name, file):
     other = tmp_path / file.format(name)
     other.parent.mkdir(exist_ok=True)
     other.write_text("raise SystemExit('another program was run')\n")
@@ -207,8 +210,8 @@ def test_a_namesake_before_ours_on_the_path_is_named(tmp_path, name, file):
 
 
 @pytest.mark.parametrize("name", OURS[1:])
-def test_a_namesake_installed_over_ours_is_named(tmp_path, name):
-    """Two wheels in one folder: the last one's ``__init__.py`` stands there."""
+def test_package_of_the_same_name_installed_over_forcefit_is_reported(tmp_path, name):
+    """Two wheels in one folder: it has the ``__init__.py`` of the last one."""
     for one in OURS:
         (tmp_path / one).mkdir()
         shutil.copy(ROOT / one / "__init__.py", tmp_path / one)
@@ -219,7 +222,8 @@ def test_a_namesake_installed_over_ours_is_named(tmp_path, name):
     assert f"found {tmp_path / name / '__init__.py'}, expected forcefit's own" in said
 
 
-def test_a_folder_of_the_same_name_hides_nothing(tmp_path):
-    """Without ``__init__.py`` it is no package while there is one further on."""
+def test_folder_of_the_same_name_does_not_hide_the_package(tmp_path):
+    """Without ``__init__.py`` it is not a package while one exists further along the
+    path."""
     (tmp_path / "assembly").mkdir()
     assert imported([tmp_path, ROOT], "import forcefit, assembly.model") == (0, "")

@@ -28,8 +28,8 @@ def stub_of(owners):
     )
 
 
-def test_the_stub_says_what_the_table_says():
-    """Write it again: python -m tests.forcefit.test_public_names."""
+def test_stub_file_equals_the_table_of_public_names():
+    """To write it again: python -m tests.forcefit.test_public_names."""
     assert STUB.read_text(encoding="utf-8") == stub_of(ff._OWNERS)
 
 
@@ -51,9 +51,7 @@ def checked(checker, folder, code):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("checker", ["mypy", "pyright"])
-def test_the_readme_passes_type_checkers_and_a_misspelt_name_does_not(
-    checker, tmp_path
-):
+def test_type_checkers_accept_the_readme_and_refuse_a_misspelt_name(checker, tmp_path):
     if find_spec(checker) is None:
         pytest.skip(f"no {checker}")
     code = python_example()

@@ -1,4 +1,4 @@
-"""Screws and wrenches: the laws of the one convention."""
+"""Screws and wrenches: properties of their transformation convention."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from stiffness.screws import (
 )
 
 
-def test_skew_is_the_cross_product(rng):
+def test_skew_matrix_times_a_vector_is_the_cross_product(rng):
     a, b = rng.normal(size=(2, 7, 3))
     np.testing.assert_allclose(
         np.einsum("nij,nj->ni", skew(a), b), np.cross(a, b), atol=1e-15
@@ -21,25 +21,26 @@ def test_skew_is_the_cross_product(rng):
 
 
 def test_a_turn_about_z_moves_a_point_on_x_along_y():
-    """Read at p = q + x: offset q - p = -x; t_p = t_q + r x (p - q) = z x x = y."""
+    """At p = q + x the offset is q - p = -x; t_p = t_q + r x (p - q) = z x x = y."""
     moved = screw_map([-1.0, 0, 0]) @ [0, 0, 1e-3, 0, 0, 0]
     np.testing.assert_allclose(moved, [0, 0, 1e-3, 0, 1e-3, 0], atol=0)
 
 
-def test_power_is_the_same_at_every_point(rng):
-    """screw_map.T carries wrenches the other way, in turned axes too."""
+def test_power_of_a_wrench_does_not_depend_on_the_reference_point(rng):
+    """The transpose of screw_map transforms wrenches in the opposite direction,
+    also between rotated axes."""
     A = screw_map(rng.normal(size=3), rotation_matrix(rng.normal(size=3)))
     screw, wrench = rng.normal(size=(2, 6))
     assert (A.T @ wrench) @ screw == pytest.approx(wrench @ (A @ screw), rel=1e-13)
 
 
 def test_a_force_has_the_moment_of_its_arm():
-    """A force fy at p = x, read at q = 0: mz = +1 (p is ahead of q along x)."""
+    """A force fy at p = x, referred to q = 0: mz = +1 (p is ahead of q along x)."""
     wrench_at_q = screw_map([-1.0, 0, 0]).T @ [0, 0, 0, 0, 1.0, 0]
     np.testing.assert_allclose(wrench_at_q, [0, 0, 1, 0, 1, 0], atol=0)
 
 
-def test_maps_compose(rng):
+def test_product_of_two_screw_maps_is_the_map_of_the_composed_motion(rng):
     a, b = rng.normal(size=(2, 3))
     R, S = rotation_matrix(rng.normal(size=(2, 3)))
     np.testing.assert_allclose(
@@ -49,7 +50,7 @@ def test_maps_compose(rng):
 
 @pytest.mark.parametrize("size", [1e-6, 1e-4, 1.0])
 def test_small_screws_are_derivatives_of_finite_motions(rng, size):
-    """Error of the small screw is of second order: below its squared size."""
+    """The error of the small screw is of second order: below its squared size."""
     turn, point = size * rng.normal(size=3), rng.normal(size=3)
     moved = (rotation_matrix(turn) - np.eye(3)) @ point
     screw = screw_map(-point) @ np.r_[turn, 0, 0, 0]
@@ -58,7 +59,7 @@ def test_small_screws_are_derivatives_of_finite_motions(rng, size):
 
 
 @pytest.mark.parametrize("angle", [1e-14, 1e-7, 1e-3, 0.5, 2.1, 3.1, np.pi - 1e-9])
-def test_rotations_are_those_of_scipy(rng, angle):
+def test_rotations_agree_with_scipy(rng, angle):
     """To rounding, in the matrix and relative to the angle."""
     axes = rng.normal(size=(200, 3))
     vectors = angle * axes / np.linalg.norm(axes, axis=-1)[:, None]
@@ -68,8 +69,8 @@ def test_rotations_are_those_of_scipy(rng, angle):
     np.testing.assert_allclose(ours, vectors, rtol=0, atol=2e-14 * angle)
 
 
-def test_half_turns_and_no_turn_have_a_rotation_vector():
-    """Where the quaternion's scalar part is 0, and where its vector part is."""
+def test_rotation_vector_is_exact_for_half_turns_and_the_identity():
+    """Where the scalar part of the quaternion is 0, and where its vector part is."""
     for axis in (*np.eye(3), np.array([3, 0, -4]) / 5, np.array([1, 2, 2]) / 3):
         turn = 2 * np.outer(axis, axis) - np.eye(3)
         np.testing.assert_allclose(abs(rotation_vector(turn)), np.pi * abs(axis))
@@ -77,13 +78,13 @@ def test_half_turns_and_no_turn_have_a_rotation_vector():
 
 
 @pytest.mark.parametrize("shape", [(), (0,), (2, 5)])
-def test_rotations_keep_leading_axes(shape):
+def test_rotation_functions_keep_leading_axes(shape):
     matrices = rotation_matrix(np.zeros((*shape, 3)))
     assert matrices.shape == (*shape, 3, 3)
     assert rotation_vector(matrices).shape == (*shape, 3)
 
 
-def test_transforms_chain(rng):
+def test_product_of_two_transforms_is_the_transform_of_the_composed_motion(rng):
     R, S = rotation_matrix(rng.normal(size=(2, 3)))
     p, q = rng.normal(size=(2, 3))
     chained = transform(p, R) @ transform(q, S)

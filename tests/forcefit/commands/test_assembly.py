@@ -19,7 +19,7 @@ from tests.three_upu_for_tests import three_upu
 ROBOT = ["irsbot2", "--pose", "tx=0.1,tz=-0.5"]
 
 
-def test_a_point_of_the_platform_and_a_direction(run):
+def test_error_at_a_point_along_a_direction_equals_that_of_python(run):
     status, out, _ = run(
         "assembly", "error", *ROBOT, "--assumption", "free", "--at", "x=0.1,z=-0.05",
         "--along", "tx=1,tz=-1", "--json", "-",
@@ -53,14 +53,14 @@ def test_a_point_of_the_platform_and_a_direction(run):
         (["--along", "tx=1,rz=1"], "expected components of a translation or of"),
     ],
 )
-def test_what_is_no_point_or_direction_is_refused(run, option, message):
+def test_wrong_point_or_direction_is_refused(run, option, message):
     status, out, err = run("assembly", "error", *ROBOT, *option)
     assert status == 2
     assert out == ""
     assert message in err
 
 
-def test_exact_under_gravity_and_the_linearisation_error_of_a_weight(run):
+def test_solve_reports_the_linearisation_error_under_gravity(run):
     gravity = ["--gravity", "z=-9.81", "--json", "-"]
     _, out, _ = run("assembly", "solve", "arm6", "--state", "exact", *gravity)
     exact = json.loads(out)
@@ -76,9 +76,11 @@ def test_exact_under_gravity_and_the_linearisation_error_of_a_weight(run):
     )
 
 
-def test_the_error_under_a_load_is_the_sag_and_what_play_adds(run, tmp_path):
-    """A pin with clearance on an elastic post, loaded downwards: the axial one is taken
-    up, so only the radial one is left; the post gives F / k. By hand.
+def test_error_under_a_load_is_the_sag_plus_the_error_of_clearances(run, tmp_path):
+    """A pin with clearance on an elastic post under a downward load.
+
+    The load closes the axial clearance, so that only the radial one remains; the post
+    deflects by F / k. By hand.
     """
     (tmp_path / "post.toml").write_text("""
 platform = "tip"
@@ -128,8 +130,9 @@ parent = "hinge"
 """
 
 
-def test_each_reading_and_each_half_has_its_own_answer(run, tmp_path):
-    """A moment that the hinge's own spring carries; by hand M / k, and the play."""
+def test_each_assumption_and_component_has_its_own_answer(run, tmp_path):
+    """A moment that the hinge's own spring carries:
+    by hand M / k, and the clearance."""
     file = tmp_path / "hinge.toml"
     file.write_text(HINGE)
     status, out, _ = run("assembly", "error", file, "--load", "mz=0.1")
@@ -165,14 +168,14 @@ def test_each_reading_and_each_half_has_its_own_answer(run, tmp_path):
         (["error", "--energy-budget", "1e300"], "--energy-budget: found 1e+300"),
     ],
 )  # fmt: skip
-def test_what_no_double_carries_is_refused_by_name(run, words, message):
+def test_number_outside_the_range_of_doubles_is_refused_by_name(run, words, message):
     status, out, err = run("assembly", words[0], "five_bar", *words[1:])
     assert (status, out) == (2, "")
     assert message in err
     assert err.count("\n") == 1
 
 
-def test_the_same_from_python():
+def test_python_refuses_numbers_that_are_not_finite_or_too_large():
     posture = home_posture(load_robot("five_bar"))
     with pytest.raises(BadInput, match=r"load: found 1e\+300, expected finite numbers"):
         solve_assembly(posture, [0, 0, 0, 1e300, 0, 0])
@@ -211,7 +214,7 @@ def test_solve_prints_the_wrenches_of_frames_and_closures(run):
     assert "certified rotation error" in out
 
 
-def test_the_certificate_of_solve_covers_the_screw(run):
+def test_certificate_of_solve_bounds_the_error_of_the_screw(run):
     _, out, _ = run("assembly", "solve", "five_bar", "--load", "fx=10", "--json", "-")
     found = json.loads(out)["certificate"]
     assert 0 < found["screw_rotation_error"] < 1e-6
@@ -232,7 +235,7 @@ most = [5e-4, 5e-4, 5e-4, 5e-5, 5e-5, 5e-5]
      ("solve", "--quantities", "margin"),
      ("sweep", "--grid", "tx=0,ty=0,tz=0.45", "-o", "x.nc")],
 )  # fmt: skip
-def test_no_command_has_a_first_order_verdict_at_a_singular_posture(
+def test_every_command_reports_that_first_order_decides_nothing_when_singular(
     run, tmp_path, monkeypatch, words
 ):
     monkeypatch.chdir(tmp_path)
@@ -261,7 +264,7 @@ def with_a_limit(path):
      ("stiffness",), ("deflection", "--along", "fz=0:-10:10"),
      ("solve", "--load", "fz=-10")],
 )  # fmt: skip
-def test_every_command_says_that_its_posture_is_beyond_the_limits(
+def test_every_command_reports_a_posture_beyond_the_joint_limits(
     run, tmp_path, monkeypatch, words
 ):
     monkeypatch.chdir(tmp_path)
@@ -274,7 +277,9 @@ def test_every_command_says_that_its_posture_is_beyond_the_limits(
     assert (out + err).count(said) == 1
 
 
-def test_statistics_beyond_the_limits_of_a_joint_say_so(run, tmp_path, monkeypatch):
+def test_statistics_beyond_the_joint_limits_have_exit_status_1(
+    run, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     with_a_limit(tmp_path / "r.toml")
     (tmp_path / "errors.toml").write_text(SOURCES)
@@ -302,8 +307,8 @@ frames = ["tip", "post"]
 """
 
 
-def test_rest_of_a_closure_bends_the_link_that_it_is_given_to(run, tmp_path):
-    """A beam clamped at both ends, one shifted by d: 12 E I / L^3 d^2 / 2."""
+def test_rest_option_bends_the_named_link_by_the_closure_gap(run, tmp_path):
+    """A beam clamped at both ends, with one end shifted by d: 12 E I / L^3 d^2 / 2."""
     (tmp_path / "gap.toml").write_text(GAP)
     status, _, err = run("assembly", "solve", tmp_path / "gap.toml")
     assert status == 2
@@ -323,7 +328,7 @@ def test_rest_of_a_closure_bends_the_link_that_it_is_given_to(run, tmp_path):
     [(["solve", "five_bar", "--rest", "ankle"], '--rest: no frame "ankle"'),
      (["solve", "five_bar", "--mismatch", "glue"], '--mismatch: found "glue"')],
 )  # fmt: skip
-def test_ways_out_of_open_closures_refuse_what_they_cannot_use(run, words, message):
+def test_rest_and_mismatch_options_refuse_what_they_cannot_use(run, words, message):
     status, out, err = run("assembly", *words)
     assert (status, out) == (2, "")
     assert message in err

@@ -1,4 +1,4 @@
-"""The command: what it writes, and how it refuses."""
+"""Commands: the results that they write, and their refusals."""
 
 import json
 import os
@@ -30,9 +30,7 @@ def robot_file(tmp_path):
     return path
 
 
-def test_solve_writes_the_public_keys_to_standard_output_and_nothing_else(
-    run, robot_file
-):
+def test_solve_writes_only_the_public_keys_to_standard_output(run, robot_file):
     status, out, _ = run("assembly", "solve", robot_file, "--pose", "tx=0,tz=-0.5",
                          "--json", "-")  # fmt: skip
     found = json.loads(out)
@@ -52,7 +50,7 @@ def test_solve_writes_the_public_keys_to_standard_output_and_nothing_else(
     assert len(found["closures"][-1]["wrench"]) == 6
 
 
-def test_pose_and_joints_name_the_same_configuration(run, robot_file):
+def test_pose_and_its_joint_values_have_equal_results(run, robot_file):
     _, out, _ = run("assembly", "solve", robot_file, "--pose", "tx=0.1",
                     "--pose", "tz=-0.45", "--json", "-")  # fmt: skip
     by_pose = json.loads(out)
@@ -64,7 +62,7 @@ def test_pose_and_joints_name_the_same_configuration(run, robot_file):
     assert by_joints["pose"]["tx"] == pytest.approx(0.1, abs=1e-10)
 
 
-def test_load_does_work(run, tmp_path):
+def test_solve_reports_the_screw_and_potential_of_a_load(run, tmp_path):
     path = tmp_path / "beams.toml"
     write_robot(coaxial_beams(np.zeros(6), (1e6, 3e6)), path)
     status, out, _ = run("assembly", "solve", path, "--load", "fx=400", "--json", "-")
@@ -74,7 +72,7 @@ def test_load_does_work(run, tmp_path):
     assert found["potential"] == pytest.approx(-400 * 1e-4 / 2)
 
 
-def test_cannot_assemble_is_an_answer_with_exit_status_1(run, tmp_path):
+def test_robot_that_cannot_assemble_has_exit_status_1(run, tmp_path):
     path = tmp_path / "stuck.toml"
     path.write_text(
         'platform = "a"\n[[frame]]\nname = "a"\nparent = "base"\n[[frame]]\n'
@@ -118,7 +116,7 @@ def test_sweep_writes_netcdf_and_a_figure(run, robot_file, tmp_path):
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 
-def test_zone_gives_both_margins(run, robot_file):
+def test_solve_reports_both_margins(run, robot_file):
     status, out, _ = run("assembly", "solve", robot_file, "--pose", "tx=0.4,tz=-0.45",
                          "--quantities", "margin", "--json", "-")  # fmt: skip
     zone = json.loads(out)["zone"]
@@ -129,7 +127,7 @@ def test_zone_gives_both_margins(run, robot_file):
     assert (zone["assemblable"], zone["assemblable_free"]) == (False, True)
 
 
-def test_exact_states_what_the_linear_model_gets_wrong(run, robot_file):
+def test_exact_solution_reports_the_error_of_the_linear_model(run, robot_file):
     status, out, _ = run("assembly", "solve", robot_file, "--pose", "tx=0,tz=-0.5",
                          "--state", "exact", "--json", "-")  # fmt: skip
     found = json.loads(out)
@@ -150,8 +148,11 @@ link = { beam = { radius = 0.005 }, young = 7e10, poisson = 0.3, pieces = 4 }
 """
 
 
-def test_exact_says_where_it_stands_beyond_a_critical_load(run, tmp_path):
-    """Euler's, 84.8 N, is 82.7 N with 4 pieces: straight it is unstable, bent not."""
+def test_exact_solution_reports_a_state_beyond_a_critical_load(run, tmp_path):
+    """Euler's load is 84.8 N, with 4 pieces 82.7 N.
+
+    Above it the straight column is unstable, the bent one stable.
+    """
     column = tmp_path / "column.toml"
     column.write_text(COLUMN)
     for load, status, said in (
@@ -168,7 +169,7 @@ def test_exact_says_where_it_stands_beyond_a_critical_load(run, tmp_path):
         assert found == status
 
 
-def test_gravity_pulls_an_arm_down(run):
+def test_solve_with_gravity_lowers_an_arm(run):
     _, out, _ = run("assembly", "solve", "arm6", "--gravity", "z=-9.81", "--json", "-")
     found = json.loads(out)
     assert found["platform_screw"][5] < 0
@@ -176,7 +177,7 @@ def test_gravity_pulls_an_arm_down(run):
     assert found["potential"] < -found["energy"]
 
 
-def test_show_draws_a_picture(run, robot_file, tmp_path):
+def test_show_writes_a_figure(run, robot_file, tmp_path):
     status, _, _ = run(
         "assembly", "show", robot_file, "--figure", tmp_path / "robot.png"
     )
@@ -228,8 +229,9 @@ def test_show_draws_a_picture(run, robot_file, tmp_path):
         (["validation", "crosscheck", "irsbot2", "--scale", "1"], "--scale: found"),
     ],
 )  # fmt: skip
-def test_bad_input_is_one_message_and_exit_status_2(run, tmp_path, monkeypatch, words,
-                                                    message):  # fmt: skip
+def test_bad_input_gives_one_message_and_exit_status_2(
+    run, tmp_path, monkeypatch, words, message
+):
     monkeypatch.chdir(tmp_path)
     status, out, err = run(*words)
     assert status == 2
@@ -251,7 +253,7 @@ EVERY_COMMAND = dict(commands(typer.main.get_command(command.app)))
 
 
 @pytest.mark.parametrize("words", EVERY_COMMAND, ids=" ".join)
-def test_every_command_explains_itself(run, words):
+def test_every_command_prints_its_help(run, words):
     status, out, err = run(*words, "--help")
     assert (status, err) == (0, "")
     assert out.startswith(" ".join(("Usage: forcefit", *words)))
@@ -271,8 +273,9 @@ def test_a_group_without_a_command_prints_its_help_line_by_line(run, group):
 
 
 @pytest.mark.parametrize("words", EVERY_COMMAND, ids=" ".join)
-def test_help_prints_every_unit_in_brackets_and_cuts_nothing_short(run, words):
-    """No part of a text is markup, and a list of commands has whole sentences."""
+def test_help_prints_every_unit_in_brackets_and_whole_sentences(run, words):
+    """No part of a text is taken for markup,
+    and lists of commands are not truncated."""
     _, out, _ = run(*words, "--help")
     printed = " ".join(out.split())
     command = EVERY_COMMAND[words]
@@ -282,13 +285,13 @@ def test_help_prints_every_unit_in_brackets_and_cuts_nothing_short(run, words):
     assert "..." not in out.partition("Commands:")[2]
 
 
-def test_there_are_units_to_print():
+def test_help_texts_have_units_in_many_options():
     assert len(EVERY_COMMAND) > 25
     helps = [p.help or "" for c in EVERY_COMMAND.values() for p in c.params]
     assert sum("[" in text for text in helps) > 40
 
 
-def test_the_version_is_that_of_the_package(run):
+def test_version_option_prints_the_version_of_the_package(run):
     installed = version("forcefit")
     assert run("--version") == (0, f"forcefit {installed}\n", "")
     assert forcefit.__version__ == installed
@@ -302,7 +305,7 @@ def test_the_version_is_that_of_the_package(run):
      ("forcefit validation crosscheck --with", "--with-clearance"),
      ("forcefit assembly solve arm", "arm6")],
 )  # fmt: skip
-def test_a_shell_completes_commands_options_and_robots(typed, offered):
+def test_shell_completion_offers_commands_options_and_robots(typed, offered):
     asked = {"_FORCEFIT_COMPLETE": "complete_bash", "COMP_WORDS": typed,
              "COMP_CWORD": str(len(typed.split()) - 1)}  # fmt: skip
     done = subprocess.run([sys.executable, "-m", "forcefit"], env=os.environ | asked,
@@ -310,7 +313,7 @@ def test_a_shell_completes_commands_options_and_robots(typed, offered):
     assert done.stdout.split() == [offered]
 
 
-def test_letters_that_the_output_lacks_are_printed_as_numbers(tmp_path):
+def test_letters_outside_the_encoding_of_the_output_are_printed_escaped(tmp_path):
     """As in a file or a pipe on Windows."""
     robot = replace(coaxial_beams([0, 0, 0, 1e-4, 0, 0]), name="Ω-4")
     write_robot(robot, tmp_path / "omega.toml")
@@ -323,7 +326,7 @@ def test_letters_that_the_output_lacks_are_printed_as_numbers(tmp_path):
     assert b"\\u03a9-4" in done.stdout
 
 
-def test_the_installed_command_refuses_without_a_traceback():
+def test_module_command_refuses_an_unknown_robot_without_a_traceback():
     done = subprocess.run([sys.executable, "-m", "forcefit", "assembly", "solve", "x"],
                           capture_output=True, text=True, check=False)  # fmt: skip
     assert done.returncode == 2
@@ -343,8 +346,8 @@ def test_the_installed_command_refuses_without_a_traceback():
         ["stiffness", "library", "build", "spec.toml", "--workers", "1025"],
     ],
 )  # fmt: skip
-def test_numbers_that_no_machine_has_are_refused(run, tmp_path, monkeypatch, words):
-    """A million processes would be begun one by one, for minutes."""
+def test_absurdly_large_counts_are_refused(run, tmp_path, monkeypatch, words):
+    """A million processes would start one by one, for minutes."""
     monkeypatch.chdir(tmp_path)
     status, _, err = run(*words)
     assert status == 2
@@ -353,7 +356,7 @@ def test_numbers_that_no_machine_has_are_refused(run, tmp_path, monkeypatch, wor
     assert list(tmp_path.iterdir()) == []
 
 
-def test_warnings_of_libraries_are_for_programmers(monkeypatch):
+def test_warnings_of_libraries_are_shown_only_on_request(monkeypatch):
     monkeypatch.setattr(sys, "argv", ["forcefit", "--version"])
     with warnings.catch_warnings():
         monkeypatch.setattr(sys, "warnoptions", ["default"])

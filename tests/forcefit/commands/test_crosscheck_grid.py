@@ -20,7 +20,7 @@ pytestmark = pytest.mark.exudyn
 AXES = {"tx": [-0.7, 0.0, 0.2], "tz": [-0.45]}
 
 
-def test_every_reachable_pose_is_checked_and_the_others_say_so():
+def test_every_reachable_pose_is_checked_and_others_are_out_of_reach():
     robot, seen = irsbot2_with(NUMBERS["cases"][0]), []
     rows = check_poses(
         robot,
@@ -38,7 +38,7 @@ def test_every_reachable_pose_is_checked_and_the_others_say_so():
 
 
 def test_pose_beyond_the_limits_of_a_joint_is_not_checked():
-    """The slides of an orthoglide follow its platform along each axis."""
+    """The slides of an orthoglide move with its platform along each axis."""
     robot = load_robot("orthoglide")
     frames = tuple(
         replace(f, limits=(-0.4, -0.3)) if f.name == "x.slide" else f
@@ -60,7 +60,7 @@ def test_pose_beyond_the_limits_of_a_joint_is_not_checked():
     assert "x.slide at -0.26 m, limits -0.4 to -0.3" in costs.unreached[1]
 
 
-def test_a_pose_that_fails_is_named_and_stops_nothing():
+def test_failed_pose_is_reported_and_the_grid_continues():
     def check(posture):
         if posture.pose()["tx"] > 0.1:
             raise SimulationFailed("irsbot2", "no equilibrium")
@@ -73,12 +73,12 @@ def test_a_pose_that_fails_is_named_and_stops_nothing():
     assert "FAILED (simulation failed)" in poses_text(rows)
 
 
-def test_no_reachable_pose_is_no_proof():
+def test_grid_without_a_reachable_pose_does_not_pass():
     rows = check_poses(irsbot2_with(NUMBERS["cases"][0]), {"tz": [-0.9]}, None)
     assert not poses_table(rows)["passed"]
 
 
-def test_the_command_takes_a_grid(tmp_path, capsys, monkeypatch):
+def test_crosscheck_command_checks_the_poses_of_a_grid(tmp_path, capsys, monkeypatch):
     import sys
 
     write_robot(irsbot2_with(NUMBERS["cases"][0]), tmp_path / "robot.toml")
@@ -98,7 +98,7 @@ def test_the_command_takes_a_grid(tmp_path, capsys, monkeypatch):
     assert "--grid: not together with" in capsys.readouterr().err
 
 
-def test_a_pose_where_nothing_is_compared_is_not_passed():
+def test_pose_without_a_comparable_difference_does_not_pass():
     """The built-in robot has no errors: at every pose zero is compared with zero."""
     rows = check_poses(load_robot("irsbot2"), AXES, lambda p: crosscheck(p, (1.0, 0.5)))
     assert [row["passed"] for row in rows] == [None, False, False]

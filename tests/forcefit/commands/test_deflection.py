@@ -8,7 +8,9 @@ from assembly.files.robot_file import write_robot
 from tests.assembly.platform_stiffness.test_deflection import shallow_arch
 
 
-def test_a_curve_goes_through_play_to_a_spring(run, tmp_path):
+def test_deflection_curve_passes_the_clearance_and_then_rises_like_a_spring(
+    run, tmp_path
+):
     picture = tmp_path / "curve.svg"
     status, out, _ = run(
         "assembly", "deflection", "hexapod", "--along", "fz=-100:100:50", "--json",
@@ -24,7 +26,7 @@ def test_a_curve_goes_through_play_to_a_spring(run, tmp_path):
     assert picture.stat().st_size > 1000
 
 
-def test_back_is_the_same_way_where_nothing_is_lost(run):
+def test_deflection_curve_without_losses_returns_on_itself(run):
     status, out, _ = run(
         "assembly", "deflection", "four_bar", "--along", "fx=100:300:100", "--back",
         "--state", "exact", "--json", "-",
@@ -36,8 +38,8 @@ def test_back_is_the_same_way_where_nothing_is_lost(run):
     assert there[0] == pytest.approx(there[4], rel=1e-6)
 
 
-def test_a_path_is_followed_past_its_limit_point(run, tmp_path):
-    """Von Mises' truss: up to the limit, back through flat, and down."""
+def test_followed_path_continues_past_its_limit_point(run, tmp_path):
+    """Von Mises' truss: up to the limit, back through the flat position, and down."""
     column = tmp_path / "arch.toml"
     write_robot(shallow_arch().robot, column)
     picture = tmp_path / "path.svg"
@@ -54,7 +56,7 @@ def test_a_path_is_followed_past_its_limit_point(run, tmp_path):
     assert picture.stat().st_size > 1000
 
 
-def test_a_followed_path_turns_by_itself(run):
+def test_follow_option_is_refused_together_with_back(run):
     status, _, err = run(
         "assembly", "deflection", "four_bar", "--along", "fx=0:1:1", "--follow",
         "--back",
@@ -73,7 +75,7 @@ def test_a_followed_path_turns_by_itself(run):
         ("fz=0:1e9:1", "expected at most 10000"),
     ],
 )
-def test_what_is_no_path_of_loads_is_refused(run, along, message):
+def test_wrong_path_of_loads_is_refused(run, along, message):
     status, out, err = run("assembly", "deflection", "four_bar", "--along", along)
     assert status == 2
     assert out == ""

@@ -1,4 +1,4 @@
-"""The files of the examples, as `pip install` alone gives them."""
+"""Files of the examples, as `pip install` alone provides them."""
 
 import tomllib
 from pathlib import Path
@@ -18,7 +18,7 @@ def files_of(folder):
     }
 
 
-def test_every_file_of_the_examples_belongs_to_one(run, tmp_path):
+def test_every_file_of_the_examples_folder_belongs_to_an_example(run, tmp_path):
     status, out, err = run("example", *EXAMPLES, "-o", tmp_path)
     assert (status, err) == (0, "")
     assert files_of(tmp_path / "examples") == files_of(ROOT / "examples")
@@ -29,7 +29,7 @@ def test_every_file_of_the_examples_belongs_to_one(run, tmp_path):
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_what_an_example_refers_to_is_written_with_it(run, tmp_path, name):
+def test_files_that_an_example_refers_to_are_written_with_it(run, tmp_path, name):
     """Surfaces, robots and measurements that its TOML files name."""
     run("example", name, "-o", tmp_path)
     for path in tmp_path.rglob("*.toml"):
@@ -50,13 +50,13 @@ def strings(value):
         yield value
 
 
-def test_examples_are_listed_without_a_name(run):
+def test_example_command_without_a_name_lists_the_examples(run):
     status, out, _ = run("example")
     assert status == 0
     assert [line.split()[0] for line in out.splitlines()] == list(EXAMPLES)
 
 
-def test_written_again_nothing_changes_and_another_content_is_kept(run, tmp_path):
+def test_example_files_are_unchanged_on_repeat_and_edited_files_are_kept(run, tmp_path):
     assert run("example", "irsbot2", "-o", tmp_path)[0] == 0
     before = files_of(tmp_path)
     status, out, _ = run("example", "irsbot2", "-o", tmp_path)
@@ -77,7 +77,7 @@ def test_written_again_nothing_changes_and_another_content_is_kept(run, tmp_path
         (["irsbot2", "-o", "nowhere"], "nowhere: no such folder"),
     ],
 )
-def test_a_wrong_name_or_folder_is_one_message(
+def test_wrong_example_name_or_folder_gives_one_message(
     run, tmp_path, monkeypatch, words, message
 ):
     monkeypatch.chdir(tmp_path)
@@ -87,7 +87,7 @@ def test_a_wrong_name_or_folder_is_one_message(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_wheel_holds_what_the_command_writes():
+def test_wheel_includes_the_files_of_all_examples():
     table = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     packages = table["tool"]["scikit-build"]["wheel"]["packages"]
     included = {to: folder for to, folder in packages.items() if to != folder}

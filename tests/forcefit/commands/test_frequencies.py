@@ -9,7 +9,7 @@ from assembly.files.robot_file import write_robot
 from assembly.model.robot import BeamLink, Frame, Robot
 
 
-def test_frequencies_come_slowest_first_with_who_bends(run):
+def test_frequencies_are_ascending_with_shares_of_the_parts(run):
     status, out, _ = run(
         "assembly", "frequencies", "delta", "--count", "4", "--json", "-"
     )
@@ -21,15 +21,16 @@ def test_frequencies_come_slowest_first_with_who_bends(run):
         assert sum(mode["shares"].values()) == pytest.approx(1.0)
 
 
-def test_a_robot_without_mass_is_bad_input(run):
+def test_frequencies_of_a_robot_without_mass_are_refused(run):
     status, out, err = run("assembly", "frequencies", "irsbot2")
     assert status == 2
     assert out == ""
     assert 'irsbot2: found no mass that moves; expected "density"' in err
 
 
-def test_frequencies_without_exact_say_that_gravity_is_left_out(run, tmp_path):
-    """A compound pendulum swings at sqrt(m g l / I) / (2 pi); nominally it does not."""
+def test_nominal_frequencies_report_that_gravity_is_left_out(run, tmp_path):
+    """A compound pendulum has the frequency sqrt(m g l / I) / (2 pi);
+    nominally it has none."""
     pendulum = Robot("pendulum", "tip", (
         Frame("pivot", joint="revolute", rotation=[np.pi / 2, 0, 0]),
         Frame("tip", "pivot", [0, -1.0, 0], mass=2.0,

@@ -55,13 +55,13 @@ def test_help_lists_every_option_once_under_a_group(run, words):
         ("validation diagnose", "--save", "Output"),
     ],
 )
-def test_help_lists_an_option_where_users_look_for_it(run, words, option, title):
+def test_help_lists_an_option_under_its_group(run, words, option, title):
     _, out, _ = run(*words.split(), "--help")
     assert titles_of_options(out)[option] == [title]
 
 
 def test_every_name_in_a_group_is_an_option_of_some_command():
-    """A name that is no option any more goes from the table too."""
+    """A name that is no longer an option must leave the table too."""
     declared = {
         name for one in COMMANDS.values() for p in one.params for name in p.opts
     }

@@ -1,4 +1,4 @@
-"""Commands that answer several questions: what goes together, and what is refused."""
+"""Commands that answer several questions: combinations of options, and refusals."""
 
 import json
 
@@ -55,7 +55,7 @@ MATERIAL = ["--young", "6e10", "--poisson", "0.3"]
          "--json: found with --to csv, expected one of the two"),
     ],
 )  # fmt: skip
-def test_options_that_do_not_go_together_are_one_message(
+def test_options_that_exclude_each_other_give_one_message(
     run, tmp_path, monkeypatch, words, message
 ):
     monkeypatch.chdir(tmp_path)
@@ -65,7 +65,7 @@ def test_options_that_do_not_go_together_are_one_message(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_straight_curve_of_a_file_is_the_beam_of_the_options(run, tmp_path):
+def test_straight_curve_file_and_beam_options_have_equal_compliance(run, tmp_path):
     (tmp_path / "c.toml").write_text(CURVE)
     by_file = run("stiffness", "beam", tmp_path / "c.toml", *MATERIAL, "--json", "-")
     options = ["--length", "0.4", "--radius", "0.02"]
@@ -78,7 +78,7 @@ def test_a_straight_curve_of_a_file_is_the_beam_of_the_options(run, tmp_path):
                                other / np.outer(scale, scale), atol=1e-9)  # fmt: skip
 
 
-def test_margins_alone_are_those_of_the_whole_solution(run):
+def test_margins_alone_equal_those_of_the_whole_solution(run):
     _, whole, _ = run("assembly", "solve", "irsbot2", "--json", "-")
     status, margins, _ = run(
         "assembly", "solve", "irsbot2", "--quantities", "margin,margin_free", "--json",

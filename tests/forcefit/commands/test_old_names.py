@@ -1,4 +1,4 @@
-"""Options by their old names: they work and are reported."""
+"""Options by their old names: they work, and the new name is reported."""
 
 import pytest
 import typer
@@ -23,7 +23,7 @@ def options_of(command):
 
 
 @pytest.mark.parametrize(("old", "new"), COMMANDS.items())
-def test_an_old_command_becomes_one_that_there_is(old, new, capsys):
+def test_old_command_is_translated_to_an_existing_one(old, new, capsys):
     words = ["file", "--at", "radius=1", "--json", "-"]  # looking up needs a place
     assert with_new_names([*old.split(), *words]) == [*new, *words]
     assert capsys.readouterr().err == f"forcefit: {old} is now {' '.join(new)}\n"
@@ -40,14 +40,14 @@ def test_an_old_command_becomes_one_that_there_is(old, new, capsys):
         (["exact", "five_bar"], ["solve", "five_bar", "--state", "exact"]),
     ],
 )
-def test_an_old_command_gives_the_answer_of_the_new_one(run, old, new):
+def test_old_command_has_the_result_of_the_new_one(run, old, new):
     status, out, _ = run("assembly", *old, "--json", "-")
     assert (status, out) == run("assembly", *new, "--json", "-")[:2]
     assert '"margin"' in out or '"linearisation_error"' in out
 
 
 @pytest.mark.parametrize(("command", "old", "new"), RENAMED)
-def test_an_old_option_becomes_one_that_the_command_has(command, old, new, capsys):
+def test_old_option_is_translated_to_an_existing_one(command, old, new, capsys):
     words, present = command.split(), list(COMMANDS.get(command, command.split()))
     joined = f"{old}=value" if old.startswith("--") else f"{old}value"
     found = with_new_names([*words, old, "value", joined, "--json", "-"])
@@ -70,7 +70,7 @@ def test_an_old_option_becomes_one_that_the_command_has(command, old, new, capsy
 
 
 @pytest.mark.parametrize(("old", "new"), [("free", "margin_free"), ("rigid", "margin")])
-def test_an_old_value_becomes_the_margin_of_that_name(old, new):
+def test_old_value_of_compliant_is_translated_to_a_margin_quantity(old, new):
     words = ["assembly", "tolerances", "r.toml"]
     assert with_new_names([*words, "--compliant", old, "free"])[3:] == [
         "--quantities", new, "free"
@@ -78,7 +78,7 @@ def test_an_old_value_becomes_the_margin_of_that_name(old, new):
     assert with_new_names([*words, f"--compliant={old}"])[3:] == [f"--quantities={new}"]
 
 
-def test_words_after_two_dashes_and_of_other_commands_stay(capsys):
+def test_words_after_two_dashes_and_of_other_commands_are_not_translated(capsys):
     for words in (
         ["assembly", "sweep", "--", "--tangent"],
         ["validation", "validity", "r", "--stiffness"],
@@ -87,7 +87,7 @@ def test_words_after_two_dashes_and_of_other_commands_stay(capsys):
     assert capsys.readouterr().err == ""
 
 
-def test_an_old_flag_gives_the_answer_of_its_new_option(run):
+def test_old_flag_has_the_result_of_its_new_option(run):
     words = ["assembly", "stiffness", "four_bar", "--load", "fx=10", "--json", "-"]
     status, new, silent = run(*words, "--state", "exact")
     old_status, old, err = run(*words, "--exact")
@@ -96,7 +96,7 @@ def test_an_old_flag_gives_the_answer_of_its_new_option(run):
     assert err == "forcefit: --exact is now --state exact\n"
 
 
-def test_looking_up_without_a_place_is_refused(run):
+def test_library_look_up_without_parameters_is_refused(run):
     status, out, err = run("stiffness", "library", "look-up", "folder")
     assert (status, out) == (2, "")
     assert "--at: missing; expected such as radius=0.02" in err

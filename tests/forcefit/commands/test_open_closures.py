@@ -1,4 +1,5 @@
-"""``--rest`` and ``--mismatch spring``: open closures in every command that places."""
+"""``--rest`` and ``--mismatch spring``: open closures in every command that uses
+them."""
 
 import csv
 import json
@@ -77,7 +78,7 @@ def files(robot, tmp_path):
 def test_statistics_of_an_open_closure_have_its_energy_in_every_draw(
     files, run, words, key, energy
 ):
-    """The gap is no random error: each draw has it whole."""
+    """The gap is not a random error: each draw includes all of it."""
     command = ["assembly", "statistics", files / "robot.toml"]
     options = ["--errors", files / "tiny.toml", "--draws", "20", "--no-margins"]
     status, _, err = run(*command, *options)
@@ -118,8 +119,8 @@ def test_study_of_an_open_closure_gives_its_energy(files, run, words, key, energ
     assert "closure leaves open" in results["errors"] or "drives" in results["errors"]
 
 
-def test_study_with_errors_of_its_own_keeps_what_the_closure_leaves_open(run, tmp_path):
-    """A further shift of 1e-4 m the other way closes the gap: no energy."""
+def test_study_adds_its_own_errors_to_the_gap_of_a_closure(run, tmp_path):
+    """A further shift of 1e-4 m in the opposite direction closes the gap: no energy."""
     (tmp_path / "robot.toml").write_text(GAP)
     text = (
         f'robot = "robot.toml"\noutput = "{tmp_path}/out"\nrest = "tip"\n'
@@ -138,7 +139,9 @@ def test_study_with_errors_of_its_own_keeps_what_the_closure_leaves_open(run, tm
      ('mismatch = "glue"', "study.toml: mismatch: found"),
      ("rest = 3", "study.toml: rest: found")],
 )  # fmt: skip
-def test_study_refuses_a_way_out_that_it_cannot_use(run, tmp_path, line, message):
+def test_study_refuses_a_rest_or_mismatch_that_it_cannot_use(
+    run, tmp_path, line, message
+):
     (tmp_path / "robot.toml").write_text(GAP)
     (tmp_path / "study.toml").write_text(f'robot = "robot.toml"\n{line}\n')
     status, out, err = run("study", tmp_path / "study.toml")
@@ -147,8 +150,10 @@ def test_study_refuses_a_way_out_that_it_cannot_use(run, tmp_path, line, message
 
 
 @robots
-def test_present_errors_of_an_open_closure_are_judged(files, run, words, key, energy):
-    """Rigid parts never take up the gap, so no factor on it goes together."""
+def test_tolerances_accept_an_open_closure_with_rest_or_mismatch(
+    files, run, words, key, energy
+):
+    """Rigid parts never close the gap, so that no factor on it can be assembled."""
     command = ["assembly", "tolerances", files / "robot.toml", "--grid", "tz=0"]
     assert run(*command)[0] == 2
     status, out, err = run(*command, *words, "--json", "-")
@@ -157,8 +162,8 @@ def test_present_errors_of_an_open_closure_are_judged(files, run, words, key, en
     assert err.count("forcefit: note: ") == 1
 
 
-def test_mismatch_at_home_stays_the_error_of_the_drives_at_other_poses(run, tmp_path):
-    """Both slides moved alike: the springs are as they were."""
+def test_mismatch_at_home_is_kept_as_a_drive_error_at_other_poses(run, tmp_path):
+    """Both slides move by the same amount, so that the springs keep their preload."""
     (tmp_path / "robot.toml").write_text(SLIDES)
     words = ["--mismatch", "spring", "--pose", "tx=0.42", "--json", "-"]
     status, out, _ = run("assembly", "solve", tmp_path / "robot.toml", *words)
@@ -166,7 +171,7 @@ def test_mismatch_at_home_stays_the_error_of_the_drives_at_other_poses(run, tmp_
     assert json.loads(out)["energy"] == pytest.approx(PRELOADED, rel=RELATIVE)
 
 
-def test_sweep_over_drives_that_do_not_fit_is_refused(run, tmp_path):
+def test_sweep_over_drive_values_is_refused_with_mismatch(run, tmp_path):
     (tmp_path / "robot.toml").write_text(SLIDES)
     words = ["--mismatch", "spring", "--grid", "q.one=0.3", "-o", tmp_path / "x.nc"]
     status, _, err = run("assembly", "sweep", tmp_path / "robot.toml", *words)
@@ -177,7 +182,7 @@ def test_sweep_over_drives_that_do_not_fit_is_refused(run, tmp_path):
 
 @robots
 def test_converted_robot_closes_and_keeps_its_energy(files, run, words, key, energy):
-    """The way for commands without the options: a file in which the loops hold."""
+    """Commands without the two options need a file whose loops close."""
     target = files / "closed.toml"
     assert run("convert", files / "robot.toml", "-o", target)[0] == 2
     assert not target.exists()
@@ -187,7 +192,7 @@ def test_converted_robot_closes_and_keeps_its_energy(files, run, words, key, ene
     assert json.loads(out)["energy"] == pytest.approx(energy, rel=RELATIVE)
 
 
-def test_convert_refuses_a_way_out_for_files_of_other_programs(run, tmp_path):
+def test_convert_refuses_rest_for_files_of_other_programs(run, tmp_path):
     (tmp_path / "r.urdf").write_text("<robot name='r'><link name='a'/></robot>")
     words = ["--rest", "a", "-o", tmp_path / "r.toml"]
     status, _, err = run("convert", tmp_path / "r.urdf", *words)

@@ -1,4 +1,4 @@
-"""The command ``forcefit assembly stiffness``: its contract with machines."""
+"""Command ``forcefit assembly stiffness``: keys of its results, exit statuses."""
 
 import json
 
@@ -23,7 +23,7 @@ parent = "slide"
 """
 
 
-def test_the_matrices_are_where_machines_expect_them(run):
+def test_stiffness_results_have_both_matrices_under_their_keys(run):
     status, out, _ = run(
         "assembly", "stiffness", "orthoglide", "--pose", "tx=0.01,ty=0,tz=0",
         "--at", "0,0,0.05",
@@ -46,7 +46,7 @@ def test_the_matrices_are_where_machines_expect_them(run):
     np.testing.assert_array_equal(side["compliance"], np.full((6, 6), None))
 
 
-def test_a_free_motion_is_null_and_exit_status_1(run, tmp_path):
+def test_free_motion_has_null_compliance_and_exit_status_1(run, tmp_path):
     (tmp_path / "slider.toml").write_text(SLIDER)
     status, out, _ = run(
         "assembly", "stiffness", str(tmp_path / "slider.toml"), "--json", "-"
@@ -69,7 +69,7 @@ def test_a_free_motion_is_null_and_exit_status_1(run, tmp_path):
         ["frequencies", "--state", "exact", "--load", "fz=5"],
     ],
 )
-def test_a_load_that_nothing_resists_is_exit_1_with_the_motion_named(
+def test_load_that_nothing_resists_has_exit_status_1_and_names_the_motion(
     run, tmp_path, words
 ):
     (tmp_path / "slider.toml").write_text(SLIDER)
@@ -81,8 +81,9 @@ def test_a_load_that_nothing_resists_is_exit_1_with_the_motion_named(
     assert "it moves slide tz; the platform along [0 0 0 0 0 1] [rad, m]" in out
 
 
-def test_a_sweep_names_the_motion_that_is_free(tmp_path):
-    """At the singular postures of a workspace, too, where the rest has its number."""
+def test_sweep_names_the_free_motion(tmp_path):
+    """Also at singular postures of a workspace,
+    where other directions have their stiffness."""
     (tmp_path / "slider.toml").write_text(SLIDER)
     asked = ask_sweep(
         str(tmp_path / "slider.toml"),
@@ -106,14 +107,14 @@ def test_a_sweep_names_the_motion_that_is_free(tmp_path):
         (["--load", "fy=x"], '--load: found "fy=x", expected NAME=NUMBER'),
     ],
 )
-def test_what_is_no_point_length_or_load_is_refused(run, option, message):
+def test_wrong_point_length_or_load_is_refused(run, option, message):
     status, out, err = run("assembly", "stiffness", "four_bar", *option)
     assert status == 2
     assert out == ""
     assert message in err
 
 
-def test_the_chart_is_written(run, tmp_path):
+def test_stiffness_command_writes_its_chart(run, tmp_path):
     picture = tmp_path / "shares.png"
     status, out, _ = run(
         "assembly", "stiffness", "irsbot2", "--state", "exact", "--load", "fz=-100",
@@ -124,8 +125,9 @@ def test_the_chart_is_written(run, tmp_path):
     assert status in {0, 1}
 
 
-def test_a_direction_has_its_stiffness_and_shares(run):
-    """Along fz it is what stands there already; of any length it is the same."""
+def test_stiffness_along_a_direction_has_its_value_and_shares(run):
+    """Along tz it equals the value of that axis;
+    the length of the vector has no effect."""
     status, out, _ = run(
         "assembly", "stiffness", "orthoglide", "--along", "tz=-2", "--json", "-"
     )
@@ -149,7 +151,7 @@ def test_a_direction_has_its_stiffness_and_shares(run):
         (["--pose", "tz=-9"], "cannot be reached"),
     ],
 )
-def test_bad_input_is_one_line_and_exit_2(run, words, message):
+def test_bad_input_to_stiffness_gives_one_line_and_exit_status_2(run, words, message):
     status, out, err = run("assembly", "stiffness", "delta", *words)
     assert status == 2
     assert out == ""
@@ -158,7 +160,7 @@ def test_bad_input_is_one_line_and_exit_2(run, words, message):
 
 
 @pytest.mark.slow
-def test_a_load_that_no_equilibrium_carries_is_exit_1(run):
+def test_load_without_an_equilibrium_has_exit_status_1(run):
     status, out, _ = run(
         "assembly",
         "stiffness",
@@ -176,8 +178,9 @@ def test_a_load_that_no_equilibrium_carries_is_exit_1(run):
     assert "out of balance" in answer["reason"]
 
 
-def test_a_platform_pushed_through_its_legs_is_said_to_be_far(run):
-    """By 10 MN, from 0.5 m below the base to above it; by 300 N by micrometres."""
+def test_stiffness_reports_a_platform_far_from_its_nominal_pose(run):
+    """10 MN move it from 0.5 m below the base to above it;
+    300 N move it by micrometres."""
     for load, far in (("fz=1e7", True), ("fz=-300", False)):
         _, out, _ = run(
             "assembly",

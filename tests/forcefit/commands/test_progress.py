@@ -1,4 +1,4 @@
-"""Progress of commands that are usually done at once."""
+"""Progress reports of commands that can take long."""
 
 import logging
 
@@ -16,9 +16,7 @@ from forcefit.commands.progress import report_loading
 from forcefit.inputs.errors import BadInput
 
 
-def test_line_of_progress_is_printed_every_two_seconds_and_no_oftener(
-    capsys, monkeypatch
-):
+def test_progress_line_is_printed_at_most_every_two_seconds(capsys, monkeypatch):
     now = [0.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
     with progress.progress_lines() as update:
@@ -50,10 +48,11 @@ def test_every_load_of_a_curve_is_reported():
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_links_that_are_solved_while_a_robot_is_loaded_are_shown(
+def test_progress_shows_the_links_solved_while_a_robot_is_read(
     terminal, monkeypatch, capsys
 ):
-    """A line for each whose finite elements run; on a terminal a bar of all three."""
+    """A line for each link whose finite elements run;
+    on a terminal a bar for all three."""
     monkeypatch.setenv("FORCE_COLOR" if terminal else "NO_COLOR", "1")
     log = logging.getLogger("assembly.files.solved_links")
     before = log.level, log.handlers
@@ -71,8 +70,8 @@ def test_links_that_are_solved_while_a_robot_is_loaded_are_shown(
     assert "of 3 links" not in shown
 
 
-def test_a_bar_ends_where_a_link_is_refused(monkeypatch, tmp_path):
-    """Its count is complete whatever happens: nothing stays on the terminal."""
+def test_progress_bar_is_completed_when_a_link_is_refused(monkeypatch, tmp_path):
+    """The count is complete after a failure, so that no bar stays on the terminal."""
     log, told = logging.getLogger("assembly.files.solved_links"), []
     handler = logging.Handler()
     handler.emit = lambda record: told.append((record.done, record.total))

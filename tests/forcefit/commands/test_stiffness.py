@@ -30,7 +30,7 @@ def run(*arguments):
     return result.stdout
 
 
-def test_beam_writes_the_papers_link():
+def test_beam_command_writes_the_stiffness_of_the_papers_link():
     results = json.loads(run(*BEAM, "--radius", "0.04", "--json", "-"))
     K = np.array(results["stiffness"])
     assert K[1, 1] == pytest.approx(1015962.1690558865, rel=1e-12)
@@ -39,7 +39,7 @@ def test_beam_writes_the_papers_link():
     assert results["relative_error_estimate"] == 0
 
 
-def test_beam_text_shows_the_matrix():
+def test_beam_command_prints_the_matrix():
     text = run(*BEAM, "--radius", "0.04")
     assert "Timoshenko beam; K read at the tip (0.452, 0, 0) m" in text
     assert "1.01596e+06" in text
@@ -68,7 +68,7 @@ def test_beam_text_shows_the_matrix():
         ),
     ],
 )
-def test_beam_options_reach_the_formula(options, section, axis, theory):
+def test_beam_options_are_passed_to_the_formula(options, section, axis, theory):
     results = json.loads(run(*BEAM, *options, "--json", "-"))
     up = [0, 1, 0] if "--up" in options else None
     C = beam_compliance(0.452, section, 6e10, 0.3, axis=axis, up=up, theory=theory)
@@ -97,7 +97,7 @@ def test_beam_options_reach_the_formula(options, section, axis, theory):
         (["--radius", "1", "--up", "x"], "lies along the axis"),
     ],
 )
-def test_beam_refuses_with_the_options_name(options, message):
+def test_beam_command_refuses_a_wrong_option_by_name(options, message):
     with pytest.raises(BadInput) as caught:
         run(*BEAM, *options)
     assert message in str(caught.value)
@@ -130,7 +130,7 @@ def test_beam_refuses_with_the_options_name(options, message):
         (["--json", "/absent/folder/x.json"], "no folder"),
     ],
 )
-def test_fea_refuses_before_it_works(change, message):
+def test_fea_refuses_wrong_options_before_meshing(change, message):
     with pytest.raises(BadInput) as caught:
         run("fea", *PLAIN, *MATERIAL, *change)
     assert message in str(caught.value)
@@ -144,7 +144,7 @@ def test_fea_refuses_before_it_works(change, message):
         (["--part", "z=0..1/young=1e9,poisson=0.3"], "--young: missing"),
     ],
 )
-def test_fea_without_a_material_for_all_of_the_link_refuses(change, message):
+def test_fea_refuses_a_link_without_a_material_everywhere(change, message):
     with pytest.raises(BadInput) as caught:
         run("fea", *PLAIN, *change)
     assert message in str(caught.value)
@@ -169,13 +169,13 @@ def test_fea_without_a_material_for_all_of_the_link_refuses(change, message):
         ),
     ],
 )
-def test_stress_refuses_before_it_works(change, message):
+def test_stress_refuses_wrong_options_before_meshing(change, message):
     with pytest.raises(BadInput) as caught:
         run("stress", *PLAIN, *MATERIAL, *change)
     assert message in str(caught.value)
 
 
-def test_fea_refuses_a_file_that_is_none(tmp_path):
+def test_fea_refuses_a_file_that_is_not_a_surface(tmp_path):
     path = tmp_path / "x.stl"
     path.write_text("solid rubbish")
     with pytest.raises(BadInput, match=r"x.stl: "):
@@ -197,12 +197,12 @@ def test_fea_writes_the_keys_of_the_format(tmp_path):
 
 
 @pytest.mark.slow
-def test_fea_of_two_materials_in_series_with_a_mass_at_the_tip():
-    """Without Poisson's effect plane sections stay plane and compliances add up:
-    of pure bending h/EI, of torsion h/GJ with G = E/2, of tension h/EA.
-
-    Accuracy 1 %; the faces between the materials are those of elements, not the plane,
-    which costs half a per cent of the mass at most."""
+def test_fea_of_two_materials_in_series_adds_their_compliances():
+    """Without Poisson's effect plane sections stay plane, and compliances add up: h/EI
+    for pure bending, h/GJ with G = E/2 for torsion, h/EA for tension. The accuracy
+    is 1 %. The faces between the materials are those of elements, not the plane,
+    which changes the mass by at most half a per cent.
+    """
     text = run(
         "fea", *PLAIN, "--young", "6e10", "--poisson", "0", "--density", "2700",
         "--part", "z=0.226..1/young=1.8e11,poisson=0,density=7800",
@@ -222,7 +222,7 @@ def test_fea_of_two_materials_in_series_with_a_mass_at_the_tip():
 
 
 @pytest.mark.slow
-def test_compare_writes_both_and_draws(tmp_path):
+def test_compare_writes_the_difference_and_a_figure(tmp_path):
     figure = tmp_path / "k.png"
     options = ["--radius", "0.04", "--figure", str(figure), "--json", "-"]
     results = json.loads(run("compare", *PLAIN, *MATERIAL, *options))
@@ -241,16 +241,17 @@ def links():
     return beam, other
 
 
-def test_a_link_two_percent_stiffer_is_seen_as_that():
-    """K 2 % up, L / r = 20: the end effect c of 1 + c r / L is 0.4 everywhere."""
+def test_comparison_reports_a_link_that_is_two_per_cent_stiffer():
+    """K is 2 % larger at L / r = 20:
+    the end effect c of 1 + c r / L is 0.4 everywhere."""
     comparison = compare_link(*links(), size=0.02)
     np.testing.assert_allclose(np.diag(comparison.difference), 0.02, rtol=1e-9)
     np.testing.assert_allclose(comparison.end_effect, 0.4, rtol=1e-9)
     assert "c = 0.40 0.40 0.40 (rotations)" in comparison_text(comparison)
 
 
-def test_the_picture_shows_every_entry_that_matters():
-    """8 of the upper entries are not zero: the diagonal and two couplings."""
+def test_comparison_figure_shows_every_nonzero_entry():
+    """Eight of the upper entries are not zero: the diagonal and two couplings."""
     figure = plot_comparison(compare_link(*links(), size=0.02))
     bars, image = figure.axes[0], figure.axes[1]
     assert len(bars.patches) == 2 * 8
@@ -258,7 +259,7 @@ def test_the_picture_shows_every_entry_that_matters():
     assert "L / r = 20" in figure.get_suptitle()
 
 
-def test_directions_as_people_write_them():
+def test_axis_option_accepts_names_and_components():
     np.testing.assert_array_equal(parse_axis("--axis", "-z"), [0, 0, -1])
     np.testing.assert_array_equal(parse_axis("--axis", "1, 2,3"), [1, 2, 3])
     # the square of 1e300 is no double

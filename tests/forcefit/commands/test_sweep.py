@@ -1,4 +1,4 @@
-"""``forcefit assembly sweep`` and ``plot``: what they write, and how they refuse."""
+"""``forcefit assembly sweep`` and ``plot``: files that they write, and refusals."""
 
 import json
 import os
@@ -19,7 +19,7 @@ most = [1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5]
 """
 
 
-def test_everything_at_once_ends_in_one_file_and_one_object(run, tmp_path):
+def test_sweep_with_all_options_writes_one_file_and_one_object(run, tmp_path):
     (tmp_path / "errors.toml").write_text(ERRORS)
     (tmp_path / "poses.csv").write_text("id,pose.tx,pose.ty\na,0,0.13\nb,0,0.5\n")
     words = ["five_bar", "--poses", tmp_path / "poses.csv",
@@ -56,8 +56,8 @@ def messages(err):
     return len(lines)
 
 
-def test_what_takes_long_is_said_at_once(capsys, monkeypatch):
-    """A log file shows it before the work ends, not only the bars after it."""
+def test_progress_of_a_long_step_is_printed_at_once(capsys, monkeypatch):
+    """A log file then shows it before the work ends."""
     import forcefit.commands.progress
 
     monkeypatch.setattr(forcefit.commands.progress, "_DELAY", 0.0)
@@ -70,7 +70,7 @@ def test_what_takes_long_is_said_at_once(capsys, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_saved_sweep_is_drawn_without_solving(run, tmp_path, monkeypatch):
+def test_plot_draws_a_saved_sweep_without_solving(run, tmp_path, monkeypatch):
     file, picture = tmp_path / "x.nc", tmp_path / "x.png"
     grid = "tx=-0.01:0.01:0.01,ty=0.12:0.14:0.02"
     assert run("assembly", "sweep", "five_bar", "--grid", grid, "-o", file)[0] == 0
@@ -99,8 +99,9 @@ def test_a_saved_sweep_is_drawn_without_solving(run, tmp_path, monkeypatch):
          "no.nc: no such file; expected a data set"),
     ],
 )  # fmt: skip
-def test_bad_input_is_one_message_and_nothing_is_written(run, tmp_path, monkeypatch,
-                                                         words, message):  # fmt: skip
+def test_bad_input_to_a_sweep_gives_one_message_and_writes_nothing(
+    run, tmp_path, monkeypatch, words, message
+):
     monkeypatch.chdir(tmp_path)
     status, out, err = run("assembly", *words)
     assert (status, out) == (2, "")
@@ -109,7 +110,7 @@ def test_bad_input_is_one_message_and_nothing_is_written(run, tmp_path, monkeypa
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_journal_of_another_grid_is_refused(run, tmp_path):
+def test_journal_of_another_sweep_is_refused(run, tmp_path):
     from assembly.sweeps.sweep import journal_path
 
     file = tmp_path / "x.nc"
@@ -158,13 +159,11 @@ GRIDS = {
      *(pytest.param(*case, marks=pytest.mark.slow)
        for case in (("0", "a map"), ("1e-4", "a line")))],
 )  # fmt: skip
-def test_a_sweep_without_a_finite_value_is_summed_up_and_drawn(
+def test_sweep_without_a_finite_value_has_a_summary_and_a_figure(
     run, tmp_path, errors, grid
 ):
-    """Errors without play or springs: no margin is finite, nothing has an energy.
-
-    Drawn at once with errors, from the file without.
-    """
+    """Errors without clearances or springs: no margin is finite, no point has an
+    energy. The figure is drawn by the sweep with errors, and from the file without."""
     robot, file, picture = (tmp_path / n for n in ("r.toml", "x.nc", "x.png"))
     robot.write_text(STIFF.replace("1e-4", errors))
     axes, words = GRIDS[grid]
@@ -186,7 +185,7 @@ def test_a_sweep_without_a_finite_value_is_summed_up_and_drawn(
         assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_first_reason_why_not_is_told(run, tmp_path):
+def test_sweep_prints_the_reason_of_the_first_failed_point(run, tmp_path):
     robot, file = tmp_path / "r.toml", tmp_path / "x.nc"
     robot.write_text(STIFF)
     status, out, _ = run("assembly", "sweep", robot, "--grid", "q.drive=0", "-o", file)
@@ -194,7 +193,7 @@ def test_the_first_reason_why_not_is_told(run, tmp_path):
     assert "\ncannot assemble, for one: a rigid part stays open by 0.0001" in out
 
 
-def test_a_sweep_that_reaches_nothing_is_summed_up_and_drawn(run, tmp_path):
+def test_sweep_without_a_reachable_point_has_a_summary_and_a_figure(run, tmp_path):
     file, picture = tmp_path / "x.nc", tmp_path / "x.png"
     words = ["--grid", "tx=5:6:0.5,ty=7:8:0.5", "-o", file, "--figure", picture]
     status, out, err = run("assembly", "sweep", "five_bar", *words)
@@ -203,7 +202,7 @@ def test_a_sweep_that_reaches_nothing_is_summed_up_and_drawn(run, tmp_path):
     assert run("assembly", "plot", file, "--figure", picture, "--at", "tx=5")[0] == 0
 
 
-def test_postures_of_a_list_and_designs_are_a_map(run, tmp_path):
+def test_sweep_of_listed_poses_and_designs_draws_a_map(run, tmp_path):
     (tmp_path / "poses.csv").write_text("id,pose.tx,pose.ty\na,0,0.13\nb,0,0.14\n")
     words = ["--vary", "elbow.link.young=2e11,7e10,1e11", "-o", tmp_path / "x.nc",
              "--figure", tmp_path / "x.svg"]  # fmt: skip
@@ -254,7 +253,7 @@ def test_ask_sweep_takes_paths_as_text_or_as_paths(tmp_path):
         (["-o", f"{'x' * 300}.nc"], "cannot be written: File name too long"),
     ],
 )  # fmt: skip
-def test_an_output_that_is_not_the_commands_is_refused_and_left(
+def test_file_of_another_program_is_refused_as_output_and_kept(
     run, tmp_path, monkeypatch, words, message
 ):
     monkeypatch.chdir(tmp_path)
@@ -272,7 +271,7 @@ def test_an_output_that_is_not_the_commands_is_refused_and_left(
     assert {p: p.lstat().st_mtime_ns for p in tmp_path.iterdir()} == before
 
 
-def test_a_sweep_replaces_its_own_file(run, tmp_path):
+def test_sweep_replaces_a_file_of_an_earlier_sweep(run, tmp_path):
     for grid in ("tx=0,ty=0.13", "tx=0,ty=0.14"):
         words = ["five_bar", "--grid", grid, "-o", tmp_path / "x.nc"]
         assert run("assembly", "sweep", *words)[0] == 0
@@ -281,8 +280,9 @@ def test_a_sweep_replaces_its_own_file(run, tmp_path):
 
 
 @pytest.mark.parametrize("kind", [SystemError, ValueError, KeyboardInterrupt])
-def test_ctrl_c_in_compiled_code_is_130_too(kind, run, monkeypatch):
-    """Which fails with errors of its own; matplotlib's are ValueErrors."""
+def test_ctrl_c_in_compiled_code_has_exit_status_130(kind, run, monkeypatch):
+    """Compiled code turns the interrupt into errors of its own;
+    those of matplotlib are ValueErrors."""
 
     def interrupted(**_):
         try:
@@ -301,7 +301,7 @@ def test_ctrl_c_in_compiled_code_is_130_too(kind, run, monkeypatch):
     assert (status, err) == (130, "forcefit: interrupted\n")
 
 
-def test_the_same_error_without_ctrl_c_is_shown_whole(run, monkeypatch):
+def test_error_without_ctrl_c_is_raised_unchanged(run, monkeypatch):
     def failed(**_):
         raise ValueError("Invalid bounding box")
 
@@ -310,8 +310,9 @@ def test_the_same_error_without_ctrl_c_is_shown_whole(run, monkeypatch):
         run("study")
 
 
-def test_a_damaged_file_is_one_message_and_nothing_more(run, tmp_path, monkeypatch):
-    """HDF5 opens some of them, and h5netcdf then fails half open."""
+def test_damaged_sweep_file_gives_one_message(run, tmp_path, monkeypatch):
+    """HDF5 opens some of these files,
+    and h5netcdf then fails while the file is half open."""
     from forcefit.commands import sweep
 
     monkeypatch.setattr(sweep, "save_figure", lambda *_: None)  # slow, after reading
@@ -331,7 +332,7 @@ def test_a_damaged_file_is_one_message_and_nothing_more(run, tmp_path, monkeypat
     ("words", "said"),
     [(["--gravity", "z=-9.81"], 1), (["--load", "fx=1"], 1), ([], 0)],
 )  # fmt: skip
-def test_sweep_says_that_frequencies_leave_load_and_gravity_out(
+def test_sweep_reports_that_frequencies_leave_load_and_gravity_out(
     run, tmp_path, words, said
 ):
     grid = ["--grid", "tx=0,ty=0.13", "--assumption", "none", "--frequencies", "1"]

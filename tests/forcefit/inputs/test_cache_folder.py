@@ -1,4 +1,4 @@
-"""Where meshes and compiled code are kept, and what happens where nothing can be."""
+"""Folder of cached meshes and compiled code, and runs without a writable folder."""
 
 import os
 import shutil
@@ -26,7 +26,7 @@ def nothing(monkeypatch, tmp_path):
     return tmp_path
 
 
-def test_the_cache_is_where_the_user_says(nothing, monkeypatch):
+def test_cache_folder_follows_the_environment_variable(nothing, monkeypatch):
     monkeypatch.setenv("FORCEFIT_CACHE", str(nothing / "mine"))
     assert cache_folder() == nothing / "mine"
     # one that cannot be made is passed over
@@ -38,7 +38,7 @@ def test_the_cache_is_where_the_user_says(nothing, monkeypatch):
     ("win32", "LOCALAPPDATA", ""), ("darwin", "", "Library/Caches"),
     ("linux", "XDG_CACHE_HOME", ".cache"),
 ])  # fmt: skip
-def test_the_cache_is_where_each_system_keeps_them(
+def test_cache_folder_follows_the_convention_of_each_system(
     system, variable, within, nothing, monkeypatch
 ):
     monkeypatch.setattr(module.sys, "platform", system)
@@ -49,7 +49,7 @@ def test_the_cache_is_where_each_system_keeps_them(
         assert cache_folder() == nothing / "other" / "forcefit"
 
 
-def test_without_a_home_the_cache_is_the_users_own_temporary_folder(
+def test_cache_folder_without_a_home_is_a_private_temporary_folder(
     nothing, monkeypatch
 ):
     def homeless():
@@ -62,8 +62,8 @@ def test_without_a_home_the_cache_is_the_users_own_temporary_folder(
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="no users of POSIX")
-def test_a_temporary_folder_that_others_may_write_is_not_taken(nothing):
-    """Because code is loaded from there."""
+def test_temporary_folder_that_others_may_write_is_not_used_as_cache(nothing):
+    """Code is loaded from the cache."""
     folder = cache_folder()
     folder.chmod(0o777)
     assert cache_folder() is None
@@ -73,15 +73,15 @@ def test_a_temporary_folder_that_others_may_write_is_not_taken(nothing):
     assert cache_folder() is None
 
 
-def test_no_cache_without_a_writable_folder(nothing):
+def test_cache_folder_is_none_without_a_writable_folder(nothing):
     shutil.rmtree(nothing / "tmp")
     assert cache_folder() is None
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("temporary", [True, False])
-def test_a_read_only_installation_without_a_home_works(tmp_path, temporary):
-    """Every __pycache__ is a file, so that not even root can write beside a source."""
+def test_read_only_installation_without_a_home_works(tmp_path, temporary):
+    """Every __pycache__ is a file, so that even root cannot write beside a source."""
     for package in ("forcefit", "stiffness", "assembly", "validation"):
         shutil.copytree(ROOT / package, tmp_path / package,
                         ignore=shutil.ignore_patterns("__pycache__"))  # fmt: skip

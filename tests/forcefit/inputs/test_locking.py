@@ -1,4 +1,4 @@
-"""Locks on files, and systems that lack what POSIX has."""
+"""Locks on files, and systems without POSIX modules."""
 
 import os
 import subprocess
@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[3]
 
 
 def test_locked_file_is_refused_until_released(tmp_path):
-    """Also within one process."""
+    """Also within a single process."""
     path = tmp_path / "map.nc.journal"
     with locked_file(path):
         with pytest.raises(BlockingIOError), locked_file(path, wait=False):
@@ -24,7 +24,7 @@ def test_locked_file_is_refused_until_released(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_lock_of_a_killed_program_is_taken(tmp_path):
+def test_lock_of_a_killed_program_is_released(tmp_path):
     path = tmp_path / "map.nc.journal"
     held = f"""
 import os
@@ -70,7 +70,7 @@ main()
     ],
 )
 def test_commands_run_without_posix_modules(tmp_path, words):
-    """Without modules and functions that Windows lacks the answer is the same.
+    """Without modules and functions that Windows lacks, results are the same.
 
     Only the command's own process is tested.
     """

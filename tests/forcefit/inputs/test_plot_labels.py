@@ -1,4 +1,4 @@
-"""Names that users chose, in every figure: shown as they are written."""
+"""Names that users chose are shown unchanged in every figure."""
 
 import numpy as np
 import pytest
@@ -27,8 +27,8 @@ def drawn_texts(figure):
 
 
 @pytest.mark.parametrize("name", ODD)
-def test_matplotlib_shows_a_name_as_it_is_written(name):
-    """As wide as the same text with formulas switched off."""
+def test_matplotlib_shows_a_name_unchanged(name):
+    """Its width equals that of the same text without mathematical markup."""
     from matplotlib.figure import Figure
 
     figure = Figure()
@@ -54,7 +54,7 @@ def grid(count, axes):
 
 
 @pytest.mark.slow
-def test_maps_and_paths_of_joints_with_odd_names_are_drawn():
+def test_maps_and_paths_show_unusual_joint_names_unchanged():
     both = grid((2, 3), (f"q.{ODD[0]}", f"{ODD[2]}.link.length"))
     shown = drawn_texts(map_figure(both))
     assert any(text.startswith(plot_label(ODD[0])) for text in shown)
@@ -65,7 +65,7 @@ def test_maps_and_paths_of_joints_with_odd_names_are_drawn():
     assert any(plot_label(f"parallel: {ODD[2]}") in text for text in shown)
 
 
-def test_a_constant_map_says_its_value_and_has_no_scale():
+def test_constant_map_states_its_value_without_a_colour_scale():
     data = grid((2, 3), ("tx", "ty"))
     data["energy"] = (("tx", "ty"), np.arange(6.0).reshape(2, 3))
     figure = map_figure(data)
@@ -74,7 +74,7 @@ def test_a_constant_map_says_its_value_and_has_no_scale():
     assert len(figure.axes) == 6 + 1  # panels, and the energy's scale
 
 
-def test_draws_importance_and_tolerances_of_odd_names_are_drawn():
+def test_figures_of_statistics_show_unusual_names_unchanged():
     attrs = {"robot": ODD[0], "seed": 1, "clearance": "worst"}
     draws = {"energy": ("draw", np.arange(5.0)), "status": ("draw", np.zeros(5))}
     shown = drawn_texts(histogram_figure(xarray.Dataset(draws, attrs=attrs)))

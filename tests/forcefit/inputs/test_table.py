@@ -1,4 +1,4 @@
-"""Strict reading of tables: what is found, what is expected, in one short line."""
+"""Strict reading of tables: found and expected value, in one short line."""
 
 import math
 
@@ -32,11 +32,11 @@ def message(function, *args, **kwargs):
 
 
 def test_bad_input_is_a_value_error():
-    """So that callers of the library need not know our class."""
+    """Callers of the library need not know this class."""
     assert isinstance(BadInput("x"), ValueError)
 
 
-def test_a_message_is_one_line_whatever_is_put_into_it():
+def test_bad_input_message_is_one_line_for_any_text():
     text = str(BadInput("a\nb\x1b[31m\u2028c\ud800"))
     assert text == r"a\nb\x1b[31m\u2028c\ud800"
     assert len(str(BadInput("x" * 10**6))) <= 800
@@ -45,7 +45,7 @@ def test_a_message_is_one_line_whatever_is_put_into_it():
 
 @given(st.text(alphabet=st.characters()), st.integers(20, 90))
 def test_one_line_keeps_short_plain_text_and_cuts_long_text(text, longest):
-    """An unseen character may take up to ten places once it is spelt out."""
+    """An escaped character may take up to ten places."""
     line = one_line(text, longest)
     assert len(line) <= 10 * longest
     assert "\n" not in line
@@ -53,7 +53,7 @@ def test_one_line_keeps_short_plain_text_and_cuts_long_text(text, longest):
         assert line == text
 
 
-def test_the_nearest_name_is_offered_or_all_of_them():
+def test_nearest_name_is_suggested_or_all_names_are_listed():
     assert nearest("raduis", ["radius", "width"]) == '; did you mean "radius"?'
     assert nearest("q", ["b", "a", "a"]) == "; valid: a, b"
     assert nearest("q", []) == ""
@@ -74,15 +74,15 @@ def test_the_nearest_name_is_offered_or_all_of_them():
     ],
     ids=str,
 )
-def test_a_value_is_described_as_it_stands_in_the_file(value, text):
+def test_value_is_described_as_written_in_the_file(value, text):
     assert describe(value) == text
 
 
-def test_an_integer_that_python_does_not_print_is_described():
+def test_integer_too_long_to_print_is_described_by_its_bits():
     assert describe(16**5000) == "an integer of 20001 bits"
 
 
-def test_a_description_is_short_whatever_is_described():
+def test_description_of_any_value_is_short():
     deep = []
     for _ in range(100_000):
         deep = [deep]
@@ -93,7 +93,7 @@ def test_a_description_is_short_whatever_is_described():
         deep = deep[0]
 
 
-def test_a_name_in_quotes_is_short():
+def test_quoted_name_is_cut_to_62_characters():
     assert quoted("a b") == '"a b"'
     assert len(quoted("x" * 10**6)) <= 62
 
@@ -102,7 +102,7 @@ def test_a_name_in_quotes_is_short():
     ([1, 2.5], [1.0, 2.5]), ([[1, 2], [3, 4]], [[1, 2], [3, 4]]), ([], []),
     ([math.inf], [math.inf]), ([int(1.7976931348623157e308)], [1.7976931348623157e308]),
 ])  # fmt: skip
-def test_lists_of_numbers_become_arrays(value, expected):
+def test_number_array_converts_lists_of_numbers(value, expected):
     np.testing.assert_array_equal(number_array(value), expected)
     assert number_array(value).dtype == float
 
@@ -112,7 +112,7 @@ def test_lists_of_numbers_become_arrays(value, expected):
     [1.0, "12", None, {"a": 1}, [True], ["1"], [[1], [1, 2]], [[1], 2], [1, [2]],
      [[1], ["a"]], [2**1024], [-(10**400)]],
 )  # fmt: skip
-def test_ragged_or_non_numeric_lists_give_none(value):
+def test_number_array_of_ragged_or_non_numeric_lists_is_none(value):
     assert number_array(value) is None
 
 
@@ -125,11 +125,11 @@ def test_ragged_or_non_numeric_lists_give_none(value):
     ([[1, 2], 3], (2, 2), "3 in row 2"),
     ([[1, 2], [3]], (2, 2), "[3] of length 1 in row 2"),
 ])  # fmt: skip
-def test_the_fault_in_an_array_is_pointed_at(value, shape, text):
+def test_fault_in_an_array_is_reported_with_its_position(value, shape, text):
     assert find_fault(value, shape) == text
 
 
-def test_infinity_is_accepted_on_request():
+def test_infinite_number_is_accepted_on_request():
     assert find_fault([1, math.inf, "a"], (3,), infinite=True) == "'a' as number 3"
 
 
@@ -141,13 +141,13 @@ def test_infinity_is_accepted_on_request():
         (0, "found 0"), (2, "found 2"), (-1.5, "found -1.5"),
     ],
 )  # fmt: skip
-def test_a_number_out_of_range_is_refused(value, text):
+def test_number_out_of_range_is_refused(value, text):
     found = message(table(a=value).number, "a", "m", above=0.0, below=2.0)
     assert found.startswith(f"f.toml: place.a: {text}")
     assert found.endswith("expected a finite number > 0 and < 2 [m]")
 
 
-def test_a_number_without_limits_says_so():
+def test_message_for_a_number_states_only_the_limits_it_has():
     assert message(table().number, "a", "rad") == (
         "f.toml: place.a: missing; expected a finite number [rad]"
     )
@@ -157,7 +157,7 @@ def test_a_number_without_limits_says_so():
     )
 
 
-def test_defaults_stand_in_for_what_is_absent():
+def test_absent_keys_have_their_defaults():
     empty = table()
     assert empty.number("a", "m", 2.5) == 2.5
     assert empty.text("b", "x") == "x"
@@ -168,7 +168,7 @@ def test_defaults_stand_in_for_what_is_absent():
     np.testing.assert_array_equal(empty.array("g", (2,), "m", np.ones(2)), [1, 1])
 
 
-def test_a_default_does_not_cover_a_mistake():
+def test_wrong_value_is_refused_in_spite_of_a_default():
     wrong = table(a="x", b=3, c=1, d=1.5, e="z", f=[1], g=[1])
     assert "place.a: found 'x'" in message(wrong.number, "a", "m", 2.5)
     assert "place.b: found 3, expected a string" in message(wrong.text, "b", "x")
@@ -183,7 +183,7 @@ def test_a_default_does_not_cover_a_mistake():
 
 
 @pytest.mark.parametrize("value", [True, -1, 1.0, "1"])
-def test_a_whole_number_is_an_integer(value):
+def test_value_that_is_not_a_whole_number_is_refused(value):
     assert "expected a whole number >= 0" in message(table(a=value).integer, "a")
 
 
@@ -194,13 +194,13 @@ def test_a_whole_number_is_an_integer(value):
     ("a\nb", r"found 'a\nb', expected no control characters"),
     ("a" * 60, "of 60 characters, expected at most 50"),
 ])  # fmt: skip
-def test_a_text_is_one_short_line(value, text):
+def test_text_that_is_not_one_short_line_is_refused(value, text):
     assert text in message(
         table(a=value).text, "a", expected="a name", longest=50
     )  # fmt: skip
 
 
-def test_a_misspelt_key_is_found_when_it_is_missed_and_when_it_is_left_over():
+def test_misspelt_key_is_reported_as_missing_and_as_unknown():
     wrong = table(raduis=1.0)
     assert 'found "raduis" instead' in message(wrong.number, "radius", "m")
     assert message(wrong.finish) == (
@@ -208,20 +208,20 @@ def test_a_misspelt_key_is_found_when_it_is_missed_and_when_it_is_left_over():
     )
 
 
-def test_an_inner_table_knows_its_place():
+def test_message_of_an_inner_table_states_its_path():
     root = Table({"a": [{"b": {"c": 1}}]}, "f.toml", "")
     inner = root.tables("a")[0].table("b")
     assert message(inner.text, "c") == "f.toml: a[1].b.c: found 1, expected a string"
     root.finish()
 
 
-def test_text_is_read_with_or_without_a_mark_and_with_any_line_ends(tmp_path):
+def test_text_is_read_with_a_byte_order_mark_and_any_line_ends(tmp_path):
     path = tmp_path / "a.txt"
     path.write_bytes(b"\xef\xbb\xbfa\r\nb\n")
     assert read_text(path) == "a\nb\n"
 
 
-def test_a_file_too_large_is_not_read(tmp_path):
+def test_file_above_64_mib_is_refused(tmp_path):
     path = tmp_path / "large"
     with path.open("wb") as file:
         file.truncate((64 << 20) + 1)
@@ -244,14 +244,14 @@ def test_wrong_toml_is_refused_with_its_reason(text, reason, tmp_path):
     assert len(found) < len(str(path)) + 250
 
 
-def test_deep_keys_that_are_sound_are_read(tmp_path):
-    """Dots in numbers and in texts are no nesting."""
+def test_dotted_keys_are_read_next_to_dots_in_values(tmp_path):
+    """Dots in numbers and in texts are not nesting."""
     path = tmp_path / "a.toml"
     numbers = ", ".join(["0.25"] * 500)
     path.write_text(f"a.b.c.d = [{numbers}]\ntext = '{'so. ' * 50}'\n")
     assert read_toml(path).content["a"]["b"]["c"]["d"] == [0.25] * 500
 
 
-def test_an_integer_that_is_no_double_is_out_of_range():
+def test_integer_beyond_the_range_of_doubles_is_refused():
     with pytest.raises(BadInput, match="--workers: found inf, expected"):
         checked("--workers", 10**400, "1", least=1)

@@ -59,7 +59,7 @@ def written_elsewhere(path):
                 yield f"{path.relative_to(ROOT)}:{node.lineno} {node.func.attr}"
 
 
-def test_no_command_writes_a_file_by_itself():
+def test_only_the_writing_module_writes_files():
     files = [p for f in ("stiffness", "assembly", "validation") for p in
              (ROOT / f).rglob("*.py")]  # fmt: skip
     files = [p for p in files if p.relative_to(ROOT).as_posix() not in _MAY]
@@ -117,7 +117,7 @@ WRITE = {
 
 @pytest.mark.parametrize("name", WRITE)
 @pytest.mark.parametrize("before", [None, b"what stood there\n"])
-def test_full_disk_is_one_message_and_keeps_the_old_file(tmp_path, name, before):
+def test_full_disk_gives_one_message_and_keeps_the_old_file(tmp_path, name, before):
     path = tmp_path / name
     if before is not None:
         path.write_bytes(WRITTEN.get(path.suffix, before))
@@ -130,14 +130,14 @@ def test_full_disk_is_one_message_and_keeps_the_old_file(tmp_path, name, before)
 
 
 @pytest.mark.parametrize("name", WRITE)
-def test_a_file_appears_whole_with_nothing_beside_it(tmp_path, name):
+def test_written_file_is_complete_and_leaves_no_other_file(tmp_path, name):
     WRITE[name](tmp_path / name)
     assert [p.name for p in tmp_path.iterdir()] == [name]
     assert (tmp_path / name).stat().st_size > 500
 
 
 @pytest.mark.parametrize("ending", PIXELS.endings)
-def test_every_ending_of_a_picture_works_and_is_replaced(tmp_path, ending):
+def test_picture_of_every_ending_is_written_and_replaced(tmp_path, ending):
     path = tmp_path / f"picture{ending.upper()}"
     for shade in (0, 255):
         save_pixels(np.full((5, 7, 3), shade, np.uint8), path)
@@ -148,7 +148,7 @@ def test_every_ending_of_a_picture_works_and_is_replaced(tmp_path, ending):
 
 
 @pytest.mark.parametrize("ending", PICTURE.endings)
-def test_every_ending_of_a_figure_works_and_is_replaced(tmp_path, ending):
+def test_figure_of_every_ending_is_written_and_replaced(tmp_path, ending):
     path = tmp_path / f"figure{ending}"
     path.write_bytes(WRITTEN[ending])
     save_figure(a_figure(), path)
@@ -165,7 +165,7 @@ def fail_in(path):
         raise KeyboardInterrupt
 
 
-def test_a_failure_while_writing_leaves_the_old_file(tmp_path):
+def test_failure_while_writing_keeps_the_old_file(tmp_path):
     path = tmp_path / "x.txt"
     path.write_text("old")
     with pytest.raises(KeyboardInterrupt):
@@ -173,7 +173,7 @@ def test_a_failure_while_writing_leaves_the_old_file(tmp_path):
     assert [p.read_text() for p in tmp_path.iterdir()] == ["old"]
 
 
-def test_file_keeps_its_mode_and_link_its_target(tmp_path):
+def test_replaced_file_keeps_its_mode_and_a_link_its_target(tmp_path):
     path, link = tmp_path / "real.json", tmp_path / "link.json"
     path.write_text("{}")
     path.chmod(0o600)
@@ -210,7 +210,7 @@ def test_a_robot_file_written_by_hand_is_not_replaced(tmp_path):
         check_writable(path, ROBOT)
 
 
-def test_odd_paths_are_refused():
+def test_invalid_paths_are_refused():
     for path in ("a\0b.json", "x" * 300 + ".json", "", ".", "/dev/null/x.json"):
         with pytest.raises(BadInput):
             check_writable(path, JSON)
@@ -226,8 +226,9 @@ def write_many(path, mark, count):
         write_text(mark * 30_000, path)
 
 
-def test_two_programs_at_once_leave_one_of_their_files(tmp_path):
-    """Each waits for the other: no mixture, and no other file."""
+def test_two_programs_writing_at_once_leave_one_complete_file(tmp_path):
+    """Each waits for the other:
+    the file is never a mixture, and no other file remains."""
     path, fork = tmp_path / "x.txt", multiprocessing.get_context("fork")
     both = [fork.Process(target=write_many, args=(path, mark, 30)) for mark in "ab"]
     for one in both:
@@ -258,7 +259,9 @@ def test_part_file_of_a_killed_program_is_replaced(tmp_path):
     assert [p.read_text() for p in tmp_path.iterdir()] == ["whole"]
 
 
-def test_a_path_is_written_with_slashes_from_the_files_folder(tmp_path, monkeypatch):
+def test_relative_path_has_slashes_and_starts_at_the_folder_of_the_file(
+    tmp_path, monkeypatch
+):
     assert path_from(tmp_path / "a" / "b", tmp_path / "c.stl") == "../../c.stl"
 
     def another_drive(*given):

@@ -1,6 +1,6 @@
-"""A study's page in a real browser: it draws; slider, click and switch do their work.
+"""A study's page in a real browser: it draws, and slider, click and switch work.
 
-Headless Chromium by selenium; skipped where there is none.
+Headless Chromium by selenium; skipped where it is not installed.
 """
 
 import base64
@@ -99,7 +99,7 @@ def slide(tab, name, value):
     wait(tab, "return window.again")
 
 
-def test_it_opens_without_a_word_in_the_console_and_without_a_network(tab):
+def test_page_opens_without_console_errors_or_network_requests(tab):
     said = [one for one in tab.get_log("browser") if one["level"] == "SEVERE"]
     assert said == []
     fetched = tab.execute_script(
@@ -113,7 +113,7 @@ def test_it_opens_without_a_word_in_the_console_and_without_a_network(tab):
     assert all(figures)
 
 
-def test_the_slider_exaggerates_in_proportion(tab, results):
+def test_slider_exaggerates_displacements_in_proportion(tab, results):
     names = ("forced, elastic", "forced, rigid")
     most = float(tab.execute_script(
         "return document.querySelector('input.exaggeration').max"
@@ -128,7 +128,7 @@ def test_the_slider_exaggerates_in_proportion(tab, results):
     slide(tab, "exaggeration", 0.5 * most)
 
 
-def test_the_closing_begins_open_and_ends_shut(tab):
+def test_closing_animation_begins_open_and_ends_closed(tab):
     steps = int(tab.execute_script("return document.querySelector('.closing').max"))
     gaps = []
     for step in (0, steps - 1):
@@ -141,7 +141,7 @@ def test_the_closing_begins_open_and_ends_shut(tab):
     assert "still open" not in traces(tab)
 
 
-def test_a_click_on_the_map_opens_the_points_numbers(tab, results):
+def test_click_on_the_map_shows_the_numbers_of_the_point(tab, results):
     from selenium.webdriver import ActionChains
     from selenium.webdriver.common.by import By
 
@@ -166,7 +166,7 @@ def test_a_click_on_the_map_opens_the_points_numbers(tab, results):
     assert texts["tx"] == "100 mm"
 
 
-def test_the_choice_of_a_quantity_changes_the_map(tab, results):
+def test_choice_of_a_quantity_changes_the_map(tab, results):
     tab.execute_script(
         "const s = document.querySelector('figure.map select');"
         "s.value = [...s.options].find(o => o.text.startsWith('energy')).value;"
@@ -181,7 +181,7 @@ def test_the_choice_of_a_quantity_changes_the_map(tab, results):
     np.testing.assert_allclose(np.array(drawn, dtype=float), energies)
 
 
-def test_a_click_sorts_and_a_button_copies_in_full(tab, results):
+def test_click_sorts_a_table_and_the_button_copies_all_digits(tab, results):
     tab.execute_script(
         "window.copied = []; navigator.clipboard.writeText = async text => {"
         " window.copied.push(text); };"
@@ -203,7 +203,7 @@ def test_a_click_sorts_and_a_button_copies_in_full(tab, results):
         assert row[4] == f"{one['rotation']!r} rad"
 
 
-def test_the_switch_shows_si_and_back(tab, results):
+def test_unit_switch_changes_to_si_and_back(tab, results):
     first = "return document.querySelector('.tile .answer span').textContent"
     axis = "return document.querySelector('figure.map .plot').layout.xaxis.title.text"
     own = tab.execute_script(first)
@@ -218,21 +218,21 @@ def test_the_switch_shows_si_and_back(tab, results):
     assert tab.execute_script(first) == own
 
 
-def test_the_numbers_in_the_browser_are_the_json(tab, results):
+def test_page_in_the_browser_contains_the_written_json(tab, results):
     held = tab.execute_script("return document.querySelector('script.results').text")
     written = (results.study.folder / "results.json").read_text()
     assert json.loads(held) == json.loads(written)
 
 
-def test_it_prints_without_its_buttons(tab):
+def test_page_prints_to_pdf_with_its_pictures(tab):
     pdf = tab.execute_cdp_cmd("Page.printToPDF", {"printBackground": True})
     content = base64.b64decode(pdf["data"])
     assert content.startswith(b"%PDF")
     assert len(content) > 50_000  # with its pictures
 
 
-def test_every_figure_is_printed_as_a_picture_of_dark_lines_on_white(tab):
-    """What WebGL drew may be gone by then; a dark page is not printed dark."""
+def test_every_figure_is_printed_with_dark_lines_on_white(tab):
+    """WebGL drawings may be lost by then, and a dark page must not be printed dark."""
     count = tab.execute_script("return document.querySelectorAll('figure').length")
     tab.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [
         {"name": "prefers-color-scheme", "value": "dark"}]})  # fmt: skip
@@ -257,7 +257,7 @@ def test_every_figure_is_printed_as_a_picture_of_dark_lines_on_white(tab):
     tab.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})
 
 
-def test_a_dark_screen_has_a_dark_page_with_light_letters(tab):
+def test_dark_colour_scheme_has_a_dark_page_with_light_text(tab):
     read = (
         "const s = getComputedStyle(document.body);"
         "return [s.backgroundColor, s.color, getComputedStyle("
@@ -277,7 +277,7 @@ def test_a_dark_screen_has_a_dark_page_with_light_letters(tab):
         assert abs(axis - back) > 128
 
 
-def test_a_phone_breaks_no_number_and_scrolls_wide_tables_in_their_box(tab):
+def test_phone_layout_breaks_no_number_and_scrolls_wide_tables(tab):
     phone = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
     tab.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", phone)
     try:
@@ -296,7 +296,7 @@ def test_a_phone_breaks_no_number_and_scrolls_wide_tables_in_their_box(tab):
         tab.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
-def test_the_enter_key_sorts_by_the_head_that_has_the_focus(tab):
+def test_enter_key_sorts_by_the_focused_column_header(tab):
     from selenium.webdriver.common.keys import Keys
 
     head = tab.execute_script(

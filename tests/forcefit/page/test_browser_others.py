@@ -1,4 +1,4 @@
-"""The pages of other commands in a real browser: they draw, and hold their JSON."""
+"""Pages of other commands in a real browser: they draw, and contain their JSON."""
 
 import json
 from pathlib import Path
@@ -52,7 +52,7 @@ def opened(request, tmp_path, run):
         tab.quit()
 
 
-def test_a_page_draws_all_its_figures_and_holds_its_json(opened):
+def test_page_draws_all_its_figures_and_contains_its_json(opened):
     tab, results, figures = opened
     said = [one for one in tab.get_log("browser") if one["level"] == "SEVERE"]
     assert said == []

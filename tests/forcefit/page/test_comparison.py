@@ -1,4 +1,4 @@
-"""Two runs side by side: what changed, and by how much."""
+"""Comparison of two runs: changed values and the size of the changes."""
 
 import json
 
@@ -29,7 +29,7 @@ AFTER = {
 }  # fmt: skip
 
 
-def test_every_change_is_found_the_largest_first():
+def test_comparison_lists_every_change_with_the_largest_first():
     seen = compare(BEFORE, AFTER, ("x", "y"))
     assert [(c.place[-2:], c.before, c.after) for c in seen.changes] == [
         (("pose", "rotation"), 0.0, 1e-3),
@@ -44,7 +44,7 @@ def test_every_change_is_found_the_largest_first():
     assert compare(BEFORE, BEFORE, ("x", "x")).changes == ()
 
 
-def test_figures_of_the_top_come_before_components_that_changed_more():
+def test_comparison_lists_headline_numbers_before_components():
     first = {
         "error": {"frozen": {"upper": 1.0, "platform_screw": [1.0, 2.0]}},
         "solution": {"energy": 2.0, "wrenches": [[1e3, 0.0], [0.0, 5.0]]},
@@ -62,7 +62,7 @@ def test_figures_of_the_top_come_before_components_that_changed_more():
     ]
 
 
-def test_a_comparison_is_a_page_without_charts():
+def test_comparison_page_has_tables_without_charts():
     text = comparison_page(compare(BEFORE, AFTER, ("x", "y")), Provenance())
     rows = {row[0].text: row[1:] for row in parse(text).tables[0][1:]}
     cells = rows["certified worst case, pose, platform translation"]
@@ -71,7 +71,7 @@ def test_a_comparison_is_a_page_without_charts():
     assert len(text) < 100_000
 
 
-def test_the_command_compares_a_page_with_a_json_file(tmp_path, run):
+def test_report_compare_accepts_pages_and_json_files(tmp_path, run):
     first, second = tmp_path / "a.json", tmp_path / "b.json"
     first.write_text(json.dumps(BEFORE))
     second.write_text(json.dumps(AFTER))
@@ -96,7 +96,9 @@ def test_the_command_compares_a_page_with_a_json_file(tmp_path, run):
         ("a.json", b"[1]", "a.json: found a JSON list or value, expected results"),
     ],
 )
-def test_what_cannot_be_compared_is_one_line(tmp_path, run, name, content, message):
+def test_files_that_cannot_be_compared_are_refused_in_one_line(
+    tmp_path, run, name, content, message
+):
     if content is not None:
         (tmp_path / name).write_bytes(content)
     status, printed, err = run("report", "compare", tmp_path / name, tmp_path / name)

@@ -1,4 +1,4 @@
-"""Pages: their numbers are the results', nothing is fetched, names stay names."""
+"""Pages: their numbers equal the results, nothing is fetched, names stay names."""
 
 import math
 
@@ -44,13 +44,13 @@ def written(*body, **changes):
         (3.0, "m/s^2", "3 m/s^2"),
     ],
 )
-def test_numbers_are_shown_in_the_units_of_a_drawing(value, unit, text):
+def test_page_numbers_are_shown_in_drawing_units(value, unit, text):
     (cell,) = parse(table(["a"], [[Value(value, unit)]])).tables[0][1]
     assert cell.text == text
     assert cell.value == pytest.approx(value, nan_ok=True)
 
 
-def test_a_units_factor_takes_si_to_what_is_shown():
+def test_unit_factor_converts_si_to_the_shown_unit():
     for unit, size in (("m", 1.0), ("m", 1e-6), ("rad", 1e-3), ("Pa", 1e6), ("N", 1.0)):
         shown = shown_in(unit, size)
         assert shown.unit == unit
@@ -58,7 +58,7 @@ def test_a_units_factor_takes_si_to_what_is_shown():
         assert shown.factor == ratio[shown.shown]
 
 
-def test_a_column_states_its_unit_once_and_keeps_every_digit():
+def test_table_column_states_its_unit_once_and_keeps_every_digit():
     value = 0.1 + 0.2  # 0.30000000000000004
     rows = [["a", value], ["b", 2.0]]
     head, first, _ = parse(table(["", Column("shift", "m")], rows)).tables[0]
@@ -67,7 +67,7 @@ def test_a_column_states_its_unit_once_and_keeps_every_digit():
     assert (first[1].text, first[1].value, first[1].si) == ("300", value, "0.3")
 
 
-def test_names_are_never_tags_and_never_end_the_data():
+def test_names_on_a_page_are_escaped_in_html_and_data():
     trace = {"type": "scatter", "x": [0.0], "y": [1.0], "name": ODD}
     named = bars({ODD: 1.0}, Axis(ODD, "m"), ODD)
     drawn = chart([trace], Axis(ODD), Axis(ODD), ODD)
@@ -81,7 +81,7 @@ def test_names_are_never_tags_and_never_end_the_data():
     assert results_in(text, "x") == seen.results
 
 
-def test_a_page_fetches_nothing_and_is_small():
+def test_page_fetches_nothing_and_is_small():
     text = written(bars({"a": 1.0}, Axis("x"), ""))
     assert parse(text).fetched == []
     assert "@import" not in text
@@ -91,7 +91,7 @@ def test_a_page_fetches_nothing_and_is_small():
     assert written() == written()
 
 
-def test_a_map_holds_every_number_in_si():
+def test_map_contains_every_number_in_si_units():
     values = np.array([[1e-4, 2e-4, np.nan], [4e-4, 5e-4, 6e-4]])
     axes = [(Axis("tx", "m"), np.array([0.0, 0.1])), (Axis("tz", "m"), np.arange(3.0))]
     layers = [Layer("shift", "shift", "m", values)]
@@ -103,8 +103,8 @@ def test_a_map_holds_every_number_in_si():
     assert spec["axes"]["x"]["values"] == [0.0, 0.1]
 
 
-def test_what_is_the_same_everywhere_is_said_not_drawn():
-    """A map of zeros and rounding once had colours from -0.1 to 0.1."""
+def test_constant_quantity_is_stated_instead_of_drawn():
+    """A map of zeros with rounding once had colours from -0.1 to 0.1."""
     axes = [(Axis("tx", "m"), np.arange(3.0))]
     flat = Layer("energy", "energy", "J", np.full(3, 2.0) * (1 + 1e-16 * np.arange(3)))
     none = Layer("margin", "margin", "", np.full(3, np.inf))
@@ -117,13 +117,13 @@ def test_what_is_the_same_everywhere_is_said_not_drawn():
     assert [layer["drawn"] for layer in spec["layers"]] == [False, True]
 
 
-def test_a_matrix_around_zero_has_colours_of_both_signs():
+def test_signed_matrix_has_a_symmetric_colour_scale():
     (spec,) = parse(matrix([[1.0, -3.0], [0.5, 2.0]], "ab", "t", "c", True)).figures
     (trace,) = spec["traces"]
     assert (trace["zmin"], trace["zmax"]) == (-3.0, 3.0)
 
 
-def test_where_the_numbers_come_from_is_on_the_page(tmp_path):
+def test_page_states_the_command_and_digests_of_its_input_files(tmp_path):
     read = tmp_path / "robot.toml"
     read.write_bytes(b"abc")
     gone = tmp_path / "gone.toml"
@@ -149,10 +149,10 @@ def test_where_the_numbers_come_from_is_on_the_page(tmp_path):
         ("[1]", "x: found a JSON list or value, expected results"),
     ],
 )
-def test_what_holds_no_results_is_refused(text, message):
+def test_page_without_results_is_refused(text, message):
     with pytest.raises(BadInput, match=message):
         results_in(text, "x")
 
 
-def test_an_integer_that_no_float_holds_is_infinite():
+def test_integer_beyond_the_range_of_doubles_is_read_as_infinite():
     assert results_in(f'{{"a": {"9" * 400}, "b": 3}}', "x") == {"a": np.inf, "b": 3}

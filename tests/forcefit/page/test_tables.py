@@ -1,4 +1,4 @@
-"""Cells, heads and colours of a page as a browser is told of them."""
+"""Cells, headers and colours of a page as a browser receives them."""
 
 import re
 
@@ -9,14 +9,14 @@ from forcefit.page.page import Page, Provenance, page
 from forcefit.page.tables import Column, Value, table
 
 
-def test_heads_take_the_focus_of_the_keyboard():
+def test_table_headers_can_have_the_keyboard_focus():
     text = table(["part", Column("shift", "m")], [["a", 1e-3]])
     heads = re.findall(r"<th( [^>]*)>", text)
     assert len(heads) == 2
     assert all("tabindex=0" in head and "scope=col" in head for head in heads)
 
 
-def test_sentences_wrap_in_their_cells_and_numbers_and_names_do_not():
+def test_only_sentences_wrap_in_table_cells():
     sentence = "any position; compliant joints also turn about their axis"
     text = table(["", "", ""], [["leg1.loop2_platform", Value(1.0, "m"), sentence]])
     cells = re.findall(r"<td([^>]*)>([^<]*)", text)
@@ -28,13 +28,13 @@ def test_sentences_wrap_in_their_cells_and_numbers_and_names_do_not():
 @pytest.mark.parametrize(
     ("good", "kind"), [(True, "good"), (None, "mixed"), (False, "bad")]
 )
-def test_a_verdict_has_the_colour_of_what_it_says(good, kind):
+def test_verdict_has_the_colour_of_its_outcome(good, kind):
     text = page(Page("t", "v", good, [], "", [], [], Provenance(), {}))
     assert f"<p class='verdict {kind}'>v</p>" in text
 
 
-def test_no_line_ends_between_a_number_and_its_unit():
-    """A number of things is not one with a unit: 12 poses, 3 N m of 2 modes."""
+def test_no_line_breaks_between_a_number_and_its_unit():
+    """A count has no unit: 12 poses, 3 N m of 2 modes."""
     verdict = "At most 0.794 mm and 13 mrad, 1.926 J, over 12 poses of 2 modes: 5 %."
     text = page(Page("t", verdict, True, [], "", [], [], Provenance(), {}))
     (shown,) = re.findall(r"<p class='verdict good'>(.*?)</p>", text)
@@ -44,8 +44,8 @@ def test_no_line_ends_between_a_number_and_its_unit():
     )
 
 
-def test_a_long_comparison_prints_its_largest_changes_and_folds_the_others():
-    """Folded parts are not printed; 1000 changes took dozens of sheets."""
+def test_long_comparison_shows_its_largest_changes_and_folds_the_others():
+    """Folded parts are not printed; 1000 changes would take dozens of sheets."""
     first = {"robot": "r", "values": {f"v{k}": 1.0 for k in range(1000)}}
     second = {"robot": "r", "values": {f"v{k}": 1.0 + k / 1e3 for k in range(1000)}}
     text = comparison_page(compare(first, second, ("a", "b")), Provenance())

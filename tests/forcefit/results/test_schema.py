@@ -58,7 +58,7 @@ def validator():
     return of
 
 
-def test_schemas_are_valid_by_the_draft_they_name():
+def test_schemas_are_valid_by_the_stated_draft():
     for content in OUTPUTS.values():
         Draft202012Validator.check_schema(schema_of(content))
 
@@ -82,7 +82,7 @@ def test_campaigns_of_the_repository_follow_the_schema(validator):
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_robot_files_that_are_written_follow_the_schema(name, tmp_path, validator):
+def test_written_robot_files_follow_the_schema(name, tmp_path, validator):
     write_robot(BUILT_IN[name](), tmp_path / "robot.toml")
     table = tomllib.loads((tmp_path / "robot.toml").read_text())
     assert not [*validator("robot").iter_errors(table)]
@@ -103,7 +103,7 @@ def test_schema_and_reader_refuse_the_same_fault(fault, validator):
         robot_of(Table(table, "robot.toml", ""), "arm")
 
 
-def test_names_are_listed_and_an_unknown_one_is_refused_with_the_nearest(run):
+def test_schema_command_lists_names_and_suggests_the_nearest(run):
     assert run("schema")[1].split("\n")[:3] == ["robot", "campaign", "assembly solve"]
     assert run("schema", "assembly", "sovle")[::2] == (
         2, 'forcefit: schema: no "assembly sovle"; did you mean "assembly solve"?\n'

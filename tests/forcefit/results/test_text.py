@@ -1,4 +1,4 @@
-"""Values and tables as text: units, rounding, and numbers that there are not."""
+"""Values and tables as text: units, rounding, and missing numbers."""
 
 import math
 
@@ -20,7 +20,7 @@ SI = {"mm": "m", "um": "m", "mrad": "rad", "urad": "rad", "MPa": "Pa", "%": "1"}
 
 
 @pytest.mark.parametrize("name", QUANTITIES)
-def test_a_display_unit_is_a_multiple_of_the_unit(name):
+def test_display_unit_is_a_multiple_of_the_si_unit(name):
     known = QUANTITIES[name]
     for shown, unit in zip(
         known.display_unit.split(", "), known.unit.split(", "), strict=True
@@ -53,7 +53,7 @@ def test_a_value_is_written_in_its_display_unit(name, value, expected):
     assert value_text(name, value) == expected
 
 
-def test_numbers_in_a_display_unit_and_errors_of_readings():
+def test_numbers_and_reading_errors_are_written_in_display_units():
     assert in_unit(1.23456e-5, "um") == "12.35 um"
     assert in_unit(0.5, "") == "0.5"
     assert value_text(number("length", "m"), 0.125) == "0.125 m"
@@ -62,7 +62,7 @@ def test_numbers_in_a_display_unit_and_errors_of_readings():
     assert readings_text({"position": None}) == "unknown"
 
 
-def test_lines_follow_the_names_and_leave_out_what_is_absent():
+def test_result_lines_follow_the_given_names_and_omit_absent_ones():
     results = {"status": "ok", "energy": 1.0, "zone": {"margin": None}}
     assert lines_of(results, "status zone.margin zone.margin_free energy load") == {
         "zone margin, compliant joints rigid": "none", "assembly energy": "1 J",
@@ -85,7 +85,7 @@ def test_lists_and_tables_are_aligned():
     assert rows[1].split() == ["b", "-", "y"]
 
 
-def test_labels_of_dimensions_are_those_of_screws_and_wrenches():
+def test_labels_of_dimensions_equal_those_of_screws_and_wrenches():
     from stiffness.screws import SCREW, WRENCH
 
     assert LABELS["screw"] == SCREW

@@ -1,4 +1,4 @@
-"""Beams: closed forms against tables, laws and hand-worked rows."""
+"""Compliance and stiffness of beams against tables, textbooks and hand calculation."""
 
 import math
 
@@ -36,7 +36,7 @@ def assert_same(matrix, expected, tol):
 
 
 @pytest.mark.parametrize("theory", PAPER)
-def test_stiffness_of_the_papers_link_is_its_reference_table(theory):
+def test_stiffness_of_the_papers_link_equals_its_published_table(theory):
     diagonal, coupling = PAPER[theory]
     expected = np.diag(diagonal)
     expected[1, 5] = expected[5, 1] = coupling
@@ -47,8 +47,8 @@ def test_stiffness_of_the_papers_link_is_its_reference_table(theory):
 
 
 @pytest.mark.parametrize("cut", [0.1, 0.5, 0.9])
-def test_two_beams_end_to_end_are_one_beam(cut, rng):
-    """C = A C1 A^T + C2 is exact, so only rounding is allowed."""
+def test_two_beams_in_series_have_the_compliance_of_one_beam(cut, rng):
+    """C = A C1 A^T + C2 is exact, so that only rounding is allowed."""
     axis, up = rng.normal(size=3), rng.normal(size=3)
     axis /= np.linalg.norm(axis)
 
@@ -76,7 +76,7 @@ def test_compliance_has_the_entries_of_the_textbook():
     assert C[1, 5] == pytest.approx(-(L**2) / (2 * E * s.I_z), rel=1e-14)
 
 
-def test_euler_is_timoshenko_without_shear():
+def test_euler_compliance_equals_timoshenkos_without_shear():
     euler = beam_compliance(0.5, SECTION, E, NU, theory="euler")
     rigid_in_shear = Section(1.2e-3, 4e-8, 9e-8, 7e-8, 1e12, 1e12)
     assert_same(euler, beam_compliance(0.5, rigid_in_shear, E, NU), 1e-10)
@@ -90,7 +90,7 @@ def test_turning_the_beam_turns_its_compliance(rng):
     assert_same(turned, A @ straight @ A.T, 1e-13)
 
 
-def test_height_stands_along_up():
+def test_section_height_lies_along_the_up_direction():
     """A plate on edge is stiff against a force along its height."""
     plate = rectangular_section(width=0.01, height=0.1, nu=NU)
     C = beam_compliance(1.0, plate, E, NU, axis=[1, 0, 0], up=[0, 0, 1], theory="euler")
@@ -98,7 +98,7 @@ def test_height_stands_along_up():
     assert C[4, 4] == pytest.approx(C[5, 5] * 100, rel=1e-12)
 
 
-def test_section_axes_default_up_is_y_unless_the_beam_lies_along_it():
+def test_section_axes_take_y_as_up_and_z_for_a_beam_along_y():
     np.testing.assert_array_equal(section_axes([2, 0, 0])[:, 2], [0, 1, 0])
     np.testing.assert_array_equal(section_axes([0, -3, 0])[:, 2], [0, 0, 1])
     axes = section_axes([1, 2, 3], [0.3, 0.1, 1.0])
@@ -106,7 +106,7 @@ def test_section_axes_default_up_is_y_unless_the_beam_lies_along_it():
     assert np.linalg.det(axes) == pytest.approx(1)
 
 
-def test_round_sections_by_hand():
+def test_round_section_constants_equal_hand_calculation():
     bar, tube = round_section(2.0, 0.25), round_section(2.0, 0.25, 1.0)
     assert bar.area == pytest.approx(4 * math.pi)
     assert bar.I_y == bar.I_z == pytest.approx(4 * math.pi)
@@ -152,7 +152,7 @@ def paper_link():
     return LinkStiffness("Timoshenko beam", C, tip=[0.452, 0, 0], base=[0, 0, 0])
 
 
-def test_a_link_is_locked_and_knows_both_matrices():
+def test_link_stiffness_is_read_only_and_the_inverse_of_its_compliance():
     link = paper_link()
     np.testing.assert_allclose(
         scaled(link.stiffness @ link.compliance, np.eye(6)), np.eye(6), atol=1e-8
@@ -198,6 +198,6 @@ def test_wrong_compliance_is_refused(C, message):
 
 
 @pytest.mark.parametrize("vector", [[1.0, math.nan, 0.0], [1.0, 2.0], [1.0] * 4])
-def test_a_direction_is_three_finite_numbers(vector):
+def test_direction_that_is_not_three_finite_numbers_is_refused(vector):
     with pytest.raises(BadInput, match="axis: found .*, expected 3 finite numbers"):
         unit_vector("axis", vector)

@@ -1,4 +1,4 @@
-"""Peak stress of beams: textbooks, a membrane solved numerically, symmetries."""
+"""Peak stress of beams against textbooks, a membrane solution and symmetries."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def constants(section):
 
 
 @pytest.mark.parametrize("section", SECTIONS)
-def test_a_pulled_beam_carries_force_over_area_everywhere(section):
+def test_stress_of_a_beam_in_tension_is_force_over_area(section):
     stress, _ = peak_beam_stress(section, 0.4, [0, 0, 0, -500.0, 0, 0])
     assert stress == pytest.approx(500 / constants(section).area, rel=1e-14)
 
@@ -39,8 +39,10 @@ def test_a_pulled_beam_carries_force_over_area_everywhere(section):
         ),
     ],
 )
-def test_a_bent_beam_has_moment_over_section_modulus(section, modulus_y, modulus_z):
-    """Handbook section moduli; with a long arm shear adds less than 3e-4."""
+def test_stress_of_a_bent_beam_is_moment_over_section_modulus(
+    section, modulus_y, modulus_z
+):
+    """Section moduli of handbooks; for a long beam shear adds less than 3e-4."""
     for moment, modulus in ([7.0, 0.0], modulus_y), ([0.0, 7.0], modulus_z):
         stress, _ = peak_beam_stress(section, 0.0, [0, *moment, 0, 0, 0])
         assert stress == pytest.approx(7 / modulus, rel=1e-12)
@@ -59,8 +61,8 @@ def test_a_bent_beam_has_moment_over_section_modulus(section, modulus_y, modulus
         (PLATE, 1.5),  # 3 V / 2 A
     ],
 )
-def test_shear_alone_is_the_books(section, shape):
-    """In both directions, at the neutral fibre; a thin tube to 2.5e-4."""
+def test_peak_stress_under_shear_alone_equals_textbook_values(section, shape):
+    """Along both section axes, at the neutral fibre; for a thin tube to 2.5e-4."""
     thin = 3e-4 if shape == 2.0 else 1e-12
     for axis in (4, 5):
         wrench = np.zeros(6)
@@ -71,8 +73,8 @@ def test_shear_alone_is_the_books(section, shape):
         assert where[axis - 3] == pytest.approx(0, abs=1e-12)
 
 
-def test_shear_of_a_box_is_v_q_over_i_b():
-    """Gere's web formula: V (b h^2 - b1 h1^2) / 8 I t over both webs t = 2 walls."""
+def test_shear_stress_of_a_box_equals_the_web_formula():
+    """Gere's formula: V (b h^2 - b1 h1^2) / 8 I t over both webs, t = 2 walls."""
     b, h, b1, h1 = 0.06, 0.04, 0.052, 0.032
     second = (b * h**3 - b1 * h1**3) / 12
     expected = np.sqrt(3) * (b * h**2 - b1 * h1**2) / (8 * second * 0.008)
@@ -82,7 +84,7 @@ def test_shear_of_a_box_is_v_q_over_i_b():
 
 
 @pytest.mark.parametrize("section", [BAR, TUBE])
-def test_a_twisted_round_beam(section):
+def test_peak_stress_of_a_twisted_round_beam_equals_torque_times_radius_over_j(section):
     second = np.pi / 2 * (0.04**4 - section.get("inner_radius", 0) ** 4)
     stress, _ = peak_beam_stress(section, 0.3, [-3.0, 0, 0, 0, 0, 0])
     assert stress == pytest.approx(np.sqrt(3) * 3 * 0.04 / second, rel=1e-12)
@@ -92,7 +94,7 @@ def test_a_twisted_round_beam(section):
     ("ratio", "k"),
     [(1.0, 0.208), (1.5, 0.231), (2.0, 0.246), (3.0, 0.267), (5.0, 0.291), (10, 0.312)],
 )
-def test_a_twisted_rectangle_is_timoshenkos_table(ratio, k):
+def test_peak_stress_of_a_twisted_rectangle_equals_timoshenkos_table(ratio, k):
     """T / (k b a^2) at the middle of the long side; the table has three digits."""
     for sides in ((0.02, 0.02 * ratio), (0.02 * ratio, 0.02)):
         section = dict(zip(("width", "height"), sides, strict=True))
@@ -103,9 +105,12 @@ def test_a_twisted_rectangle_is_timoshenkos_table(ratio, k):
 
 
 @pytest.mark.parametrize("section", [PLATE, {"width": 0.05, "height": 0.02}])
-def test_stresses_of_a_rectangle_add_up_to_their_forces(section):
-    """Integrals over the section by Simpson's rule.  Torsion, with a kink at the short
-    sides, is to 5e-4.  Outer faces are free of shear across."""
+def test_stresses_of_a_rectangle_integrate_to_the_forces(section):
+    """Integrals over the section by Simpson's rule.
+
+    The tolerance for torsion is 5e-4, since its stress has a kink at the short sides.
+    Outer faces have no shear normal to them.
+    """
     fibres, influence = section_stress(section)
     y, z = fibres.reshape(33, 33, 2).transpose(2, 0, 1)
     sigma, tau_y, tau_z = influence.reshape(33, 33, 3, 6).transpose(2, 3, 0, 1)
@@ -171,7 +176,7 @@ def membrane(section, cells):
 
 
 @pytest.mark.parametrize("wall", [0.004, 0.002])
-def test_a_twisted_box_is_a_membranes(wall):
+def test_torsion_of_a_box_agrees_with_the_membrane_analogy(wall):
     """Walls 1/10 and 1/20 of the shorter side.  Bredt's theory with the wall's own
     twist neglects the corners, 2 to 4 % of J; its stress is accurate to 4 and 2 %."""
     section = BOX | {"wall": wall}
@@ -182,7 +187,7 @@ def test_a_twisted_box_is_a_membranes(wall):
     assert stress / np.sqrt(3) == pytest.approx(max(right, upper), rel=tolerance)
 
 
-def test_bending_and_torsion_of_a_crank():
+def test_peak_stress_of_a_crank_combines_bending_and_torsion():
     """Gere, combined loads: sigma = 32 M / pi d^3, tau = 16 T / pi d^3 at the base."""
     stress, where = peak_beam_stress({"radius": 0.02}, 0.3, [30.0, 0, 0, 0, 0, 400.0])
     sigma, tau = 32 * 120 / (np.pi * 0.04**3), 16 * 30 / (np.pi * 0.04**3)
@@ -190,15 +195,17 @@ def test_bending_and_torsion_of_a_crank():
     assert where == pytest.approx([0, 0, 0.02], abs=2e-3)
 
 
-def test_a_moment_at_the_tip_can_outdo_the_base():
-    """fz L cancels my: only shear acts at the base."""
+def test_peak_stress_is_at_the_tip_when_a_force_cancels_the_base_moment():
+    """The moment of the tip force cancels my at the base, where only shear remains."""
     stress, where = peak_beam_stress(BAR, 0.5, [0, 50.0, 0, 0, 0, 100.0])
     assert where[0] == 0.5
     assert stress == pytest.approx(50 / (np.pi * 0.04**3 / 4), rel=1e-3)
 
 
 @pytest.mark.parametrize("section", [BAR, TUBE])
-def test_turning_the_wrench_about_a_round_beam_changes_nothing(section, rng):
+def test_turning_the_wrench_on_a_round_beam_turns_the_peak_and_keeps_its_stress(
+    section, rng
+):
     wrench = rng.normal(size=(50, 6))
     angle = 7 * np.pi / 180  # fibres stand at whole degrees
     turn = np.eye(3)
@@ -210,8 +217,8 @@ def test_turning_the_wrench_about_a_round_beam_changes_nothing(section, rng):
 
 
 @pytest.mark.parametrize("section", SECTIONS)
-def test_a_mirrored_wrench_gives_the_same_peak(section, rng):
-    """z to -z: forces keep x and y, moments keep z."""
+def test_mirrored_wrench_has_the_same_peak_stress(section, rng):
+    """z becomes -z: forces keep x and y, moments keep z."""
     wrench = rng.normal(size=(50, 6))
     mirrored = wrench * [-1, -1, 1, 1, 1, -1]
     one, there = peak_beam_stress(section, 0.2, wrench)
@@ -221,7 +228,7 @@ def test_a_mirrored_wrench_gives_the_same_peak(section, rng):
 
 
 @pytest.mark.parametrize("section", SECTIONS)
-def test_many_wrenches_give_the_peaks_of_each(section, rng):
+def test_array_of_wrenches_gives_the_peak_of_each_wrench(section, rng):
     wrench = rng.normal(size=(3, 1000, 6))
     stress, where = peak_beam_stress(section, 0.2, wrench)
     assert stress.shape == (3, 1000)
@@ -270,7 +277,7 @@ def test_wrong_stress_input_is_refused(section, length, wrench, message):
 ])  # fmt: skip
 @pytest.mark.parametrize("length", [0.0, 0.02, 1.0])
 def test_a_quarter_turn_of_section_and_wrench_turns_the_peak(section, length):
-    """y becomes z and z becomes -y; also short beams, with shear and torsion."""
+    """y becomes z, and z becomes -y; also for short beams, with shear and torsion."""
     rng = np.random.default_rng(9)
     turned = section | {"width": section["height"], "height": section["width"]}
     quarter = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
@@ -299,8 +306,9 @@ SUPPORTS = {
 
 
 @pytest.mark.parametrize("name", SUPPORTS)
-def test_a_heavy_beam_bends_as_in_the_books(name):
-    """Timoshenko, Strength of Materials I: q L^2 / 2, / 8, / 8, / 12."""
+def test_peak_stress_of_a_heavy_beam_equals_textbook_values(name):
+    """Timoshenko, Strength of Materials I:
+    largest moments q L^2 / 2, / 8, / 8 and / 12."""
     wrench, moment, place = SUPPORTS[name]
     stress, where = peak_beam_stress(PLATE, LENGTH, wrench, [0, 0, -W])
     sigma = 6 * moment / (0.02 * 0.05**2)
@@ -311,14 +319,14 @@ def test_a_heavy_beam_bends_as_in_the_books(name):
 
 
 @pytest.mark.parametrize("section", SECTIONS)
-def test_a_hanging_beam_carries_its_weight_at_the_top(section):
+def test_hanging_beam_has_its_peak_stress_at_the_top(section):
     stress, where = peak_beam_stress(section, LENGTH, np.zeros(6), [W, 0, 0])
     assert stress == pytest.approx(W / constants(section).area, rel=1e-14)
     assert where[0] == 0.0
 
 
 @pytest.mark.parametrize("section", SECTIONS)
-def test_a_heavy_beams_parts_agree_with_the_whole(section, rng):
+def test_peak_stress_of_a_heavy_beam_equals_the_largest_of_its_two_parts(section, rng):
     """The wrench of the outer part at any cut loads the inner part's tip."""
     for _ in range(20):
         wrench, weight = rng.normal(size=6) * [1, 1, 1, 20, 20, 20], rng.normal(size=3)

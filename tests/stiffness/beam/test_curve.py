@@ -1,4 +1,4 @@
-"""Curved and tapered beams, thin-walled sections: closed forms and finite elements."""
+"""Curved and tapered beams and thin-walled sections against closed forms."""
 
 import math
 
@@ -38,14 +38,14 @@ def assert_same(matrix, expected, tol):
     np.testing.assert_allclose(scaled(matrix - expected, expected), 0, atol=tol)
 
 
-def test_a_straight_piece_is_the_beam(rng):
+def test_compliance_of_a_straight_piece_equals_that_of_a_beam(rng):
     axis, up = rng.normal(size=3), rng.normal(size=3)
     C = curve_compliance([straight_piece([0, 0, 0], axis, CROOKED, up)], E, NU)
     length = np.linalg.norm(axis)
     assert_same(C, beam_compliance(length, CROOKED, E, NU, axis=axis, up=up), 1e-13)
 
 
-def test_an_l_is_two_beams_one_after_the_other():
+def test_compliance_of_an_l_shape_equals_that_of_two_beams_in_series():
     first = beam_compliance(0.2, CROOKED, E, NU, axis=[0, 0, 1], up=[0, 1, 0])
     second = beam_compliance(0.15, CROOKED, E, NU, axis=[1, 0, 0], up=[0, 1, 0])
     A = screw_map([-0.15, 0, 0])
@@ -57,7 +57,7 @@ def test_an_l_is_two_beams_one_after_the_other():
     assert_same(curve_compliance(pieces, E, NU), A @ first @ A.T + second, 1e-13)
 
 
-def test_a_quarter_circle_is_castiglianos():
+def test_compliance_of_a_quarter_circle_equals_castiglianos_solution():
     """Clamped at (R, 0), pulled at (0, R): in the plane, and across it.
 
     x: (3 pi/4 - 2) R^3/EI + pi R/4EA;  y: pi R^3/4EI + pi R/4EA;
@@ -72,8 +72,9 @@ def test_a_quarter_circle_is_castiglianos():
     assert C[5, 5] == pytest.approx(q * R**3 / EI + (3 * q - 2) * R**3 / GJ, rel=1e-12)
 
 
-def test_a_cone_is_stretched_and_twisted_as_in_the_books():
-    """L / (E pi r0 r1);  2 L (r0^2 + r0 r1 + r1^2) / (3 pi G r0^3 r1^3)."""
+def test_compliance_of_a_cone_equals_closed_forms():
+    """Axial L / (E pi r0 r1);
+    torsion 2 L (r0^2 + r0 r1 + r1^2) / (3 pi G r0^3 r1^3)."""
     L, r0, r1 = 0.35, 0.045, 0.025
     cone = straight_piece(
         [0, 0, 0], [0, 0, L], lambda t: round_section(r0 + (r1 - r0) * t, NU)
@@ -170,7 +171,7 @@ def measured_section(solid, center, lengths=(0.15, 0.25)):
     }
 
 
-def test_a_rectangles_constants_are_those_of_finite_elements():
+def test_section_constants_of_a_rectangle_agree_with_finite_elements():
     """Saint-Venant's torsion series against elements of a quarter of the width."""
     measured = measured_section(
         lambda L: box_solid((4, 4, round(40 * L)), (0.04, 0.04, L)), (0.02, 0.02)
@@ -181,7 +182,7 @@ def test_a_rectangles_constants_are_those_of_finite_elements():
     assert measured["J"] == pytest.approx(section.J, rel=2e-4)
 
 
-def test_a_round_bars_energy_has_hutchinsons_shear_factor_not_cowpers():
+def test_shear_energy_of_a_round_bar_has_hutchinsons_factor_instead_of_cowpers():
     """Hutchinson (2001): 6 (1 + nu)^2 / (7 + 12 nu + 4 nu^2) = 0.9252 at nu = 0.3.
 
     Cowper's 0.8864, which the public format asks of beams, is 4 % lower: a known
@@ -195,7 +196,7 @@ def test_a_round_bars_energy_has_hutchinsons_shear_factor_not_cowpers():
     assert section.shear_y == pytest.approx(0.8864, abs=1e-4)
 
 
-def test_a_thin_boxs_constants_are_those_of_finite_elements():
+def test_section_constants_of_a_thin_box_agree_with_finite_elements():
     """Bredt's formula neglects the corners: 3.5 % of J at wall / width = 1 / 12."""
     wall = 0.06 / 12
     measured = measured_section(
@@ -214,8 +215,8 @@ def test_a_thin_boxs_constants_are_those_of_finite_elements():
 
 @pytest.mark.parametrize("away", [(0.0, 0.0, 0.0), (0.7, -0.3, 0.5)])
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e2])
-def test_a_curve_cut_in_two_is_the_curve_wherever_it_stands(away, size):
-    """An arc in two arcs, a bar in two bars; their lengths add up."""
+def test_curve_cut_in_two_keeps_compliance_and_length_at_any_place(away, size):
+    """An arc cut into two arcs and a bar cut into two bars; their lengths add up."""
     o, turn = np.array(away) * size, np.array([0.0, 0.6, 0.0])
     centre, corner = o + [0, 0, 0.2 * size], o + [-0.3 * size, 0, 0]
     half = arc_piece(o, centre, turn / 2, CROOKED)
@@ -241,7 +242,7 @@ def test_a_curve_cut_in_two_is_the_curve_wherever_it_stands(away, size):
         arc_piece(o, centre + [0, 1e-3 * size, 0], turn, CROOKED)
 
 
-def test_the_length_of_a_parabola_is_that_of_the_books():
+def test_curve_length_of_a_parabola_equals_its_closed_form():
     """y = x^2 from 0 to 1: sqrt(5) / 2 + asinh(2) / 4; the speed changes with t."""
     parabola = Piece(
         place=lambda t: np.array([t, t**2, 0.0]),
@@ -254,8 +255,8 @@ def test_the_length_of_a_parabola_is_that_of_the_books():
     assert curve_length([parabola, line]) == pytest.approx(expected + 3, rel=1e-8)
 
 
-def test_the_tolerance_is_a_share_in_any_unit():
-    """A cone of 60 to 1, long or short: along its axis it gives L / (E pi r0 r1)."""
+def test_curve_tolerance_is_relative_at_any_size():
+    """A cone of 60 to 1, short or long: its axial compliance is L / (E pi r0 r1)."""
     for unit in (1e-3, 1e3):
         thick, thin = 0.06 * unit, 1e-3 * unit
         needle = straight_piece(

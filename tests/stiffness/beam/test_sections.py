@@ -1,4 +1,4 @@
-"""Areas and second moments against sums of rectangles, torsion against the series."""
+"""Section constants against sums of rectangles, torsion constants against series."""
 
 import math
 
@@ -26,7 +26,7 @@ def composed(*parts):
     return area, I_y, I_z
 
 
-def test_an_i_is_its_web_and_two_flanges():
+def test_constants_of_an_i_section_equal_sums_over_web_and_flanges():
     section = i_section(0.06, 0.1, 0.006, 0.008, NU)
     middle = (0.1 - 0.008) / 2
     area, I_y, I_z = composed(
@@ -43,7 +43,7 @@ def test_an_i_is_its_web_and_two_flanges():
     )
 
 
-def test_a_box_is_its_four_walls():
+def test_constants_of_a_box_section_equal_sums_over_its_four_walls():
     box = declared_section({"width": 0.06, "height": 0.1, "wall": 0.004}, NU)
     area, I_y, I_z = composed(
         (0.06, 0.004, 0.0, 0.048), (0.06, 0.004, 0.0, -0.048),
@@ -59,7 +59,7 @@ def test_a_box_is_its_four_walls():
 
 
 @pytest.mark.parametrize(("width", "height"), [(0.02, 0.02), (0.02, 0.05), (0.1, 0.01)])
-def test_a_rectangle_twists_by_the_series_of_saint_venant(width, height):
+def test_torsion_constant_of_a_rectangle_equals_saint_venants_series(width, height):
     """16 a b^3 (1/3 - 64 b / (pi^5 a) sum tanh(n pi a / 2 b) / n^5), n odd; halves."""
     rectangle = declared_section({"width": width, "height": height}, NU)
     a, b = max(width, height) / 2, min(width, height) / 2
@@ -72,8 +72,8 @@ def test_a_rectangle_twists_by_the_series_of_saint_venant(width, height):
     )
 
 
-def test_the_size_of_a_bar_is_its_radius_in_any_unit():
-    """Of a rectangle it is the longer side over sqrt(3): 2 sqrt(h^2 / 12)."""
+def test_section_size_equals_the_radius_of_a_round_bar_in_any_unit():
+    """The size of a rectangle is its longer side over sqrt(3): 2 sqrt(h^2 / 12)."""
     for unit in (1e-3, 1.0, 1e3):
         assert round_section(unit, NU).size == pytest.approx(unit, rel=1e-14)
         for sides in ((3 * unit, unit), (unit, 3 * unit)):
@@ -87,7 +87,7 @@ def test_the_size_of_a_bar_is_its_radius_in_any_unit():
     lambda nu: box_section(1.0, 2.0, 0.1, nu),
     lambda nu: i_section(1.0, 2.0, 0.1, 0.1, nu),
 ])  # fmt: skip
-def test_poissons_ratio_lies_between_minus_one_and_a_half(section):
+def test_poissons_ratio_outside_minus_one_to_one_half_is_refused(section):
     for nu in (-0.999, 0.499):
         assert section(nu).area > 0
     for nu in (-1.0, -1.5, 0.5, math.nan):
@@ -95,7 +95,7 @@ def test_poissons_ratio_lies_between_minus_one_and_a_half(section):
             section(nu)
 
 
-def test_a_bar_without_a_hole_is_a_tube_of_inner_radius_zero():
+def test_section_check_accepts_inner_radius_zero_and_refuses_absurd_sizes():
     check_section("link", {"radius": 1.0, "inner_radius": 0.0})
     for size in (1e-41, 1e41, math.nan):
         with pytest.raises(BadInput, match="no size of a section"):
@@ -105,8 +105,8 @@ def test_a_bar_without_a_hole_is_a_tube_of_inner_radius_zero():
 @pytest.mark.parametrize(
     ("nu", "factor"), [(0.0, 5 / 6), (0.3, 130 / 153), (-0.5, 10 / 13)]
 )
-def test_a_rectangles_shear_factor_is_cowpers(nu, factor):
-    """10 (1 + nu) / (12 + 11 nu), whatever its sides; 5 / 6 where nothing shrinks."""
+def test_shear_factor_of_a_rectangle_equals_cowpers(nu, factor):
+    """10 (1 + nu) / (12 + 11 nu) for any sides; 5 / 6 at nu = 0."""
     for sides in ((0.1, 0.3), (0.3, 0.1), (1.0, 1.0)):
         section = rectangular_section(*sides, nu)
         assert (section.shear_y, section.shear_z) == pytest.approx((factor, factor))
@@ -141,9 +141,9 @@ def thin_shear_factor(h, b, web, flange, webs, nu):
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, -0.4])
 @pytest.mark.parametrize(("b", "h"), [(0.06, 0.1), (0.2, 0.05), (0.1, 0.1)])
-def test_shear_factors_of_thin_sections_are_cowpers_integral(b, h, nu):
-    """Of a box in both directions; of an I along its web, and across as of its flanges,
-    two rectangles."""
+def test_shear_factors_of_thin_sections_equal_cowpers_integral(b, h, nu):
+    """A box in both directions;
+    an I along its web, and across it from its two flanges, which are rectangles."""
     wall, web, flange = 0.002, 0.003, 0.005
     box = box_section(b + wall, h + wall, wall, nu)
     across, along = (

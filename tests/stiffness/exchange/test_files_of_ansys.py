@@ -1,4 +1,4 @@
-"""Matrices of Ansys: one half, rows in another order, with a mapping."""
+"""Import of Ansys matrices: stored halves, row orders and mapping files."""
 
 import numpy as np
 import pytest
@@ -69,8 +69,9 @@ def solid(tmp_path):
 
 
 @pytest.mark.parametrize("symmetry", ["symmetric", "general"])
-def test_matrix_market_and_the_vector_of_nodes(solid, symmetry):
-    """One half, whatever the head says; rows by node in the order of the vector."""
+def test_matrix_market_rows_follow_the_vector_of_nodes(solid, symmetry):
+    """One half is stored, whatever the header states;
+    rows are grouped by node in the order of the vector."""
     folder, K, order = solid
     expected = import_link(folder / "k.mtx", nodes=folder / "nodes.csv", **ENDS)
     (folder / "full.mmf").write_text(matrix_market(K, symmetry))
@@ -80,7 +81,7 @@ def test_matrix_market_and_the_vector_of_nodes(solid, symmetry):
 
 
 @pytest.mark.parametrize("kind", ["RSA", "RUA"])
-def test_harwell_boeing_and_its_mapping(solid, kind):
+def test_harwell_boeing_rows_follow_the_mapping_file(solid, kind):
     folder, K, order = solid
     expected = import_link(folder / "k.mtx", nodes=folder / "nodes.csv", **ENDS)
     freedoms = [(node + 1, d) for node in order.tolist() for d in (1, 2, 3)]
@@ -98,7 +99,7 @@ def test_harwell_boeing_and_its_mapping(solid, kind):
     assert link.mass == pytest.approx(0.324)
 
 
-def test_nodes_of_a_named_selection_with_decimal_commas(solid):
+def test_node_table_with_decimal_commas_is_read_and_a_second_unit_is_refused(solid):
     folder, K, order = solid
     expected = import_link(folder / "k.mtx", nodes=folder / "nodes.csv", **ENDS)
     places = [line.split(",") for line in (folder / "nodes.csv").read_text().split()]
@@ -113,8 +114,8 @@ def test_nodes_of_a_named_selection_with_decimal_commas(solid):
         import_link(folder / "full.mtx", nodes=folder / "nodes.txt", unit="mm", **ENDS)
 
 
-def test_mapping_of_six_freedoms_a_node_is_read(tmp_path):
-    """A superelement of two nodes, the second one first."""
+def test_mapping_of_six_freedoms_per_node_is_read(tmp_path):
+    """A superelement of two nodes, with the second node first."""
     B = np.random.default_rng(0).normal(size=(12, 12))
     K = B @ B.T
     rows = np.r_[6:12, 0:6]
@@ -167,7 +168,7 @@ def test_wrong_harwell_boeing_file_is_refused(change, message, tmp_path):
     ("array real general", "3 3\n2\n1\n0\n1\n3\n0\n0\n0\n4\n"),
     ("array real symmetric", "3 3\n2\n1\n0\n3\n0\n4\n"),
 ])  # fmt: skip
-def test_every_kind_of_matrix_market(head, numbers, tmp_path):
+def test_matrix_market_file_of_every_kind_is_read(head, numbers, tmp_path):
     """Arrays are column by column; symmetric matrices have the lower half."""
     matrix = np.array([[2.0, 1, 0], [1, 3, 0], [0, 0, 4]])
     path = tmp_path / "k.mtx"

@@ -1,4 +1,4 @@
-"""A solid's full matrix, in the files of several programs, condensed to its ends."""
+"""Import of a solid's full matrix from several programs, condensed to its two ends."""
 
 import numpy as np
 import pytest
@@ -52,8 +52,8 @@ def backwards(nodes):
 
 
 @pytest.mark.parametrize("order", [in_order, backwards])
-def test_a_solid_of_three_columns_takes_its_nodes_from_the_deck(order, tmp_path):
-    """Rows without names are three a node, in the order in which the deck has them."""
+def test_three_column_matrix_takes_its_nodes_from_the_input_deck(order, tmp_path):
+    """Rows without names are three per node, in the order of the deck."""
     nodes, K = full_matrix((1, 1, 2))
     write_solid(tmp_path, nodes, K)
     ends = {"base": "z=0", "tip": "z=0.2"}
@@ -66,8 +66,8 @@ def test_a_solid_of_three_columns_takes_its_nodes_from_the_deck(order, tmp_path)
 
 
 @pytest.mark.slow
-def test_the_three_files_of_calculix(tmp_path):
-    """``.sti`` and ``.mas``, upper halves by columns; ``.dof`` names their rows."""
+def test_calculix_stiffness_mass_and_freedom_files_are_read(tmp_path):
+    """``.sti`` and ``.mas`` hold upper halves by columns; ``.dof`` names their rows."""
     nodes, K = full_matrix((1, 1, 2))
     write_solid(tmp_path, nodes, K)
     ends = {"base": "z=0", "tip": "z=0.2"}
@@ -95,7 +95,7 @@ def test_the_three_files_of_calculix(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.exudyn
-def test_a_solid_is_condensed_as_exudyn_condenses_it(tmp_path):
+def test_condensed_solid_agrees_with_exudyn(tmp_path):
     """Rigid faces at both ends (RBE2), static modes of Hurty-Craig-Bampton, to 1e-8."""
     fem = pytest.importorskip("exudyn.FEM")
     nodes, K = full_matrix()
@@ -126,8 +126,8 @@ def test_a_solid_is_condensed_as_exudyn_condenses_it(tmp_path):
     assert_same(link.stiffness, theirs, 1e-8)
 
 
-def test_grids_of_nastran_in_narrow_wide_and_free_fields(tmp_path):
-    """A wide one takes two lines; coordinates may have exponents without a letter."""
+def test_nastran_grids_in_narrow_wide_and_free_fields_are_read(tmp_path):
+    """A wide-field entry takes two lines; exponents may lack their letter."""
     path = tmp_path / "bar.bdf"
     path.write_text(
         "$ a comment\nCEND\nBEGIN BULK\n"
@@ -147,16 +147,17 @@ def test_grids_of_nastran_in_narrow_wide_and_free_fields(tmp_path):
     assert np.array(list(nodes.values())) == pytest.approx(np.array(expected))
 
 
-def test_a_grid_in_other_axes_is_refused(tmp_path):
-    """The line does not define its coordinate system."""
+def test_nastran_grid_in_another_coordinate_system_is_refused(tmp_path):
+    """The line refers to a coordinate system that it does not define."""
     path = tmp_path / "bar.bdf"
     path.write_text("GRID,9,4,1.,2.,3.\n")
     with pytest.raises(BadInput, match="line 1: found 'GRID,9,4"):
         read_nodes(path, 1.0)
 
 
-def test_of_a_punch_file_s_matrices_stiffness_and_mass_are_chosen(tmp_path):
-    """Square matrices next to a rectangular one whose name begins with M."""
+def test_stiffness_and_mass_are_selected_among_the_matrices_of_a_punch_file(tmp_path):
+    """Both are square;
+    the file also has a rectangular matrix whose name begins with M."""
     path = tmp_path / "part.pch"
     path.write_text(
         "DMIG    KAAX           0       6       2       0\n"

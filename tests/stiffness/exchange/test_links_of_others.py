@@ -1,4 +1,4 @@
-"""Links of other programs: a textbook's beam, refusals, export and import."""
+"""Import of links from other programs: a textbook beam, refusals, export and import."""
 
 import json
 
@@ -131,8 +131,11 @@ def dmig_small(K):
     ("k.npy", lambda p, K: np.save(p, K), 1e-9),
     ("k.npz", lambda p, K: save_npz(p, csr_matrix(K)), 1e-9),
 ])  # fmt: skip
-def test_a_textbook_beam_from_every_program(name, write, tolerance, tmp_path):
-    """Millimetres in, SI out; the base is found 0.5 m behind the tip."""
+def test_textbook_beam_imported_from_every_program_has_its_stiffness(
+    name, write, tolerance, tmp_path
+):
+    """The file is in millimetres, the link in SI units;
+    the base is 0.5 m behind the tip."""
     path = tmp_path / name
     write(path, textbook_beam())
     link = import_link(path, unit="mm")
@@ -141,7 +144,8 @@ def test_a_textbook_beam_from_every_program(name, write, tolerance, tmp_path):
 
 
 def test_dmig_of_four_digits_is_refused_as_unbalanced(tmp_path):
-    """Eight characters hold four digits, so the ends balance to a stiff beam's 1e-4."""
+    """Eight characters hold four digits:
+    the ends then balance only to 1e-4 of a stiff beam."""
     path = tmp_path / "k.pch"
     K = textbook_beam()
     K = np.vectorize(lambda v: float(f"{v:.3E}"))(K)
@@ -154,8 +158,9 @@ def test_dmig_of_four_digits_is_refused_as_unbalanced(tmp_path):
     "to", ["matrix-market", "abaqus", "calculix", "nastran", "numpy"]
 )
 @pytest.mark.parametrize("unit", ["m", "mm"])
-def test_exported_link_is_imported_again(to, unit, tmp_path, rng):
-    """Any stiffness, any offset; ten digits of Nastran's fields, else rounding."""
+def test_exported_link_is_imported_with_the_same_stiffness(to, unit, tmp_path, rng):
+    """For any stiffness and offset;
+    to ten digits in Nastran's fields, to rounding otherwise."""
     L = rng.normal(size=(6, 6))
     size = np.array([3, 2, 1, 1e4, 2e4, 3e4])
     K = (L @ L.T + np.eye(6)) * np.outer(size, size)
@@ -168,7 +173,7 @@ def test_exported_link_is_imported_again(to, unit, tmp_path, rng):
     assert link.base - link.tip == pytest.approx(offset, abs=1e-8)
 
 
-def test_a_matrix_has_the_ending_by_which_it_is_read(run, tmp_path):
+def test_export_refuses_an_ending_of_another_format(run, tmp_path):
     run("stiffness", "beam", "--length", 0.4, "--radius", 0.02, "--young", 7e10,
         "--poisson", 0.3, "--json", tmp_path / "rod.json")  # fmt: skip
     for to, name in (("numpy", "rod.npz"), ("nastran", "rod.npy")):
@@ -179,7 +184,7 @@ def test_a_matrix_has_the_ending_by_which_it_is_read(run, tmp_path):
         assert not (tmp_path / name).exists()
 
 
-def test_scipy_reads_our_matrix_market(tmp_path):
+def test_exported_matrix_market_file_is_read_by_scipy(tmp_path):
     path = tmp_path / "k.mtx"
     K = expected_stiffness()
     path.write_bytes(link_file(K, np.array([-0.5, 0, 0]), "matrix-market"))
@@ -188,15 +193,16 @@ def test_scipy_reads_our_matrix_market(tmp_path):
     assert mmread(path, spmatrix=False).toarray() == pytest.approx(expected, rel=1e-15)
 
 
-def test_six_rows_are_the_tip_s(tmp_path):
+def test_matrix_of_six_rows_is_the_stiffness_at_the_tip(tmp_path):
     np.save(tmp_path / "k.npy", textbook_beam()[6:, 6:])
     assert_same(
         import_link(tmp_path / "k.npy", unit="mm").stiffness, expected_stiffness()
     )
 
 
-def test_masses_are_read_beside(tmp_path):
-    """Two lumps at the ends: centre in the middle, m L^2 / 4 about it."""
+def test_mass_matrix_gives_mass_centre_and_inertia(tmp_path):
+    """Two lumps at the ends:
+    the centre is in the middle, the inertia about it m L^2 / 4."""
     path = tmp_path / "k.mtx"
     path.write_text(user_element(textbook_beam(), beam_mass()))
     link = import_link(path, mass=path, unit="mm")
@@ -208,8 +214,8 @@ def test_masses_are_read_beside(tmp_path):
     assert link.inertia == pytest.approx(expected, abs=1e-12 * mass)
 
 
-def test_a_chain_of_beams_is_condensed_to_its_ends(tmp_path):
-    """Two half beams in series with a free middle node are one beam."""
+def test_chain_of_two_half_beams_is_condensed_to_one_beam(tmp_path):
+    """Two half beams in series, whose middle node is free."""
     K, part = np.zeros((18, 18)), textbook_beam(LENGTH / 2)
     K[:12, :12] += part
     K[6:, 6:] += part
@@ -233,7 +239,7 @@ def test_a_chain_of_beams_is_condensed_to_its_ends(tmp_path):
     (lambda K: K, ["--order", "x"], '--order: found "x"'),
     (lambda K: np.array(["a"]), [], "expected a square of numbers"),
 ])  # fmt: skip
-def test_matrix_that_is_no_link_is_refused_in_one_line(
+def test_matrix_that_is_not_of_a_link_is_refused_in_one_line(
     run, matrix, options, message, tmp_path
 ):
     path = tmp_path / "k.npy"
@@ -268,8 +274,8 @@ def test_wrong_matrix_file_is_refused_in_one_line(run, name, text, message, tmp_
     assert message in err.splitlines()[-1]
 
 
-def test_from_a_beam_to_nastran_and_back(run, tmp_path):
-    """The command's own files: beam --json, export, import --json."""
+def test_beam_exported_to_nastran_and_imported_keeps_its_stiffness(run, tmp_path):
+    """By the commands' own files: beam --json, export, import --json."""
     f = tmp_path
     beam = ["--length", 0.5, "--radius", 0.01, "--young", 2.1e11, "--poisson", 0.3]
     assert run("stiffness", "beam", *beam, "--json", f / "b.json")[0] == 0
@@ -290,7 +296,7 @@ def test_from_a_beam_to_nastran_and_back(run, tmp_path):
     assert "found no stiffness, base and tip" in err
 
 
-def test_only_a_matrix_of_the_same_format_is_replaced(run, tmp_path):
+def test_export_replaces_only_a_matrix_of_the_same_format(run, tmp_path):
     link, out = tmp_path / "rod.json", tmp_path / "rod.mtx"
     assert run("stiffness", "beam", "--length", 0.4, "--radius", 0.02, "--young", 6e10,
                "--poisson", 0.3, "--json", link)[0] == 0  # fmt: skip
@@ -314,7 +320,7 @@ def test_stiffness_above_1e100_is_not_exported(run, tmp_path):
     assert not (tmp_path / "rod.mtx").exists()
 
 
-def test_a_matrix_of_no_link_s_size_is_refused(tmp_path):
+def test_import_refuses_a_stiffness_above_1e100(tmp_path):
     path = tmp_path / "rod.npy"
     np.save(path, 1e200 * np.eye(12))
     with pytest.raises(BadInput, match="not finite, or above 1e100"):

@@ -1,4 +1,4 @@
-"""DMIG in every layout of its lines, and the choice between a file's matrices."""
+"""DMIG files in every layout, and selection among the matrices of a file."""
 
 import numpy as np
 import pytest
@@ -72,8 +72,8 @@ LAYOUTS = [between_commas, cards_between_commas, between_blanks, large_fields]
 
 
 @pytest.mark.parametrize("write", LAYOUTS)
-def test_every_layout_holds_the_textbook_s_beam_and_its_mass(write, tmp_path):
-    """In mm and tonnes; the closed forms of the beam, and rho A L of its mass."""
+def test_dmig_of_every_layout_gives_the_textbook_stiffness_and_mass(write, tmp_path):
+    """In mm and tonnes; stiffness of the beam's closed forms, and mass rho A L."""
     path = tmp_path / "beam.dmig"
     path.write_text(
         write(textbook_beam(), "KAAX")
@@ -103,7 +103,7 @@ def test_every_layout_holds_the_textbook_s_beam_and_its_mass(write, tmp_path):
         ),
     ],
 )  # fmt: skip
-def test_one_node_retained_of_a_held_body_is_the_tip(name, write, tmp_path):
+def test_dmig_of_a_single_node_is_the_stiffness_at_the_tip(name, write, tmp_path):
     path = tmp_path / name
     path.write_text(write(textbook_beam()[6:, 6:]))
     assert_same(import_link(path, unit="mm").stiffness, expected_stiffness(), 1e-9)
@@ -142,7 +142,7 @@ def test_wrong_dmig_is_refused(text, message, tmp_path):
         read_matrix(path)
 
 
-def test_stiffness_is_no_mass_but_a_name_of_ones_own_may_be(tmp_path):
+def test_mass_is_not_read_from_a_stiffness_name_but_from_an_unknown_name(tmp_path):
     path = tmp_path / "k.pch"
     path.write_text(large_fields(textbook_beam(), "KAAX"))
     with pytest.raises(BadInput, match=r"KAAX \(stiffness\), expected one of mass"):
@@ -154,7 +154,7 @@ def test_stiffness_is_no_mass_but_a_name_of_ones_own_may_be(tmp_path):
 @pytest.mark.parametrize(
     "text", [DIAGONAL + DIAGONAL, DIAGONAL.replace("7,3,1.0E+06", "7,3,1.0E+06,0.0")]
 )
-def test_dmig_that_repeats_itself_or_is_real_is_read(text, tmp_path):
+def test_dmig_with_repeated_entries_or_of_real_type_is_read(text, tmp_path):
     path = tmp_path / "k.dmig"
     path.write_text(text)
     assert read_matrix(path).matrix.shape == (6, 6)

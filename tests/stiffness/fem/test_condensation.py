@@ -1,4 +1,4 @@
-"""Interfaces' motions and loads: rigid motions, energies, unknowns."""
+"""Condensation to the interfaces: rigid motions, energies, number of unknowns."""
 
 import numpy as np
 import pytest
@@ -19,10 +19,8 @@ CENTERS = np.array([[0.02, 0.05, 0.01], [0.03, 0.02, 0.23]])
 
 
 @pytest.mark.parametrize("order", [2, 3])
-def test_the_mean_motion_of_an_interface_is_the_nearest_rigid_one_over_its_area(
-    rng, order
-):
-    """Least squares at the points of the area's rule, for any field."""
+def test_mean_motion_of_an_interface_is_the_least_squares_rigid_motion(rng, order):
+    """Fitted at the integration points of its area, for any displacement field."""
     mesh = isoparametric(bar_solid(1, 2, 0.04, 0.1), order)
     field = rng.normal(size=(len(mesh.nodes), 3))
     mean = np.einsum("nik,ni->k", _distributed_loads(mesh, 1, CENTERS[1]), field)
@@ -44,9 +42,9 @@ def scaled_screw(screw):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_stiffness_is_twice_the_energy_of_its_fields(kind):
-    """K by assembling all of it; the base rests, the tip's mean motion is the screw,
-    and forces act at the interfaces alone."""
+def test_condensed_stiffness_equals_twice_the_energy_of_its_fields(kind):
+    """K from the whole assembled matrix; the base rests,
+    the tip's mean motion is the screw, and forces act at the interfaces alone."""
     mesh = isoparametric(box_solid((1, 2, 2), SIZE), 2)
     solution = condense(mesh, *constants(mesh), CENTERS, kind)
     upper = assemble(mesh, *constants(mesh)).toarray()
@@ -76,9 +74,9 @@ def test_a_stiffness_is_twice_the_energy_of_its_fields(kind):
     np.testing.assert_allclose(means[1], np.eye(6), atol=1e-8)
 
 
-def test_unknowns_exclude_the_held_interfaces():
-    """All nodes of a quadratic 2 by 4 by 4 grid; less base and tip; less the base;
-    less six supports."""
+def test_number_of_unknowns_excludes_held_interfaces():
+    """The nodes of a quadratic 2 by 4 by 4 grid:
+    without base and tip, without the base, and without six supports."""
     mesh = isoparametric(box_solid((1, 2, 2), SIZE), 2)
     layer, count = 3 * 5, 3 * 5 * 5
     unknowns, kinds = [], []

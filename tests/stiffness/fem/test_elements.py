@@ -1,4 +1,4 @@
-"""Finite elements of links: laws, closed forms, rates of convergence."""
+"""Finite elements of links: symmetries, closed forms, rates of convergence."""
 
 import numpy as np
 import pytest
@@ -68,8 +68,8 @@ both_orders = pytest.mark.parametrize("order", [2, 3])
 
 
 @pytest.mark.parametrize(("order", "layers"), MESHES)
-def test_six_rigid_motions_cost_nothing(rng, order, layers):
-    """Curved and cut elements included: they hold linear fields exactly."""
+def test_only_the_six_rigid_motions_store_no_energy(rng, order, layers):
+    """Curved and cut elements included: they represent linear fields exactly."""
     mesh = curved_mesh(order, layers)
     K = full(assemble(mesh, *constants(mesh)))
     motions = rigid_motions(mesh.nodes, np.array([0.3, 0.2, 0.1])).reshape(-1, 6)
@@ -89,8 +89,8 @@ def test_six_rigid_motions_cost_nothing(rng, order, layers):
 
 
 @pytest.mark.parametrize(("order", "layers"), MESHES)
-def test_a_linear_field_is_exact_on_any_mesh(rng, order, layers):
-    """The patch test: inner nodes find the linear field that the boundary has."""
+def test_linear_field_is_exact_on_any_mesh(rng, order, layers):
+    """Patch test: inner nodes have the linear field that the boundary has."""
     solid = split_joining_edges(crooked(rng), (0, 1))
     parts = layered(solid, (0, 1)) if layers else None
     mesh = isoparametric(solid, order, parts)
@@ -109,7 +109,7 @@ def test_a_linear_field_is_exact_on_any_mesh(rng, order, layers):
 
 @pytest.mark.parametrize("curved", [False, True])
 def test_stiffness_matrix_equals_that_of_scikit_fem(curved):
-    """A second code, whose weak form shares nothing with ours but the rule."""
+    """A second program, which shares only the quadrature rule with this one."""
     import skfem
     from scipy.spatial import cKDTree
     from skfem.models.elasticity import linear_elasticity
@@ -135,9 +135,9 @@ def test_stiffness_matrix_equals_that_of_scikit_fem(curved):
 
 
 @both_orders
-def test_a_polynomial_of_the_elements_degree_has_its_energy(rng, order):
-    """A second method: the strain energy of u = A m, m all monomials of the degree, by
-    differentiating monomials and a tensor rule on the whole box."""
+def test_strain_energy_of_a_polynomial_field_equals_its_integral(rng, order):
+    """A second method: the strain energy of u = A m, where m are all monomials of the
+    degree, by differentiating monomials and a tensor rule on the whole box."""
     size = np.array([0.5, 0.6, 0.8])
     mesh = isoparametric(box_solid((1, 2, 2), size), order)
     powers = lattice(order)[:, 1:]
@@ -162,8 +162,8 @@ def test_a_polynomial_of_the_elements_degree_has_its_energy(rng, order):
 
 
 @both_orders
-def test_a_mirrored_link_has_the_mirrored_stiffness(order):
-    """x to -x: RX, TY, TZ keep their sign, RY, RZ, TX change it."""
+def test_mirrored_link_has_the_mirrored_stiffness(order):
+    """x becomes -x: RX, TY, TZ keep their sign, RY, RZ, TX change it."""
     solid = box_solid((2, 3, 3), (0.05, 0.08, 0.2))
     flipped = solid.points * [-1, 1, 1]
     cells = outward(flipped, solid.cells)
@@ -195,8 +195,8 @@ def test_turning_the_mesh_turns_the_stiffness(rng, kind, order):
 
 
 @both_orders
-def test_millimetres_give_the_same_link(order):
-    """Lengths times 1000, Pa as N/mm^2: N mm/rad and N/mm come out."""
+def test_stiffness_in_millimetres_is_the_stiffness_in_metres_converted(order):
+    """Lengths times 1000 and Pa as N/mm^2 give K in N mm/rad and N/mm."""
     mesh = isoparametric(box_solid((2, 2, 3), (0.05, 0.08, 0.2)), order)
     large = isoparametric(box_solid((2, 2, 3), (50.0, 80.0, 200.0)), order)
     tip = np.array([[0, 0, 0], [0.025, 0.04, 0.2]])
@@ -208,8 +208,8 @@ def test_millimetres_give_the_same_link(order):
 
 
 @both_orders
-def test_reading_at_another_tip_is_a_screw_map(order):
-    """The same mesh, K read elsewhere: K' = A^T K A with A from there to here."""
+def test_stiffness_at_another_tip_follows_from_a_screw_map(order):
+    """For the same mesh K' = A^T K A, with A from the first tip to the second."""
     solid = box_solid((2, 2, 3), (0.05, 0.08, 0.2))
     near, there = np.array([0.02, 0.04, 0.2]), np.array([0.1, -0.2, 0.3])
     _, one = solved(solid, order, tip=near)
@@ -220,8 +220,8 @@ def test_reading_at_another_tip_is_a_screw_map(order):
 
 
 @pytest.mark.parametrize("name", sorted({"SuperLU", solver_name()}))
-def test_a_singular_matrix_is_reported(name):
-    """SuperLU meets an empty column, PARDISO a negative pivot."""
+def test_singular_matrix_is_reported_with_the_solver(name):
+    """SuperLU finds an empty column, PARDISO a negative pivot."""
     mesh = isoparametric(box_solid((1, 1, 1), (1, 1, 1)))
     upper = assemble(mesh, *constants(mesh))
     wrong = 0 * upper if name == "SuperLU" else -upper
@@ -232,10 +232,13 @@ def test_a_singular_matrix_is_reported(name):
 @pytest.mark.parametrize(
     ("order", "rings", "layers", "rel"), [(2, 3, 8, 5e-4), (3, 3, 6, 2e-6)]
 )
-def test_distributing_ends_give_saint_venants_bar_exactly(order, rings, layers, rel):
-    """Tractions linear over the face: for moments, tension and torsion of a round bar
-    the exact solution is the beam's, with no end effect; what is left is the circle's
-    error, h^4 of quadratic elements and h^6 of cubic ones."""
+def test_distributing_interfaces_reproduce_the_compliance_of_a_round_beam(
+    order, rings, layers, rel
+):
+    """Tractions are linear over the face: for moments, tension and torsion of a round
+    bar the exact solution is the beam's, without an end effect. The remaining error
+    is the circle's: h^4 for quadratic elements and h^6 for cubic ones.
+    """
     solid = bar_solid(rings, layers, 0.04, 0.2)
     _, solution = solved(solid, order, "distributing-both")
     C = inverted(solution.stiffness)
@@ -246,22 +249,23 @@ def test_distributing_ends_give_saint_venants_bar_exactly(order, rings, layers, 
 
 
 @both_orders
-def test_a_rigid_interface_is_stiffer_than_a_mean_and_that_than_two(order):
+def test_each_distributing_interface_lowers_the_stiffness(order):
     solid = bar_solid(2, 4, 0.04, 0.2)
     rigid, one, two = (solved(solid, order, kind)[1].stiffness for kind in KINDS)
     assert np.linalg.eigvalsh(scaled(rigid - one, rigid))[0] > -1e-9
     assert np.linalg.eigvalsh(scaled(one - two, rigid))[0] > -1e-9
 
 
-def test_the_papers_bar_with_a_distributing_tip():
-    """Converged reference: 1 020 060 N m/rad, reached from above; this mesh 5e-4."""
+def test_papers_bar_with_a_distributing_tip_agrees_with_its_converged_stiffness():
+    """The converged value is 1 020 060 N m/rad, approached from above;
+    this mesh is 5e-4 off."""
     _, solution = solved(bar_solid(2, 16, 0.04, 0.452), 3, "distributing")
     assert 0 < solution.stiffness[0, 0] / 1020060 - 1 < 1e-3
 
 
 @pytest.mark.slow
-def test_slender_bars_become_timoshenkos():
-    """End effect c r / L: halved when the length doubles (slope -1 within 0.05)."""
+def test_excess_over_timoshenkos_beam_is_inverse_to_the_length():
+    """The end effect c r / L halves when the length doubles (slope -1 within 0.05)."""
     excess = []
     lengths = np.array([0.4, 0.8, 1.6])
     for length in lengths:
@@ -276,8 +280,8 @@ def test_slender_bars_become_timoshenkos():
 
 
 @both_orders
-def test_a_bar_without_poisson_is_stretched_and_bent_exactly(order):
-    """nu = 0: nothing shrinks, so rigid ends disturb nothing; K_TZ = E A / L."""
+def test_tension_and_bending_of_a_bar_are_exact_at_zero_poissons_ratio(order):
+    """Without lateral contraction rigid ends have no end effect; K_TZ = E A / L."""
     mesh = isoparametric(box_solid((2, 2, 4), (0.03, 0.05, 0.2)), order)
     lam, mu = lame(E, 0.0)
     ones = np.ones(len(mesh.cells))
@@ -306,7 +310,7 @@ def harmonic_slope(x):
 @pytest.mark.parametrize(
     ("order", "counts"), [(2, (6, 12)), pytest.param(3, (4, 8), marks=pytest.mark.slow)]
 )
-def test_strains_converge_with_the_power_of_the_mesh(order, counts):
+def test_strain_energy_error_converges_with_the_order_of_the_elements(order, counts):
     """The gradient of a harmonic function is in equilibrium without body force.
 
     It is prescribed on the surface of a cube; quadratic elements leave an error of h^2
@@ -353,10 +357,10 @@ def flat_and_bent(order, bulge):
 
 @pytest.mark.parametrize("order", [2, 3])
 @pytest.mark.parametrize("bulge", [-0.3, 0.0, 0.04])
-def test_normals_point_out_of_elements_however_bent(order, bulge):
-    """Gauss: the integral of n is nothing, that of x . n three times the volume.
-
-    The middle of a flat element is beyond the tangent planes of a face that bends in.
+def test_normals_point_out_of_flat_and_bent_elements(order, bulge):
+    """Gauss's theorem: the integral of n is zero, that of x . n is three times the
+    volume. The middle of a flat element is beyond the tangent planes of a face that
+    bends in.
     """
     mesh = flat_and_bent(order, bulge)
     places, normal, area, _ = gradients_on_faces(mesh, np.arange(4))

@@ -48,8 +48,8 @@ def volume(mesh):
 # --- what the elements cannot follow -------------------------------------------------
 
 
-def test_estimated_errors_are_a_matrix_of_energies():
-    """Symmetric and positive: a Gram matrix, like the true K_h - K."""
+def test_estimated_error_matrix_is_symmetric_and_positive():
+    """It is a Gram matrix, like the true error K_h - K."""
     K, indicated, _ = bar(1, 6).totals()
     assert np.abs(scaled(indicated - indicated.T, indicated)).max() < 1e-12
     assert np.linalg.eigvalsh(scaled(indicated, indicated))[0] > 0
@@ -58,8 +58,8 @@ def test_estimated_errors_are_a_matrix_of_energies():
     assert (lowest > -1e-12 * np.trace(each, axis1=1, axis2=2)).all()
 
 
-def test_rigid_motions_and_constant_strains_leave_no_error():
-    """On bent elements too: these hold linear fields exactly."""
+def test_estimated_error_is_zero_for_rigid_motions_and_constant_strains():
+    """Also on bent elements, which represent linear fields exactly."""
     mesh, K = bar(1, 6).mesh, bar(1, 6).solution.stiffness
     lam, mu = constants(mesh)
     singular = np.ones(len(mesh.cells), dtype=bool)
@@ -80,8 +80,9 @@ def polynomials(x, degree, rng):
 
 
 @pytest.mark.parametrize("singular", [False, True])
-def test_linear_strains_leave_no_error_and_quadratic_ones_do(rng, singular):
-    """Straight elements hold quadratic displacements, whose stresses are linear."""
+def test_estimated_error_is_zero_for_linear_strains_only(rng, singular):
+    """Straight elements represent quadratic displacements,
+    whose stresses are linear."""
     mesh = isoparametric(box_solid((1, 2, 2), (0.5, 0.6, 0.8)))
     lam, mu = constants(mesh)
     where = np.full(len(mesh.cells), singular)
@@ -98,9 +99,11 @@ def test_linear_strains_leave_no_error_and_quadratic_ones_do(rng, singular):
     assert np.diag(estimate[1]).min() > 1e-5 * E
 
 
-def test_indicator_at_a_singular_edge_is_the_nonlinear_energy():
-    """u = (0, 0, z^3 / 3): of the stress of z^2 an element's best linear part is taken
-    off, here by least squares; the share is the same for all, near one."""
+def test_indicator_at_a_singular_edge_is_the_energy_of_the_nonlinear_stress():
+    """u = (0, 0, z^3 / 3) has a stress of z^2, from which the best linear fit of each
+    element is subtracted, here by least squares. The share is the same for all
+    elements and nearly one.
+    """
     mesh = isoparametric(box_solid((2, 1, 3), (0.5, 0.6, 0.8)))
     lam, mu = constants(mesh)
     field = np.zeros((len(mesh.nodes), 3, 1))
@@ -136,7 +139,7 @@ def shifted(excess, kind="distributing-both"):
 
 
 @pytest.mark.parametrize("excess", [1e-3, -1e-3])
-def test_a_bar_thinner_than_its_shape_is_as_much_softer_as_the_books_say(excess):
+def test_geometry_error_of_a_bar_follows_the_powers_of_its_radius(excess):
     """Free ends: A grows with R^2, I and J with R^4; K_h - K = -4 x the excess of K in
     bending and torsion, -2 x in tension, to first order (1 %: the circle's and the
     square's error)."""
@@ -157,8 +160,8 @@ def test_a_bar_thinner_than_its_shape_is_as_much_softer_as_the_books_say(excess)
 @pytest.mark.parametrize(
     "mesh", [(1, 12), (2, 12), pytest.param((3, 18), marks=pytest.mark.slow)]
 )
-def test_torsion_follows_the_fourth_power_of_the_radius(mesh):
-    """J ~ R^4, the mesh's volume ~ R^2: the relative error is twice the volume's."""
+def test_torsion_error_of_the_geometry_is_twice_the_volume_error(mesh):
+    """J grows with R^4, the mesh's volume with R^2."""
     level = bar(*mesh)
     expected = 2 * (volume(level.mesh) / (np.pi * R**2 * L) - 1)
     estimate = level.totals()[2][2, 2] / TORSION
@@ -171,8 +174,9 @@ def test_torsion_follows_the_fourth_power_of_the_radius(mesh):
 @pytest.mark.parametrize(
     "mesh", [(1, 6), (1, 12), (2, 12), pytest.param((2, 24), marks=pytest.mark.slow)]
 )
-def test_the_estimate_covers_the_true_error_on_one_mesh(mesh):
-    """Bending: from above to 1 032 277 N m/rad, within five times; torsion G J / L."""
+def test_estimate_from_one_mesh_covers_the_true_error(mesh):
+    """In bending K approaches 1 032 277 N m/rad from above,
+    and the estimate is at most five times the error; torsion has G J / L."""
     K, indicated, shape = bar(*mesh).totals()
     error, _ = estimated_error([(K, indicated, shape)])
     true = K[0, 0] / BENDING - 1
@@ -184,15 +188,15 @@ def test_the_estimate_covers_the_true_error_on_one_mesh(mesh):
     assert abs(K[2, 2] / TORSION - 1) < told[2]
 
 
-def test_indicated_error_is_near_the_true_error():
-    """Bending's error without the safety factor is within 1.5 of the true one."""
+def test_indicated_error_is_within_1_5_times_the_true_error():
+    """Of the bending stiffness, without the safety factor."""
     for mesh in ((1, 6), (1, 12), (2, 12), (2, 24)):
         K, indicated, shape = bar(*mesh).totals()
         true = K[0, 0] / BENDING - 1 - shape[0, 0] / BENDING
         assert 1 / 1.5 < indicated[0, 0] / BENDING / true < 1.5
 
 
-def test_two_meshes_bound_the_error_of_the_finer():
+def test_two_meshes_bound_the_error_of_the_finer_mesh():
     history = [bar(*mesh).totals() for mesh in ((1, 6), (2, 12))]
     error, _ = estimated_error(history)
     K = history[1][0]
@@ -219,9 +223,11 @@ def plate(*counts):
     return solve_level(solid, [Material(E, NU)], centers, "rigid").totals()
 
 
-def test_residual_tractions_of_a_unit_cube_have_the_energy_by_hand():
-    """A shear s over a unit cube leaves s on four faces, whose triangles are 1 by 1:
-    2 s^2 / mu / pi times their height 1 / sqrt 2, by hand; a pull across nothing."""
+def test_residual_traction_energy_of_a_unit_cube_equals_hand_calculation():
+    """A shear s of a unit cube leaves tractions s on four faces, whose triangles are 1
+    by 1: energy 2 s^2 / mu / pi times their height 1 / sqrt 2. A tension across free
+    faces leaves none.
+    """
     mesh = isoparametric(box_solid((1, 1, 1), np.ones(3)))
     lam, mu = constants(mesh)
     fields = np.zeros((len(mesh.nodes), 3, 2))
@@ -232,7 +238,7 @@ def test_residual_tractions_of_a_unit_cube_have_the_energy_by_hand():
     assert np.abs(estimate - np.diag([estimate[0, 0], 0])).max() == 0
 
 
-def test_error_of_a_twisted_thin_plate_is_covered():
+def test_estimated_error_of_a_twisted_thin_plate_covers_the_true_error():
     """Elements 7 to 15 mm wide on a 2 mm plate, whose layer is 0.6 mm deep at its free
     edges: the true error of twisting is 1.4 and 0.7 %."""
     history = [plate(4, 1, 8), plate(8, 1, 16)]
@@ -244,7 +250,7 @@ def test_error_of_a_twisted_thin_plate_is_covered():
             assert 0.006 < true < told[2] < 6 * true
 
 
-def test_a_layer_takes_most_of_the_error_at_the_clamped_edges():
+def test_layers_at_clamped_edges_at_least_halve_the_bending_error():
     """The same tetrahedra without layers have more than twice the error in bending."""
     solid = split_joining_edges(bar_solid(2, 12, R, L), (0, 1))
     mesh = isoparametric(solid)

@@ -1,4 +1,4 @@
-"""Whole links from their surfaces, to an asked accuracy within a budget."""
+"""Finite elements of whole links from their surfaces: requested accuracy and budget."""
 
 import numpy as np
 import pytest
@@ -38,11 +38,11 @@ PLANES = (parse_interface("z=0"), parse_interface("z=0.452"))
 
 
 @pytest.mark.slow
-def test_the_papers_bar_from_its_surface(cache):
-    """Converged references: bending 1 032 277 N m/rad, torsion G J / L.
+def test_papers_bar_from_its_surface_agrees_within_its_estimated_error(cache):
+    """The converged bending stiffness is 1 032 277 N m/rad, that of torsion G J / L.
 
-    Asked 0.5 %; the estimate must cover the true error.  The mesh's own stiffness is
-    above the true one, by no more than twice the estimate.
+    The requested accuracy is 0.5 %, and the estimate must cover the true error. The
+    mesh's own stiffness is above the true one, by no more than twice the estimate.
     """
     solution = solve_link(
         bar_surface(),
@@ -73,8 +73,8 @@ def test_the_papers_bar_from_its_surface(cache):
 
 
 @pytest.mark.slow
-def test_a_bar_of_two_materials_end_to_end(cache):
-    """Stretched: two springs in series, but for the end effect both have."""
+def test_bar_of_two_materials_stretches_like_two_springs_in_series(cache):
+    """Tension only; the end effect, which both bars have, is within 2 %."""
     middle = CutFace(Plane(np.array([0, 0, 0.226]), np.array([0, 0, 1.0])))
     half = Material(2 * E, NU, where=lambda p: p[:, 2] > 0.226, faces=(middle,))
     options = FemOptions(cache=cache, budget=Budget(levels=2))
@@ -109,7 +109,7 @@ def test_wrong_options_are_refused(change, message, cache):
     assert message in str(caught.value)
 
 
-def test_the_center_of_a_plane_is_its_areas_and_of_a_bore_its_point():
+def test_interface_center_is_the_centroid_of_a_plane_and_the_point_of_a_bore():
     surface = bar_surface()
     np.testing.assert_allclose(
         interface_center(surface, PLANES[1], "tip"), [0, 0, 0.452], atol=1e-15
@@ -118,8 +118,8 @@ def test_the_center_of_a_plane_is_its_areas_and_of_a_bore_its_point():
     np.testing.assert_array_equal(interface_center(surface, bore, "tip"), [0, 0, 0.1])
 
 
-def test_within_a_budget_of_unknowns_the_mesh_still_becomes_finer():
-    """Less than wanted, where more would not fit; the estimate says what is missed."""
+def test_mesh_is_refined_up_to_the_budget_of_unknowns():
+    """The requested accuracy does not fit into the budget, which the results report."""
     section, material = {"width": 0.3, "height": 0.3}, Material(E, NU)
     first = solve_bar(section, material, FemOptions(1e-3, budget=Budget(levels=1))).link
     budget = Budget(unknowns=2 * first.mesh["unknowns"])
@@ -134,14 +134,17 @@ def test_within_a_budget_of_unknowns_the_mesh_still_becomes_finer():
 
 
 @pytest.mark.parametrize("budget", [Budget(unknowns=99), Budget(seconds=1e-9)])
-def test_a_first_mesh_that_costs_more_than_the_budget_is_refused(budget):
+def test_first_mesh_above_the_budget_is_refused(budget):
     words = r"the coarsest mesh that follows the part has \d+ unknowns, about .* s and"
     with pytest.raises(MeshFailed, match=f"{words}.*allow more time"):
         solve_bar({"radius": 0.1}, Material(E, NU), FemOptions(budget=budget))
 
 
-def test_first_mesh_is_tried_with_smaller_edges_while_there_is_time(monkeypatch):
-    """A tenth of the diagonal, a half and a fifth of that; once without time."""
+def test_failed_first_mesh_is_retried_with_smaller_edges_while_time_remains(
+    monkeypatch,
+):
+    """Edges of a tenth of the diagonal, then half and a fifth of that;
+    one try without time."""
     surface, edges = bar_surface(), []
 
     def fail(*_, edge, **__):

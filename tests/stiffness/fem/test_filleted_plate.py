@@ -1,4 +1,4 @@
-"""A plate with a fillet that meets its rounded corners, as CAD programs make them."""
+"""Finite elements of a filleted plate with rounded corners, as from CAD programs."""
 
 import numpy as np
 import pytest
@@ -12,9 +12,13 @@ BOUNDS = [45822, 48702, 9.5734e6, 1.04078e9, 2.89622e8, 2.92001e6]
 
 
 @pytest.mark.slow
-def test_a_filleted_plate_is_meshed_as_it_is_and_no_stiffer_than_it_can_be(tmp_path):
-    """Its volume is that of the integral over its height to 0.01 %, no element is flat,
-    and K is not above its upper bounds; a mesh of another shape was by 16 to 23 %."""
+def test_filleted_plate_keeps_its_volume_and_stiffness_stays_below_upper_bounds(
+    tmp_path,
+):
+    """The volume agrees with the integral over the height to 0.01 %, and no element is
+    flat. K is below its upper bounds; a mesh of another shape exceeded them by 16 to
+    23 %.
+    """
     options = FemOptions(0.1, cache=tmp_path)
     materials = [Material(7e10, 0.3)]
     solved = solve_link(filleted_plate(), *ENDS, materials, options=options)

@@ -24,7 +24,7 @@ def inertia_of_points(masses, places):
     return centre, squares * np.eye(3) - np.einsum("i,ij,ik->jk", masses, x, x)
 
 
-def test_a_box_with_two_points_follows_steiners_rule():
+def test_mass_properties_of_a_box_with_two_point_masses_follow_steiners_rule():
     mesh = box()
     density = np.full(len(mesh.cells), 2000.0)
     body = 2000.0 * SIZE.prod()
@@ -40,7 +40,7 @@ def test_a_box_with_two_points_follows_steiners_rule():
     np.testing.assert_allclose(inertia, about + own, rtol=1e-10, atol=1e-12)
 
 
-def test_mass_without_density_is_that_of_the_points():
+def test_mass_without_density_is_that_of_the_point_masses():
     mesh = box()
     nothing = np.zeros(len(mesh.cells))
     mass, centre, inertia = mass_properties(mesh, nothing)

@@ -1,4 +1,4 @@
-"""What an isotropic material is, and which is none."""
+"""Isotropic materials: accepted values and refusals."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from stiffness.mesh.edge_grading import layered
 from tests.solids_for_tests import box_solid
 
 
-def test_without_a_density_a_material_has_no_mass():
+def test_material_without_a_density_has_density_zero():
     assert Material(2.1e11, 0.3).density == 0.0
 
 
@@ -21,7 +21,8 @@ def test_wrong_density_is_refused(density):
 
 
 def test_element_has_the_last_material_that_contains_its_centre():
-    """Lame's constants, at the mean of the four corners, curved or not."""
+    """Lame's constants at the mean of the four corners,
+    for curved and straight elements."""
     solid = box_solid((2, 1, 3), np.array([0.1, 0.1, 0.1]))
     mesh = isoparametric(solid, 3, layered(solid, (0, 1)))
     asked = []
@@ -45,7 +46,7 @@ def test_element_has_the_last_material_that_contains_its_centre():
         material_of_elements(mesh, [])
 
 
-def test_a_material_may_be_as_soft_and_light_as_one_likes():
+def test_material_of_very_low_modulus_and_no_density_is_accepted():
     mesh = isoparametric(box_solid((1, 1, 1), np.array([0.1, 0.1, 0.1])), 2)
     table = material_of_elements(mesh, [Material(1e-3, 0.25)])
     np.testing.assert_allclose(table, [[4e-4, 4e-4, 0.0]] * len(mesh.cells))

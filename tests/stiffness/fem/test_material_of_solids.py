@@ -43,8 +43,8 @@ def rod():
     return solved(rod_in_tube(INNER, OUTER, LENGTH), LENGTH, materials)
 
 
-def test_prisms_in_series_follow_the_unit_load_integrals(bar):
-    """L / E A and L / E I add up; a tip force also shears, 6 / 5 of it over G A."""
+def test_compliance_of_prisms_in_series_equals_the_unit_load_integrals(bar):
+    """L / E A and L / E I add up; a tip force adds shear with 6 / 5 of L / G A."""
     A = WIDTH * HEIGHT
     C = inverted(bar.level.solution.stiffness)
     flexible = lambda I: (FAR / STEEL + NEAR / ALUMINIUM) / I  # noqa: E731
@@ -61,7 +61,7 @@ def test_prisms_in_series_follow_the_unit_load_integrals(bar):
         assert C[shift, shift] == pytest.approx(sag, rel=2e-3)
 
 
-def test_mass_and_centre_are_those_of_both_solids(bar):
+def test_mass_and_centre_include_both_solids(bar):
     near, far = 2700 * NEAR * WIDTH * HEIGHT, 7800 * FAR * WIDTH * HEIGHT
     center = (near * NEAR / 2 + far * (NEAR + FAR / 2)) / (near + far)
     assert bar.link.mass == pytest.approx(near + far, rel=1e-9)
@@ -69,8 +69,8 @@ def test_mass_and_centre_are_those_of_both_solids(bar):
 
 
 @pytest.mark.slow
-def test_a_rod_glued_into_a_tube_twists_and_stretches_in_parallel(rod):
-    """G J and E A add up, exactly: circles turn as a whole."""
+def test_stiffness_of_a_rod_in_a_tube_is_the_sum_of_both(rod):
+    """G J and E A add up exactly, since circles rotate as a whole."""
     K = rod.level.solution.stiffness
     areas = np.pi * np.array([INNER**2, OUTER**2 - INNER**2])
     J = np.pi / 2 * np.array([INNER**4, OUTER**4 - INNER**4])
@@ -80,7 +80,7 @@ def test_a_rod_glued_into_a_tube_twists_and_stretches_in_parallel(rod):
 
 
 @pytest.mark.slow
-def test_the_curved_face_between_solids_is_a_face_of_the_mesh(rod):
+def test_mesh_follows_the_curved_face_between_two_solids(rod):
     """Each modulus fills its own cylinder; facets would miss 0.3 % of it."""
     stiff = rod.level.material[:, 2] == 7800
     volume = sum(w[stiff[part]].sum() for part, *_, w in integration(rod.level.mesh))
@@ -88,8 +88,8 @@ def test_the_curved_face_between_solids_is_a_face_of_the_mesh(rod):
 
 
 @pytest.mark.slow
-def test_stresses_on_both_sides_of_the_face_are_their_own(rod):
-    """Strain is the same everywhere: stresses are as the moduli, none between."""
+def test_stress_at_the_face_between_two_solids_is_that_of_each_material(rod):
+    """The strain is the same everywhere, so stresses are in the ratio of the moduli."""
     area = np.pi * np.array([INNER**2, OUTER**2 - INNER**2])
     strain = 1000 / (np.array([STEEL, ALUMINIUM]) @ area)
     stresses = von_mises(stress_influence(rod, 0.02).stresses([0, 0, 0, 0, 0, 1000]))
@@ -103,7 +103,7 @@ def test_stresses_on_both_sides_of_the_face_are_their_own(rod):
     (["", "rood"], r'no solid "rood"; did you mean "rod"\?'),
     (["", "rod+tub"], r'no solid "tub"; did you mean "tube"\?'),
 ])  # fmt: skip
-def test_a_solid_that_is_unknown_or_lacks_a_material_is_named(given, message):
+def test_unknown_solid_or_solid_without_material_is_refused_by_name(given, message):
     surface = rod_in_tube(INNER, OUTER, LENGTH)
     with pytest.raises(BadInput, match=message):
         placed_materials(surface, [Material(STEEL, 0.3, solid=name) for name in given])
@@ -125,7 +125,7 @@ def test_a_surface_without_solids_is_refused():
         placed_materials(surface, [Material(STEEL, 0.3, solid="rod")])
 
 
-def test_a_part_of_solids_is_read_and_scaled():
+def test_part_option_of_several_solids_is_parsed_and_its_modulus_scaled():
     part = parse_part("--part", "solid=end/a+end b/young=2e11,poisson=0.3,density=7800")
     assert (part.solid, part.E, part.density) == ("end/a+end b", 2e11, 7800)
     twice = parse_part("--part", scaled_part("solid=a/young=2e11,poisson=0.3", 2.0))

@@ -1,4 +1,4 @@
-"""The middle of the interval in which a stiffness lies: closed forms and laws."""
+"""Middle of the interval that contains a stiffness: closed forms and properties."""
 
 from dataclasses import replace
 
@@ -38,7 +38,8 @@ def test_middle_stiffness_subtracts_half_of_a_small_error():
 
 @given(st.integers(0, 10**6), st.floats(1e-6, 30.0))
 def test_stated_error_covers_the_whole_interval(seed, size):
-    """K_h less any share of E, also where E is larger than K_h."""
+    """From K_h down to K_h - c E for any c in 0 to 1,
+    also where E is larger than K_h."""
     K_h, E = random_definite(seed), random_definite(seed + 1, size)
     middle, told = middle_stiffness(K_h, E, NONE)
     for share in (0.0, 0.3, 1.0):
@@ -47,9 +48,9 @@ def test_stated_error_covers_the_whole_interval(seed, size):
 
 
 @given(st.integers(0, 10**6), st.floats(1e-6, 1e4))
-def test_at_least_half_of_every_motions_stiffness_is_left(seed, size):
-    """The middle stays a stiffness however large the error of a coarse mesh is; where
-    E nowhere exceeds K_h it is the middle exactly."""
+def test_middle_stiffness_is_at_least_half_of_the_meshs_in_every_motion(seed, size):
+    """However large the error of a coarse mesh is;
+    where E nowhere exceeds K_h, the result is the middle exactly."""
     K_h, E = random_definite(seed), random_definite(seed + 1, size)
     middle, _ = middle_stiffness(K_h, E, NONE)
     least = np.linalg.eigvals(np.linalg.solve(K_h, middle)).real.min()
@@ -58,7 +59,7 @@ def test_at_least_half_of_every_motions_stiffness_is_left(seed, size):
     assert least == pytest.approx(expected, rel=1e-6)
 
 
-def test_geometry_error_is_stated_without_moving_the_middle():
+def test_geometry_error_adds_to_the_stated_error_and_keeps_the_middle():
     K, E = random_definite(3), random_definite(4, 1e-3)
     geometry = 1e-4 * random_definite(5) * np.where(np.eye(6), -1, 1)
     middle, told = middle_stiffness(K, E, geometry)
@@ -67,8 +68,9 @@ def test_geometry_error_is_stated_without_moving_the_middle():
     np.testing.assert_allclose(told - half, np.abs(geometry), rtol=1e-9)
 
 
-def test_the_middle_does_not_depend_on_units():
-    """Millimetres in place of metres, also where the guard takes less off."""
+def test_middle_stiffness_does_not_depend_on_units():
+    """Millimetres in place of metres,
+    also where less than half of the error is subtracted."""
     units = np.outer(np.repeat([1.0, 1e3], 3), np.repeat([1.0, 1e3], 3))
     for size in (1e-3, 10.0):
         K, E, g = random_definite(6), random_definite(7, size), random_definite(8, 0.1)
@@ -87,8 +89,8 @@ def bar():
     return solve_bar({"width": 0.25, "height": 0.25}, Material(2.0, 0.3), options)
 
 
-def test_link_is_softer_than_its_mesh_by_the_stated_error(bar):
-    """Both are ends of one interval: K_h above, the link in the middle."""
+def test_link_stiffness_is_below_the_meshs_by_the_stated_error(bar):
+    """K_h is the upper end of the interval, the link's stiffness its middle."""
     K_h, K = bar.level.solution.stiffness, bar.link.stiffness
     above = np.diag(scaled(K_h - K, K))
     assert (above > 0).all()
@@ -97,8 +99,8 @@ def test_link_is_softer_than_its_mesh_by_the_stated_error(bar):
     np.testing.assert_allclose(above, told, rtol=1e-6)
 
 
-def test_fields_stresses_and_condensed_ends_stay_the_meshs_own(bar):
-    """They balance the wrench of the mesh's own stiffness, whatever is told of K."""
+def test_stresses_and_condensed_ends_use_the_stiffness_of_the_mesh(bar):
+    """They balance the wrench of the mesh's own stiffness, not of the corrected one."""
     held = two_ends(bar).stiffness[6:, 6:]
     np.testing.assert_allclose(held, bar.level.solution.stiffness, rtol=1e-9)
     softer = replace(bar, link=replace(bar.link, compliance=2 * bar.link.compliance))

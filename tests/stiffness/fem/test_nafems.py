@@ -113,7 +113,7 @@ def on(mesh, values, value):
     return mesh.faces[np.isclose(values[mesh.faces], value, atol=1e-9).all(axis=1)]
 
 
-def test_le1_elliptic_membrane():
+def test_nafems_le1_elliptic_membrane_has_the_published_stress():
     """10 MPa outward on the outer edge; sigma_yy at D (2, 0) is 92.7 MPa.
 
     Plane stress by a free sheet of 0.02 m; printed to three digits, so 0.1 % of it.
@@ -129,7 +129,7 @@ def test_le1_elliptic_membrane():
     assert stress_at(mesh, held, loads, node) == pytest.approx(92.7e6, rel=1e-3)
 
 
-def test_le10_thick_plate():
+def test_nafems_le10_thick_plate_has_the_published_stress():
     """1 MPa on the upper face; sigma_yy at D (2, 0, top) is -5.38 MPa, 0.6 %."""
     unit, mesh = ring((6, 7, 4), 0.6)
     held = np.zeros(mesh.nodes.shape, dtype=bool)
@@ -163,8 +163,8 @@ def warmth(x):
     return np.hypot(x[..., 0], x[..., 1]) + x[..., 2]
 
 
-def test_free_expansion_is_stressless():
-    """A body held nowhere but against rigid motion grows by coefficient x T."""
+def test_free_thermal_expansion_causes_no_stress():
+    """The body is held only against rigid motions and expands by coefficient x T."""
     mesh = isoparametric(box_solid((2, 2, 2), (0.3, 0.2, 0.1)))
     loads = heated(mesh, lambda x: np.full(x.shape[:-1], 50.0), 2.3e-4)
     held = mesh.nodes == 0  # the three planes through the origin
@@ -193,7 +193,7 @@ def le11_stress(counts):
 
 
 @pytest.mark.slow
-def test_le11_solid_cylinder_taper_sphere():
+def test_nafems_le11_solid_cylinder_taper_sphere_has_the_published_stress():
     """T = r + z, 2.3e-4 / K, ends held along z; sigma_zz at A is -105 MPa, 0.6 %.
 
     A is a corner with a steep gradient: it takes six cubic elements across.

@@ -25,8 +25,8 @@ def tensor(six):
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def test_the_equivalent_stress_is_that_of_the_deviator_in_any_axes(rng):
-    """sqrt(3/2 s : s), s without its mean; the same of the turned tensor."""
+def test_von_mises_stress_equals_the_deviators_norm_in_any_axes(rng):
+    """sqrt(3/2 s : s), where s is the deviator, also of the rotated tensor."""
     six = rng.normal(size=(20, 6))
     whole = tensor(six)
     mean = np.trace(whole, axis1=1, axis2=2)[:, None, None] / 3
@@ -39,7 +39,7 @@ def test_the_equivalent_stress_is_that_of_the_deviator_in_any_axes(rng):
 
 
 @pytest.mark.parametrize("order", [2, 3])
-def test_a_linear_field_has_its_stress_at_every_node(rng, order):
+def test_nodal_stress_of_a_linear_field_is_exact(rng, order):
     """2 mu e + lam tr e, on bent elements too."""
     mesh = isoparametric(bar_solid(1, 2, 0.04, 0.1), order)
     A = rng.normal(size=(3, 3, 6))
@@ -55,8 +55,8 @@ def test_a_linear_field_has_its_stress_at_every_node(rng, order):
     np.testing.assert_allclose(found, [stress] * len(mesh.nodes), rtol=1e-9)
 
 
-def test_each_material_has_its_own_stress_at_a_seam():
-    """Two materials under one strain: the stress is 3 or 7, and nothing between."""
+def test_nodal_stress_at_a_material_boundary_is_that_of_each_material():
+    """Two materials under one strain: the stress is 3 or 7, without an average."""
     mesh = isoparametric(box_solid((1, 1, 2), (1.0, 1.0, 2.0)), 2)
     high = mesh.nodes[mesh.cells[:, :4]].mean(axis=1)[:, 2] > 1
     field = np.zeros((len(mesh.nodes), 3, 6))
@@ -100,7 +100,8 @@ def box_of_stress(tip_scale=1.0):
 
 @pytest.mark.parametrize("scale", [1.0, 1.5, 0.5])
 def test_stresses_near_the_ends_are_excluded(scale):
-    """A stretch of one along z, lam and lam + 2 mu, five times for a unit force."""
+    """A stretch of 1 along z has the stresses lam and lam + 2 mu,
+    times five for a unit force."""
     solved = box_of_stress(scale)
     stress = stress_influence(solved)
     assert stress.away == pytest.approx(0.25 * max(scale, 1.0), rel=1e-9)
@@ -127,8 +128,11 @@ def one_element(rng, order, bend):
 
 @pytest.mark.parametrize("order", [2, 3])
 @pytest.mark.parametrize("bend", [0.0, 0.03])
-def test_gradients_at_nodes_are_those_of_any_field_of_the_element(rng, order, bend):
-    """Of a crooked one of linear fields, of a straight one of its own degree's."""
+def test_nodal_gradients_of_fields_within_the_elements_space_are_exact(
+    rng, order, bend
+):
+    """Linear fields on a distorted element;
+    polynomials of its degree on a straight one."""
     mesh = one_element(rng, order, bend)
     ((part, G),) = node_gradients(mesh)
     assert part.tolist() == [0]

@@ -20,8 +20,11 @@ def bar(request):
     return solve_bar(SECTION, Material(2e11, 0.3, DENSITY), options)
 
 
-def test_a_heavy_cantilever_is_bent_by_what_hangs_beyond_each_section(bar):
-    """rho g A (L - z)^2 / 2, linear over the section; shear bends it by 1e-3 more."""
+def test_bending_stress_of_a_heavy_cantilever_follows_the_weight_beyond_each_section(
+    bar,
+):
+    """The moment is rho g A (L - z)^2 / 2, the stress linear over the section;
+    shear adds 1e-3."""
     field = stress_influence(with_own_weight(bar), 0.1)
     stress = field.stresses(np.r_[np.zeros(6), 0.0, -G, 0.0])[:, 2]
     x, y, z = field.places.T
@@ -31,7 +34,7 @@ def test_a_heavy_cantilever_is_bent_by_what_hangs_beyond_each_section(bar):
     np.testing.assert_allclose(stress, expected, atol=5e-3 * largest)
 
 
-def test_the_peak_of_the_weight_is_that_of_the_beam(bar):
+def test_peak_stress_under_own_weight_agrees_with_the_beam(bar):
     """From 50 mm off the wall; over the whole length 6 rho g A L^2 / 2 / h^3."""
     peak = peak_stress(bar, np.zeros(6), section=SECTION, up=[0, 1, 0], away=0.05,
                        gravity=[0, -G, 0])  # fmt: skip
@@ -44,8 +47,8 @@ def test_the_peak_of_the_weight_is_that_of_the_beam(bar):
     assert peak.error < 1e-2 * there
 
 
-def test_weight_along_the_bar_stretches_it(bar):
-    """rho g (L - z) hangs below each section."""
+def test_weight_along_the_bar_gives_a_linear_axial_stress(bar):
+    """rho g (L - z), the weight below each section."""
     field = stress_influence(with_own_weight(bar), 0.1)
     stress = field.stresses(np.r_[np.zeros(6), 0.0, 0.0, G])[:, 2]
     expected = DENSITY * G * (1 - field.places[:, 2])
@@ -53,7 +56,7 @@ def test_weight_along_the_bar_stretches_it(bar):
 
 
 def test_a_wrench_and_the_weight_superpose(bar):
-    """Half the weight lifted at the tip: the wall carries no moment."""
+    """A tip force that carries half of the weight leaves no moment at the wall."""
     lift = DENSITY * G * SIDE**2 / 2
     field = stress_influence(with_own_weight(bar), 0.1)
     stress = field.stresses([0, 0, 0, 0, lift, 0, 0, -G, 0])[:, 2]

@@ -1,4 +1,4 @@
-"""The mesh report, by hand."""
+"""Mesh report against hand calculation."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def one(points):
     return Solid(points, cells, faces, np.zeros(4, dtype=int), (None,))
 
 
-def test_angles_and_quality_of_known_tetrahedra():
+def test_angles_and_quality_of_known_tetrahedra_equal_hand_calculation():
     """Regular: arccos(1/3) at every edge, quality 1.  Corner of a cube: three right
     angles and three of arccos(1/sqrt(3)); edges 1 and sqrt(2), volume 1/6."""
     np.testing.assert_allclose(dihedral_angles(one(REGULAR)), np.arccos(1 / 3))
@@ -30,7 +30,7 @@ def test_angles_and_quality_of_known_tetrahedra():
 
 
 def test_flat_tetrahedron_has_low_quality():
-    """Height 0.01 over a triangle of side 1: angles near 0 and near pi."""
+    """A height of 0.01 over a triangle of side 1: angles are near 0 and near pi."""
     flat = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.8, 0], [0.5, 0.3, 0.01]])
     angles = dihedral_angles(one(flat))
     assert angles.min() < 0.05
@@ -38,7 +38,7 @@ def test_flat_tetrahedron_has_low_quality():
     assert element_quality(one(flat))[0] < 0.1
 
 
-def test_the_report_of_a_box_and_of_a_bar():
+def test_mesh_report_has_the_exact_volume_and_area_of_a_box_and_a_bar():
     """A box's numbers are exact; a bar's cubic sides miss the circle by 1e-7."""
     box = box_solid((2, 3, 4), (0.1, 0.2, 0.3))
     report = mesh_report(box, isoparametric(box))

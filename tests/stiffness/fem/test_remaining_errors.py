@@ -1,4 +1,4 @@
-"""Indicated errors against the formula of their decay, tractions by hand."""
+"""Remaining errors against the formula of their decay, tractions by hand."""
 
 import numpy as np
 import pytest
@@ -49,7 +49,7 @@ def share_of_the_rest(ratio):
 # at -3.75 the stress of some elements has its least value in their middle: no slope
 @pytest.mark.parametrize("bend", [0.01, 0.3, 1.0, 2.0, 5.0, 100.0, -3.75, -3.5])
 @pytest.mark.parametrize("stiffness", [E, 7.0])
-def test_the_remaining_error_follows_from_the_decay(bend, stiffness):
+def test_remaining_error_follows_from_the_decay_of_the_indicated_error(bend, stiffness):
     """u = z^2 / 2 + c z^3 / 3: a stress z + c z^2.  By what cases are compared is the
     same for both energies."""
     mesh = isoparametric(box_solid((1, 1, 3), (0.5, 0.6, 0.8)))
@@ -84,7 +84,7 @@ def heights(size):
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("order", [2, 3])
-def test_tractions_of_a_constant_stress_by_hand(rng, size, order):
+def test_traction_errors_of_a_constant_stress_equal_hand_calculation(rng, size, order):
     """A face's energy is t^2 / (2 mu) times its area times its height over pi, for
     every pair of fields; whichever faces are free."""
     mesh = isoparametric(box_solid((1, 1, 1), np.array(size)), order)

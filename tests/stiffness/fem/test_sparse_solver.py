@@ -20,8 +20,8 @@ def chosen():
 
 @pytest.mark.parametrize("name", sorted({"SuperLU", solver_name()}))
 @pytest.mark.parametrize("columns", [1, 6])
-def test_the_whole_matrix_is_solved_from_its_upper_triangle(rng, name, columns):
-    """A = B B^T + I, dense by numpy."""
+def test_sparse_solver_needs_only_the_upper_triangle(rng, name, columns):
+    """The matrix is A = B B^T + I; numpy's dense solution is the reference."""
     B = random_array((40, 40), density=0.1, rng=rng).toarray()
     A = B @ B.T + np.eye(40)
     loads = rng.normal(size=(40, columns))
@@ -36,14 +36,14 @@ def test_superlu_is_used_without_pypardiso(monkeypatch, chosen):
 
 
 def test_superlu_is_used_if_pypardiso_does_not_load(monkeypatch, chosen):
-    """For example with MKL's library of another architecture."""
+    """For example because the MKL library is of another architecture."""
     monkeypatch.setattr(sparse_solver, "find_spec", lambda _: object())
     monkeypatch.setattr(sparse_solver, "_mkl", lambda: None)
     monkeypatch.setitem(sys.modules, "pypardiso", None)
     assert chosen() == "SuperLU"
 
 
-def test_missing_mkl_gives_no_library(monkeypatch):
+def test_mkl_library_is_none_when_mkl_is_not_installed(monkeypatch):
     def absent(name):
         raise sparse_solver.PackageNotFoundError(name)
 

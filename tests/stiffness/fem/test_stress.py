@@ -37,7 +37,7 @@ def notched(keep):
     return stress_influence(MeshedLink(link, level, centers), away=0.05)
 
 
-def test_inner_edges_without_a_fillet_are_named():
+def test_inner_edges_without_a_fillet_are_reported():
     """A notch in the column's middle has two; a whole column has none.  Its clamped
     outlines are outside the region."""
     whole = notched(lambda x: np.full(len(x), True))
@@ -48,8 +48,8 @@ def test_inner_edges_without_a_fillet_are_named():
     assert "inner edges without a fillet" in notch.region
 
 
-def test_von_mises_by_hand():
-    """Uniaxial s, pure shear sqrt(3) t, pressure nothing."""
+def test_von_mises_stress_equals_hand_calculation():
+    """Uniaxial stress s gives s, pure shear t gives sqrt(3) t, pressure gives zero."""
     assert von_mises([2.0, 0, 0, 0, 0, 0]) == 2.0
     assert von_mises([0, 0, 0, 0, 3.0, 0]) == pytest.approx(3 * np.sqrt(3))
     assert von_mises([5.0, 5, 5, 0, 0, 0]) == 0
@@ -60,15 +60,19 @@ def test_von_mises_by_hand():
     ([1e3, 0, 0, 0, 0, 0], 1e3 * R / SECOND),
     ([0, 0, 1e3, 0, 0, 0], np.sqrt(3) * 1e3 * R / (2 * SECOND)),
 ])  # fmt: skip
-def test_a_bar_in_the_middle_has_the_stress_of_the_books(solved, wrench, expected):
-    """Four radii from both ends end effects have decayed (e^-4 a radius): 0.3 %,
-    the mesh's (averaged at nodes, elements of half the radius)."""
+def test_stress_in_the_middle_of_a_bar_equals_textbook_values(solved, wrench, expected):
+    """Four radii from both ends the end effects have decayed (e^-4 a radius).
+
+    The tolerance of 0.3 % is the mesh's (averaged at nodes, elements of half the
+    radius).
+    """
     stress = stress_influence(solved, away=4 * R)
     assert stress.peak(wrench)[0] == pytest.approx(expected, rel=3e-3)
 
 
-def test_a_pulled_bar_is_pulled_along_and_free_across(solved):
-    """Components, since von Mises does not see a pressure: zz = F / A, xx = yy = 0."""
+def test_stress_of_a_bar_in_tension_is_axial_only(solved):
+    """Components, since the von Mises stress does not see a pressure:
+    zz = F / A, xx = yy = 0."""
     stress = stress_influence(solved, away=4 * R).stresses([0, 0, 0, 0, 0, 1e3])
     np.testing.assert_allclose(stress[:, 2], 1e3 / AREA, rtol=3e-3)
     assert np.abs(stress[:, :2]).max() < 1e-3 * 1e3 / AREA
@@ -84,7 +88,7 @@ def test_a_bent_bar_peaks_at_the_far_section_of_the_region(solved):
     assert value == pytest.approx(expected, rel=0.02)
 
 
-def test_stresses_superpose(solved, rng):
+def test_stresses_are_linear_in_the_wrench(solved, rng):
     stress = stress_influence(solved)
     a, b = rng.normal(size=(2, 6))
     np.testing.assert_allclose(
@@ -95,7 +99,7 @@ def test_stresses_superpose(solved, rng):
     assert stress.peak(3 * a)[0] == pytest.approx(3 * stress.peak(a)[0])
 
 
-def test_the_region_is_stated_and_the_edge_kept_out(solved):
+def test_stress_region_is_reported_and_excludes_the_clamped_edges(solved):
     stress = stress_influence(solved)
     assert stress.away == pytest.approx(R, rel=1e-6)
     assert stress.places[:, 2].min() >= R * (1 - 1e-9)
@@ -106,9 +110,9 @@ def test_the_region_is_stated_and_the_edge_kept_out(solved):
         stress_influence(solved, away=1.0)
 
 
-def test_the_peak_has_the_beams_beside_it(solved):
-    """A sideways force: at the section nearest to the base the region ends on, M = F
-    (L - away); the whole beam's is F L.  Mesh 2 %, as above."""
+def test_peak_stress_is_reported_with_that_of_the_beam(solved):
+    """A sideways force: at the section of the region nearest to the base M = F (L -
+    away); for the whole beam M = F L. The mesh's error is 2 %, as above."""
     load = [0, 0, 0, 1e3, 0, 0]
     peak = peak_stress(solved, load, section={"radius": R})
     assert peak.away == pytest.approx(R, rel=1e-6)
@@ -120,8 +124,8 @@ def test_the_peak_has_the_beams_beside_it(solved):
     assert np.linalg.norm(peak.place[:2]) == pytest.approx(R, rel=1e-6)
 
 
-def test_the_beam_is_read_in_the_links_axes(solved):
-    """Torsion about the link's z, and a moment at the tip that is the base's too."""
+def test_beam_stress_follows_the_axes_of_the_link(solved):
+    """Torsion about the link's z axis, and a moment that is equal at tip and base."""
     twist = peak_stress(solved, [0, 0, 50, 0, 0, 0], section={"radius": R})
     expected = np.sqrt(3) * 50 * R / (2 * SECOND)
     assert twist.beam[0] == pytest.approx(expected, rel=1e-9)
@@ -134,13 +138,13 @@ def test_the_beam_is_read_in_the_links_axes(solved):
     assert bent[1].beam[0] == pytest.approx(50 * 6 / (0.05 * 0.02**2), rel=1e-9)
 
 
-def test_a_section_of_constants_is_refused_before_the_work(solved):
+def test_stress_refuses_a_section_given_by_constants(solved):
     section = {"area": 1.0, "I_y": 1.0, "I_z": 1.0, "J": 1.0}
     with pytest.raises(BadInput, match="says nothing of its outer fibres"):
         peak_stress(solved, np.ones(6), section=section)
 
 
-def test_the_report_and_the_picture_say_where(solved):
+def test_stress_report_and_figure_state_region_and_beam_stress(solved):
     peak = peak_stress(solved, [0, 0, 0, 1e3, 0, 0], section={"radius": R})
     text = stress_text(peak)
     assert "at least 0.04 m away from both interfaces" in text

@@ -45,8 +45,9 @@ def bar(request):
     ([1e3, 0, 0, 0, 0, 0], 1e3 * R / SECOND),
     ([0, 0, 1e3, 0, 0, 0], np.sqrt(3) * 1e3 * R / (2 * SECOND)),
 ])  # fmt: skip
-def test_a_bars_stress_lies_within_the_estimated_error(bar, wrench, expected):
-    """F / A, M R / I and T R / J, four radii from the ends, whose effect is 0.1 %."""
+def test_stress_of_a_bar_agrees_within_the_estimated_error(bar, wrench, expected):
+    """F / A, M R / I and T R / J at four radii from the ends,
+    where the end effect is 0.1 %."""
     peak = peak_stress(bar, wrench, away=4 * R)
     assert abs(peak.von_mises - expected) <= peak.error + 1e-3 * expected
     assert peak.error < 0.25 * expected
@@ -66,8 +67,8 @@ def test_an_estimated_error_is_proportional_to_the_load(bar, rng):
     )
 
 
-def test_elements_agree_about_a_uniform_strain(rng):
-    """Displacements linear in place: one stress everywhere, up to rounding."""
+def test_estimated_stress_error_of_a_uniform_strain_is_zero(rng):
+    """Displacements linear in place give one stress everywhere, up to rounding."""
 
     def everything(x):
         return np.full(len(x), True)
@@ -83,7 +84,9 @@ def test_elements_agree_about_a_uniform_strain(rng):
     assert estimated_error(level, pull, 7, everywhere, ~everywhere) > 1e-3 * scale
 
 
-def test_a_peak_at_an_inner_edge_has_no_error_because_it_has_no_value():
+def test_peak_at_a_sharp_inner_edge_has_no_error_estimate():
+    """The true stress at such an edge is infinite."""
+
     def keep(x):
         return (x[:, 0] < 0.05) | (np.abs(x[:, 2] - 0.2) > 0.1)
 
@@ -95,12 +98,12 @@ def test_a_peak_at_an_inner_edge_has_no_error_because_it_has_no_value():
 
 
 @pytest.mark.slow
-def test_a_shouldered_shafts_peak_lies_within_the_estimated_error():
+def test_peak_stress_of_a_stepped_shaft_agrees_within_the_estimated_error():
     """D 30, d 20, r 2 mm in tension, torsion and bending, 15 mm from the ends.
 
-    Expected per N and N m: quadratic axisymmetric elements, with the first harmonic in
-    bending, of another program, on meshes of 0.1 and 0.05 mm in the fillet that agree
-    to 0.3 %.  Peterson's charts have 5.94 (3 % below) in tension.
+    The expected values per N and N m come from another program: quadratic axisymmetric
+    elements, with the first harmonic in bending, on meshes of 0.1 and 0.05 mm in the
+    fillet that agree to 0.3 %.  Peterson's charts have 5.94 (3 % below) in tension.
     """
     points, triangles = shouldered_shaft(0.015, 0.010, 0.002, 48, 8)
     surface = check_surface(points, triangles, "shaft")

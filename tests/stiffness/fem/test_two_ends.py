@@ -11,7 +11,7 @@ from stiffness.fem.two_ends import two_ends
 
 
 @pytest.mark.parametrize("interface", ["rigid", "distributing"])
-def test_both_ends_are_the_schur_complement_of_the_whole_matrix(interface):
+def test_stiffness_of_both_ends_equals_the_schur_complement(interface):
     """Twelve motions of both ends at once, by dense elimination of all other nodes."""
     options = FemOptions(0.5, interface, Budget(levels=1))
     solved = solve_bar({"width": 0.3, "height": 0.4}, Material(1.0, 0.3, 2.0), options)

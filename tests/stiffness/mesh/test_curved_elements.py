@@ -1,4 +1,4 @@
-"""Curved elements: on their shapes, of their shapes' volume, none inverted."""
+"""Curved elements: they follow their shapes, and none is inverted."""
 
 import numpy as np
 import pytest
@@ -58,8 +58,9 @@ def side_errors(mesh):
     return np.abs(np.hypot(*nodes[:, :2].T) / 0.04 - 1)
 
 
-def test_nodes_and_layers_follow_the_cylinder():
-    """Cubic elements have an error of the fourth power of their size, cut or not."""
+def test_nodes_of_curved_elements_lie_on_the_cylinder_to_fourth_order():
+    """The error of cubic elements falls with the fourth power of their size,
+    with or without layers."""
     errors = {rings: layers_of_bar(rings, 2 * rings, 3) for rings in (2, 4)}
     for k in range(2):
         coarse, fine = (side_errors(errors[rings][k]).max() for rings in (2, 4))
@@ -75,9 +76,11 @@ def volume(mesh):
     return sum(chunk.w.sum() for chunk in integration(mesh))
 
 
-def test_the_volume_of_a_round_bar_converges_with_the_sixth_power():
-    """Edges and faces deviate to both sides of an arc, so that errors cancel; the
-    quadratic elements' error falls with the fourth."""
+def test_volume_of_a_round_bar_converges_with_the_sixth_power():
+    """Edges and faces deviate to both sides of an arc, so that errors cancel.
+
+    The error of quadratic elements falls with the fourth power.
+    """
     exact = np.pi * 0.04**2 * 0.2
     for order, power, least in ((2, 4, 1e-5), (3, 6, 1e-7)):
         error = [
@@ -89,8 +92,8 @@ def test_the_volume_of_a_round_bar_converges_with_the_sixth_power():
 
 
 @pytest.mark.parametrize("order", [2, 3])
-def test_cutting_layers_leaves_a_bent_element_as_it_is(order):
-    """Parts are cut in its own coordinates: the same volume, the same area."""
+def test_cutting_layers_keeps_volume_and_area_of_bent_elements(order):
+    """Parts are cut in the element's own coordinates."""
     whole, cut = layers_of_bar(2, 4, order)
     assert len(cut.cells) > len(whole.cells)
     assert volume(cut) == pytest.approx(volume(whole), rel=1e-12)
@@ -102,8 +105,8 @@ def shell_volume(inner, outer):
     return SOLID_ANGLE * (outer**3 - inner**3) / 3
 
 
-def test_a_spheres_volume_converges_with_the_sixth_power():
-    """Concave and convex faces, with nodes of the outline on both shapes."""
+def test_volume_of_a_sphere_converges_with_the_sixth_power():
+    """Concave and convex faces; nodes of the outline lie on both shapes."""
     error = []
     for n in (1, 2, 4):
         mesh = isoparametric(shell((n, n, n), 0.6, 1.0))
@@ -112,7 +115,7 @@ def test_a_spheres_volume_converges_with_the_sixth_power():
     assert error[2] < 1e-6
 
 
-def test_the_outline_of_a_sphere_lies_on_its_planes():
+def test_nodes_on_the_planes_of_a_sphere_sector_lie_on_them():
     mesh = isoparametric(shell((2, 2, 2), 0.6, 1.0))
     for number in range(2, 6):
         solid = shell((1, 1, 1), 0.6, 1.0)
@@ -121,7 +124,7 @@ def test_the_outline_of_a_sphere_lies_on_its_planes():
 
 
 @pytest.mark.parametrize(("number", "sign"), [(0, 1), (1, -1)])
-def test_a_wall_off_its_shape_is_energy_density_times_volume(number, sign):
+def test_geometry_error_equals_energy_density_times_missing_volume(number, sign):
     """A constant strain: a hollow radius larger by 1e-4 takes volume from the shape, a
     round one adds it; the difference of energies is the density's times that."""
     solid = shell((3, 3, 2), 0.6, 1.0)
@@ -149,8 +152,10 @@ THIN = [((2, 2, 1), 0.95), ((4, 4, 1), 0.96), ((5, 5, 1), 0.965), ((8, 8, 1), 0.
 @pytest.mark.parametrize(("counts", "inner"), THIN)
 @pytest.mark.parametrize("order", [2, 3])
 def test_elements_of_thin_walls_are_not_inverted(counts, inner, order):
-    """A face that bulges by a quarter of the wall would invert its tetrahedron: such
-    elements are straightened, and all have the orientation of their corners."""
+    """A face that bulges by a quarter of the wall would invert its tetrahedron.
+
+    Such elements are straightened, and all have the orientation of their corners.
+    """
     solid = shell(counts, inner, 1.0)
     bent = curved_elements(solid, order)
     assert bent.inverted.any()
@@ -164,7 +169,7 @@ def test_elements_of_thin_walls_are_not_inverted(counts, inner, order):
 
 
 @pytest.mark.parametrize(("counts", "inner"), THIN[1:3])
-def test_refining_inverted_elements_brings_the_volume_nearer(counts, inner):
+def test_refining_inverted_elements_more_than_halves_the_volume_error(counts, inner):
     """Straightened elements deviate from the shape, smaller ones by less than half."""
     solid = shell(counts, inner, 1.0)
     error = [

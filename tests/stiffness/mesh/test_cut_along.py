@@ -27,8 +27,8 @@ def area_of(solid, patch):
 
 
 @pytest.mark.parametrize("edge", [0.37, 0.5, 0.52, 0.601])
-def test_a_face_cut_along_a_line_has_the_area_up_to_it(edge):
-    """The foot of a unit box belongs to patch 0 up to x = edge, to patch 3 beyond."""
+def test_face_cut_along_a_line_has_the_area_up_to_the_line(edge):
+    """The bottom of a unit box belongs to patch 0 up to x = edge, to patch 3 beyond."""
     box = box_solid((4, 3, 3), (1.0, 1.0, 1.0))
     middle = box.points[box.faces].mean(axis=1)
     beyond = (box.patch == 0) & (middle[:, 0] > edge)
@@ -56,7 +56,7 @@ BLOCK = rounded_block((0.06, 0.03), 0.02, [(0.0, 0.0), (0.0, 0.02)], 18)
 FLAT_ENDS = parse_interface("x=-0.06"), parse_interface("x=0.06")
 
 
-def test_a_held_face_ends_where_its_rounding_begins(tmp_path):
+def test_interface_without_a_sharp_edge_ends_where_the_rounding_begins(tmp_path):
     """120 x 60 x 20 mm with corners of 20 mm: each end's flat face is 20 x 20 mm."""
     solid = mesh_solid(BLOCK, *FLAT_ENDS, edge=0.014, envelope=1e-3, cache=tmp_path)
     for patch, x in ((0, -0.06), (1, 0.06)):
@@ -67,7 +67,9 @@ def test_a_held_face_ends_where_its_rounding_begins(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_rounded_block_is_as_symmetric_and_no_stiffer_than_it_can_be(tmp_path):
+def test_rounded_block_has_no_forbidden_coupling_and_stays_below_an_upper_bound(
+    tmp_path,
+):
     """Couplings that its mirror planes forbid vanish; 119 142 N m/rad is an upper
     bound of K_RZ by a conforming mesh of another program."""
     options = FemOptions(0.02, cache=tmp_path)

@@ -1,4 +1,4 @@
-"""Layers along singular edges: found, conforming, of the same volume, nested."""
+"""Layers along singular edges: found, conforming, nested, of the same volume."""
 
 from math import prod
 
@@ -109,7 +109,7 @@ def check_layers(solid, held):
     kept=st.lists(st.booleans(), min_size=12, max_size=12).filter(any),
     held=st.sampled_from(CLAMPED),
 )
-def test_layers_of_any_pile_of_boxes_conform_and_lose_nothing(kept, held):
+def test_layers_of_any_union_of_boxes_conform_and_keep_the_volume(kept, held):
     """Also bodies that touch in an edge or a corner, holes and steps."""
     counts = np.array([3, 2, 2])
 
@@ -130,9 +130,12 @@ def test_layers_of_any_pile_of_boxes_conform_and_lose_nothing(kept, held):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_richer_space_gives_a_softer_link(kind):
-    """On a box the geometry is exact: quadratic fields are cubic ones, and those of
-    whole elements are those of their parts; K falls in every direction."""
+def test_richer_finite_element_space_lowers_the_stiffness(kind):
+    """On a box the geometry is exact.
+
+    Quadratic fields are a subset of cubic ones, and fields of whole elements of those
+    of their parts; K falls in every direction.
+    """
     held = (0, 1)
     solid = split_joining_edges(box_solid((2, 2, 3), (0.05, 0.08, 0.2)), held)
     parts = layered(solid, held)
@@ -153,7 +156,7 @@ def test_a_richer_space_gives_a_softer_link(kind):
             assert values[5] > 1e-5 or kind != "rigid"
 
 
-def test_a_smooth_box_stays_whole():
+def test_mesh_without_singular_edges_is_not_split():
     solid = box_solid((2, 2, 3), (0.05, 0.08, 0.2))
     assert len(singular_edges(solid, ())) == 0
     assert split_joining_edges(solid, ()).cells.shape == solid.cells.shape
@@ -174,8 +177,9 @@ def bent_plate(angle, unit, way):
 
 @pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("way", [1, -1])
-def test_an_inner_edge_of_more_than_35_degrees_is_singular(unit, way):
-    """On the side toward which a plate is bent; on the other it is an outer one."""
+def test_inner_edge_of_more_than_35_degrees_is_singular(unit, way):
+    """An edge is an inner one on the side toward which the plate is bent,
+    else an outer one."""
     for degrees, edges in ((34.0, 0), (36.0, 2), (60.0, 2)):
         solid = bent_plate(np.radians(degrees), unit, way)
         found = singular_edges(solid, ())

@@ -1,4 +1,4 @@
-"""A mesh fitted to a surface's patches, and refusals."""
+"""Meshes fitted to the patches of a surface, and refusals."""
 
 from collections import Counter
 from itertools import combinations
@@ -18,7 +18,7 @@ from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, box_solid
 Z = np.array([0.0, 0, 1])
 
 
-def test_a_face_of_one_tetrahedron_alone_is_on_the_boundary():
+def test_faces_of_a_single_tetrahedron_are_the_boundary():
     """Counted directly, in a box without some of its tetrahedra."""
     rng = np.random.default_rng(6)
     cells = box_solid((3, 3, 2), (1.0, 1.0, 1.0)).cells
@@ -49,9 +49,8 @@ def test_a_mesh_without_a_face_on_an_interface_is_refused(other, missing):
         fit_to_patches(made.points, made.cells, SURFACE, patches)
 
 
-def test_cells_of_either_orientation_and_points_of_no_cell_are_put_in_order():
-    """The same solid as from well-ordered cells, without unused points; far from the
-    origin."""
+def test_fit_turns_cells_of_wrong_orientation_and_drops_unused_points():
+    """The solid equals that of well-ordered cells; it lies far from the origin."""
     far = np.array([3.0, -2.0, 1.0])
     rng = np.random.default_rng(7)
     made = box_solid((2, 2, 2), (0.1, 0.1, 0.1))

@@ -1,4 +1,4 @@
-"""Polynomials on tetrahedra: values on the lattice, derivatives, numbers."""
+"""Lagrange polynomials on tetrahedra: lattice values, derivatives, shared nodes."""
 
 from math import prod
 
@@ -19,14 +19,18 @@ def inside(rng, corners, count=20):
 
 @pytest.mark.parametrize("corners", CORNERS)
 @pytest.mark.parametrize("degree", ORDERS)
-def test_shape_functions_are_one_at_their_point_and_zero_at_the_others(degree, corners):
+def test_shape_functions_are_one_at_their_own_point_and_zero_at_all_others(
+    degree, corners
+):
     N, _ = shape_functions(degree, lattice(degree, corners) / degree)
     np.testing.assert_allclose(N, np.eye(len(N)), atol=1e-15)
 
 
 @pytest.mark.parametrize("corners", CORNERS)
 @pytest.mark.parametrize("degree", ORDERS)
-def test_shape_functions_hold_every_polynomial_of_their_degree(rng, degree, corners):
+def test_shape_functions_represent_every_polynomial_of_their_degree(
+    rng, degree, corners
+):
     """They sum to one, and their derivatives to zero."""
     L = inside(rng, corners)
     N, dN = shape_functions(degree, L)
@@ -40,8 +44,8 @@ def test_shape_functions_hold_every_polynomial_of_their_degree(rng, degree, corn
 
 @pytest.mark.parametrize("corners", CORNERS)
 @pytest.mark.parametrize("degree", ORDERS)
-def test_derivatives_are_those_of_central_differences(rng, degree, corners):
-    """Of a cubic they are off by the step squared over 6 times its third derivative,
+def test_derivatives_of_shape_functions_equal_central_differences(rng, degree, corners):
+    """For a cubic the error is the squared step over 6 times the third derivative,
     which is at most 27: 1e-9 at a step of 1e-5."""
     L, step = inside(rng, corners), 1e-5
     _, dN = shape_functions(degree, L)
@@ -54,9 +58,8 @@ def test_derivatives_are_those_of_central_differences(rng, degree, corners):
 
 
 @pytest.mark.parametrize("order", [2, 3])
-def test_a_shared_node_has_one_place(order):
-    """Every element computes the same place for it, in any order; and the
-    grid of a box has as many nodes as its finer grid."""
+def test_shared_node_has_the_same_place_in_every_element(order):
+    """In any order of the corners; a box has as many nodes as its finer grid."""
     solid = box_solid((2, 3, 2), (0.1, 0.2, 0.3))
     mesh = isoparametric(solid, order)
     assert len(mesh.nodes) == prod(order * n + 1 for n in (2, 3, 2))

@@ -25,8 +25,8 @@ def kuhn_cube(n):
 
 
 @pytest.mark.slow
-def test_a_meshed_bar_has_exact_interfaces_and_a_round_side(tmp_path):
-    """24 facets: the polygon lacks 1.1 % of area; the corners lie on the circle."""
+def test_meshed_bar_has_flat_ends_and_corners_on_its_cylinder(tmp_path):
+    """The bar has 24 facets; a second call reads the same mesh from the cache."""
     solid = mesh_solid(bar(facets=24), *FACES, edge=0.02, cache=tmp_path)
     assert solid.volumes().min() > 0
     for number, height in ((0, 0.0), (1, 0.1)):
@@ -61,7 +61,7 @@ DAMAGED = {
 
 
 @pytest.mark.parametrize("damage", DAMAGED)
-def test_a_damaged_mesh_of_the_cache_is_made_again(tmp_path, monkeypatch, damage):
+def test_damaged_mesh_in_the_cache_is_replaced(tmp_path, monkeypatch, damage):
     monkeypatch.setattr(
         mesh_module, "_tetrahedralize", lambda *_: (MADE.points, MADE.cells)
     )
@@ -80,7 +80,7 @@ def test_a_damaged_mesh_of_the_cache_is_made_again(tmp_path, monkeypatch, damage
     [(0, "first\nno inside", "no inside"), (0, "no inside\n", "no inside"),
      (1, "first\nout of memory", "out of memory")],
 )  # fmt: skip
-def test_failed_mesher_is_reported_with_its_last_words(
+def test_failed_mesher_is_reported_with_its_last_output(
     tmp_path, monkeypatch, status, words, told
 ):
     """The mesher finds no solid, or it crashes."""
@@ -106,8 +106,8 @@ def test_mesher_is_stopped_at_its_time_limit(tmp_path):
 @pytest.mark.skipif(
     not mesh_module._SAME_NUMBERS.exists(), reason="the C++ library is not GNU's"
 )
-def test_the_same_surface_gives_the_same_mesh(tmp_path):
-    """Made twice in different caches; another edge gives another mesh."""
+def test_same_surface_has_the_same_mesh_in_every_cache(tmp_path):
+    """Two runs with different caches agree; another edge length changes the mesh."""
     one, again, other = (
         mesh_solid(bar(), *FACES, edge=edge, cache=tmp_path / str(number))
         for number, edge in enumerate((0.03, 0.03, 0.029))
@@ -117,8 +117,8 @@ def test_the_same_surface_gives_the_same_mesh(tmp_path):
     assert not np.array_equal(one.cells, other.cells)
 
 
-def test_a_mesh_with_a_breach_is_refused(tmp_path, monkeypatch):
-    """One of 64 columns of the cube is missing: 1.6 % of the volume, a hole."""
+def test_mesh_with_a_missing_column_is_refused(tmp_path, monkeypatch):
+    """One of 64 columns of the cube is missing: a hole of 1.6 % of the volume."""
     cube = kuhn_cube(8)
     place = np.floor(cube.points[cube.cells].mean(axis=1) / 0.0125)
     whole = ~((place[:, 0] == 3) & (place[:, 1] == 4))
@@ -135,7 +135,7 @@ def test_a_mesh_with_a_breach_is_refused(tmp_path, monkeypatch):
     [("distal_plain", 0, 1), ("tube", 1, 1), ("delta_forearm", 0, 2)],
 )
 def test_eulers_characteristic_counts_shells_and_holes(name, ways_through, shells):
-    """Two for each shell, also the forearm's cavity, less two for each hole."""
+    """Two for each shell, also the forearm's cavity, minus two for each hole."""
     surface = read_surface(Path(__file__).parents[3] / "meshes" / f"{name}.stl")
     characteristic = euler_characteristic(surface.triangles)
     assert characteristic == 2 * shells - 2 * ways_through
@@ -143,9 +143,10 @@ def test_eulers_characteristic_counts_shells_and_holes(name, ways_through, shell
 
 @pytest.mark.parametrize("name", ["distal_plain", "delta_forearm", "l_bracket"])
 def test_coarser_surface_has_fewer_triangles_and_the_same_volume(name):
-    """Corners of the coarse surface near the part, as many holes, its volume to 1 %.
+    """The coarse surface is near the part, has as many holes, and its volume to 1 %.
 
-    The bracket's triangles are all needed."""
+    The bracket needs all of its triangles.
+    """
     import pyvista as pv
 
     surface = read_surface(Path(__file__).parents[3] / "meshes" / f"{name}.stl")
@@ -165,8 +166,9 @@ def test_coarser_surface_has_fewer_triangles_and_the_same_volume(name):
     assert np.abs(apart).max() < 4e-4
 
 
-def test_a_surface_that_cannot_be_coarser_within_the_tolerance_is_kept():
-    """A 32-gon of r = 20 mm: a corner less is 0.4 mm off, 0.1 mm are allowed."""
+def test_surface_that_cannot_be_decimated_within_the_tolerance_is_kept():
+    """A 32-gon of r = 20 mm:
+    without one corner it deviates by 0.4 mm, and 0.1 mm are allowed."""
     surface = bar()
     points, triangles = coarser_surface(surface, 1e-4)
     assert triangles is surface.triangles
@@ -174,7 +176,8 @@ def test_a_surface_that_cannot_be_coarser_within_the_tolerance_is_kept():
 
 
 def test_faces_of_a_mesh_belong_to_the_patches_that_they_lie_on():
-    """The ends' faces look along the bar, the side's across; its corners are on it."""
+    """Faces at the ends point along the bar, faces of the side across it;
+    their corners lie on it."""
     surface = bar()
     made = bar_solid(5, 4, 0.02, 0.1)
     solid = fit_to_patches(

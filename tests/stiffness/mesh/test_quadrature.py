@@ -1,4 +1,4 @@
-"""Rules of integration over triangles and tetrahedra."""
+"""Quadrature rules for triangles and tetrahedra."""
 
 from math import factorial, prod
 
@@ -13,9 +13,9 @@ CORNERS = (3, 4)
 
 @pytest.mark.parametrize("corners", CORNERS)
 @pytest.mark.parametrize("degree", range(1, 7))
-def test_rules_integrate_monomials_exactly(degree, corners):
-    """Integral of a product of L_c^p_c: d! product(p_c!) / (d + sum p_c)! times the
-    size, 1 / d! in d dimensions; the tables have 14 digits."""
+def test_quadrature_rules_integrate_monomials_exactly(degree, corners):
+    """The integral of a product of L_c^p_c is d! product(p_c!) / (d + sum p_c)! times
+    the size, 1 / d! in d dimensions; the tables have 14 digits."""
     L, weights = quadrature(degree, corners)
     np.testing.assert_allclose(L.sum(axis=1), 1, rtol=1e-14)
     for power in lattice(degree, corners):
@@ -26,14 +26,17 @@ def test_rules_integrate_monomials_exactly(degree, corners):
 
 @pytest.mark.parametrize("corners", CORNERS)
 @pytest.mark.parametrize("degree", range(1, 7))
-def test_rules_have_positive_weights_at_points_inside(degree, corners):
-    """Or on the surface: an energy of a positive density is then positive."""
+def test_quadrature_rules_have_positive_weights_at_points_inside(degree, corners):
+    """Points may lie on the surface.
+
+    The energy of a positive density is then positive.
+    """
     L, weights = quadrature(degree, corners)
     assert (weights > 0).all()
     assert (L >= 0).all()
 
 
 @pytest.mark.parametrize("corners", CORNERS)
-def test_a_degree_without_a_rule_is_refused(corners):
+def test_degree_without_a_quadrature_rule_is_refused(corners):
     with pytest.raises(ValueError, match="degree is 7, expected one up to 6"):
         quadrature(7, corners)

@@ -18,7 +18,7 @@ def crooked(rng):
 
 @pytest.mark.parametrize("solid", [crooked(np.random.default_rng(1)),
                                    bar_solid(2, 4, 0.02, 0.1)])  # fmt: skip
-def test_faces_stay_the_boundary_outward_and_of_their_patch(solid):
+def test_refined_faces_stay_on_the_boundary_of_their_patch_and_point_outward(solid):
     """Each patch keeps the sum of its faces' vectors where its shape is unknown; a
     bar's side stays on its circle, and no end shrinks."""
     asked = np.random.default_rng(2).integers(1, 4, len(solid.cells))
@@ -48,8 +48,8 @@ def test_faces_stay_the_boundary_outward_and_of_their_patch(solid):
 
 
 @pytest.mark.parametrize("halvings", [0, 1, 2, 4])
-def test_every_part_of_a_cell_is_halved_as_often_as_asked(rng, halvings):
-    """At least as often; other cells only where they must conform."""
+def test_every_part_of_a_cell_is_halved_as_often_as_requested(rng, halvings):
+    """At least as often; other cells are halved only where they must conform."""
     solid = crooked(rng)
     asked = np.zeros(len(solid.cells), dtype=int)
     asked[7] = halvings

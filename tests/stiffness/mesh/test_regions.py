@@ -1,4 +1,4 @@
-"""Regions of another material: the mesh is cut along their faces."""
+"""Regions of another material, along whose faces the mesh is cut."""
 
 from dataclasses import replace
 
@@ -31,8 +31,8 @@ def layer(contrast):
     ("x=0.011..0.02,z=0.02..0.0271", (0.009, 0.03, 0.0071)),
     ("x=0.004..0.0227,y=0.009..0.0203,z=0.013..0.0371", (0.0187, 0.0113, 0.0241)),
 ])  # fmt: skip
-def test_a_mesh_is_cut_along_the_faces_of_a_box(region, size):
-    """The elements of the region fill its own volume, and no other is changed."""
+def test_mesh_is_cut_along_the_faces_of_a_box(region, size):
+    """The elements of the region fill its volume, and no other element changes."""
     regions = regions_of([
         Material(E, 0.3),
         parse_part("--part", f"{region}/young=1e9,poisson=0.3"),
@@ -44,8 +44,8 @@ def test_a_mesh_is_cut_along_the_faces_of_a_box(region, size):
     assert volumes[inside].sum() == pytest.approx(np.prod(size), rel=1e-9)
 
 
-def test_edges_of_a_layer_on_the_boundary_go_around_the_block():
-    """Two squares of 30 mm at the layer's faces."""
+def test_material_edges_of_a_layer_go_around_the_block():
+    """Two squares with sides of 30 mm at the layer's faces."""
     regions = regions_of([Material(E, 0.3), layer(10)])
     cut = cut_by_regions(block(), regions)
     start, end = cut.points[material_edges(cut, regions)].swapaxes(0, 1)
@@ -54,7 +54,7 @@ def test_edges_of_a_layer_on_the_boundary_go_around_the_block():
 
 
 @pytest.mark.parametrize("contrast", [0.01, 10, 1e4])
-def test_layers_in_series_stretch_as_springs_do(contrast):
+def test_material_layers_in_series_stretch_like_springs(contrast):
     """Without Poisson's ratio the stress is uniform: L / E A of the layers add up."""
     materials = [Material(E, 0.0), layer(contrast)]
     solid = cut_by_regions(block(), regions_of(materials))
@@ -64,9 +64,9 @@ def test_layers_in_series_stretch_as_springs_do(contrast):
 
 
 @pytest.mark.parametrize("contrast", [0.1, 10, 100])
-def test_a_face_through_elements_is_part_of_the_error(contrast):
-    """A layer that is given as a function of the points alone: the mesh is not cut, and
-    the stated error covers what the uniform stress shows."""
+def test_stated_error_covers_a_material_boundary_that_cuts_elements(contrast):
+    """The layer is a function of the points alone,
+    so the mesh is not cut along its faces."""
     jagged = replace(layer(contrast), faces=())
     materials = [Material(E, 0.0), jagged]
     level = solve_level(block(), materials, CENTERS, "rigid")

@@ -56,11 +56,14 @@ def ends(length):
          np.pi / 2 * (0.01**4 - 0.0097**4), np.pi * (0.01**2 - 0.0097**2)),
     ],
 )  # fmt: skip
-def test_a_rod_and_a_thin_tube_are_as_stiff_as_their_closed_forms(
+def test_stiffness_of_a_rod_and_a_thin_tube_agrees_with_closed_forms(
     surface, length, J, A, tmp_path
 ):
-    """Torsion is exact between rigid ends; tension but for the ends, which may not
-    contract: no softer than E A / L, and by less than a width of the length stiffer."""
+    """Torsion is exact between rigid ends.
+
+    In tension the ends cannot contract: K is at least E A / L, and at most one width
+    over the length above it.
+    """
     options = FemOptions(0.01, cache=tmp_path)
     link = solve_link(surface, *ends(length), [Material(E, NU)], options=options).link
     error = link.relative_error_estimate
@@ -71,8 +74,8 @@ def test_a_rod_and_a_thin_tube_are_as_stiff_as_their_closed_forms(
     assert 1 - error < stretch < 1.01 + error
 
 
-def test_a_slender_bar_lies_where_its_surface_does():
-    """Turned and moved: its volume, and its ends on the interfaces."""
+def test_slender_bar_mesh_follows_a_turned_and_moved_surface():
+    """Its volume, its middle, and its ends on the interfaces."""
     turn = rotation_matrix(np.array([0.3, -0.7, 1.1]))
     shift = np.array([0.2, -0.1, 0.4])
     for made, area in ((box(0.002, 0.005, 0.4), 1e-5), (tube(0.01, 0.0097, 0.4), None)):
@@ -90,8 +93,8 @@ def test_a_slender_bar_lies_where_its_surface_does():
         assert solid.volumes().sum() == pytest.approx(volume, rel=0.03)
 
 
-def test_slender_bar_declines_other_parts():
-    """A stubby bar, a tapered one, and one that a disc holds in its middle only."""
+def test_slender_bar_mesh_is_not_made_for_other_parts():
+    """A stubby bar, a tapered bar, a tube that is too short, and a side interface."""
     stubby = check_surface(*cylinder(0.02, 0.1), "bar")
     assert slender_bar(stubby, *ends(0.1)) is None
     tapered = check_surface(*cylinder(1e-3, 1.0, 32, 0.8e-3), "taper")

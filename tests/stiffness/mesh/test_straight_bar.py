@@ -23,8 +23,8 @@ SECTIONS = [
 
 
 @pytest.mark.parametrize("section", SECTIONS, ids=lambda section: "-".join(section))
-def test_a_bar_is_closed_and_has_its_volume_and_ends(section):
-    """Exactly, except that chords replace circles."""
+def test_straight_bar_mesh_is_closed_and_has_exact_volume_and_ends(section):
+    """Exact except that chords replace circles."""
     solid = straight_bar(section)
     area = declared_section(section, 0.3).area
     assert (solid.volumes() > 0.0).all()
@@ -51,8 +51,8 @@ def test_no_element_of_a_round_bar_is_inverted(section):
 @pytest.mark.parametrize(
     "section", [ROUND, {"radius": 0.3}, pytest.param(THIN, marks=pytest.mark.slow)]
 )
-def test_torsion_of_round_bars_and_tubes_is_that_of_the_textbook(section):
-    """G J / L: round sections do not warp, so that held ends change nothing."""
+def test_torsion_of_round_bars_and_tubes_equals_the_textbook_value(section):
+    """G J / L: round sections do not warp, so that held ends have no effect."""
     options = FemOptions(0.01, budget=Budget(unknowns=60_000))
     link = solve_bar(section, Material(1.0, 0.3), options).link
     J = declared_section(section, 0.3).J
@@ -63,8 +63,9 @@ def test_torsion_of_round_bars_and_tubes_is_that_of_the_textbook(section):
     assert 1.0 < link.stiffness[5, 5] / declared_section(section, 0.3).area < 1.1
 
 
-def test_a_square_bar_bends_alike_about_both_axes_and_its_estimate_covers_its_error():
-    """A finer mesh by ten: K falls by no more than what was estimated."""
+def test_square_bar_bends_equally_about_both_axes_within_its_estimated_error():
+    """A mesh for a tenth of the accuracy:
+    K falls by no more than the estimated error."""
     coarse, fine = (
         solve_bar(
             {"width": 0.2, "height": 0.2}, Material(1.0, 0.3),

@@ -38,7 +38,7 @@ def spec(tmp_path):
     return Spec(tmp_path / "links", "round", "beam", GRID | MATERIAL)
 
 
-def test_entries_hold_what_they_were_made_for(spec):
+def test_library_entry_has_the_stiffness_of_its_parameters(spec):
     files = build_library(spec)
     assert len(files) == 9
     key = "round-beam-length0.3-radius0.02-young6e+10-poisson0.3"
@@ -53,7 +53,9 @@ def test_entries_hold_what_they_were_made_for(spec):
     assert entry.about["date"].endswith("+00:00")
 
 
-def test_a_build_goes_on_where_it_was_stopped(spec, monkeypatch):
+def test_interrupted_library_build_continues_with_the_missing_entries(
+    spec, monkeypatch
+):
     made = []
     whole = library_build._make_entry
 
@@ -76,7 +78,7 @@ def test_a_build_goes_on_where_it_was_stopped(spec, monkeypatch):
     assert len(read_library(spec.folder)) == 9
 
 
-def test_two_processes_build_the_same(spec):
+def test_two_processes_build_all_library_entries(spec):
     told = []
     build_library(
         spec, workers=2, update=lambda done, total: told.append((done, total))
@@ -86,8 +88,9 @@ def test_two_processes_build_the_same(spec):
     assert len(read_library(spec.folder)) == 9
 
 
-def test_between_the_grid_points_the_error_is_covered(spec, rng):
-    """Nearly powers of the lengths: a grid of three is good to a per cent or two."""
+def test_stated_error_between_grid_points_covers_the_true_error(spec, rng):
+    """The stiffness is nearly a power of the lengths:
+    a grid of three points gives 2 %."""
     build_library(spec)
     entries = read_library(spec.folder)
     for _ in range(20):
@@ -100,7 +103,7 @@ def test_between_the_grid_points_the_error_is_covered(spec, rng):
         assert gap < 0.02
 
 
-def test_a_grid_point_is_given_back_as_it_is(spec):
+def test_look_up_at_a_grid_point_returns_its_entry(spec):
     build_library(spec)
     wanted = {"length": 0.3, "radius": 0.04, "young": 6e10, "poisson": 0.3}
     K, error = look_up(read_library(spec.folder), wanted)
@@ -116,7 +119,9 @@ def test_a_grid_point_is_given_back_as_it_is(spec):
         ({"radius": None}, "radius: missing; the grid has it"),
     ],
 )
-def test_what_the_grid_does_not_hold_is_refused(spec, change, message):
+def test_look_up_outside_the_grid_or_with_other_parameters_is_refused(
+    spec, change, message
+):
     build_library(spec)
     wanted = {"length": 0.3, "radius": 0.02, "young": 6e10, "poisson": 0.3} | change
     wanted = {k: v for k, v in wanted.items() if v is not None}
@@ -125,7 +130,7 @@ def test_what_the_grid_does_not_hold_is_refused(spec, change, message):
     assert message in str(caught.value)
 
 
-def test_a_grid_with_a_hole_is_refused(spec):
+def test_grid_with_a_missing_entry_is_refused(spec):
     files = build_library(spec)
     files[0].unlink()
     wanted = {"length": 0.3, "radius": 0.02, "young": 6e10, "poisson": 0.3}
@@ -133,7 +138,7 @@ def test_a_grid_with_a_hole_is_refused(spec):
         look_up(read_library(spec.folder), wanted)
 
 
-def test_an_entry_of_other_parameters_is_named(spec):
+def test_entry_with_other_parameters_is_refused_by_name(spec):
     """A key renamed by hand in one file, or entries of two libraries in one folder."""
     build_library(spec)
     *others, last = read_library(spec.folder)
@@ -182,7 +187,7 @@ def test_wrong_entry_is_refused(spec, text, message):
     assert message in str(caught.value)
 
 
-def test_what_is_not_there_is_named(spec, tmp_path):
+def test_missing_entry_or_library_is_refused_by_name(spec, tmp_path):
     build_library(spec)
     with pytest.raises(BadInput, match='no entry "round-beam"'):
         read_entry(spec.folder, "round-beam")
@@ -206,7 +211,7 @@ def test_what_is_not_there_is_named(spec, tmp_path):
         (('method = "beam"', 'method = "beam"\nfoo = 1'), 'unknown key "foo"'),
     ],
 )
-def test_a_build_file_that_is_none_is_refused(tmp_path, change, message):
+def test_wrong_build_file_is_refused(tmp_path, change, message):
     path = tmp_path / "spec.toml"
     path.write_text(SPEC.replace(*change))
     with pytest.raises(BadInput) as caught:
@@ -214,7 +219,7 @@ def test_a_build_file_that_is_none_is_refused(tmp_path, change, message):
     assert message in str(caught.value)
 
 
-def test_the_commands_build_and_read(tmp_path):
+def test_library_commands_build_entries_and_read_them(tmp_path):
     spec = tmp_path / "spec.toml"
     spec.write_text(EXAMPLE.read_text())
     folder = tmp_path / "link_library"
@@ -246,7 +251,7 @@ def test_the_commands_build_and_read(tmp_path):
         run("read", folder, "--at", "length")
 
 
-def test_other_programs_get_translations_first():
+def test_stiffness_for_other_programs_has_translations_first():
     K = exact(0.3, 0.02)
     swapped = translations_first(K)
     assert swapped[0, 0] == K[3, 3]
@@ -265,7 +270,7 @@ def test_other_programs_get_translations_first():
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_surfaces_of_shapes_hold_their_volume(shape):
+def test_surfaces_of_shapes_enclose_the_volume_of_the_shape(shape):
     """Polygons of 64 corners lack 0.16 % of a circle's area."""
     lengths = {
         "length": 0.3, "radius": 0.03, "inner_radius": 0.02, "tip_radius": 0.02,
@@ -285,7 +290,7 @@ def test_surfaces_of_shapes_hold_their_volume(shape):
 
 
 @pytest.mark.slow
-def test_finite_elements_fill_a_library_too(tmp_path):
+def test_library_of_finite_elements_has_stiffness_and_mass_of_the_bar(tmp_path):
     grid = {"length": (0.2,), "radius": (0.03,), "young": (6e10,), "poisson": (0.3,)}
     grid["density"] = (2700.0,)
     spec = Spec(tmp_path / "links", "round", "fea", grid)
@@ -310,9 +315,11 @@ def meshed_bar(length):
 
 
 @pytest.mark.parametrize("length", [0.24, 0.36])
-def test_between_finite_elements_the_error_is_covered_too(length):
-    """Meshed where the library has no entry; both answers may be wrong by their own
-    estimates.  Between three lengths interpolation itself leaves less than 1 %."""
+def test_stated_error_between_finite_element_entries_covers_a_direct_mesh(length):
+    """The direct answer is meshed where the library has no entry, and has an estimated
+    error of its own. Between three lengths interpolation itself leaves less than 1
+    %.
+    """
     entries = [meshed_bar(v) for v in (0.195, 0.3, 0.45)]
     table, error = look_up(entries, {"length": length})
     direct = meshed_bar(length)
@@ -337,8 +344,8 @@ BETWEEN = {
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_a_build_file_of_each_shape_ships_with_its_entries(shape):
-    """The keys are those a build would make: it finds all of them there."""
+def test_build_file_of_each_shape_ships_with_its_entries(shape):
+    """The keys are those that a build would make; the folder has an entry for each."""
     spec = read_spec(SHIPPED / f"{shape}.toml")
     assert (spec.shape, spec.method) == (shape, "fea")
     entries = read_library(SHIPPED / shape)
@@ -350,7 +357,9 @@ def test_a_build_file_of_each_shape_ships_with_its_entries(shape):
 
 
 @pytest.mark.parametrize(("shape", "length"), BETWEEN)
-def test_between_shipped_entries_an_independent_stiffness_is_covered(shape, length):
+def test_stated_error_between_shipped_entries_covers_an_independent_stiffness(
+    shape, length
+):
     K, error = look_up(read_library(SHIPPED / shape), {"length": length})
     i = [0, 2, 3, 5]
     exact = np.array(BETWEEN[shape, length])
@@ -360,9 +369,12 @@ def test_between_shipped_entries_an_independent_stiffness_is_covered(shape, leng
 
 
 @pytest.mark.parametrize("shape", ["rectangle", "box"])
-def test_shipped_square_links_are_their_beams_with_stiffer_ends(shape):
-    """Held ends add up to 0.3 b / L in bending, nothing is softer than Timoshenko's
-    but a box in torsion, whose corners Bredt's formula leaves out."""
+def test_shipped_square_links_are_slightly_stiffer_than_their_beams(shape):
+    """Held ends add up to 0.3 b / L in bending.
+
+    No entry is softer than Timoshenko's beam but a box in torsion, whose corners
+    Bredt's formula leaves out.
+    """
     K, _ = look_up(read_library(SHIPPED / shape), {"length": 0.37})
     lengths = read_spec(SHIPPED / f"{shape}.toml").grid
     lengths = {k: lengths[k][0] for k in SHAPES[shape]} | {"length": 0.37}
@@ -373,7 +385,7 @@ def test_shipped_square_links_are_their_beams_with_stiffer_ends(shape):
 
 
 @pytest.mark.parametrize("length", [0.19, 0.46])
-def test_the_shipped_library_refuses_outside(length):
+def test_shipped_library_refuses_a_length_outside_its_grid(length):
     result = CliRunner().invoke(
         app, ["library", "read", str(SHIPPED / "tube"), "--at", f"length={length}"]
     )
@@ -381,7 +393,7 @@ def test_the_shipped_library_refuses_outside(length):
     assert "outside the grid, 0.2 .. 0.45" in str(result.exception)
 
 
-def test_a_build_that_fails_leaves_no_folder(tmp_path, monkeypatch):
+def test_failed_library_build_leaves_no_folder(tmp_path, monkeypatch):
     path = tmp_path / "spec.toml"
     path.write_text(SPEC)
     spec = read_spec(path)

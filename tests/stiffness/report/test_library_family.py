@@ -44,7 +44,7 @@ def parts(tmp_path, monkeypatch):
     return tmp_path, asked
 
 
-def test_a_row_is_an_entry_with_its_sizes(parts):
+def test_each_row_of_a_family_table_becomes_an_entry_with_its_sizes(parts):
     folder, asked = parts
     files = build_library(read_spec(folder / "spec.toml"))
     assert [one.tip for one in asked] == [f"z={length!r}" for length in LENGTHS]
@@ -55,7 +55,7 @@ def test_a_row_is_an_entry_with_its_sizes(parts):
     assert len(asked) == len(LENGTHS)  # nothing is made again
 
 
-def test_a_changed_size_is_made_again(parts):
+def test_build_recomputes_only_the_row_whose_file_changed(parts):
     folder, asked = parts
     build_library(read_spec(folder / "spec.toml"))
     (folder / "rod1.stl").write_text("solid changed")
@@ -64,7 +64,7 @@ def test_a_changed_size_is_made_again(parts):
 
 
 @pytest.mark.parametrize("length", [0.25, 0.37, 0.55])
-def test_between_stored_sizes_the_error_stated_holds_the_closed_form(parts, length):
+def test_stated_error_between_family_sizes_covers_the_closed_form(parts, length):
     folder, _ = parts
     build_library(read_spec(folder / "spec.toml"))
     K, error = look_up(read_library(folder / "links"), {"length": length})
@@ -73,7 +73,7 @@ def test_between_stored_sizes_the_error_stated_holds_the_closed_form(parts, leng
     assert np.abs(scaled(error, truth)).max() < 0.02
 
 
-def test_an_entry_left_out_is_within_the_error_the_others_state(parts):
+def test_stated_error_of_the_other_sizes_covers_an_omitted_entry(parts):
     folder, _ = parts
     build_library(read_spec(folder / "spec.toml"))
     entries = read_library(folder / "links")
@@ -95,7 +95,7 @@ def test_an_entry_left_out_is_within_the_error_the_others_state(parts):
         ("0.3,0.02", "0.2,0.02", '"rod-length0.2-radius0.02" twice'),
     ],
 )
-def test_a_wrong_table_is_one_line(parts, old, new, message):
+def test_wrong_family_table_is_refused_in_one_line(parts, old, new, message):
     folder, _ = parts
     table = folder / "rods.csv"
     table.write_text(table.read_text().replace(old, new, 1))
@@ -104,14 +104,14 @@ def test_a_wrong_table_is_one_line(parts, old, new, message):
     assert "\n" not in str(error.value)
 
 
-def test_an_interface_may_name_only_sizes_there_are(parts):
+def test_interface_that_names_an_unknown_size_is_refused(parts):
     folder, _ = parts
     (folder / "spec.toml").write_text(SPEC.replace("{length}", "{height}"))
     with pytest.raises(BadInput, match="line 2: tip"):
         read_spec(folder / "spec.toml")
 
 
-def test_of_several_families_one_is_asked_for(parts):
+def test_library_of_several_families_requires_a_family_name(parts):
     folder, _ = parts
     second = SPEC.partition("[[family]]")[2].replace('"rod"', '"bar"')
     (folder / "spec.toml").write_text(SPEC + "[[family]]" + second)

@@ -64,7 +64,9 @@ def bar_stl(tmp_path, monkeypatch, cache):
 
 
 @pytest.mark.slow
-def test_a_surface_is_an_entry_with_its_files_digest_and_error(bar_stl, tmp_path):
+def test_surface_entry_has_the_digest_of_its_file_and_an_error_estimate(
+    bar_stl, tmp_path
+):
     """Held ends make a bar of L / r = 7 stiffer than its beam, by less than 10 %."""
     spec = tmp_path / "spec.toml"
     spec.write_text(LINKS)
@@ -89,7 +91,7 @@ def test_a_surface_is_an_entry_with_its_files_digest_and_error(bar_stl, tmp_path
         look_up([entry], {"young": 6e10})
 
 
-def test_an_entry_of_a_surface_is_made_again_only_if_something_changed(
+def test_surface_entry_is_rebuilt_only_if_its_input_changed(
     bar_stl, tmp_path, monkeypatch
 ):
     made = []
@@ -142,7 +144,7 @@ def test_an_entry_of_a_surface_is_made_again_only_if_something_changed(
         (("accuracy = 0.01", 'shape = "round"'), "grid"),
     ],
 )  # fmt: skip
-def test_a_surface_that_is_not_said_properly_is_refused(
+def test_wrong_surface_table_of_a_build_file_is_refused(
     bar_stl, tmp_path, change, message
 ):
     path = tmp_path / "spec.toml"
@@ -152,7 +154,7 @@ def test_a_surface_that_is_not_said_properly_is_refused(
     assert message in str(caught.value)
 
 
-def test_a_surface_without_its_interface_is_refused_and_nothing_written(
+def test_surface_without_its_interface_is_refused_and_nothing_is_written(
     bar_stl, tmp_path
 ):
     spec = tmp_path / "spec.toml"
@@ -162,8 +164,8 @@ def test_a_surface_without_its_interface_is_refused_and_nothing_written(
     assert not (tmp_path / "links").exists()
 
 
-def test_a_step_file_is_an_entry_too(tmp_path, monkeypatch, cache):
-    """A brick by gmsh's own kernel; STEP is in millimetres and says so."""
+def test_step_file_becomes_a_library_entry(tmp_path, monkeypatch, cache):
+    """A brick by gmsh's own kernel, in millimetres as the file states."""
     gmsh = pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
     monkeypatch.setenv("FORCEFIT_CACHE", str(cache))
     gmsh.initialize(interruptible=False)

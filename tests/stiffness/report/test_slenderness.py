@@ -1,4 +1,4 @@
-"""Beam beside finite elements over slenderness, and beams along curves from files."""
+"""Beams against finite elements over slenderness, and beams along curve files."""
 
 import json
 from dataclasses import replace
@@ -42,7 +42,7 @@ def diagonal_residual(sweep):
     return np.abs(np.diagonal(sweep.residual, axis1=1, axis2=2)).max()
 
 
-def test_the_fit_finds_what_was_put_in():
+def test_end_effect_fit_recovers_the_simulated_coefficients():
     sweep = fit_end_effect([made_up(r, 0.2, 0.7) for r in (5, 10, 20, 40)])
     np.testing.assert_allclose(np.diag(sweep.end_effect), 0.2, rtol=1e-9)
     np.testing.assert_allclose(np.diag(sweep.second), 0.7, rtol=1e-9)
@@ -50,8 +50,9 @@ def test_the_fit_finds_what_was_put_in():
     assert "c = 0.200 0.200 0.200 (rotations)" in sweep.explanation
 
 
-def test_what_does_not_fade_is_left_over():
-    """A modulus 1 % too high is no end effect: most of it stays in the residual."""
+def test_modulus_error_stays_in_the_residual_of_the_end_effect_fit():
+    """A modulus 1 % too high is not an end effect,
+    since it does not fade with length."""
     comparisons = []
     for ratio in (5, 10, 20, 40):
         one = made_up(ratio, 0.2, 0.0)
@@ -64,14 +65,14 @@ def test_what_does_not_fade_is_left_over():
     assert diagonal_residual(clean) < 1e-12
 
 
-def test_mesh_errors_are_told_in_c():
+def test_end_effect_error_follows_from_the_errors_of_the_meshes():
     """0.1 % of the beam's K on both meshes; by hand, c = 2 y20 20 - y10 10."""
     sweep = fit_end_effect([made_up(r, 0.2, 0.7, error=1e-3) for r in (10, 20)])
     expected = 1e-3 * (40 / (1 + 0.01 + 0.7 / 400) + 10 / (1 + 0.02 + 0.7 / 100))
     assert np.diag(sweep.end_effect_error) == pytest.approx(expected, rel=1e-9)
 
 
-def test_table_and_picture_show_every_entry():
+def test_slenderness_table_and_figure_show_every_entry():
     sweep = fit_end_effect([made_up(r, 0.2, 0.7) for r in (5, 10, 20)])
     text = sweep_text(sweep)
     assert "RX" in text
@@ -92,9 +93,11 @@ ENDS = {
 
 
 @pytest.mark.slow
-def test_a_round_bars_ends():
-    """Beside an independent solution each mesh is too stiff, by no more than it says;
-    the same fit of the exact values has c = 0.212, 0.254, 0.102 and none in torsion."""
+def test_end_effect_of_a_round_bar_agrees_with_an_independent_solution():
+    """Each mesh is stiffer than that solution, by no more than its stated error.
+
+    The same fit of the exact values has c = 0.212, 0.254, 0.102 and zero in torsion.
+    """
     sweep = sweep_slenderness({"radius": 0.02}, 6e10, 0.3, list(ENDS), accuracy=0.004)
     for comparison, exact in zip(sweep.comparisons, ENDS.values(), strict=True):
         comparisons = np.diag(comparison.difference)
@@ -108,7 +111,7 @@ def test_a_round_bars_ends():
 
 
 @pytest.mark.slow
-def test_without_poissons_ratio_tension_has_no_ends():
+def test_axial_stiffness_at_zero_poissons_ratio_has_no_end_effect():
     """K_TZ = E V / L^2 with the mesh's own volume, exactly but for the tilt of curved
     sides, squared.  Arcs as parabolas leave phi^4 / 30 of the volume, phi = pi / n with
     n of them around: 5e-5 for the 16 of the coarsest mesh."""
@@ -136,7 +139,7 @@ def test_without_poissons_ratio_tension_has_no_ends():
         (["--section", "width=1"], "--section: found width, expected one of"),
     ],
 )
-def test_slenderness_refuses_before_it_works(options, message):
+def test_slenderness_refuses_wrong_options_before_meshing(options, message):
     with pytest.raises(BadInput) as caught:
         CliRunner().invoke(
             app,
@@ -146,7 +149,7 @@ def test_slenderness_refuses_before_it_works(options, message):
     assert message in str(caught.value)
 
 
-def test_a_beam_that_ends_elsewhere_is_refused():
+def test_comparison_of_a_beam_with_another_tip_is_refused():
     C = beam_compliance(0.4, round_section(0.02, 0.3), 6e10, 0.3)
     one = LinkStiffness("beam", C, tip=[0.4, 0, 0], base=[0, 0, 0])
     other = LinkStiffness("fea", C, tip=[0.41, 0, 0], base=[0, 0, 0])
@@ -154,7 +157,7 @@ def test_a_beam_that_ends_elsewhere_is_refused():
         compare_link(one, other, 0.02)
 
 
-def test_wrenches_and_numbers_as_people_write_them():
+def test_wrench_and_ratio_options_are_parsed():
     np.testing.assert_array_equal(parse_load(["fx=1,mz=-2"], "-w"), [0, 0, -2, 1, 0, 0])
     with pytest.raises(BadInput, match='unknown component "fq"; valid: fx'):
         parse_load(["fq=1"], "--wrench")
@@ -180,9 +183,12 @@ def curve_file(tmp_path: Path, content: str) -> Path:
     return path
 
 
-def test_an_l_from_a_file_is_two_beams(tmp_path):
-    """The command prints what the function gives; length 0.35 m; Castigliano by hand
-    for a force along y at the tip: both legs bend, the first twists."""
+def test_curve_file_of_an_l_shape_gives_the_compliance_by_hand(tmp_path):
+    """The command prints the result of the function; the length is 0.35 m.
+
+    Castigliano by hand for a force along y at the tip: both legs bend, the first
+    twists.
+    """
     path = curve_file(tmp_path, L_BRACKET)
     result = CliRunner().invoke(
         app, ["beam", str(path), *MATERIAL, "--theory", "euler", "--json", "-"]
@@ -199,8 +205,9 @@ def test_an_l_from_a_file_is_two_beams(tmp_path):
     assert C[4, 4] == pytest.approx(expected, rel=1e-9)
 
 
-def test_tapers_and_arcs_from_a_file(tmp_path):
-    """A cone is stretched by L / (E pi r1 r2); a quarter circle ends on its axis."""
+def test_curve_file_of_tapers_and_arcs_gives_closed_forms(tmp_path):
+    """The axial compliance of a cone is L / (E pi r1 r2);
+    a quarter circle ends on its axis."""
     cone = """
 [[piece]]
 end = [0.3, 0, 0]
@@ -237,7 +244,7 @@ section = { width = 0.01, height = 0.02, wall = 0.001 }
         ),
     ],
 )
-def test_a_curve_file_that_is_none_is_refused(tmp_path, change, message):
+def test_wrong_curve_file_is_refused_by_its_path(tmp_path, change, message):
     path = curve_file(tmp_path, L_BRACKET.replace(*change, 1))
     with pytest.raises(BadInput) as caught:
         read_curve(path, 0.3)
@@ -245,7 +252,7 @@ def test_a_curve_file_that_is_none_is_refused(tmp_path, change, message):
     assert str(caught.value).startswith(str(path))
 
 
-def test_a_surface_goes_with_a_curve_or_a_section_not_both(tmp_path):
+def test_compare_refuses_a_curve_file_together_with_a_section(tmp_path):
     path = curve_file(tmp_path, L_BRACKET)
     command = ["compare", "x.stl", "--base", "z=0", "--tip", "x=0.15", *MATERIAL]
     with pytest.raises(BadInput, match="--curve: its file has the sections"):
@@ -265,7 +272,7 @@ def rectangle(width, height, up, stiffer=1.0, axis=(0, 0, 1)):
 
 
 @pytest.mark.parametrize("axis", [(0, 0, 1), (0.6, 0, 0.8)])
-def test_a_section_turned_by_a_quarter_is_told_apart_from_held_ends(axis):
+def test_comparison_reports_a_section_turned_by_90_degrees(axis):
     """A 20 x 60 mm bar 2 % stiffer than its beam; I differs ninefold if turned."""
     solid = rectangle(0.06, 0.02, [0, 1, 0], 1.02, axis)
     right = compare_link(rectangle(0.06, 0.02, [0, 1, 0], axis=axis), solid, 0.03)
@@ -286,7 +293,7 @@ def test_a_section_turned_by_a_quarter_is_told_apart_from_held_ends(axis):
         assert comparison_results(turned)["axes_turned"] == 90
 
 
-def test_a_nearly_square_bar_within_the_meshs_error_is_not_called_turned():
+def test_comparison_reports_no_turn_within_the_error_of_the_mesh():
     solid = rectangle(0.0200, 0.0202, [0, 1, 0])
     unsure = replace(solid, stiffness_error=0.02 * solid.stiffness)
     beam = rectangle(0.0202, 0.0200, [0, 1, 0])
@@ -294,8 +301,8 @@ def test_a_nearly_square_bar_within_the_meshs_error_is_not_called_turned():
     assert compare_link(beam, solid, 0.01).better_turn[0] == 90
 
 
-def test_a_bent_beams_corner_is_named():
-    """Straight: no word of corners; an L: its corner is no end effect."""
+def test_comparison_names_the_corner_of_a_bent_beam_only():
+    """A straight beam has no corner; in an L shape the corner is not an end effect."""
     one = made_up(20, 0.2, 0.0)
     assert "corner" not in one.explanation
     bent = compare_link(one.beam, one.fea, 0.02, length=1.5 * one.length)

@@ -25,7 +25,7 @@ AREAS = {
 
 
 @pytest.mark.parametrize("shape", AREAS)
-def test_a_shape_encloses_its_volume_between_its_ends(shape):
+def test_surface_of_a_shape_encloses_its_volume_between_its_ends(shape):
     """Width along x, height along y, the base at z = 0."""
     lengths, area = AREAS[shape]
     surface = shape_surface(shape, lengths | {"length": L})
@@ -38,8 +38,8 @@ def test_a_shape_encloses_its_volume_between_its_ends(shape):
 
 
 @pytest.mark.parametrize("shape", AREAS)
-def test_a_shapes_beam_has_its_ends_and_its_area(shape):
-    """Areas of circles where the surface has polygons of 64 corners."""
+def test_beam_of_a_shape_has_the_ends_and_area_of_the_shape(shape):
+    """The beam has circles where the surface has polygons of 64 corners."""
     lengths, area = AREAS[shape]
     (piece,) = shape_beam(shape, lengths | {"length": L}, NU)
     np.testing.assert_array_equal(piece.place(0.0), [0, 0, 0])
@@ -56,7 +56,7 @@ def test_a_shapes_beam_has_its_ends_and_its_area(shape):
         assert [areas[0], areas[2]] == pytest.approx(expected, rel=1e-12)
 
 
-def test_a_tube_or_a_box_needs_a_hole():
+def test_tube_or_box_without_a_hole_is_refused():
     with pytest.raises(BadInput, match="leave a hole"):
         check_shape("box", {"length": L, "width": R, "height": S, "wall": S / 2})
     with pytest.raises(BadInput, match="smaller than radius"):

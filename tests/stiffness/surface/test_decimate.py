@@ -18,8 +18,8 @@ def fine_cube(unit, bump=0.0):
 
 
 @pytest.mark.parametrize("unit", [0.02, 100.0])
-def test_fine_cube_becomes_coarse(unit):
-    """Flat sides need no triangles within: a tenth and fewer, in any unit."""
+def test_decimated_cube_has_fewer_triangles_and_its_volume(unit):
+    """Flat sides need no inner triangles: less than a tenth remains, in any unit."""
     surface = fine_cube(unit)
     points, triangles = coarser_surface(surface, 1e-4 * unit)
     assert len(triangles) < 0.1 * len(surface.triangles)
@@ -30,8 +30,8 @@ def test_fine_cube_becomes_coarse(unit):
 
 
 @pytest.mark.parametrize("unit", [0.02, 100.0])
-def test_bump_above_the_tolerance_is_kept(unit):
-    """A bump of 0.8 mm keeps its tip to 0.1 mm."""
+def test_decimation_keeps_a_bump_above_the_tolerance(unit):
+    """The tip of a bump of 0.8 mm is kept to 0.1 mm."""
     surface = fine_cube(unit, 8e-4)
     points, triangles = coarser_surface(surface, 1e-4 * unit)
     assert len(triangles) < len(surface.triangles)

@@ -1,4 +1,4 @@
-"""Lifted facets: shares of corners, unit normals, Phong's fourth order, any unit."""
+"""Lifted facets: weights of corners, unit normals, fourth-order accuracy, any unit."""
 
 import numpy as np
 import pytest
@@ -14,8 +14,9 @@ def side(radius, facets):
 
 
 @pytest.mark.parametrize("radius", [1e-3, 1.0, 1e3])
-def test_lifted_facets_leave_the_fourth_power_of_the_angle(radius):
-    """A flat facet of half-angle a leaves a^2 / 2 of the radius, a lifted one a^4."""
+def test_lifted_facets_deviate_by_the_fourth_power_of_the_angle(radius):
+    """A flat facet of half-angle a deviates by a^2 / 2 of the radius,
+    a lifted one by a^4."""
     facets, a = 24, np.pi / 24
     patch = side(radius, facets)
     spokes = patch.points[:, :2] / radius
@@ -31,8 +32,8 @@ def test_lifted_facets_leave_the_fourth_power_of_the_angle(radius):
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1e6])
-def test_facets_are_the_same_in_every_unit(unit):
-    """Of unequal triangles, whose corners' angles alone weigh the normals."""
+def test_lifted_facets_do_not_depend_on_the_unit(unit):
+    """The triangles are unequal, so that angles at corners weigh the normals."""
     rng = np.random.default_rng(2)
     x, y = (v.ravel() for v in np.meshgrid([0, 0.1, 0.5, 1.2], [0, 0.7, 0.8]))
     points = np.column_stack([x, y, 0.1 * rng.normal(size=12)])
@@ -51,8 +52,8 @@ def test_facets_are_the_same_in_every_unit(unit):
 
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
-def test_one_facet_alone_is_flat(size):
-    """Unit normals and distances from its plane, also of narrow corners."""
+def test_single_facet_has_the_normals_and_distances_of_its_plane(size):
+    """Also at narrow corners."""
     corners = size * np.array([[0.0, 0, 2], [1, 0, 2], [0.05, 0.1, 2]])
     facet = Facets(corners, np.array([[0, 1, 2]]))
     np.testing.assert_allclose(facet.normals, [[0, 0, 1]] * 3, atol=1e-12)

@@ -27,7 +27,7 @@ FLAT = {"point": POINT, "normal": [0, 3, 4]}
          "bore", POINT, UNIT, 1e-9),
     ],
 )  # fmt: skip
-def test_interface_has_the_place_and_direction_of_its_text(
+def test_interface_has_the_kind_point_and_direction_of_its_text(
     text, kind, point, direction, radius
 ):
     interface = parse_interface(text)
@@ -76,12 +76,12 @@ def test_wrong_interface_is_refused(text, message):
     ("bore=1,2,3/0,3,4/0.5", "bore=1,2,3/0,0.6,0.8/0.5"),
     ("disc=1,2,3/0,3,4/0.5", "disc=1,2,3/0,0.6,0.8/0.5"),
 ])  # fmt: skip
-def test_an_interface_is_written_as_it_is_read(text, written):
+def test_written_interface_is_read_as_the_same_interface(text, written):
     assert str(parse_interface(text)) == written
     assert str(parse_interface(written)) == written
 
 
-def test_distances_are_from_the_plane_or_the_cylinder(rng):
+def test_interface_distance_is_measured_from_the_plane_or_the_cylinder(rng):
     """Along the normal, or across the axis beyond the radius; inside and outside."""
     point, d = np.array([1.0, 2.0, 3.0]), np.array([0, 0.6, 0.8])
     u, v = np.array([1.0, 0, 0]), np.array([0, 0.8, -0.6])
@@ -99,7 +99,7 @@ def test_distances_are_from_the_plane_or_the_cylinder(rng):
 
 
 @pytest.mark.parametrize("point", [[0.0, 0.0], [0.0, np.nan, 0.0], [np.inf, 0, 0]])
-def test_a_point_is_three_finite_numbers(point):
+def test_interface_point_that_is_not_three_finite_numbers_is_refused(point):
     words = r"disc: the point must be 3 finite numbers \[m\]"
     with pytest.raises(BadInput, match=words):
         Interface("disc", point, [0, 0, 1], 1.0)
@@ -115,7 +115,7 @@ def test_radius_of_a_table_must_be_finite_and_positive(radius):
 
 
 def test_rigid_faces_that_share_an_edge_are_refused():
-    """Two sides of a cube: the stiffness between them has no finite value."""
+    """The stiffness between two sides of a cube has no finite value."""
     surface = check_surface(CUBE, CUBE_TRIANGLES, "cube")
     one, other = parse_interface("y=0"), parse_interface("z=0.1")
     with pytest.raises(BadInput, match=r"cube: base .* and tip .* share an edge near"):

@@ -1,4 +1,4 @@
-"""Triangles that cross, against edge and triangle as a linear system."""
+"""Intersecting triangles against the linear system of an edge and a triangle."""
 
 import numpy as np
 import pytest
@@ -19,8 +19,8 @@ def crosses(one, other):
 
 
 @pytest.mark.parametrize("along", [0, 1, 2])
-def test_any_order_unit_and_longest_side_give_the_same_pairs(along):
-    """Neighbours share a corner, and do not cross."""
+def test_crossing_pairs_do_not_depend_on_order_unit_or_longest_side(along):
+    """Neighbours share a corner and do not count as crossing."""
     rng = np.random.default_rng(along)
     corners = 0.3 * rng.uniform(-1, 1, (40, 3, 3))
     corners[:, :, along] += 0.05 * rng.permutation(40)[:, None]
@@ -45,7 +45,7 @@ def test_any_order_unit_and_longest_side_give_the_same_pairs(along):
 
 
 def test_crossing_pairs_are_found_among_many_triangles():
-    """More than are looked at together; the last two cross."""
+    """There are more triangles than one batch holds; the last two cross."""
     rng = np.random.default_rng(1)
     corners = 1e-3 * rng.normal(size=(1100, 3, 3))
     corners[:, :, 1] += 5.0 * rng.permutation(1100)[:, None]
@@ -61,8 +61,8 @@ def test_crossing_pairs_are_found_among_many_triangles():
 @pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("way", [1, -1])
 def test_touching_triangles_do_not_cross(unit, way):
-    """A needle's edge of length 2 ends in a triangle's plane, or passes its side; a
-    billionth of a length further it crosses."""
+    """A needle's edge of length 2 ends in the plane of a triangle, or passes its side;
+    a billionth of a length further it crosses."""
     base = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])[::way]
 
     def crossing(at, low, high, third):

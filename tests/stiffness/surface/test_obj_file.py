@@ -41,7 +41,7 @@ def cube(corner="{k}", line="f {corners}\n"):
         "no last line end",
     ],
 )  # fmt: skip
-def test_every_way_to_name_a_corner_gives_the_same_cube(tmp_path, content):
+def test_obj_corners_in_every_notation_give_the_same_cube(tmp_path, content):
     path = tmp_path / "cube.obj"
     path.write_bytes(content.encode())
     points, faces = read_obj(path)
@@ -49,15 +49,15 @@ def test_every_way_to_name_a_corner_gives_the_same_cube(tmp_path, content):
     assert faces == [[k - 1 for k in side] for side in SIDES]
 
 
-def test_faces_that_name_absent_texture_coordinates_are_read(tmp_path):
-    """VTK's reader crashes; 1e-3 m^3."""
+def test_obj_faces_with_absent_texture_coordinates_are_read(tmp_path):
+    """VTK's reader crashes on such files; the cube has 1e-3 m^3."""
     path = tmp_path / "cube.obj"
     path.write_text(cube("{k}/{k}"))
     assert read_surface(path).volume == pytest.approx(1e-3, rel=1e-12)
 
 
 def test_a_concave_polygon_is_cut_into_triangles_inside_it(tmp_path):
-    """An L of 0.1 m with arms 0.04 m wide, 0.02 m thick: 0.0064 m^2 x 0.02 m."""
+    """An L shape of 0.1 m with arms 0.04 m wide, 0.02 m thick: 0.0064 m^2 x 0.02 m."""
     outline = [(0, 0), (0.1, 0), (0.1, 0.04), (0.04, 0.04), (0.04, 0.1), (0, 0.1)]
     lines = [f"v {x} {y} {z}" for z in (0, 0.02) for x, y in outline]
     lines += ["f 6 5 4 3 2 1", "f 7 8 9 10 11 12"]
@@ -78,14 +78,14 @@ def test_a_concave_polygon_is_cut_into_triangles_inside_it(tmp_path):
     ("v 1 2 z", r"cube.obj:9: found 'v 1 2 z', expected v X Y Z"),
     ("f 1 2 400000000", r"found a face of point 400000000, expected 1 to 8"),
 ])  # fmt: skip
-def test_a_line_that_is_not_proper_is_refused_with_its_number(tmp_path, line, message):
+def test_wrong_obj_line_is_refused_with_its_number(tmp_path, line, message):
     path = tmp_path / "cube.obj"
     path.write_text(POINTS + line + "\n")
     with pytest.raises(BadInput, match=message):
         read_surface(path)
 
 
-def test_a_file_without_faces_is_refused(tmp_path):
+def test_obj_file_without_faces_is_refused(tmp_path):
     path = tmp_path / "points.obj"
     path.write_text(POINTS)
     with pytest.raises(BadInput, match="holds no triangles, or is not OBJ"):

@@ -54,7 +54,7 @@ SHAPES = [
 
 
 @pytest.mark.parametrize(("fit", "shape"), SHAPES)
-def test_a_shape_is_found_from_points_on_it(fit, shape, rng):
+def test_fit_recovers_a_shape_from_points_on_it(fit, shape, rng):
     R, shift = rotation_matrix(rng.normal(size=3)), rng.normal(size=3)
     points = samples(shape, rng)
     normals = shape.signed(points)[1]
@@ -64,8 +64,8 @@ def test_a_shape_is_found_from_points_on_it(fit, shape, rng):
 
 
 @pytest.mark.parametrize(("fit", "shape"), SHAPES)
-def test_gradients_are_those_of_the_distance(fit, shape, rng):
-    """Central differences: error 1e-10 of rounding over a step of 1e-6."""
+def test_shape_gradients_equal_differences_of_the_distance(fit, shape, rng):
+    """Central differences with a step of 1e-6 have a rounding error of 1e-10."""
     points = samples(shape, rng) + 0.1 * rng.normal(size=(40, 3))
     _, gradients = shape.signed(points)
     for k, step in enumerate(1e-6 * np.eye(3)):
@@ -73,8 +73,8 @@ def test_gradients_are_those_of_the_distance(fit, shape, rng):
         np.testing.assert_allclose(gradients[:, k], slope, atol=1e-8)
 
 
-def test_a_slot_is_two_planes_and_two_half_cylinders():
-    """Tangent faces, without a sharp edge between them."""
+def test_slot_is_recognised_as_planes_and_half_cylinders():
+    """Its faces are tangent, without a sharp edge between them."""
     angle = np.linspace(-np.pi / 2, np.pi / 2, 17)
     half = 0.02 * np.column_stack([np.cos(angle), np.sin(angle)])
     outline = np.concatenate([half + [0.03, 0], -half - [0.03, 0]])
@@ -125,7 +125,7 @@ def barrel(facets=32, layers=12):
 
 
 @pytest.mark.slow
-def test_facets_of_no_known_shape_are_lifted_toward_it():
+def test_facets_of_an_unknown_shape_are_lifted_toward_the_true_surface():
     """Middles of 32-sided rings lack 0.48 % of the radius, lifted ones 0.02 %."""
     surface, _ = barrel()
     patches = find_patches(surface, parse_interface("z=0"), parse_interface("z=0.1"))
@@ -141,8 +141,9 @@ def test_facets_of_no_known_shape_are_lifted_toward_it():
 
 
 @pytest.mark.slow
-def test_a_barrels_mesh_has_its_volume_not_its_facets(tmp_path):
-    """The facets lack more than 0.6 % of it; the curved mesh less than 0.03 %."""
+def test_mesh_of_a_barrel_has_the_volume_of_the_smooth_shape(tmp_path):
+    """Its facets lack more than 0.6 % of the volume,
+    the curved mesh less than 0.03 %."""
     surface, exact = barrel()
     faces = parse_interface("z=0"), parse_interface("z=0.1")
     solid = mesh_solid(surface, *faces, edge=0.012, envelope=1e-3, cache=tmp_path)

@@ -1,4 +1,4 @@
-"""Planes, cones, spheres, tori: distances by hand, fits in any unit, their guesses."""
+"""Planes, cones, spheres and tori: distances by hand, fits in any unit."""
 
 import numpy as np
 import pytest
@@ -46,8 +46,9 @@ FITS = {"plane": fit_plane, "cone": fit_cone, "sphere": fit_sphere, "torus": fit
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_a_point_lifted_along_the_normal_is_that_far_away(name):
-    """On the shape the distance is zero; 0.1 out it is 0.1, 0.1 in it is -0.1."""
+def test_signed_distance_equals_the_offset_along_the_normal(name):
+    """On the shape the distance is zero;
+    0.1 outside it is 0.1, 0.1 inside it is -0.1."""
     shape, points = CASES[name]
     distances, normals = shape.signed(points)
     np.testing.assert_allclose(distances, 0, atol=1e-14)
@@ -60,7 +61,7 @@ def test_a_point_lifted_along_the_normal_is_that_far_away(name):
 
 @pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("name", CASES)
-def test_a_fit_is_the_same_in_every_unit(name, unit):
+def test_fitted_shape_does_not_depend_on_the_unit(name, unit):
     """To 1e-12 of the size; the first guess of a whole ring is nearly the answer."""
     shape, points = CASES[name]
     normals = shape.signed(points)[1]
@@ -81,7 +82,7 @@ def test_a_fit_is_the_same_in_every_unit(name, unit):
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_a_plane_looks_where_its_facets_look(sign):
+def test_normal_of_a_fitted_plane_has_the_sign_of_its_facets(sign):
     points = CASES["plane"][1]
     tilted = AXIS + 0.3 * np.linalg.svd(AXIS[None])[2][1]
     tilted /= np.linalg.norm(tilted)
@@ -89,13 +90,14 @@ def test_a_plane_looks_where_its_facets_look(sign):
     np.testing.assert_allclose(fitted.normal, sign * AXIS, atol=1e-14)
 
 
-def test_projecting_nothing_gives_nothing():
+def test_projection_of_no_points_is_empty():
     assert project(np.zeros((0, 3)), (CASES["plane"][0],)).shape == (0, 3)
 
 
 @pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
-def test_a_point_goes_to_the_common_line_of_two_round_shapes(unit):
-    """To rounding, by Newton's method: the first step alone leaves a tenth."""
+def test_projection_onto_two_round_shapes_ends_on_their_common_line(unit):
+    """To rounding, by Newton's method:
+    after the first step a tenth of the distance remains."""
     sphere = Sphere(unit * CENTER, 2.0 * unit)
     cylinder = Cone(unit * (CENTER + [0.3, 0.0, 0.0]), AXIS, 1.0 * unit)
     points = ring_points([1.3, 0.9], [1.6, -1.9])

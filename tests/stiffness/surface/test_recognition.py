@@ -33,8 +33,8 @@ def volume_of(fillet=0.006, corner=0.025):
 
 @pytest.mark.parametrize("fillet", [0.002, 0.006])
 @pytest.mark.parametrize("steps", [4, 6])
-def test_fillets_around_rounded_corners_are_cylinders_and_tori(fillet, steps):
-    """Four of each, and four upright cylinders, of the radii it was made with."""
+def test_fillets_of_a_rounded_plate_are_recognised_as_cylinders_and_tori(fillet, steps):
+    """Four of each, and four upright cylinders, with the radii of the plate."""
     patches = find_patches(filleted_plate(fillet, 0.025, steps), *ENDS)
     kinds = [type(shape) for shape in patches.shapes]
     assert (kinds.count(Plane), kinds.count(Cone), kinds.count(Torus)) == (6, 8, 4)
@@ -45,8 +45,8 @@ def test_fillets_around_rounded_corners_are_cylinders_and_tori(fillet, steps):
             assert (shape.radius, shape.tube) == pytest.approx((0.025 - fillet, fillet))
 
 
-def test_the_volume_of_a_filleted_plate_is_that_of_its_true_shapes():
-    """Against the integral over its height; the facets lack 0.1 % of it."""
+def test_volume_of_a_filleted_plate_is_that_of_its_recognised_shapes():
+    """The reference is the integral over the height; the facets lack 0.1 % of it."""
     surface = filleted_plate()
     true = TrueSurface(surface, find_patches(surface, *ENDS))
     assert surface.volume < 0.9995 * volume_of()
@@ -54,7 +54,7 @@ def test_the_volume_of_a_filleted_plate_is_that_of_its_true_shapes():
     assert true.unsure_volume == 0.0
 
 
-def test_the_volume_of_a_faceted_cylinder_is_the_cylinders():
+def test_faceted_cylinder_has_the_volume_of_the_true_cylinder():
     surface = check_surface(*cylinder(0.02, 0.1, 32), "bar")
     faces = parse_interface("z=0"), parse_interface("z=0.1")
     true = TrueSurface(surface, find_patches(surface, *faces))
@@ -81,8 +81,8 @@ def chamfered(width, flat, drop):
 
 
 @pytest.mark.parametrize("flat", [0.02, 0.03, 0.036])
-def test_flat_chamfers_stay_flat(flat):
-    """Chamfers of 20 degrees on both sides of a flat top are no cylinder."""
+def test_flat_chamfers_are_not_recognised_as_a_cylinder(flat):
+    """Chamfers of 20 degrees on both sides of a flat top."""
     drop = np.tan(np.radians(20)) * (0.04 - flat) / 2
     surface = chamfered(0.04, flat, drop)
     faces = parse_interface("z=0"), parse_interface("z=0.1")
@@ -91,8 +91,9 @@ def test_flat_chamfers_stay_flat(flat):
     assert len(patches.shapes) == 8
 
 
-def test_a_plate_between_fillets_is_flat_and_not_bulged():
-    """The side of two triangles, 150 x 6 mm, meets fillets on three of its edges."""
+def test_flat_side_between_fillets_stays_flat():
+    """The side consists of two triangles, 150 x 6 mm,
+    and meets fillets on three edges."""
     surface = filleted_plate()
     true = TrueSurface(surface, find_patches(surface, *ENDS))
     middle = np.array([[0.01, 0.15, 0.009], [0.0, -0.15, 0.008]])
@@ -120,9 +121,12 @@ def domed_bar():
     return check_surface(points, np.concatenate(triangles), "domed bar")
 
 
-def test_cylinders_beside_a_hump_are_not_drawn_into_it():
-    """Its facets lack 0.44 % of the integral of pi r^2; smoothed they lack less than is
-    told, and the long cylinders are no part of the hump."""
+def test_cylinders_next_to_a_hump_are_recognised_separately():
+    """The facets lack 0.44 % of the integral of pi r^2.
+
+    The smoothed surface lacks less than its stated uncertainty, and the long cylinders
+    are no part of the hump.
+    """
     surface = domed_bar()
     faces = parse_interface("z=0"), parse_interface("z=0.1")
     patches = find_patches(surface, *faces)

@@ -29,8 +29,8 @@ def tilted(angle, size):
 
 @pytest.mark.parametrize("unit", [0.01, 1.0, 100.0])
 @pytest.mark.parametrize("kind", ["plane=0,0,0/0,0,1", "disc=0,0,0/0,0,1/{}"])
-def test_a_triangle_on_a_plane_has_all_corners_there_and_faces_it(unit, kind):
-    """Within 1e-5 of the diagonal, either way; normals within acos 0.9."""
+def test_triangles_on_a_plane_have_all_corners_and_their_normal_on_it(unit, kind):
+    """Corners within 1e-5 of the diagonal on either side; normals within acos 0.9."""
     near = 1e-5 * np.sqrt(2)
     flat = np.array(tilted(0.0, 0.1))
     surface = loose(
@@ -53,8 +53,8 @@ def around(radius, angle, tilt=0.0):
 
 
 @pytest.mark.parametrize("unit", [0.01, 1.0, 100.0])
-def test_a_triangle_on_a_bore_has_all_corners_there_and_faces_across(unit):
-    """Within 2e-3 of the radius; normals 60 degrees and more from the axis."""
+def test_triangles_on_a_bore_have_all_corners_on_it_and_face_across_its_axis(unit):
+    """Corners within 2e-3 of the radius; normals at least 60 degrees from the axis."""
     radius = 0.1
     on = around(radius, 0.5)
     out = on / radius
@@ -75,8 +75,8 @@ def spoke(low, high):
 
 
 @pytest.mark.parametrize("unit", [0.1, 1.0, 10.0])
-def test_disc_has_the_triangles_within_its_radius(unit):
-    """To 0.2 %; what goes from 1 % inside to 1 % outside is cut, and refused."""
+def test_disc_interface_has_the_triangles_within_its_radius(unit):
+    """To 0.2 %; a triangle from 1 % inside to 1 % outside is cut, and refused."""
     radius, shift = 0.2, np.array([0.3, -0.1, 0.2])
     center = ",".join(map(str, unit * shift))
     disc = parse_interface(f"disc={center}/0,0,1/{unit * radius}")
@@ -110,7 +110,7 @@ def test_interface_off_the_part_is_refused_with_the_extent_of_the_part():
         triangles_on(bar(), disc, "tip")
 
 
-def test_an_interface_is_the_shape_that_it_is_called():
+def test_interface_shape_is_a_plane_or_cylinder_by_its_kind():
     bore = interface_shape(parse_interface("bore=1,2,3/0,3,4/0.5"))
     assert isinstance(bore, Cone)
     assert (bore.radius, bore.slope) == (0.5, 0.0)

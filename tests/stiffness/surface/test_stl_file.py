@@ -63,8 +63,8 @@ def read(tmp_path, content):
         "name of keywords", "several solids",
     ],
 )  # fmt: skip
-def test_text_as_programs_write_it_is_read_exactly(tmp_path, content):
-    """Double precision: what the text says, to the last bit."""
+def test_text_stl_is_read_exactly(tmp_path, content):
+    """In double precision, equal to the last bit."""
     np.testing.assert_array_equal(read(tmp_path, content), CORNERS)
 
 
@@ -84,8 +84,8 @@ def test_text_as_programs_write_it_is_read_exactly(tmp_path, content):
         "count of -1", "last tag cut",
     ],
 )  # fmt: skip
-def test_binary_as_programs_write_it_is_read(tmp_path, content):
-    """Single precision, as the format is."""
+def test_binary_stl_is_read(tmp_path, content):
+    """In single precision, as the format has."""
     found = read(tmp_path, content)
     np.testing.assert_array_equal(found, CORNERS.astype("<f4"))
 
@@ -101,7 +101,9 @@ def test_binary_as_programs_write_it_is_read(tmp_path, content):
     (TEXT[: TEXT.rindex(b"\n", 0, TEXT.rindex(b"endloop")) - 4], "facet 12: the file"),
     (TEXT[: TEXT.rindex(b"vertex") + 6], "facet 12: the file is cut"),
 ])  # fmt: skip
-def test_a_damaged_file_is_refused_with_its_facet(tmp_path, content, message):
+def test_damaged_stl_file_is_refused_with_the_number_of_the_facet(
+    tmp_path, content, message
+):
     with pytest.raises(BadInput, match=re.escape(message).replace('"', "['\"]")) as no:
         read(tmp_path, content)
     assert "cube.stl" in str(no.value)

@@ -26,8 +26,8 @@ def write_stl(path, points, triangles):
 
 
 @pytest.mark.parametrize("kind", ["stl", "ply", "obj", "vtk", "vtp"])
-def test_every_format_gives_the_same_surface(tmp_path, kind):
-    """Single precision of STL and PLY: 1e-7 of the coordinates."""
+def test_every_file_format_has_the_same_surface(tmp_path, kind):
+    """STL and PLY have single precision: 1e-7 of the coordinates."""
     pyvista = pytest.importorskip("pyvista")
     points, triangles = cylinder()
     path = tmp_path / f"bar.{kind}"
@@ -38,7 +38,7 @@ def test_every_format_gives_the_same_surface(tmp_path, kind):
     assert len(surface.triangles) == len(triangles)
 
 
-def test_the_unit_scales_the_part(tmp_path):
+def test_surface_unit_scales_the_part_and_a_wrong_unit_is_refused(tmp_path):
     points, triangles = cylinder()
     path = write_stl(tmp_path / "bar.stl", 1000 * points, triangles)
     assert read_surface(path, "mm").volume == pytest.approx(bar().volume, rel=1e-6)
@@ -48,7 +48,7 @@ def test_the_unit_scales_the_part(tmp_path):
         read_surface(path, "mmm")
 
 
-def test_a_prism_has_its_own_volume_and_area():
+def test_cube_has_the_volume_and_area_of_its_sides():
     surface = check_surface(CUBE, CUBE_TRIANGLES, "cube")
     assert surface.volume == pytest.approx(1e-3, rel=1e-14)
     assert surface.area == pytest.approx(6e-2, rel=1e-14)
@@ -71,7 +71,7 @@ def test_wrong_surface_file_is_refused(tmp_path, name, content, message):
         read_surface(path)
 
 
-def test_a_cavity_is_part_of_a_body():
+def test_cavity_is_subtracted_from_the_volume_of_a_body():
     both = np.concatenate([CUBE_TRIANGLES, CUBE_TRIANGLES + 8])
     hollow = np.concatenate([CUBE, 0.5 * CUBE + 0.025])
     surface = check_surface(hollow, both, "cube")
@@ -79,23 +79,23 @@ def test_a_cavity_is_part_of_a_body():
     assert "cavity was inside out" in surface.repairs[0]
 
 
-def test_nearly_equal_vertices_are_merged_and_named(rng):
-    """Every triangle with its own vertices, each off by 1e-10 m."""
+def test_nearly_equal_vertices_are_merged_and_reported(rng):
+    """Every triangle has its own vertices, each displaced by about 1e-10 m."""
     loose = CUBE[CUBE_TRIANGLES].reshape(-1, 3) + 1e-10 * rng.normal(size=(36, 3))
     surface = check_surface(loose, np.arange(36).reshape(-1, 3), "cube")
     assert len(surface.points) == 8
     assert "nearly equal vertices merged" in surface.repairs[0]
 
 
-def test_units_of_length_are_scipys():
+def test_units_of_length_equal_those_of_scipy():
     expected = {"m": 1.0, "dm": constants.deci, "cm": constants.centi,
                 "mm": constants.milli, "um": constants.micro, "in": constants.inch,
                 "inch": constants.inch, "ft": constants.foot}  # fmt: skip
     assert pytest.approx(expected, rel=1e-15) == UNITS
 
 
-def test_a_volume_is_the_same_far_from_the_origin():
-    """Some 40 km away, where products of coordinates have no digit left of 1 l."""
+def test_signed_volume_does_not_change_far_from_the_origin():
+    """Some 40 km away, products of coordinates have no digit left for 1 litre."""
     far = CUBE + np.array([1e4, -2e4, 3e4])
     for points, tolerance in ((CUBE, 1e-12), (far, 1e-8)):
         volume = signed_volume(points, CUBE_TRIANGLES)

@@ -20,8 +20,8 @@ TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 CORNERS = 0.1 * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 
 
-def test_a_triangles_vector_is_its_area_along_its_normal_wherever_it_lies():
-    """Legs 3 and 4 in the plane z = 7: 6 upward; turned over, downward."""
+def test_area_vector_of_a_triangle_is_its_area_along_its_normal():
+    """Legs 3 and 4 in the plane z = 7: 6 upward; in reverse order, downward."""
     points = np.array([[1.0, 2, 7], [4, 2, 7], [1, 6, 7]])
     triangles = np.array([[0, 1, 2], [1, 2, 0], [2, 1, 0]])
     expected = [[0, 0, 6], [0, 0, 6], [0, 0, -6]]
@@ -31,8 +31,9 @@ def test_a_triangles_vector_is_its_area_along_its_normal_wherever_it_lies():
     assert surface.diagonal == pytest.approx(5)
 
 
-def test_a_digest_is_of_the_geometry_alone():
-    """It depends on every bit of coordinates and corners, not on name or layout."""
+def test_surface_digest_depends_on_the_geometry_only():
+    """It depends on every bit of coordinates and corners,
+    not on name or memory layout."""
     one = Surface(CUBE, CUBE_TRIANGLES, "one")
     same = Surface(np.asfortranarray(CUBE), CUBE_TRIANGLES.astype(np.int32), "other")
     assert one.digest() == same.digest()
@@ -50,8 +51,8 @@ def test_a_digest_is_of_the_geometry_alone():
         (1.001e-3, "mm", None), (0.999e-3, "mm", "m"), (0.999e-3, "m", "m"),
     ],
 )  # fmt: skip
-def test_part_of_implausible_size_is_refused_with_a_unit(size, unit, hint):
-    """A millimetre to twenty metres across."""
+def test_part_of_implausible_size_is_refused_with_a_likely_unit(size, unit, hint):
+    """Plausible sizes are from a millimetre to twenty metres."""
     points = CUBE * size / (0.1 * np.sqrt(3))
     if hint is None:
         check_surface(points, CUBE_TRIANGLES, "part", unit)
@@ -62,8 +63,8 @@ def test_part_of_implausible_size_is_refused_with_a_unit(size, unit, hint):
         check_surface(points, CUBE_TRIANGLES, "part", unit)
 
 
-def test_a_step_file_states_its_own_unit(tmp_path, monkeypatch):
-    """The given unit counts for other files only."""
+def test_unit_option_is_ignored_for_a_step_file(tmp_path, monkeypatch):
+    """The file states its unit; the option counts for other files only."""
     points, triangles = cylinder()
     monkeypatch.setattr(
         surface_module, "_read_triangles", lambda *_: (points, triangles, None)
@@ -76,8 +77,10 @@ def test_a_step_file_states_its_own_unit(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(("size", "unit"), [(1e-4, "m"), (100.0, "mm")])
-def test_a_step_file_of_the_wrong_unit_is_told_the_likely_one(size, unit, monkeypatch):
-    """A part of 0.1 m whose numbers are metres under the head of millimetres."""
+def test_step_file_with_a_wrong_unit_is_refused_with_the_likely_unit(
+    size, unit, monkeypatch
+):
+    """A part of 0.1 m whose numbers are metres, in a file that states millimetres."""
     points, triangles = cylinder(0.2 * size, size)
     monkeypatch.setattr(
         surface_module, "_read_triangles", lambda *_: (points, triangles, None)
@@ -89,7 +92,7 @@ def test_a_step_file_of_the_wrong_unit_is_told_the_likely_one(size, unit, monkey
 
 
 def test_points_of_no_triangle_are_ignored():
-    """Neither NaN nor a distant point."""
+    """Such a point may be NaN or far away."""
     points = np.concatenate([[[np.nan] * 3, [1e6, 0, 0]], CUBE])
     surface = check_surface(points, CUBE_TRIANGLES + 2, "cube")
     assert surface.volume == pytest.approx(1e-3)
@@ -98,7 +101,7 @@ def test_points_of_no_triangle_are_ignored():
 
 
 @pytest.mark.parametrize("pair", [[0, 0, 1], [0, 1, 1], [1, 0, 1]])
-def test_a_triangle_of_two_corners_is_dropped_and_named(pair):
+def test_triangle_of_two_corners_is_dropped_and_reported(pair):
     triangles = np.concatenate([CUBE_TRIANGLES, [pair]])
     surface = check_surface(CUBE, triangles, "cube")
     assert len(surface.triangles) == 12
@@ -107,7 +110,7 @@ def test_a_triangle_of_two_corners_is_dropped_and_named(pair):
 
 @pytest.mark.parametrize("turned", [1, 5, 7, 11])
 @pytest.mark.parametrize("hollow", [False, True])
-def test_turned_triangles_are_repaired_and_named(rng, turned, hollow):
+def test_reversed_triangles_are_repaired_and_reported(rng, turned, hollow):
     """The smaller number of triangles is turned, then a shell that is inside out."""
     mixed = CUBE_TRIANGLES.copy()
     some = rng.choice(12, turned, replace=False)
@@ -127,7 +130,7 @@ def test_turned_triangles_are_repaired_and_named(rng, turned, hollow):
     assert edges == {(b, a) for a, b in edges}
 
 
-def test_a_second_body_is_named_by_its_middle():
+def test_second_body_is_refused_with_the_place_of_its_middle():
     far = CUBE + [0.3, 0.4, 0.5]
     points = np.concatenate([2 * CUBE, far])
     triangles = np.concatenate([CUBE_TRIANGLES, CUBE_TRIANGLES + 8])
@@ -184,7 +187,7 @@ def test_surface_that_bounds_no_solid_is_refused(points, triangles, message):
         check_surface(points, triangles, "part")
 
 
-def test_place_where_a_surface_cuts_itself_is_named():
+def test_place_where_a_surface_intersects_itself_is_reported():
     """The cube's top drawn up to a spike, or down through its bottom: the middle of two
     triangles that cross is named, one of the spike's and one of the bottom's."""
     sides = [t for t in CUBE_TRIANGLES if not (CUBE[t][:, 2] == 0.1).all()]

@@ -71,7 +71,7 @@ def msh4(elements, kind, dimension):
     ],
     ids=["2.2 triangles", "4.1 triangles", "2.2 solid", "4.1 solid", "2.2 quads"],
 )
-def test_a_cube_of_gmsh_is_a_cube(tmp_path, content, capfd):
+def test_msh_file_of_a_cube_is_read(tmp_path, content, capfd):
     """Written by hand after the format's description; 12 triangles around 1e-3 m^3."""
     path = tmp_path / "cube.msh"
     path.write_text(content)
@@ -97,7 +97,9 @@ def test_wrong_msh_file_is_refused(tmp_path, content, message, capfd):
     assert capfd.readouterr().out == ""
 
 
-def test_step_without_gmsh_says_what_to_install(tmp_path, monkeypatch):
+def test_step_file_without_gmsh_is_refused_with_the_package_to_install(
+    tmp_path, monkeypatch
+):
     monkeypatch.setitem(sys.modules, "gmsh", None)
     path = tmp_path / "part.step"
     path.write_text("ISO-10303-21;")
@@ -120,8 +122,10 @@ def gmsh():
         gmsh.finalize()
 
 
-def test_step_is_read_in_its_own_unit_and_its_cylinders_are_known(tmp_path, gmsh):
-    """Millimetres stand in the file; 48 facets a circle leave 0.3 % of the volume."""
+def test_step_file_is_read_in_its_own_unit_and_its_cylinders_are_recognised(
+    tmp_path, gmsh
+):
+    """The file is in millimetres; 48 facets a circle lack 0.3 % of the volume."""
     path = tmp_path / "tube.step"
     gmsh.write(str(path))
     gmsh.finalize()
@@ -150,7 +154,7 @@ gmsh.write(sys.argv[1])
 
 
 def test_one_of_several_solids_is_read_by_its_name(tmp_path, run):
-    """A cylinder of 20 x 100 mm beside a box of 10 x 20 x 30 mm; facets cost 0.3 %."""
+    """A cylinder of 20 x 100 mm and a box of 10 x 20 x 30 mm; facets lack 0.3 %."""
     pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
     path = tmp_path / "two.step"
     # in a process of its own: what was read before decides the unit that is written
@@ -186,8 +190,8 @@ gmsh.write(sys.argv[1])
 """
 
 
-def test_solids_are_listed_and_several_that_touch_are_read_as_one(tmp_path):
-    """Boxes of 20 x 30 x 40, 10 x 10 x 50 on it, and 1 x 1 x 1 mm apart."""
+def test_touching_solids_are_united_and_separate_ones_refused(tmp_path):
+    """Boxes of 20 x 30 x 40 mm, 10 x 10 x 50 mm on it, and 1 x 1 x 1 mm apart."""
     pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
     path = tmp_path / "three.step"
     script = [sys.executable, "-c", TOUCHING, str(path)]
@@ -241,7 +245,7 @@ def test_a_file_that_crashes_its_reader_is_refused(tmp_path, kept):
 
 
 def test_reader_is_stopped_at_its_time_limit(tmp_path, monkeypatch):
-    """The time limit of the reader's process; none reads a file within 1 ms."""
+    """The time limit is that of the reader's process, which needs more than 1 ms."""
     path = tmp_path / "part.vtk"
     path.write_text("# vtk DataFile Version 3.0\n")
     monkeypatch.setattr(surface_files, "_TIME_LIMIT", 0.001)
@@ -277,7 +281,7 @@ def faces_of(model, path, solid):
     return list(sides(model, dict.fromkeys(chosen.values(), 0)))
 
 
-def test_the_faces_are_those_of_the_solid_that_is_named(tmp_path):
+def test_faces_of_a_named_solid_are_selected_and_unknown_names_refused(tmp_path):
     path = tmp_path / "arm.step"
     assert faces_of(Model(arm=[1, 2]), path, "") == [1, 2]
     both = Model(arm=[1, 2], bolt=[3], bolt__2=[4, 5], _=[6])
@@ -294,8 +298,8 @@ def test_the_faces_are_those_of_the_solid_that_is_named(tmp_path):
         faces_of(crowd, path, "")
 
 
-def test_faces_between_solids_have_one_on_each_side():
-    """Two solids that share face 2: it is inside, the others are outside."""
+def test_face_between_two_solids_has_one_solid_on_each_side():
+    """Two solids share face 2, which is inside; the others are outside."""
     model = Model(arm=[1, 2], bolt=[2, 3])
     assert sides(model, {11: 0, 12: 1}) == {1: (0, -1), 2: (0, 1), 3: (1, -1)}
     assert sides(model, {11: 0, 12: 0}) == {1: (0, -1), 3: (0, -1)}

@@ -1,4 +1,4 @@
-"""K_C by virtual joints against the links' finite elements themselves."""
+"""Platform compliance by virtual joints against the finite elements of the links."""
 
 import json
 
@@ -49,8 +49,8 @@ def posture():
     return posture
 
 
-def test_solid_link_has_no_rigid_energy_and_the_stiffness_of_a_beam():
-    """Square section 1 x 2, length 6: K_E within the few per cent of its held ends."""
+def test_solid_link_has_no_rigid_energy_and_nearly_the_stiffness_of_a_beam():
+    """Square section 1 x 2, length 6: held ends add a few per cent to K_E."""
     link = BeamLink({"width": 0.05, "height": 0.1}, 70e9, 0.3, up=(0, 1, 1))
     frame = Frame("tip", translation=[0.1, 0.2, -0.2], link=link)
     solid = solid_link(frame)
@@ -65,7 +65,7 @@ def test_solid_link_has_no_rigid_energy_and_the_stiffness_of_a_beam():
 
 @pytest.mark.slow
 def test_virtual_joints_reproduce_solids_loaded_at_their_ends(posture):
-    """Condensed K_E against the displacement method over all bodies: rounding."""
+    """Condensed K_E agrees with the displacement method over all bodies to rounding."""
     costs = platform_costs([posture])
     assert costs.meshed[0] < 1e-9
     assert 1e-3 < costs.beams[0] < 0.1
@@ -75,7 +75,7 @@ def test_virtual_joints_reproduce_solids_loaded_at_their_ends(posture):
 
 
 @pytest.mark.slow
-def test_cost_of_a_single_link_is_that_of_the_platform():
+def test_cost_of_a_single_link_equals_that_of_the_platform():
     frame = Frame("tip", translation=[0.3, 0.0, 0.0], link=ROUND)
     posture = home_posture(Robot("cantilever", "tip", (frame,)))
     solid = solid_link(frame)
@@ -88,7 +88,7 @@ def test_cost_of_a_single_link_is_that_of_the_platform():
     assert costs.by_link == {"tip": pytest.approx(costs.beams)}
 
 
-def test_cost_of_many_poses_equals_that_of_each():
+def test_platform_cost_of_many_poses_equals_that_of_each_pose():
     robot = load_robot("irsbot2")
     postures = [place_robot(robot, {"tx": x, "tz": -0.5}) for x in (0.0, 0.2)]
     both = platform_costs(postures)
@@ -126,8 +126,9 @@ def test_validity_command_names_the_link_of_largest_cost(run, tmp_path):
     assert "only that link a beam" in picture.read_text()
 
 
-def test_validity_over_poses_reports_median_and_largest(run, tmp_path):
-    """One pose of three out of reach; a list of the same poses says the same."""
+def test_validity_over_poses_reports_median_and_largest_cost(run, tmp_path):
+    """One of three poses is out of reach;
+    a list of the same poses has the same result."""
     listed = tmp_path / "poses.csv"
     listed.write_text("id,pose.tx,pose.tz\na,0,-0.5\nb,0.2,-0.5\nc,3,-0.5\n")
     words = ["validation", "validity", "irsbot2", "--solids", "--json", "-"]

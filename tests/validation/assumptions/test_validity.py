@@ -1,4 +1,4 @@
-"""What the model's assumptions cost, against closed forms and the simulation."""
+"""Cost of the model's assumptions, against closed forms and the simulation."""
 
 import json
 import math
@@ -61,7 +61,7 @@ def posture():
 @pytest.mark.parametrize(
     ("shift", "tilt"), [((2e-5, 0), (0, 3e-4)), ((0, 1e-5), (-6e-4, 0))]
 )
-def test_bushes_add_what_disc_and_cone_bound_apart(shift, tilt):
+def test_margin_of_two_bushes_is_the_sum_of_the_shares_of_disc_and_cone(shift, tilt):
     """Margins by hand: disc and cone max(r / c, theta / t), bushes r / c + theta / t.
 
     Whether shift and tilt lie in one plane or not: the worse bush has the sum.
@@ -72,14 +72,15 @@ def test_bushes_add_what_disc_and_cone_bound_apart(shift, tilt):
     assert bush_margin(at) == pytest.approx(r + theta, rel=1e-9)
 
 
-def test_a_shift_across_the_tilts_plane_costs_bushes_less():
-    """(TX + h RY, TY - h RX) = (r, h theta) here: sqrt of the sum of squares."""
+def test_margin_of_two_bushes_for_a_shift_across_the_tilt_is_a_root_of_squares():
+    """(TX + h RY, TY - h RX) = (r, h theta) here,
+    so the margin is a root of summed squares."""
     at = pin([3e-4, 0, 0, 2e-5, 0, 0])
     expected = math.hypot(2e-5 / 3e-5, 3e-4 / 7.5e-4)
     assert bush_margin(at) == pytest.approx(expected, rel=1e-9)
 
 
-def test_bushes_lie_between_disc_and_cone_and_half_of_these(posture):
+def test_two_bushes_lie_between_full_and_half_disc_and_cone(posture):
     """Both in energy and in margin."""
     frames = tuple(
         replace(f, clearance=replace(
@@ -101,7 +102,7 @@ def test_bushes_lie_between_disc_and_cone_and_half_of_these(posture):
         assert disc <= bush_margin(posture, compliant) <= 2 * disc
 
 
-def test_bushes_leave_joints_without_tilt_alone():
+def test_bushes_do_not_change_joints_without_tilt_clearance():
     robot = load_robot("hexapod")  # ball joints and cardans: radial and axial clearance
     joints = virtual_joints(robot)
     np.testing.assert_array_equal(bush_joints(joints).cones, joints.cones)
@@ -129,8 +130,9 @@ def test_simulation_with_two_bushes_gives_the_same_energy_ratio(posture):
     assert bushes / disc == pytest.approx(expected, rel=2e-3)
 
 
-def test_half_weights_move_a_cantilever_a_third_too_far():
-    """q L^4 / 6 EI instead of q L^4 / 8 EI, shear alike; slopes q L^3 / 4 for / 6."""
+def test_half_weights_overestimate_the_sag_of_a_cantilever_by_a_third():
+    """q L^4 / 6 EI instead of q L^4 / 8 EI, with equal shear;
+    slopes q L^3 / 4 EI instead of q L^3 / 6 EI."""
     L, g = 0.5, 9.81
     link = replace(FLAT, theory="euler")
     cost = halves_cost(cantilever(link), [0, 0, -g])
@@ -143,8 +145,9 @@ def test_half_weights_move_a_cantilever_a_third_too_far():
     assert cost.energy == pytest.approx((1 / 24) / (1 / 40) - 1, rel=1e-9)
 
 
-def test_the_whole_cantilevers_energy_is_that_of_its_ends_and_between_them():
-    """q^2 L^5 / 40 EI: the ends' equivalents store the rest of q^2 L^5 / 1440 EI."""
+def test_energy_of_a_heavy_cantilever_is_that_of_its_ends_plus_that_between():
+    """The sum is q^2 L^5 / 40 EI,
+    of which q^2 L^5 / 1440 EI is stored between the ends."""
     L, g = 0.5, 9.81
     at = cantilever(replace(FLAT, theory="euler"))
     second, q = 0.02**3 * 0.05 / 12, RHO * 1e-3 * g
@@ -157,10 +160,11 @@ def test_the_whole_cantilevers_energy_is_that_of_its_ends_and_between_them():
 
 @pytest.mark.exudyn
 @pytest.mark.parametrize("elements", [1, 2, 8])
-def test_elements_of_the_simulation_store_the_same_energy(elements):
-    """In all directions, with shear; the share within an element is not in Exudyn.
+def test_energy_of_simulated_elements_equals_that_of_ends_plus_between_ends(elements):
+    """In all directions, with shear.
 
-    Scaled down to 1e-3 m/s^2, where bending is linear to 1e-8.
+    Exudyn has no energy within an element. The weight is scaled down to 1e-3 m/s^2,
+    where bending is linear to 1e-8.
     """
     from validation.multibody.simulation import SimulationModel, simulate_assembly
 
@@ -176,7 +180,8 @@ def test_elements_of_the_simulation_store_the_same_energy(elements):
 
 
 def test_link_cost_is_zero_for_equal_stiffness(posture):
-    """The beam's K_E as a matrix; twice as soft costs much."""
+    """The beam's K_E given as a matrix costs nothing;
+    half of that stiffness costs much."""
     beams = {
         f.name: np.linalg.inv(link_compliance(f))
         for f in posture.robot.frames
@@ -189,8 +194,8 @@ def test_link_cost_is_zero_for_equal_stiffness(posture):
     assert link_cost(posture, {k: K / 2 for k, K in beams.items()}).matters
 
 
-def test_linear_closures_cost_the_square_of_the_errors(posture):
-    """Position falls by four as errors and clearances are halved."""
+def test_cost_of_linear_closures_grows_with_the_square_of_the_errors(posture):
+    """The position error falls to a quarter as errors and clearances are halved."""
     from validation.crosscheck.pair import scaled
 
     full, half = closure_cost(posture), closure_cost(scaled(posture, 0.5))
@@ -205,7 +210,7 @@ def test_cost_matters_above_one_percent_or_twenty_micrometres():
 
 
 @pytest.mark.usefixtures("coarse_solids")
-def test_a_thick_bar_is_stiffer_than_its_beam_because_its_ends_are_held(posture):
+def test_thick_bar_with_held_ends_is_stiffer_than_its_beam_in_bending_only(posture):
     """Bending by 1 + c r / L, c about 0.2 (an end held flat cannot warp); torsion not.
 
     At L / r = 5 that is 4 per cent; a mesh good to 1 per cent lets it be seen.
@@ -227,7 +232,7 @@ def test_a_thick_bar_is_stiffer_than_its_beam_because_its_ends_are_held(posture)
 
 
 def test_costs_are_unknown_without_errors_and_load(tmp_path):
-    """Both models store rounding: their ratio is not a cost."""
+    """Both models then store energies of rounding, whose ratio is not a cost."""
     target = tmp_path / "costs.json"
     words = ["validity", "irsbot2", "--pose", "tx=0,tz=-0.5", "--json", str(target)]
     outcome = CliRunner().invoke(app, words)
@@ -239,8 +244,9 @@ def test_costs_are_unknown_without_errors_and_load(tmp_path):
     assert "nothing to compare" in costs["disc and cone, not two bushes"]["reason"]
 
 
-def test_pose_has_a_cost_without_stored_energy():
-    """A serial bar turned by t at its base: the tip's shift is off by l t^2 / 2."""
+def test_position_cost_is_known_without_stored_energy():
+    """A serial bar turned by t at its base:
+    the tip's position has an error of l t^2 / 2."""
     frames = (
         Frame("a", geometric_error=[0, 0, 0.01, 0, 0, 0]),
         Frame("b", "a", translation=[0.5, 0, 0]),
@@ -253,7 +259,8 @@ def test_pose_has_a_cost_without_stored_energy():
 
 
 def test_validity_command_reports_which_assumptions_matter(tmp_path):
-    """Disc and cone matter on the paper's robot; other costs state a reason."""
+    """Disc and cone matter for the paper's robot;
+    costs that are unknown have a reason."""
     target, file = tmp_path / "costs.json", tmp_path / "robot.toml"
     write_robot(irsbot2_with(NUMBERS["cases"][0]), file)
     words = ["validity", str(file), "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100"]
@@ -270,8 +277,8 @@ def test_validity_command_reports_which_assumptions_matter(tmp_path):
 
 
 @pytest.mark.usefixtures("coarse_solids")
-def test_heavy_round_bars_have_a_cost_for_every_assumption(posture):
-    """Heavy round bars."""
+def test_every_assumption_has_a_cost_for_heavy_round_bars(posture):
+    """Round bars with L / r = 10, with weight and solids."""
     heavy = replace(posture, robot=with_bars(posture.robot, 10.0, 2700.0))
     costs = assumption_costs(heavy, gravity=[0, 0, -9.81], solids=True)
     assert all(isinstance(cost, Cost) for cost in costs.values())
@@ -279,7 +286,7 @@ def test_heavy_round_bars_have_a_cost_for_every_assumption(posture):
     assert 0 < costs["beams, not solids"].energy < 0.1
 
 
-def test_beam_needs_the_pieces_that_leave_20_um():
+def test_suggested_pieces_of_a_beam_leave_an_error_below_20_um():
     """A moment M rolls a beam up to a circle: what one spring is off is known.
 
     Its tip at L (sin a / a - 1, (1 - cos a) / a), a = M L / EI; one spring turns by a

@@ -1,4 +1,4 @@
-"""Campaign folders: sound ones are read, wrong ones are refused in one line."""
+"""Campaign folders: correct ones are read, wrong ones are refused in one line."""
 
 import math
 import re
@@ -14,7 +14,7 @@ from validation.campaign.campaign import number_rows
 from validation.campaign.campaign_file import read_campaign
 
 
-def test_campaign_has_the_content_of_its_files(tmp_path):
+def test_campaign_has_the_values_of_its_files(tmp_path):
     """Two arms by hand: x = cos q1 + 0.8 cos(q1 + q2), y likewise."""
     campaign = read_campaign(write_campaign(tmp_path / "first"))
     assert campaign.name == "first"
@@ -36,7 +36,7 @@ def test_campaign_has_the_content_of_its_files(tmp_path):
     assert not campaign.measured.flags.writeable
 
 
-def test_take_keeps_the_order_and_numbers_of_rows(tmp_path):
+def test_take_keeps_the_requested_order_and_the_configuration_numbers(tmp_path):
     campaign = read_campaign(write_campaign(tmp_path))
     some = campaign.take([3, 1])
     assert some.ids == ("m4", "m2")
@@ -53,7 +53,7 @@ def test_number_rows_counts_by_first_occurrence():
 
 
 def test_commanded_poses_give_the_commanded_joints(tmp_path):
-    """The tool's poses of commanded joints, given as commands."""
+    """The rows command the tool's poses that follow from the same joint values."""
     joints = read_campaign(write_campaign(tmp_path / "joints"))
     tool = joints.transforms[:, joints.robot.index("tool")]
     rows = [
@@ -90,8 +90,8 @@ def test_labels_in_any_script_and_spaces_are_read(tmp_path):
     assert read_campaign(write_campaign(tmp_path, rows=rows)).ids[0].startswith("Ü")
 
 
-def test_declared_semicolons_decimal_commas_and_units_are_understood(tmp_path):
-    """The same numbers in another dialect are the same campaign."""
+def test_declared_semicolons_decimal_commas_and_units_are_read(tmp_path):
+    """The same numbers in another notation are the same campaign."""
     plain = read_campaign(write_campaign(tmp_path / "plain"))
     in_mm = [
         "m1;5,729577951308232;11,459155902616464;0;0;0,01;0,02;0,03;1,5;0;1",
@@ -115,8 +115,8 @@ def test_declared_semicolons_decimal_commas_and_units_are_understood(tmp_path):
     np.testing.assert_array_equal(other.sigma, plain.sigma)  # [noise] is always SI
 
 
-def test_a_measured_motion_is_converted_to_si(tmp_path):
-    """An inclinometer in urad, a distance in mm; other covariates are as they are."""
+def test_measured_motion_is_converted_to_si_units(tmp_path):
+    """An inclinometer in urad, a distance in mm; other covariates keep their unit."""
     head, extra = f"{HEAD},cov.tilt,cov.gap,cov.bed", "[units]\ncov.tilt = 'urad'\n"
     rows = [f"{row},3,{k},5" for k, row in enumerate(ROWS)]
     folder = write_campaign(tmp_path, head, rows, extra=f"{extra}cov.gap = 'mm'\n")
@@ -137,14 +137,14 @@ def test_byte_order_mark_and_carriage_returns_are_accepted(tmp_path):
     assert len(read_campaign(folder / "campaign.toml")) == 4
 
 
-def test_sigma_of_a_row_replaces_that_of_the_device(tmp_path):
+def test_sigma_of_a_row_replaces_the_sigma_of_the_device(tmp_path):
     rows = ["a,0,0,1e-5,2e-5,3e-6,", "b,0,0,1e-5,,,"]
     head = "id,q.one,q.two,meas.tx,meas.ty,sigma.tx,sigma.ty"
     sigma = read_campaign(write_campaign(tmp_path, head=head, rows=rows)).sigma
     np.testing.assert_array_equal(sigma[:, 3:5], [[3e-6, 5e-6], [5e-6, 5e-6]])
 
 
-def test_unknown_registration_allows_large_positions_not_rotations(tmp_path):
+def test_unknown_registration_allows_large_positions_but_not_rotations(tmp_path):
     rows = ["a,0,0,1,2,3,-5.5,10,2,0,0,1"]
     head = "id,q.one,q.two,meas.rx,meas.ry,meas.rz,meas.tx,meas.ty,meas.tz,"
     head += "cov.temperature,cov.time,cov.approach"
@@ -294,14 +294,15 @@ def test_missing_folder_is_refused(tmp_path):
         read_campaign(tmp_path / "gone")
 
 
-def test_wrong_robot_file_of_a_campaign_is_named(tmp_path):
+def test_wrong_robot_file_of_a_campaign_is_refused_by_name(tmp_path):
     folder = write_campaign(tmp_path, robot=ARM.replace("one", "base", 1))
     with pytest.raises(BadInput, match=r"robot.toml: frame"):
         read_campaign(folder)
 
 
 def test_campaign_files_of_the_docs_are_read(tmp_path):
-    """All blocks together: irsbot2 at 100 mm, 10 N written as 0,01 kN."""
+    """All blocks of the page together:
+    irsbot2 at 100 mm, with 10 N written as 0,01 kN."""
     docs = Path(__file__).parents[3] / "docs" / "campaigns.md"
     blocks = re.findall(r"```toml\n(.*?)```", docs.read_text("utf-8"), flags=re.S)
     assert len(blocks) == 3
@@ -324,8 +325,9 @@ def test_campaign_files_of_the_docs_are_read(tmp_path):
 POINTS = "[points]\nA = [0.1, 0, 0]\nB = [0, 0.2, 0]\n"
 
 
-def test_a_row_is_read_point_by_point(tmp_path):
-    """A point of the tool moves with it: its nominal place is the pose's by hand."""
+def test_row_of_several_points_becomes_a_row_for_each_point(tmp_path):
+    """A point of the tool moves with it:
+    its nominal place equals that of the pose by hand."""
     head = "id,q.one,q.two,session,meas.A.tx,meas.A.ty,meas.B.tx,meas.tz"
     rows = ["m1,0.1,0.2,a,1e-5,2e-5,3e-5,4e-5", "m2,0.1,0.2,b,,,5e-5,"]
     campaign = read_campaign(write_campaign(tmp_path, head, rows, extra=POINTS))
@@ -347,7 +349,7 @@ def test_a_row_is_read_point_by_point(tmp_path):
     assert campaign.take([3]).targets.tolist() == [[0, 0.2, 0]]
 
 
-def test_each_of_several_tables_is_a_session(tmp_path):
+def test_each_of_several_tables_becomes_a_session(tmp_path):
     folder = write_campaign(tmp_path, toml={"measurements": '["a.csv", "b.csv"]'})
     (folder / "a.csv").write_text(f"{HEAD}\n{ROWS[0]}\n")
     (folder / "b.csv").write_text(f"{HEAD}\n{ROWS[1]}\n{ROWS[2]}\n")

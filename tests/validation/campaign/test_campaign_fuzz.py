@@ -153,7 +153,8 @@ def test_table_of_any_dialect_is_read_or_refused_in_one_line(
     bom, end, delimiter, quote, decimal, encoding, declared, comma, columns, cut,
     tmp_path,
 ):  # fmt: skip
-    """Line ends, marks, encodings, columns twice, a last row that is cut short."""
+    """Line endings, byte order marks, encodings,
+    repeated columns, a truncated last row."""
     table = [line.split(",") for line in TEXT.splitlines()]
     table = [[*row, *(row[k] for k in columns)] for row in table]
     table[1][0] = "é1"
@@ -260,7 +261,7 @@ def test_any_numbers_are_read_or_refused_in_one_line(rows, tmp_path):
 
 
 def test_undamaged_campaign_is_read(tmp_path):
-    """So that the damaged files have no other fault."""
+    """It ensures that the damaged files have no other fault."""
     folder = write_campaign(tmp_path)
     (folder / "campaign.toml").write_text(TOML)
     assert len(read_campaign(folder)) == 4

@@ -108,7 +108,7 @@ def test_robot_is_carried_to_a_new_session_by_few_rows(machine, run):
     assert again.error.position < 1.3 * SIGMA
 
 
-def test_rows_of_one_place_do_not_suffice(machine, run):
+def test_set_up_rows_of_a_single_place_do_not_suffice(machine, run):
     """Forty rows within a milliradian determine a place, not the device's rotation."""
     wide = measured(machine, 60, 0.8)
     text = (wide / "measurements.csv").read_text().splitlines()
@@ -125,7 +125,7 @@ def test_rows_of_one_place_do_not_suffice(machine, run):
 
 
 def test_saved_robot_predicts_its_own_sessions(machine, run):
-    """The device stood elsewhere each day; the residual is noise."""
+    """The device has another place in each session; the residual is noise."""
     tight = load_robot(machine / "declared.toml")
     tight = replace(
         tight, frames=tuple(replace(f, clearance=None) for f in tight.frames)
@@ -141,7 +141,7 @@ def test_saved_robot_predicts_its_own_sessions(machine, run):
     assert 0.8 < error.normalised < 1.1
 
 
-def test_sessions_are_carried_one_by_one(machine, run):
+def test_robot_is_carried_to_each_session_separately(machine, run):
     folder = measured(machine, 60, 0.8, ["a", "b"] * 30)
     code, _, days, out = carried(run, machine, folder, "--setup", "10")
     assert code == 0
@@ -150,7 +150,7 @@ def test_sessions_are_carried_one_by_one(machine, run):
 
 
 def test_drift_is_not_carried_over_without_a_clock(machine, run):
-    """The wave of another day, 15 sigma, is not written to the carried file."""
+    """The drift of another day, 15 sigma, is not written to the carried file."""
     folder = measured(machine, 60, 0.8)
     with_a_wave(machine, 3e-4, 1e-4)
     code, said, (day,), out = carried(run, machine, folder, "--setup", "12")
@@ -164,7 +164,7 @@ def test_drift_is_not_carried_over_without_a_clock(machine, run):
 
 
 def test_drift_is_fitted_again_to_set_up_rows(machine, run):
-    """Every fourth row determines today's wave to a third of sigma."""
+    """Every fourth row determines the drift of the new session to a third of sigma."""
     folder = measured(machine, 80, 0.8, wave=(-2e-4, 1e-4))
     with_a_wave(machine, 3e-4, 1e-4)
     rows = ",".join(map(str, range(1, 81, 4)))
@@ -180,7 +180,7 @@ def test_drift_is_fitted_again_to_set_up_rows(machine, run):
     assert written.parameters["sine"] == pytest.approx(numbers["sine"]["value"])
 
 
-def test_set_up_rows_of_the_first_minutes_leave_a_drift_open(machine, run):
+def test_set_up_rows_of_the_first_minutes_do_not_determine_a_drift(machine, run):
     """The prior is 2e-4 m; half an hour later the drift is unknown."""
     folder = measured(machine, 60, 0.8, wave=(0.0, 0.0))
     with_a_wave(machine, 2e-4, 2e-4)

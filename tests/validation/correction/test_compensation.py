@@ -44,7 +44,9 @@ def two_links(x, y, length):
     return first, second
 
 
-def test_compensation_of_a_longer_link_and_a_zero_is_that_by_hand(tmp_path, run):
+def test_compensation_of_a_longer_link_and_an_offset_equals_hand_calculation(
+    tmp_path, run
+):
     robot, table = written(tmp_path, LONGER + ZERO, ["a,0.3,0.9", "b,-0.2,1.2"])
     out, offsets = tmp_path / "out.csv", tmp_path / "offsets.csv"
     left = tmp_path / "diagnosis.json"
@@ -72,7 +74,7 @@ def test_compensation_of_a_longer_link_and_a_zero_is_that_by_hand(tmp_path, run)
 
 
 def test_compensation_keeps_joints_within_their_limits(tmp_path, run):
-    """The second joint is at its limit: the first angle gives the least distance."""
+    """The second joint is at its limit: the first angle minimises the distance."""
     text = LONGER.replace("position = 0.5", "position = 0.5\nlimits = [0.0, 0.9]")
     robot, table = written(tmp_path, text, ["a,0.3,0.9"])
     found = compensate(read_commands(table, load_robot(robot)))
@@ -96,8 +98,8 @@ def test_registration_is_compensated_only_on_request(tmp_path):
     assert np.abs(found.after[0, 3:]).max() < 1e-9
 
 
-def test_the_spread_is_that_of_tolerances_and_parameters(tmp_path):
-    """A zero known to 1e-4 rad swings the tip by its distance from the drive."""
+def test_compensation_spread_includes_tolerances_and_fitted_parameters(tmp_path):
+    """A zero uncertain by 1e-4 rad moves the tip by that angle times its distance."""
     text = ARM.replace(
         'name = "one"', 'name = "one"\ntolerance = [0, 0, 1e-4, 0, 0, 0]'
     )
@@ -119,7 +121,7 @@ std = { "1.sine" = 2e-4 }
 
 @pytest.mark.parametrize("name", ["arm6", "delta", "hexapod"])
 def test_compensation_brings_a_simulated_machine_to_its_target(name, tmp_path):
-    """The machine is simulated by another program.
+    """Another program simulates the machine.
 
     The residual is of second order: the square of the errors over the size of the
     robot, some nanometres here.
@@ -180,8 +182,8 @@ parameters = { "0" = OFF }
 
 
 @pytest.mark.parametrize("off", [2e11, -5.0, 1e-3])
-def test_a_correction_larger_than_the_robot_is_refused(off, tmp_path, run):
-    """The command of a slide whose function shifts it by metres is kept."""
+def test_correction_larger_than_the_robot_keeps_the_command(off, tmp_path, run):
+    """The function shifts a slide by metres."""
     robot, table = written(
         tmp_path, SLIDE.replace("OFF", repr(off)), ["a,0.3"], "id,q.carriage"
     )

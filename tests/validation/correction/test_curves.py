@@ -1,4 +1,4 @@
-"""Functions as curves: their values by hand, their bands, their units."""
+"""Functions as curves: values by hand, uncertainty bands, units."""
 
 import json
 from math import sin
@@ -27,7 +27,7 @@ def explained(tmp_path, run, *words, effects=(BANDED, FORMULA, LAG)):
     return text, json.loads(file.read_text())["functions"]
 
 
-def test_explained_curves_follow_their_parameters(tmp_path, run):
+def test_explained_curves_equal_their_functions_and_deviations(tmp_path, run):
     text, (wave, formula, lag) = explained(tmp_path, run)
     x = np.array(wave["x"])
     assert (x[0], x[-1]) == pytest.approx((-np.pi, np.pi))
@@ -53,7 +53,7 @@ def test_explain_takes_a_range_and_writes_a_figure(tmp_path, run):
     assert figure.read_text().count("gear of the drive") >= 1
 
 
-def test_two_variables_give_three_curves(tmp_path, run):
+def test_function_of_two_variables_gives_three_curves(tmp_path, run):
     both = (
         LAG
         .replace('"lag"', '"powers"')

@@ -33,7 +33,7 @@ def test_learned_range_covers_variables_without_time_and_outliers(tmp_path):
     assert ranges["load.fz"] == (0.0, 0.0)
 
 
-def test_learned_range_has_a_margin_of_a_twentieth(tmp_path):
+def test_learned_range_has_a_margin_of_five_per_cent(tmp_path):
     robot = read_robot(robot_file(tmp_path))
     for tilt, outside in ((0.4, 0), (0.42, 0), (0.43, 1), (-0.03, 1)):
         rows = [f"a,0.1,0.2,{tilt},0,0", "b,0.5,0.2,0.2,9,0"]
@@ -53,7 +53,7 @@ def test_learned_range_has_a_margin_of_a_twentieth(tmp_path):
 def test_full_turn_of_a_joint_stays_in_the_learned_range(
     variables, form, name, outside, tmp_path
 ):
-    """Except for functions of its angle that are not periodic."""
+    """Except for functions of the angle that are not periodic."""
     robot = read_robot(robot_file(tmp_path))
     if variables:
         one = Function("base", ("tx",), variables, form, {name: 1e-6})

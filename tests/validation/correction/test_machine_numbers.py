@@ -50,7 +50,7 @@ def wet_post(readings, wet, covariance, folder, numbers=("0", "1")):
     return replace(campaign, robot=saved), campaign
 
 
-def test_a_number_is_the_weighted_mean_of_prior_and_readings(tmp_path):
+def test_carried_parameter_is_the_weighted_mean_of_prior_and_readings(tmp_path):
     """Prior 0 +- s, n readings of y +- sigma: conjugate normal distributions."""
     y, s, n = 4e-5, 3e-5, 8
     saved, declared = wet_post([y] * 12, [1] * 12, [[s**2]], tmp_path, ("1",))
@@ -65,8 +65,8 @@ def test_a_number_is_the_weighted_mean_of_prior_and_readings(tmp_path):
     assert known.covariance[0, 0] == pytest.approx(1 / (told + prior), rel=1e-6)
 
 
-def test_known_sums_of_parameters_stay_known(tmp_path):
-    """Only a + b was known; dry rows determine a, and b follows."""
+def test_known_sum_of_two_parameters_is_kept(tmp_path):
+    """Only a + b was known; the new rows determine a, and b follows."""
     s, little, a = 1e-4, 1e-9, 5e-5
     C = s**2 * np.array([[1, -1], [-1, 1]]) + little**2 * np.eye(2)
     wet = [0] * 8 + [1] * 8
@@ -80,10 +80,10 @@ def test_known_sums_of_parameters_stay_known(tmp_path):
     assert numbers["0"] + numbers["1"] == pytest.approx(0.0, abs=0.01 * a)
 
 
-def test_change_beyond_the_saved_deviation_is_followed(
+def test_prior_is_widened_for_a_change_of_twenty_standard_deviations(
     tmp_path,
 ):
-    """At twenty standard deviations the prior and its spread are widened."""
+    """The carried parameter then follows the readings."""
     s, y = 2e-6, 4e-5
     saved, declared = wet_post([y] * 40, [1] * 40, [[s**2]], tmp_path, ("1",))
     carried = carry(saved, declared, np.arange(40) < 20, ())
@@ -94,7 +94,7 @@ def test_change_beyond_the_saved_deviation_is_followed(
     assert day.suffices
 
 
-def test_carried_file_predicts_the_judged_rows(tmp_path):
+def test_carried_file_predicts_the_other_rows_with_the_reported_error(tmp_path):
     s, y = 3e-5, 4e-5
     saved, declared = wet_post([y] * 12, [1] * 12, [[s**2]], tmp_path, ("1",))
     carried = carry(saved, declared, np.arange(12) < 8, ())
@@ -107,7 +107,7 @@ def test_carried_file_predicts_the_judged_rows(tmp_path):
     assert again.spread[:, 3] == pytest.approx(carried.sessions[0].uncertainty)
 
 
-def test_machine_numbers_exclude_those_of_a_session(tmp_path):
+def test_machine_parameters_exclude_those_of_a_session(tmp_path):
     saved, _ = wet_post([0.0] * 12, [1] * 12, np.eye(2) * 1e-12, tmp_path)
     clock = Function("reading", ("tx",), ("time",), "powers", {"1": 1e-9})
     robot = replace(
@@ -129,8 +129,8 @@ def test_machine_numbers_exclude_those_of_a_session(tmp_path):
     assert len(own) == 2
 
 
-def test_compliance_stays_positive():
-    """At least a thousandth of the compliance stays; a rigid joint stays rigid."""
+def test_carried_compliance_stays_positive():
+    """At least a thousandth of the compliance remains; a rigid joint stays rigid."""
     robot = campaign_of(np.zeros((1, 6))).robot
     K = np.diag([np.inf, np.inf, np.inf, 1e6, np.inf, np.inf])
     soft = replace(robot, frames=(replace(robot.frames[0], joint_stiffness=K),))
@@ -146,8 +146,8 @@ def test_compliance_stays_positive():
     ("base", "ry", "screw"), ("reading", "ry", "screw"), ("reading", "tz", "screw"),
     ("j2", "rz", "screw"), ("j2", "rz", "compliance"),
 ])  # fmt: skip
-def test_slopes_of_functions_are_finite_differences(where, component, kind, tmp_path):
-    """By differences of the prediction, under load, with a registered device."""
+def test_slopes_of_functions_equal_finite_differences(where, component, kind, tmp_path):
+    """Differences of the prediction, under load, with a registered device."""
     robot, rng = with_errors(arm()), np.random.default_rng(2)
     lines = ["id,q.j1,q.j2,q.j3,load.fx,load.fz,load.mz"]
     for i, q in enumerate(rng.uniform(-1, 1, (5, 6))):
@@ -176,8 +176,8 @@ def test_slopes_of_functions_are_finite_differences(where, component, kind, tmp_
 
 
 @pytest.mark.slow
-def test_softer_spring_is_found_by_twenty_rows(tmp_path):
-    """On Monday the machine is diagnosed; on Tuesday its drive is a quarter softer."""
+def test_softer_spring_is_found_in_a_new_session_from_twenty_rows(tmp_path):
+    """The machine is diagnosed on Monday; on Tuesday its drive is a quarter softer."""
     springs = {"monday": 5e4, "tuesday": 4e4}
     days = {}
     for day, stiffness in springs.items():

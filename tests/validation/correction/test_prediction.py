@@ -35,7 +35,7 @@ def rows_of(path):
 
 
 def test_predict_reads_a_table_of_commands(tmp_path, run):
-    """A turn of the first joint by a sin q swings the tool about the base."""
+    """A rotation of the first joint by a sin q moves the tool about the base."""
     table = tmp_path / "new.csv"
     table.write_text("id,q.one,q.two\na,0.3,0.0\nb,-0.4,0.5\n")
     out = tmp_path / "readings.csv"
@@ -92,8 +92,8 @@ def test_predict_refuses_a_missing_covariate(tmp_path, run):
     assert not out.exists()
 
 
-def test_sessions_are_registered_one_by_one(tmp_path):
-    """The tracker stood in two places; the residual is zero."""
+def test_each_session_is_registered_separately(tmp_path):
+    """The tracker has another place in each session; the residual is zero."""
     robot = load_robot("arm6")
     write_robot(robot, tmp_path / "robot.toml")
     rng = np.random.default_rng(1)

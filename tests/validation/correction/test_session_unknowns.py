@@ -1,4 +1,4 @@
-"""Unknowns of a session, their prior sizes, and the robot without them."""
+"""Unknowns of a session, their prior sizes, and the robot without a session."""
 
 from dataclasses import replace
 
@@ -26,14 +26,17 @@ def saved():
 
 
 def test_without_session_drops_registration_and_functions_of_time(saved):
-    """The tool stays with the robot, functions of a session stay in that session."""
+    """The robot keeps its tool; functions of a session stay in that session."""
     alone = without_session(saved)
     assert alone.effects == {"registration": {"tool.tx": 0.02}}
     assert alone.functions == (SPRING, OTHER_DAY)
 
 
-def test_a_drift_begins_as_it_was_and_a_step_at_zero(saved):
-    """Rms of 3 and 4 is 5/sqrt 2; shapes are kept; a formula is not fitted."""
+def test_session_drift_starts_at_its_saved_value_and_a_step_at_zero(saved):
+    """The rms of 3 and 4 is 5 / sqrt 2.
+
+    Shape parameters are kept, and a formula is not fitted.
+    """
     unknowns = session_unknowns(saved, (), clock=True)
     names = [name for _, name in unknowns.names]
     assert names == ["amplitude.tx", "amplitude.tz", "size"]
@@ -49,8 +52,8 @@ def test_a_drift_begins_as_it_was_and_a_step_at_zero(saved):
     assert step.session == "today"
 
 
-def test_powers_of_time_are_each_as_large_as_they_were(saved):
-    """1e-4 m and 1e-12 m/s^3 have no unit in common."""
+def test_prior_size_of_each_power_of_time_is_its_saved_value(saved):
+    """1e-4 m and 1e-12 m/s^3 have no common unit."""
     numbers = {"0": 1e-4, "1": 2e-8, "3": 1e-12}
     cubic = Function("reading", ("tx",), ("time",), "powers", numbers)
     robot = replace(saved, effects={}, functions=(cubic,))

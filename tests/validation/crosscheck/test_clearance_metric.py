@@ -1,4 +1,4 @@
-"""Clearances as contact: closed forms, and the linear model's cones."""
+"""Clearances as contacts: closed forms, agreement with the linear model's cones."""
 
 import math
 import time
@@ -53,9 +53,9 @@ def push(cone, screw, width):
 
 @pytest.mark.parametrize("arm", [0.0, 0.04, -0.04])
 def test_contact_force_is_the_gradient_of_its_energy(arm):
-    """Central differences of half a nanometre; inside, at the bound, outside.
+    """Central differences of half a nanometre inside, at and outside the bound.
 
-    With an arm of 40 mm a pin tilted by r / arm touches as one shifted by r does.
+    With an arm of 40 mm, a pin tilted by r / arm touches like one shifted by r.
     """
     disc = replace(DISC, arm=arm)
     unit = np.array([0.04, 0.04, 1, 1, 1, 1])  # [m] for a rad
@@ -72,7 +72,7 @@ def test_contact_force_is_the_gradient_of_its_energy(arm):
                 assert force == pytest.approx(slope, abs=2e-5 * scale)
 
 
-def test_a_narrow_contact_is_nothing_inside_and_a_spring_outside():
+def test_narrow_contact_has_no_force_inside_and_a_spring_force_outside():
     """k (r - c) at first order; c is 30 um, r - c a hundredth of it."""
     assert push(DISC, [0, 0, 0, 1e-5, 0, 0], 1e-4)[3] < 1e-6 * 1e12 * 3e-5
     outside = push(DISC, [0, 0, 0, 0, 3.03e-5, 0], 1e-4)
@@ -80,7 +80,7 @@ def test_a_narrow_contact_is_nothing_inside_and_a_spring_outside():
     assert outside[4] == pytest.approx(1e12 * 3e-7, rel=0.02)
 
 
-def test_a_pin_in_two_bushes_touches_where_its_axis_is_there():
+def test_pin_in_two_bushes_touches_where_its_axis_reaches_the_radius():
     """A tilt by c / h, or a shift by c, just touches; both together press.
 
     At z = h the axis is at (TX + h RY, TY - h RX).
@@ -100,8 +100,9 @@ def test_a_pin_in_two_bushes_touches_where_its_axis_is_there():
     assert both[1] == pytest.approx(0.04 * both[3])
 
 
-def test_clearance_of_a_joint_follows_the_format():
-    """An absent bound is zero; a passive joint's motion is free or bounded by spin."""
+def test_joint_clearance_follows_the_robot_file():
+    """An absent bound is zero;
+    the own motion of a passive joint is free or bounded by spin."""
     clearance = Clearance(radial=1e-5, tilt=2e-4, spin=0.01)
     fixed = joint_clearance(Frame("f", clearance=clearance), scale=0.5)
     assert [(c.rows, c.size) for c in fixed.cones] == [
@@ -134,7 +135,7 @@ def test_axial_clearance_reduces_the_misfit(misfit):
 
 
 @pytest.mark.parametrize("pause", [0.0, 0.05])
-def test_a_time_limit_ends_its_simulation_and_no_other(pause, monkeypatch):
+def test_time_limit_ends_only_its_own_simulation(pause, monkeypatch):
     """Also where the processor sleeps; Exudyn's timer is one for all models.
 
     Without a limit 0.05 s at each of some 3000 calls of the contact are minutes.
@@ -188,8 +189,9 @@ def irsbot2():
 
 
 @pytest.mark.slow
-def test_the_papers_robot_with_clearances_agrees_in_energy_and_springs(irsbot2):
-    """Within 2 per cent at no error; the optimality gap falls with the square."""
+def test_crosscheck_of_the_papers_robot_with_clearances_passes(irsbot2):
+    """The models agree within 2 % as errors vanish;
+    the optimality gap falls with the square."""
     check = crosscheck(
         place_robot(irsbot2, {"tx": 0.0, "tz": -0.5}), (1.0, 0.5, 0.25), clearances=True
     )
@@ -200,10 +202,10 @@ def test_the_papers_robot_with_clearances_agrees_in_energy_and_springs(irsbot2):
 
 
 @pytest.mark.slow
-def test_with_clearances_the_energy_is_that_of_finite_rotations(irsbot2):
+def test_energy_with_clearances_agrees_with_the_exact_model(irsbot2):
     """Contacts against cones, springs as links, at the paper's full errors.
 
-    Contacts leave 0.3 per cent at most; the linear energy is off by several.
+    Contacts differ by at most 0.3 %; the linear energy differs by more than 1 %.
     """
     posture = place_robot(irsbot2, {"tx": 0.1, "tz": -0.15})
     check = crosscheck(posture, (1.0, 0.5), links="spring", clearances=True)
@@ -228,8 +230,9 @@ def heavy(length=0.4):
 
 
 @pytest.mark.parametrize("links", ["beam", "spring"])
-def test_weight_acts_together_with_clearance(links):
-    """A hundredfold weight exceeds the clearance: energy, springs, gap hold.
+def test_crosscheck_passes_for_weight_together_with_clearance(links):
+    """A hundredfold weight exceeds the clearance:
+    checks of energy, springs and gap pass.
 
     With beams the simulation also stores q^2 L^5 / 1440 EI each between their ends.
     """
@@ -244,8 +247,8 @@ def test_weight_acts_together_with_clearance(links):
     assert abs(ratio - 1) > 0.1
 
 
-def test_wrong_weight_together_with_clearance_fails(monkeypatch):
-    """Five per cent too heavy in the linear model."""
+def test_crosscheck_with_clearances_fails_for_a_wrong_weight(monkeypatch):
+    """The weight in the linear model is 5 % too large."""
     import assembly.linear.assembled
 
     right = assembly.linear.assembled.weights
@@ -277,7 +280,7 @@ def drawn(name, size, pose=None):
                   marks=pytest.mark.slow)],
 )  # fmt: skip
 def test_errors_within_the_clearance_store_no_energy(name, size, pose, said):
-    """Without load, errors within the clearance store no energy.
+    """There is no load.
 
     This is a check of overconstrained robots only: the others close without energy
     whatever their clearance.
@@ -294,8 +297,8 @@ def test_errors_within_the_clearance_store_no_energy(name, size, pose, said):
      pytest.param("delta", [0, 0, 0, 0, 0, -50], marks=pytest.mark.slow),
      ("five_bar", [0, 0, 0, 0, -20, 0])],
 )  # fmt: skip
-def test_gap_under_a_load_is_relative_to_the_stored_energy(name, load):
-    """Without errors, closing costs nothing: the reference is the load's energy.
+def test_optimality_gap_under_a_load_is_relative_to_the_stored_energy(name, load):
+    """Without errors closing needs no energy: the reference is the load's energy.
 
     Parts of the five-bar stay free under its load.
     """

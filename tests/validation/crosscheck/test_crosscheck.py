@@ -1,4 +1,4 @@
-"""The two models agree to first order, and a broken model fails."""
+"""Cross-check: the two models agree to first order, and a broken model fails."""
 
 import math
 from dataclasses import replace
@@ -35,7 +35,9 @@ def triangle(error):
     return home_posture(Robot("triangle", "a_tip", frames, (("a_tip", "b_tip"),)))
 
 
-def test_the_pose_difference_of_the_papers_robot_falls_as_the_square(posture):
+def test_pose_difference_of_the_papers_robot_falls_with_the_square_of_the_scale(
+    posture,
+):
     """Slope 2.0 within 0.1, and every limit within a thousandth."""
     result = crosscheck(posture)
     assert result.passed
@@ -48,7 +50,7 @@ def test_the_pose_difference_of_the_papers_robot_falls_as_the_square(posture):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("signed", [False, True])
-def test_slopes_hold_over_poses_and_draws(signed):
+def test_crosscheck_passes_over_poses_and_draws(signed):
     robot = load_robot("irsbot2")
     for seed in range(3):
         for tx, tz in ((0.2, -0.45), (-0.4, -0.35), (0.1, -0.15), (-0.15, -0.6)):
@@ -58,11 +60,11 @@ def test_slopes_hold_over_poses_and_draws(signed):
             assert crosscheck(place).passed, (seed, tx, tz)
 
 
-def test_finite_rotations_explain_the_whole_difference(posture):
-    """With springs as links, two codes with finite rotations: 1e-4 of the difference.
-
-    With beams the residual is their own finite bending.
-    """
+def test_exact_model_explains_the_difference_between_linear_model_and_simulation(
+    posture,
+):
+    """With springs as links, the exact model and the simulation agree to 1e-4 of the
+    difference. With beams, their own finite bending is the residual."""
     springs = crosscheck(posture, links="spring")
     assert springs.passed
     assert max(springs.metric.unexplained.values()) < 1e-3
@@ -70,8 +72,11 @@ def test_finite_rotations_explain_the_whole_difference(posture):
     assert max(beams.metric.unexplained.values()) < 0.1
 
 
-def test_difference_not_due_to_finite_rotations_fails(posture, monkeypatch):
-    """The exact model given errors one per cent too large; the others' agree."""
+def test_crosscheck_fails_for_a_difference_that_finite_rotations_do_not_explain(
+    posture, monkeypatch
+):
+    """The exact model gets errors that are one per cent too large;
+    the two others agree."""
     import validation.crosscheck.pair
 
     right = validation.crosscheck.pair.solve_exact
@@ -98,8 +103,9 @@ def test_a_load_is_scaled_with_the_errors(irsbot2):
 
 
 @pytest.mark.parametrize("links", ["beam", "spring"])
-def test_weight_is_the_same_on_both_sides(links):
-    """A slender, heavy pair of bars, and a body off its frame's origin."""
+def test_crosscheck_with_weight_passes(links):
+    """A slender, heavy pair of bars,
+    and a body whose centre is off its frame's origin."""
     posture = triangle([1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4])
     heavy = replace(STEEL, density=7800.0)
     frames = tuple(
@@ -133,11 +139,12 @@ def erring(name, density):
 
 
 @pytest.mark.parametrize("name", ["3rrr", "arm6"])
-def test_weight_and_moment_act_alike_in_both_finite_models(name):
-    """Weight on erring beams, and a couple of dead forces beside a force.
+def test_exact_model_and_simulation_agree_under_weight_and_moment(name):
+    """Weight on beams with errors,
+    and a couple of dead forces together with a force.
 
-    Relative to what separates them from the linear model; a weight that starts where
-    it would without errors leaves 7e-3, a moment of constant direction 58 per cent.
+    The bound is relative to the difference from the linear model. A weight that starts
+    at its nominal place would leave 7e-3, a moment of constant direction 58 per cent.
     """
     posture = erring(name, 2700.0)
     load = [1, 2, 3, 50, 20, -30]
@@ -146,8 +153,8 @@ def test_weight_and_moment_act_alike_in_both_finite_models(name):
     assert max(check.metric.unexplained.values()) < 1e-4
 
 
-def test_wrong_weight_in_the_exact_model_fails(monkeypatch):
-    """Five per cent too heavy, in the model with finite motions alone."""
+def test_crosscheck_fails_for_a_wrong_weight_in_the_exact_model(monkeypatch):
+    """The weight is 5 % too large in the model with finite motions only."""
     import assembly.exact.exact
 
     right = assembly.exact.exact.dead_loads
@@ -163,11 +170,9 @@ def test_wrong_weight_in_the_exact_model_fails(monkeypatch):
 
 
 @pytest.mark.slow
-def test_rolling_rods_are_held_and_reported():
-    """The delta's rods roll by radians under a load; without one they need no holding.
-
-    Both virtual-joint models then have the same springs, and all agree.
-    """
+def test_rods_that_roll_under_a_load_are_held_and_reported():
+    """The delta's rods roll by radians under a load, and without a load need no
+    holding. Both virtual-joint models then have the same springs, and all agree."""
     still = crosscheck(erring("delta", 1600.0), (1.0, 0.5))
     assert still.passed, still.text()
     assert not still.pairs[0].simulated.held
@@ -186,8 +191,8 @@ def test_rolling_rods_are_held_and_reported():
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("load", [None, [0, 0, 0, 0, 0, -100.0]])
-def test_a_delta_with_errors_of_3_mrad_passes(seed, load):
-    """Rods that roll are held alike in all models, and no order hides another."""
+def test_crosscheck_of_a_delta_with_errors_of_3_mrad_passes(seed, load):
+    """Rods that roll are held alike in all models."""
     robot = load_robot("delta")
     sources = tolerance_sources(
         robot, [3e-3] * 3 + [0] * 3, [f.name for f in robot.frames]
@@ -197,8 +202,8 @@ def test_a_delta_with_errors_of_3_mrad_passes(seed, load):
     assert check.passed, check.text()
 
 
-def test_scales_are_added_until_limits_are_known(irsbot2):
-    """Limits are not known to a thousandth: smaller scales are added."""
+def test_smaller_scales_are_added_until_limits_are_known(irsbot2):
+    """From the two requested scales limits are uncertain by over a thousandth."""
     at = place_robot(
         with_papers_errors(load_robot("irsbot2"), 0, signed=True), {"tx": 0, "tz": -0.5}
     )
@@ -216,22 +221,22 @@ def test_scales_are_added_until_limits_are_known(irsbot2):
     "lever arm one per cent short",
     pytest.param("links half a per cent stiff", marks=pytest.mark.slow),
 ])  # fmt: skip
-def test_two_scales_find_a_broken_term_too(irsbot2, name, broken):
+def test_crosscheck_on_two_scales_fails_for_a_broken_term(irsbot2, name, broken):
     broken(MUTATIONS[name])
     at = place_robot(irsbot2, {"tx": 0.1, "tz": -0.45})
     check, _ = attempt("irsbot2", lambda: crosscheck(at, (1.0, 0.5), LOAD))
     assert check is None or check.table()["verdict"] == "failed"
 
 
-def test_clearances_are_left_out_on_both_sides():
-    """With its clearance of 10 um the error of 8 um would store no energy."""
+def test_crosscheck_without_clearances_removes_them_from_both_models():
+    """With its clearance of 10 um, the error of 8 um would store no energy."""
     check = crosscheck(triangle([0, 0, 0, 8e-6, 0, 0]))
     assert check.posture.robot.frame("a").clearance is None
     assert check.passed
     assert check.pairs[0].simulated.energy > 1e-6
 
 
-def test_a_serial_robot_has_no_energy_and_still_a_slope():
+def test_crosscheck_of_a_serial_robot_has_a_slope_without_energy():
     frames = (
         Frame("a", geometric_error=[0.01, 0.02, 0.03, 1e-3, 0, 0]),
         Frame("b", "a", translation=[0.5, 0, 0],
@@ -255,7 +260,7 @@ def test_crosscheck_without_errors_and_load_has_no_signal():
     assert result.metric.differences["translation"].max() < 1e-15  # rounding of 0.4 m
 
 
-def test_checks_without_signal_are_counted_next_to_passed_ones():
+def test_checks_without_signal_are_counted_separately():
     """No spring is loaded: only the platform's pose is compared."""
     error = [0.01, 0.02, 0.03, 1e-3, 0, 0]
     frame = Frame("a", translation=[0.5, 0, 0], link=STEEL, geometric_error=error)
@@ -270,7 +275,7 @@ def test_checks_without_signal_are_counted_next_to_passed_ones():
     assert outcome[-1] == f"passed; {counted} checks had nothing to compare"
 
 
-def test_failed_simulation_is_a_row_of_the_table():
+def test_crosscheck_reports_a_failed_simulation_as_a_row():
     frames = (
         Frame("a", translation=[1, 0, 0]),
         Frame("b", translation=[1, 0, 0], geometric_error=[0, 0, 0, 1e-4, 0, 0]),
@@ -301,7 +306,9 @@ BY_DEFAULT = (
         for name, mutation in MUTATIONS.items()
     ],
 )
-def test_broken_term_of_the_linear_model_fails(irsbot2, mutation, broken):
+def test_crosscheck_fails_for_a_broken_term_of_the_linear_model(
+    irsbot2, mutation, broken
+):
     """The simulation shares none of these terms, so each breaks the agreement."""
     broken(mutation)
     posture = place_robot(irsbot2, {"tx": 0.1, "tz": -0.45})
@@ -312,19 +319,19 @@ def test_broken_term_of_the_linear_model_fails(irsbot2, mutation, broken):
 BENT = [1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4]
 
 
-def test_two_crossed_bars_pass():
-    """They bend in both planes; the paper's links carry no shear."""
+def test_crosscheck_of_two_crossed_bars_passes():
+    """The bars bend in both planes; the paper's links carry no shear."""
     assert crosscheck(triangle(BENT), load=LOAD).passed
 
 
 @pytest.mark.parametrize("mutation", BEAM_MUTATIONS.values(), ids=BEAM_MUTATIONS.keys())
-def test_broken_beam_of_the_linear_model_fails(mutation, broken):
-    """In the model of two crossed bars."""
+def test_crosscheck_fails_for_a_broken_beam_of_the_linear_model(mutation, broken):
+    """The robot is that of two crossed bars."""
     broken(mutation)
     assert not crosscheck(triangle(BENT), load=LOAD).passed
 
 
-def test_the_slope_figure_shows_what_was_found(posture):
+def test_slope_figure_shows_the_measured_differences(posture):
     from validation.crosscheck.plot import slope_figure
 
     check = crosscheck(posture, scales=(1.0, 0.5))
@@ -339,7 +346,7 @@ def test_the_slope_figure_shows_what_was_found(posture):
     ["four_bar", "five_bar", "3rrr", "orthoglide", "arm6",
      *(pytest.param(name, marks=pytest.mark.slow) for name in ("delta", "hexapod"))],
 )  # fmt: skip
-def test_every_built_in_robot_passes_under_a_load(name):
+def test_crosscheck_of_every_built_in_robot_passes_under_a_load(name):
     """Their drives are springs about one axis and rigid in the other five."""
     posture = home_posture(load_robot(name))
     check = crosscheck(posture, (1.0, 0.5, 0.25), load=[0, 0, 0, 10.0, 20.0, -50.0])

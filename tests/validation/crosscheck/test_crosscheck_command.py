@@ -71,7 +71,7 @@ def test_crosscheck_writes_the_public_keys(tmp_path):
 
 
 def test_crosscheck_keeps_clearances_on_request(tmp_path):
-    """Springs in series with a misfit larger than the clearance between them."""
+    """Springs in series whose misfit is larger than the clearance between them."""
     target, file = tmp_path / "check.json", tmp_path / "robot.toml"
     gap = np.array([0, 0, 0, 2e-4, 1e-4, 5e-5])
     loose = Clearance(radial=2e-5, axial=1e-5)

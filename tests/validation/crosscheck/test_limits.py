@@ -9,7 +9,7 @@ from validation.crosscheck.limits import difference_slope, extrapolate, slope_ch
 
 
 def test_extrapolation_is_exact_for_polynomials():
-    """Three points, a parabola: 3 - 2 s + 5 s^2 is 3 at s = 0."""
+    """Three points of a parabola: 3 - 2 s + 5 s^2 is 3 at s = 0."""
     s = np.array([1.0, 0.5, 0.25])
     values = np.array([3 - 2 * s + 5 * s**2, s]).T
     np.testing.assert_allclose(extrapolate(s, values), [3, 0], atol=1e-14)
@@ -18,18 +18,16 @@ def test_extrapolation_is_exact_for_polynomials():
 SCALES = np.array([1.0, 0.5, 0.25, 0.125])
 
 
-def test_a_slope_ignores_what_is_below_the_floor():
+def test_slope_ignores_differences_below_the_floor():
     scales = [1.0, 0.1, 0.01]
     slope = difference_slope(scales, [1e-3, 1e-5, 1e-6], 1e-5 / 2)
     assert slope == pytest.approx(2.0)
     assert math.isnan(difference_slope(scales, [1e-3, 1e-9, 1e-9], 1e-5))
 
 
-def test_higher_orders_do_not_change_the_slope_whatever_they_cancel():
-    """Second and third order nearly opposite: lines through logarithms say 2.9 to 1.8.
-
-    The polynomial through four scales holds orders one to four exactly.
-    """
+def test_higher_orders_do_not_change_the_slope():
+    """Second and third order are nearly opposite: local logarithmic slopes are 1.8 to
+    2.9. The polynomial through four scales represents orders one to four exactly."""
     second, third = np.array([1.4, 0.3, 0.0]), np.array([-1.3, -0.2, 0.4])
     s = SCALES[:, None]
     difference = second * s**2 + third * s**3 + 0.2 * s**4
@@ -39,16 +37,14 @@ def test_higher_orders_do_not_change_the_slope_whatever_they_cancel():
     assert difference_slope(SCALES, difference, 0.0) == pytest.approx(2.0, abs=1e-9)
 
 
-def test_a_difference_of_third_order_has_no_first_order_either():
+def test_slope_check_accepts_a_difference_of_third_order():
     """Where symmetry removes the second order."""
     assert slope_check(SCALES, SCALES**3, 0.0, 0.1).verdict == "ok"
 
 
 @pytest.mark.parametrize(("first", "expected"), [(1.0, 1.0), (0.02, 2 - 0.16 / 1.16)])
-def test_the_slope_is_that_of_the_first_two_orders_at_the_smallest_scale(
-    first, expected
-):
-    """d = s^2 + s/50 at 1/8: s^2 is 0.0156, s/50 is 0.0025, 0.16 of it."""
+def test_slope_is_that_of_the_first_two_orders_at_the_smallest_scale(first, expected):
+    """d = s^2 + s / 50 at s = 1/8: s^2 is 0.0156, and s / 50 is 0.0025, 0.16 of it."""
     second = 1.0 if first < 1 else 0.0
     found = difference_slope(SCALES, second * SCALES**2 + first * SCALES, 0.0)
     assert found == pytest.approx(expected, abs=1e-9)
@@ -57,8 +53,9 @@ def test_the_slope_is_that_of_the_first_two_orders_at_the_smallest_scale(
     ).verdict == ("fails")
 
 
-def test_noise_as_large_as_the_first_order_is_no_signal():
-    """1e-10 on differences of 2e-10 at the smallest scale; with 1e-12 it is a slope."""
+def test_slope_check_does_not_fail_on_noise_as_large_as_the_first_order():
+    """Noise of 1e-10 on differences of 2e-10 at the smallest scale;
+    with noise of 1e-12 the check decides."""
     rng = np.random.default_rng(1)
     right = 2e-10 * (SCALES[:, None] / SCALES[-1]) ** 2 * [1.0, 0.0, 0.0]
     noisy = right + 1e-10 * rng.choice([-1.0, 1.0], size=(4, 3))

@@ -1,4 +1,4 @@
-"""Solids in a floating frame: Exudyn condenses our matrix, and gets our K_E."""
+"""Solids in a floating frame against their condensed stiffness K_E."""
 
 from pathlib import Path
 
@@ -48,7 +48,7 @@ def block():
     ).stiffness @ A.T
 
 
-def test_a_loaded_solid_deforms_by_our_stiffness(block):
+def test_loaded_solid_in_the_simulation_deforms_by_its_condensed_stiffness(block):
     """screw = K_E^-1 w and E = w K_E^-1 w / 2; 1e-6 rad is linear to 1e-6."""
     body, K = block
     frame = Frame("tip", translation=[0.1, 0.2, 0.3], link=MatrixLink(K))
@@ -67,11 +67,9 @@ def test_a_loaded_solid_deforms_by_our_stiffness(block):
     np.testing.assert_allclose(assembly.link_wrenches[0], wrench, atol=1e-5 * 0.4)
 
 
-def test_a_solid_between_two_walls_is_its_spring_to_first_order(block):
-    """The same loop with the solid and with its K_E: the difference is of second order.
-
-    A tenth of the misfit, a hundredth of the difference.
-    """
+def test_solid_between_two_walls_agrees_with_its_spring_to_first_order(block):
+    """The same loop with the solid and with its K_E:
+    at a tenth of the misfit, the difference is a hundredth."""
     body, K = block
     error = np.array([1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4])
     frames = (
@@ -92,11 +90,11 @@ def test_a_solid_between_two_walls_is_its_spring_to_first_order(block):
 
 
 @pytest.mark.slow
-def test_a_robot_of_meshed_links_passes_with_solids():
+def test_crosscheck_of_a_robot_with_meshed_links_passes_with_solids():
     """From the surface file: K_E in the linear model, the solid in the simulation.
 
-    Both come from one mesh; what K_E is off the solid by is the sparse solver's
-    rounding, and a floating frame bends linearly about its base.
+    Both come from one mesh. They differ by the sparse solver's rounding, and a floating
+    frame bends linearly about its base.
     """
     link = MeshLink(SURFACE, "z=0", "z=0.452", 60e9, 0.3)
     error = [1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4]

@@ -1,4 +1,4 @@
-"""The smallest changes that a cross-check detects, for two bars on one line by hand."""
+"""Smallest changes that a cross-check detects, by hand for two bars on one line."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -46,7 +46,7 @@ def without(robot, pairs):
     return PoseMetric(robot, pairs, True, False)
 
 
-def test_smallest_noticed_clearance_follows_from_the_energy_saved():
+def test_smallest_detected_clearance_change_follows_from_the_energy():
     """E = k (e - c)^2 / 4: a share d of c changes it by 2 c d / (e - c)."""
     by_name = found(bars(), with_clearances)
     (clearance,) = (r for r in by_name.values() if r.kind == "clearance")
@@ -56,15 +56,16 @@ def test_smallest_noticed_clearance_follows_from_the_energy_saved():
     assert (clearance.value, clearance.unproved) == (CLEARANCE, False)
 
 
-def test_smallest_noticed_error_follows_from_the_energy_cost():
+def test_smallest_detected_error_change_follows_from_the_energy():
     """A share d of e changes E by 2 e d / (e - c)."""
     (error,) = (r for r in found(bars(), with_clearances).values() if r.kind == "error")
     expected = TOLERANCE * (ERROR - CLEARANCE) / (2 * ERROR)
     assert error.smallest == pytest.approx(expected, rel=0.02)
 
 
-def test_smallest_noticed_stiffness_is_twice_the_bound():
-    """Of two equal springs in a row one makes half the energy: 2 b for the bound b."""
+def test_smallest_detected_stiffness_change_is_twice_the_bound():
+    """Each of two equal springs in series stores half of the energy:
+    2 b for the bound b."""
     for clearance, metric, bound in (
         (CLEARANCE, with_clearances, TOLERANCE),
         (None, without, LIMIT_TOLERANCE),

@@ -1,4 +1,4 @@
-"""K_C against Exudyn, also of forced assemblies."""
+"""Platform stiffness against Exudyn, also of forced assemblies."""
 
 import json
 from dataclasses import replace
@@ -21,8 +21,8 @@ SLOW = ("hexapod", "orthoglide", "arm6")
     "name", ["four_bar", *(pytest.param(n, marks=pytest.mark.slow) for n in SLOW)]
 )
 @pytest.mark.parametrize("links", ["spring", "beam"])
-def test_robots_without_errors_are_as_stiff_in_the_simulation(name, links):
-    """Beams are not bent there, so that they equal K_E."""
+def test_stiffness_of_robots_without_errors_agrees_with_the_simulation(name, links):
+    """Beams are straight there, so that their stiffness is K_E."""
     answer = check_stiffness(home_posture(load_robot(name)), links=links)
     assert answer.differences["linearised"] < 1e-8
     assert answer.differences["exact"] < 1e-6
@@ -30,7 +30,7 @@ def test_robots_without_errors_are_as_stiff_in_the_simulation(name, links):
 
 
 @pytest.mark.slow
-def test_forced_assembly_is_as_stiff_in_the_simulation():
+def test_stiffness_of_a_forced_assembly_agrees_with_the_simulation():
     """At the paper's full errors the nominal matrix is off by 5 %.
 
     The load has a moment, of dead forces in both models.
@@ -45,7 +45,7 @@ def test_forced_assembly_is_as_stiff_in_the_simulation():
 
 
 @pytest.mark.parametrize("force", [-100, 50])
-def test_a_loaded_robot_is_as_stiff_in_the_simulation(force):
+def test_stiffness_of_a_loaded_robot_agrees_with_the_simulation(force):
     answer = check_stiffness(
         home_posture(load_robot("four_bar")), [0, 0, 0, 0, force, 0]
     )
@@ -55,8 +55,8 @@ def test_a_loaded_robot_is_as_stiff_in_the_simulation(force):
     assert answer.passed
 
 
-def test_a_pin_pressed_into_its_hole_is_held_along_the_rim():
-    """Its stiffness is F/c and that of its arm."""
+def test_pin_pressed_against_its_hole_has_a_stiffness_along_the_rim():
+    """Its stiffness is F / c in series with that of its arm."""
     force, bound, k = 300.0, 5e-5, 1e6
     link = MatrixLink(np.diag([1e4, 1e4, 1e4, k, k, k]))
     frames = (
@@ -75,14 +75,14 @@ def test_a_pin_pressed_into_its_hole_is_held_along_the_rim():
     assert answer.tolerance == 2e-2
 
 
-def test_wrong_stiffness_fails():
+def test_stiffness_check_fails_for_a_wrong_stiffness():
     answer = check_stiffness(home_posture(load_robot("four_bar")))
     assert answer.passed
     wrong = replace(answer.exact, root=answer.exact.root * (1 + 1e-5))
     assert not replace(answer, exact=wrong).passed
 
 
-def test_uncertain_method_does_not_decide():
+def test_stiffness_check_ignores_a_method_whose_error_is_large():
     answer = check_stiffness(home_posture(load_robot("four_bar")))
     noisy = replace(answer.simulated, stepped=answer.simulated.stepped * 1.1)
     assert not replace(answer, simulated=noisy).passed
@@ -92,7 +92,7 @@ def test_uncertain_method_does_not_decide():
     assert not replace(answer, simulated=noisy).passed
 
 
-def test_links_in_pieces_are_beams_where_one_spring_is_none():
+def test_stiffness_of_links_in_pieces_converges_to_that_of_beams():
     """The error of n pieces falls as 1/n^2, down to that of Exudyn's elements."""
     robot, off = load_robot("four_bar"), []
     for pieces in (1, 2, 4):
@@ -108,7 +108,7 @@ def test_links_in_pieces_are_beams_where_one_spring_is_none():
     assert np.array(off[:-1]) / off[1:] == pytest.approx(4.0, rel=0.1)
 
 
-def test_platforms_that_stand_elsewhere_are_in_another_equilibrium():
+def test_stiffness_check_reports_another_equilibrium_at_another_pose():
     answer = check_stiffness(home_posture(load_robot("four_bar")), [0, 0, 0, 0, 50, 0])
     assert answer.moved == pytest.approx(answer.simulated_moved, abs=1e-9)
     there = answer.simulated.platform.copy()
@@ -128,7 +128,7 @@ def test_platforms_that_stand_elsewhere_are_in_another_equilibrium():
     assert "FAILED" in other.text()
 
 
-def test_bent_joint_that_is_locked_and_elastic_is_named():
+def test_stiffness_check_names_a_bent_joint_that_is_locked_and_elastic():
     robot = load_robot("four_bar")
     frames = [
         replace(f, joint_stiffness=np.diag([np.inf, 1e3, 1e3, np.inf, np.inf, 1e6]))

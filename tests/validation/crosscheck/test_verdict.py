@@ -45,8 +45,8 @@ def compared(scales, wrong, second=0.05, third=0.03):
     return compare_scales(scales, solve, Found)
 
 
-def test_right_model_passes_from_two_scales():
-    """Slope 1.76 and limit 0.015 on the two scales alone."""
+def test_correct_model_passes_from_two_requested_scales():
+    """The slope of 1.76 and the limit of 0.015 on two scales alone would not pass."""
     s = np.array([1.0, 0.5])
     assert abs(difference_slope(s, 0.05 * s**2 + 0.03 * s**3, 0) - 2) > 0.1
     comparison = compared((1.0, 0.5), wrong=0.0)
@@ -60,24 +60,24 @@ def test_right_model_passes_from_two_scales():
 
 @pytest.mark.parametrize("wrong", [0.003, -0.003, 0.02, -0.05])
 @pytest.mark.parametrize("scales", [(1.0, 0.5), (1.0, 0.7), (2.0, 1.0, 0.5)])
-def test_a_wrong_term_of_three_thousandths_is_found_on_few_scales(wrong, scales):
-    """On two scales its limit is uncertain by 0.05."""
+def test_wrong_term_of_three_thousandths_fails_on_few_scales(wrong, scales):
+    """On two scales alone its limit is uncertain by 0.05."""
     assert verdict(compared(scales, wrong)) == "failed"
 
 
-def test_a_wrong_term_does_not_hide_behind_the_second_order():
+def test_wrong_term_that_the_second_order_cancels_at_one_scale_fails():
     """At s = 0.5 both cancel: -0.025 s + 0.05 s^2."""
     assert verdict(compared((1.0, 0.5), wrong=-0.025, third=0.0)) == "failed"
 
 
-def test_no_scales_are_added_to_enough():
+def test_no_scale_is_added_when_limits_are_known():
     comparison = compared((1.0, 0.5, 0.25, 0.125), wrong=0.0)
     assert len(comparison.pairs) == 4
     assert verdict(comparison) == "passed"
 
 
-def test_undecided_after_six_scales_is_reported():
-    """A check that is never known better than to twice its bound."""
+def test_undecided_check_is_reported_after_six_scales():
+    """The uncertainty of this check always exceeds its bound."""
 
     class Vague(Found):
         def __post_init__(self):
@@ -88,8 +88,9 @@ def test_undecided_after_six_scales_is_reported():
     assert verdict(comparison) == "not decided"
 
 
-def test_noise_neither_fails_nor_passes():
-    """Simulations resolve a hundredth of the floor; the extrapolation makes 15 of 1."""
+def test_comparison_of_noise_has_the_verdict_no_signal():
+    """Simulations resolve a hundredth of the floor;
+    extrapolation multiplies that by 15."""
 
     def solve(s):
         return Scale(s, 0.0, 1e-14)
@@ -100,8 +101,8 @@ def test_noise_neither_fails_nor_passes():
     assert len(comparison.pairs) == 4
 
 
-def test_zero_against_a_signal_fails():
-    """A signal in the other model alone is a difference."""
+def test_zero_compared_with_a_signal_fails():
+    """A signal in only one of the models is a difference."""
 
     def solve(s):
         return Scale(s, 0.0, 1e-6 * s)
@@ -111,7 +112,7 @@ def test_zero_against_a_signal_fails():
     assert verdict(comparison) == "failed"
 
 
-def test_comparison_without_checks_does_not_pass():
+def test_comparison_without_checks_has_the_verdict_no_signal():
     class Empty(Found):
         def __post_init__(self):
             self.checks = {}

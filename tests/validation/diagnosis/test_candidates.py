@@ -53,8 +53,8 @@ def test_basis_is_orthonormal_and_keeps_zero_columns(sensitivities):
 
 
 @pytest.mark.parametrize("units", [1.0, 1e-12])
-def test_parameters_are_named_by_component(sensitivities, units):
-    """T x and its standard deviations, at any scale."""
+def test_function_parameters_are_named_by_component(sensitivities, units):
+    """T x and its standard deviations, for units of any size."""
     s, _ = sensitivities
     _, mixed = s.basis(("q.one",), LINE)
     x, std = units * np.array([1.0, -2.0, 0.5, 3.0]), units * np.full(4, 0.1)
@@ -107,7 +107,7 @@ def test_sensitivity_of_a_component_depends_on_its_place(axis):
 
 
 def test_variables_are_varied_and_known_in_every_row():
-    """Not a constant load, a temperature missing in a row, or a time of zero."""
+    """Constant loads, incomplete temperatures and times of zero are no variables."""
     varying = np.linspace(-1.0, 0.5, 8)
     lacking = np.where(np.arange(8) == 3, np.nan, varying)
     conditions = conditions_of(bar(
@@ -142,7 +142,7 @@ rotation = [0.0, -1.5707963267948966, 0.0]
 
 
 def test_positions_and_loads_that_vary_by_rounding_are_no_variables(tmp_path):
-    """A slide rotated by pi/2, whose cosine is 6e-17 in floating point."""
+    """A slide rotated by pi / 2, whose cosine is 6e-17 in floating point."""
     (tmp_path / "slide.toml").write_text(SLIDE)
     x = np.linspace(0.0, 0.5, 9).round(3)
     lines = [f"m{i},{a},{5 * a},{1e-17 * a}" for i, a in enumerate(x)]

@@ -1,4 +1,4 @@
-"""Which effects readings support, by closed forms on a bar."""
+"""Effects that readings support, by closed forms on a bar."""
 
 from dataclasses import replace
 
@@ -36,7 +36,7 @@ def first(fit):
 
 @pytest.mark.parametrize(("times", "claimed"), [(0.98, False), (1.02, True)])
 @pytest.mark.parametrize("sign", [1, -1])
-def test_length_is_claimed_at_one_in_a_thousand(times, claimed, sign):
+def test_length_is_claimed_at_the_threshold_of_one_in_a_thousand(times, claimed, sign):
     """Its standard deviation is sigma / sqrt(8), from eight readings along the bar."""
     length = sign * times * SURE * SIGMA[3] / np.sqrt(8)
     plain = bar(link=BEAM)
@@ -45,7 +45,7 @@ def test_length_is_claimed_at_one_in_a_thousand(times, claimed, sign):
     assert first(fit) == claimed
 
 
-def test_drive_that_turns_against_its_load_is_rigid_and_no_effect():
+def test_drive_that_turns_against_its_load_gets_no_compliance():
     """The compliance is at its lower bound, zero, and no parameter is reported."""
     seen = np.tile([0, 0, -3e-4, 0, 0, 0], (8, 1))
     fit = machine(bar([0, 0, 30.0, 0, 0, 0], seen), SOFTER, start=1e-6)
@@ -81,7 +81,7 @@ def test_effect_at_its_bound_is_not_supported():
 
 @pytest.mark.parametrize(("value", "claimed"), [(1.5, True), (1.05, False)])
 def test_exponent_at_its_bound_is_not_supported(value, claimed):
-    """The exponent of a contact must not be at its bound."""
+    """The exponent is that of a contact."""
     slots = (
         Slot(("drive.give",), Unknown("give", 1e-6, 0.0, 1.0), 0.0),
         Slot(("drive.exponent",), Unknown("exponent", 0.5, 1.05, 6.0), 1.5, True),
@@ -116,7 +116,9 @@ def softer(robot, x, variance):
     (0.8, 0.72, 0.8 * 0.81 * 1e-3),
     (None, 0.9, 0.81 * 1e-3),
 ])  # fmt: skip
-def test_parameter_deviation_is_that_of_the_factor(declared, value, std):
+def test_stated_deviation_is_that_of_the_factor_instead_of_the_fitted_unknown(
+    declared, value, std
+):
     """1 / factor - 1 is fitted: the deviation of factor f is f^2 times its own."""
     robot = bar(link=BEAM).robot
     if declared is not None:
@@ -151,7 +153,7 @@ def test_negative_compliance_is_bounded_at_zero():
     assert np.array_equal(declared, found)
 
 
-def test_nuisance_parameters_follow_ridge_regression():
+def test_nuisance_parameters_equal_ridge_regression():
     """The mean of eight readings along the bar, shrunk by its prior."""
     size, std = 3e-6, 2e-6
     plain = bar(link=BEAM)

@@ -1,4 +1,4 @@
-"""Noise that the points of one measurement have in common, in a diagnosis."""
+"""Diagnosis with noise common to the points of one measurement."""
 
 from dataclasses import replace
 
@@ -76,8 +76,9 @@ def found(columns, readings, seed, device=DEVICE):
     pytest.param(DEVICE, (3e-4, 0.0), marks=pytest.mark.slow),
     pytest.param(0.1 * DEVICE, (0.0, 5e-6), marks=pytest.mark.slow),
 ])  # fmt: skip
-def test_noise_in_common_is_found_with_its_sizes(columns, device, sizes):
-    """60 measurements of three components: 5 % each, and four times that."""
+def test_common_noise_is_found_with_its_sizes(columns, device, sizes):
+    """60 measurements of three components determine a size to 5 %;
+    the tolerance is 25 %."""
     rng = np.random.default_rng([7, 1])
     selected = found(columns, moved(CAMPAIGN, sizes, rng), 7, device)
     assert selected.hypotheses == selected.functions == ()
@@ -104,7 +105,8 @@ def test_length_is_found_next_to_common_noise(columns, seed):
 
 
 def test_fit_counts_common_noise_once_per_measurement():
-    """Of a length: (c^2 + sigma^2/3) / measurements, for a shift c of all points."""
+    """The variance of a length is (c^2 + sigma^2 / 3) / measurements,
+    for a common shift c."""
     c = 3 * DEVICE
     common = np.zeros((len(CAMPAIGN), 6, 3))
     common[:, 3:] = c * np.eye(3)
@@ -117,7 +119,7 @@ def test_fit_counts_common_noise_once_per_measurement():
 
 @pytest.mark.parametrize("repeats", [True, False])
 def test_deviation_equal_in_repeats_is_a_lack_of_fit(repeats):
-    """A motion that is equal in all repeats of a command."""
+    """The deviation is a motion that is equal in all repeats of a command."""
     rng = np.random.default_rng(3)
     campaign = three_points(80)
     visit = campaign.measured_at_once
@@ -144,7 +146,7 @@ def diagnosed(robot, wanted, seed, folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
-def test_poor_repeatability_alone_claims_nothing(seed, tmp_path):
+def test_poor_repeatability_alone_leads_to_no_claim(seed, tmp_path):
     robot = with_errors(arm()) if seed % 2 else without_clearance(three_rrr())
     _, diagnosis = diagnosed(robot, {}, seed, tmp_path)
     assert diagnosis.verdict == "none_needed"
@@ -160,7 +162,8 @@ def test_poor_repeatability_alone_claims_nothing(seed, tmp_path):
 
 @pytest.mark.slow
 def test_intervals_cover_the_truth_next_to_common_noise(tmp_path):
-    """An encoder's offset in twelve campaigns: 90 % intervals, 8 of 12 in 99 %."""
+    """An encoder's offset in twelve campaigns:
+    at least 8 of the 90 % intervals cover it."""
     covers, hidden = 0, [(Hidden("encoder_offset", {"j2": 1e-4}), 5.0)]
     for seed in range(12):
         made, diagnosis = diagnosed(

@@ -78,7 +78,7 @@ def left_by_the_truth(name, found, folder):
     return float(np.sqrt(np.nanmean(z[found.held.rows] ** 2)))
 
 
-def test_one_effect_is_named_and_measured(diagnosed, tmp_path):
+def test_single_effect_is_found_with_its_value(diagnosed, tmp_path):
     found = diagnosed("one")
     assert (found.verdict, found.claimed) == ("explained", ("drive_compliance",))
     assert found.probability["drive_compliance"] > 0.9
@@ -108,7 +108,7 @@ def test_correlated_noise_widens_standard_deviations(diagnosed, tmp_path):
 
 
 def test_noise_above_sigma_is_reported_without_a_cause(diagnosed, tmp_path):
-    """Three times the stated sigma, in which errors are reported."""
+    """The noise is three times the stated sigma, in which errors are reported."""
     exact = measured(tmp_path, noise=0.0, force=0.0, temperature=0.0)
     noise = 3.0 * SIGMA * np.random.default_rng(6).normal(size=(len(exact), 6))
     found = diagnose(replace(exact, measured=exact.measured + noise))
@@ -126,7 +126,8 @@ def test_noise_above_sigma_is_reported_without_a_cause(diagnosed, tmp_path):
 
 @pytest.mark.parametrize("name", ["none", "one", "pair"])
 def test_model_sequence_leads_from_the_declared_to_the_fitted_model(name, diagnosed):
-    """Only steps that the machine has; the last row is the error after."""
+    """It has only the steps of this machine;
+    its last row is the error after the fit."""
     found = diagnosed(name)
     terms = {"none": []}.get(name, ["library effects"])
     assert [step.term for step in found.sequence] == ["declared", *terms]
@@ -141,7 +142,7 @@ def test_model_sequence_leads_from_the_declared_to_the_fitted_model(name, diagno
         assert last.unknowns == pytest.approx(len(found.fit.x), abs=0.01)
 
 
-def test_sound_model_is_not_changed(diagnosed):
+def test_diagnosis_does_not_change_a_correct_model(diagnosed):
     found = diagnosed("none")
     assert (found.verdict, found.claimed) == ("none_needed", ())
     assert found.before == found.after
@@ -150,7 +151,7 @@ def test_sound_model_is_not_changed(diagnosed):
     assert "suffices" in sentence(found)
 
 
-def test_two_effects_are_named_together(diagnosed, tmp_path):
+def test_two_effects_are_found_together_with_their_values(diagnosed, tmp_path):
     found = diagnosed("pair")
     assert found.verdict == "explained"
     assert set(found.claimed) == {"encoder_offset", "thermal_expansion"}
@@ -172,7 +173,7 @@ def test_constant_temperature_makes_expansion_and_length_ambiguous(diagnosed):
 
 
 @pytest.mark.slow
-def test_unexplained_deviation_is_learned(diagnosed):
+def test_deviation_outside_the_library_is_learned_as_functions(diagnosed):
     found = diagnosed("outside")
     assert (found.verdict, found.claimed) == ("learned", ())
     assert found.after.normalised < found.before.normalised
@@ -195,7 +196,7 @@ def test_unknown_registration_with_outliers_and_gaps_is_explained(diagnosed):
 
 @pytest.mark.slow
 def test_model_selected_on_a_subset_is_fitted_to_all_rows(tmp_path, monkeypatch):
-    """Parameters are narrower than from the subset; all outliers are found."""
+    """Parameters are more certain than from the subset; all outliers are found."""
     campaign = measured(tmp_path / "device", seed=1, **CASES["device"])
     monkeypatch.setattr(trace, "_SEARCHED", 30)
     found = diagnose(campaign)
@@ -217,7 +218,7 @@ KEYS = {
 
 
 @pytest.mark.parametrize("name", ["one", "none", "confounded"])
-def test_results_are_in_the_public_format(name, diagnosed):
+def test_diagnosis_results_are_in_the_public_format(name, diagnosed):
     found = diagnosed(name)
     written = json.loads(json.dumps(plain(table(found)), allow_nan=False))
     for key, kind in KEYS.items():
@@ -249,7 +250,7 @@ def test_results_are_in_the_public_format(name, diagnosed):
         assert len(decide["load"]) == 6
 
 
-def test_a_diagnosis_shows_its_verdict_on_a_few_lines(diagnosed):
+def test_repr_of_a_diagnosis_is_short_and_has_its_verdict(diagnosed):
     found = diagnosed("one")
     assert len(repr(found)) < 600
     for said in (found.verdict, *found.claimed, f"{found.after.normalised:.3g} after"):
@@ -260,8 +261,8 @@ def test_a_diagnosis_shows_its_verdict_on_a_few_lines(diagnosed):
 ODD = ("$x^{<b>&_\\$", "a$b_ \\frac{<i>")  # a formula and a tag to other programs
 
 
-def test_a_report_shows_odd_names_as_they_are_written(diagnosed):
-    """A frame, a covariate and an outlying row named as formulas and tags."""
+def test_diagnosis_report_shows_unusual_names_unchanged(diagnosed):
+    """Names of a frame, a covariate and an outlying row look like formulas and tags."""
     found = diagnosed("none")
     first, *others = found.campaign.robot.frames
     named = (
@@ -309,9 +310,10 @@ def test_simulated_campaigns_get_an_accepted_verdict(name):
 
 @pytest.mark.slow
 def test_practice_campaigns_of_another_program_score_without_error(tmp_path):
-    """Scored by the program that came with them: parameters within 3 std.
+    """The program that came with them computes the score: parameters within 3 std.
 
-    After / perfect model: 1.15 is 2.6 standard deviations of the rms of 25 rows' noise.
+    The error after is at most 1.15 of that of a perfect model, which is 2.6 standard
+    deviations of the rms of 25 rows of noise.
     """
     try:
         practice = data_folder("practice")

@@ -1,4 +1,4 @@
-"""Difficult campaigns, by what is known of their machines."""
+"""Diagnosis of difficult campaigns against known facts about their machines."""
 
 from dataclasses import replace
 from functools import cache
@@ -44,7 +44,7 @@ def effect(found, name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
-def test_saved_robot_predicts_the_printed_error_and_a_smaller_one_than_declared(
+def test_saved_robot_predicts_the_printed_error_which_is_below_the_declared(
     folder, diagnosed, tmp_path
 ):
     found = diagnosed(folder)
@@ -61,7 +61,7 @@ def test_saved_robot_predicts_the_printed_error_and_a_smaller_one_than_declared(
 
 @pytest.mark.slow
 def test_expansion_of_a_printer_is_recovered(diagnosed, tmp_path):
-    """23.4e-6 per kelvin declared, 12e-6 true."""
+    """The declared coefficient is 23.4e-6 per kelvin, the true one 12e-6."""
     found = diagnosed(CASES / "declared_effect")
     assert (found.verdict, found.claimed) == ("explained", ("thermal_expansion",))
     one = effect(found, "thermal_expansion")["frame"]
@@ -83,14 +83,14 @@ def test_clearance_in_a_leg_is_explained_as_clearance(diagnosed):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["fb_wear", "fb_gear"])
 def test_effects_outside_the_library_are_learned(name, diagnosed):
-    """A rod that grows with time, and waves of a gear, are learned to the noise."""
+    """A rod that grows with time and a gear's waves are learned down to the noise."""
     found = diagnosed(CASES / name)
     assert (found.verdict, found.claimed) == ("learned", ())
     assert found.after.normalised < 1.2
 
 
 @pytest.mark.slow
-def test_scatter_of_repeats_is_not_claimed(diagnosed):
-    """Errors are in units of the stated sigma; hysteresis is not a drift."""
+def test_scatter_of_repeats_is_not_claimed_as_drift(diagnosed):
+    """Errors are in units of the stated sigma, and hysteresis is not a drift."""
     found = diagnosed(CASES / "hyst")
     assert not set(found.claimed) & {"drift", "encoder_eccentricity"}

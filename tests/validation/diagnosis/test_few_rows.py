@@ -1,4 +1,4 @@
-"""Too few rows: no claim, and the number of rows that is needed."""
+"""Too few rows: the diagnosis makes no claim and states the number of rows needed."""
 
 from dataclasses import replace
 
@@ -29,7 +29,7 @@ def seen(rows, seed, unlike=0.0):
 @pytest.mark.parametrize(
     "seed", [1, *(pytest.param(k, marks=pytest.mark.slow) for k in (2, 3))]
 )
-def test_eight_rows_of_a_target_explain_nothing(seed):
+def test_eight_rows_of_a_target_are_reported_as_too_few(seed):
     """24 readings against twenty unknowns of geometry."""
     found = diagnose(seen(8, seed))
     assert found.verdict == NOT_ENOUGH_ROWS
@@ -44,7 +44,7 @@ def test_eight_rows_of_a_target_explain_nothing(seed):
 
 
 @pytest.mark.slow
-def test_requested_number_of_rows_suffices():
+def test_diagnosis_with_the_requested_number_of_rows_finds_the_effect():
     found = diagnose(seen(8, 1))
     wanted = int(found.needed.split("about ")[1].split()[0])
     again = diagnose(seen(wanted, 1))
@@ -54,7 +54,7 @@ def test_requested_number_of_rows_suffices():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [4, 5])
-def test_random_readings_are_never_explained(seed):
+def test_random_readings_are_not_explained(seed):
     """Random readings of a hundred sigma, in 8 or 16 rows."""
     for rows in (8, 16):
         found = diagnose(seen(rows, seed, unlike=100.0))
@@ -63,7 +63,7 @@ def test_random_readings_are_never_explained(seed):
 
 
 @pytest.mark.parametrize("rows", [2, 3])
-def test_very_few_rows_claim_nothing(rows):
+def test_very_few_rows_lead_to_no_claim(rows):
     """Functions have at most as many columns as there are rows."""
     campaign = seen(rows, 1)
     time = np.linspace(0.0, 600.0, rows)

@@ -1,4 +1,4 @@
-"""The robot drawn on a diagnosis' page, against its readings."""
+"""Drawing of the robot on the page of a diagnosis, against its readings."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ def diagnosed(tmp_path_factory):
 
 
 def test_drawn_robot_is_at_its_measured_pose(diagnosed):
-    """Within five sigma of the reading; the declared model is off by twenty."""
+    """Within five sigma of the reading; the declared model is off by twenty sigma."""
     row, name = worst_row(diagnosed)
     assert name == "position"
     aside = diagnosed.held.rows & ~diagnosed.outliers
@@ -33,14 +33,14 @@ def test_drawn_robot_is_at_its_measured_pose(diagnosed):
     assert np.abs(diagnosed.residual_before[row][known] / sigma).max() > 20
 
 
-def test_the_page_names_the_row_and_what_is_drawn(diagnosed):
+def test_page_names_the_drawn_row_and_effect(diagnosed):
     row, _ = worst_row(diagnosed)
     drawn = worst_robot(diagnosed)
     assert f"Row {diagnosed.campaign.ids[row]}, held out" in drawn
     assert "drive compliance" in drawn
 
 
-def test_without_rows_held_out_nothing_is_drawn(diagnosed):
+def test_robot_is_not_drawn_without_held_out_rows(diagnosed):
     no_rows = np.zeros(len(diagnosed.campaign), bool)
     none = replace(diagnosed, held=replace(diagnosed.held, folds=(no_rows,)))
     assert worst_row(none) == (-1, "")

@@ -61,7 +61,7 @@ def found():
 
 
 def test_large_errors_of_frames_are_explained_as_finite_motions(found):
-    """Down to the noise in held-out rows; first-order errors would leave 1.5 sigma."""
+    """The error of held-out rows is noise; first-order errors would leave 1.5 sigma."""
     assert (found.verdict, found.claimed) == ("explained", ())
     assert found.before.normalised > 500
     assert found.after.normalised == pytest.approx(1.0, abs=0.3)
@@ -71,7 +71,7 @@ def test_large_errors_of_frames_are_explained_as_finite_motions(found):
 
 
 def test_errors_are_root_mean_squares_over_measured_cells(found):
-    """By hand: one row of 3, 4 and 0 um is judged."""
+    """By hand, for one held-out row of 3, 4 and 0 um."""
     campaign = found.campaign
     left = np.zeros((12, 6))
     left[2] = [1e-5, -2e-5, 3e-5, 3e-6, 4e-6, 0.0]

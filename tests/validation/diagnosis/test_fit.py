@@ -23,7 +23,7 @@ from validation.diagnosis.diagnose import diagnose
 
 
 @pytest.mark.parametrize("start", [0.0, 1e-19, -1e-3])
-def test_a_length_is_the_mean_of_the_readings_along_the_bar(start):
+def test_fitted_length_is_the_mean_of_the_readings_along_the_bar(start):
     """Its standard deviation is sigma / sqrt(R): rotations do not depend on it."""
     plain = bar(link=BEAM)
     noise = np.random.default_rng(4).normal(size=(8, 6)) * SIGMA
@@ -40,7 +40,7 @@ def test_a_length_is_the_mean_of_the_readings_along_the_bar(start):
 
 
 def test_uncertainty_of_a_stiffness_follows_from_that_of_its_compliance():
-    """Turn M/k and arc M L/k in every row; std k = k^2 std(1/k)."""
+    """Rotation M / k and shift M L / k in every row; std k = k^2 std(1 / k)."""
     M, k = 30.0, 2e5
     campaign = gives_way(M, k)
     fit = machine(campaign, SOFTER, start=1e-6)
@@ -51,7 +51,7 @@ def test_uncertainty_of_a_stiffness_follows_from_that_of_its_compliance():
     assert std == pytest.approx(k**2 / np.sqrt(J), rel=1e-3)
 
 
-def test_a_standard_deviation_is_that_of_the_slopes_where_the_fit_ends():
+def test_standard_deviation_follows_from_the_slopes_at_the_fitted_value():
     """Only x is read: L (cos(q + e) - cos q), of slope -L sin(q + e) per radian.
 
     Slopes are the linear model's at the robot reached, off by e to first order.
@@ -79,7 +79,7 @@ def test_intervals_cover_the_truth_at_the_stated_rate():
     assert 1e-3 < binom.cdf(inside, 60, 0.6827) < 1 - 1e-3
 
 
-def test_an_offset_is_exact_far_from_straight():
+def test_fitted_offset_is_exact_for_a_large_deflection():
     """The drive turns by a where K (a - e) = F L cos(q + a)."""
     K, F, e = 2e3, 150.0, 4e-3
     spring = np.diag([np.inf, np.inf, K, np.inf, np.inf, np.inf])
@@ -100,7 +100,8 @@ def test_an_offset_is_exact_far_from_straight():
 
 
 def test_finite_model_needs_no_geometric_stiffening():
-    """K a = F L cos(q + a): a quarter turn of the load's arm is no first order."""
+    """K a = F L cos(q + a):
+    the load's arm turns so far that first order is not enough."""
     K, F, rows = 2e3, 150.0, 20
     spring = np.diag([np.inf, np.inf, K, np.inf, np.inf, np.inf])
     plain = bar([0, 0, 0, 0, F, 0], rows=rows, spring=spring)

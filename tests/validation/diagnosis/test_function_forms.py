@@ -13,7 +13,7 @@ CONDITIONS = conditions_of(
 
 
 @pytest.mark.parametrize("name", ["q.drive", "time", "cov.temperature", "position.x"])
-def test_priors_of_all_forms_sum_to_one(name):
+def test_prior_probabilities_of_all_forms_sum_to_one(name):
     found = forms.every(CONDITIONS, name)
     assert len(set(found)) == len(found)
     assert np.exp(forms.log_priors(found)).sum() == pytest.approx(1.0)

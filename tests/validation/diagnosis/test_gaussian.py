@@ -1,4 +1,4 @@
-"""The algebra of a Gaussian model, against the density of the normal distribution."""
+"""Algebra of the Gaussian model, against the density of the normal distribution."""
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def test_flat_columns_are_projected_out_exactly(draw):
 
 
 @pytest.mark.parametrize("columns", [1, 3])
-def test_gain_is_the_evidence_averaged_over_sizes(draw, columns):
+def test_evidence_gain_is_averaged_over_prior_sizes(draw, columns):
     X, std, z = draw
     rng = np.random.default_rng(5)
     B = np.linalg.qr(rng.normal(size=(40, columns)))[0]
@@ -74,7 +74,7 @@ def test_gain_is_the_evidence_averaged_over_sizes(draw, columns):
     assert found[0] == pytest.approx(expected, rel=1e-9)
 
 
-def test_a_bounded_unknown_gains_the_ratio_of_half_normals():
+def test_evidence_gain_of_a_bounded_unknown_is_the_ratio_over_the_half_axis():
     # quadrature over the half axis: p(z | x > 0) against p(z | x = 0); of so many
     # readings of rms 1 tau is known
     b, n = 0.8, 1_000_000

@@ -1,4 +1,4 @@
-"""Which rows are held out."""
+"""Selection of the rows that are held out."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,8 @@ def held_in(campaign):
     (59, "folds", 59), (9, "folds", 9),
 ])  # fmt: skip
 def test_whole_configurations_are_held_out(configurations, how, judge):
-    """A quarter, at most 60, or a tenth of many; all of them in folds of few."""
+    """A quarter, but at most 60, or a tenth of many;
+    all of them, in folds, if there are few."""
     repeat = np.random.default_rng(0).permutation(np.repeat(range(configurations), 2))
     campaign = campaign_of(np.ones((len(repeat), 6)), repeat=repeat)
     held = hold_out(campaign)
@@ -45,7 +46,7 @@ def test_few_configurations_are_held_out_by_spans_of_time():
 
 
 @pytest.mark.parametrize(("rows", "folds"), [(1, 1), (2, 2), (3, 3), (7, 5)])
-def test_every_one_of_few_rows_is_held_out(rows, folds):
+def test_every_row_of_a_small_campaign_is_held_out_once(rows, folds):
     campaign = campaign_of(np.ones((rows, 6)), time=60.0 * np.arange(rows))
     parts = held_in(campaign)
     assert len(parts) == folds

@@ -30,10 +30,10 @@ def named(conditions, loads=()):
     ("time", "drift", TIME, True), ("time", "drift", np.full(8, 60.0), False),
     ("time", "drift", np.zeros(8), False),
 ])  # fmt: skip
-def test_an_effect_needs_its_covariate_in_every_row_and_once_not_zero(
+def test_effect_is_tested_only_if_its_covariate_is_complete_and_not_zero(
     covariate, effect, values, told
 ):
-    """An effect that settles needs times that differ."""
+    """An effect that settles also needs times that differ."""
     conditions = conditions_of(bar(link=BEAM))
     given = replace(conditions, **{covariate: values})
     assert (effect in named(given)) is told
@@ -41,7 +41,7 @@ def test_an_effect_needs_its_covariate_in_every_row_and_once_not_zero(
     assert others == ({effect} if told else set())
 
 
-def test_a_load_is_off_in_directions_in_which_it_was_recorded():
+def test_load_gain_is_tested_in_recorded_directions_only():
     """The factor and the offsets of recorded directions, together or alone."""
     found = named(conditions_of(bar(link=BEAM)), ["fy", "mz"])["load_gain"]
     assert found == [
@@ -51,7 +51,7 @@ def test_a_load_is_off_in_directions_in_which_it_was_recorded():
     assert named(conditions_of(bar(link=BEAM)))["load_gain"] == [[("factor",)]]
 
 
-def test_components_of_weight_and_of_a_foundation_act_together_or_one_by_one():
+def test_weight_and_base_compliance_are_tested_together_and_by_component():
     found = named(conditions_of(bar(link=BEAM)))
     axes = [("g.x",), ("g.y",), ("g.z",)]
     assert found["self_weight"] == [axes, *([axis] for axis in axes)]

@@ -120,7 +120,7 @@ def test_effect_outside_the_library_is_learned_as_a_function(diagnosed, tmp_path
 
 
 @pytest.mark.slow
-def test_equivalent_places_are_listed(diagnosed):
+def test_equivalent_places_of_a_learned_function_are_listed(diagnosed):
     """In a planar arm any body that moves out of the plane is equivalent."""
     found = diagnosed("sag")
     assert found.verdict == "learned"
@@ -131,7 +131,7 @@ def test_equivalent_places_are_listed(diagnosed):
 
 
 @pytest.mark.slow
-def test_scatter_is_not_learned(diagnosed):
+def test_scatter_is_not_learned_as_a_function(diagnosed):
     """Three times the stated noise, without repeats."""
     found = diagnosed("scatter")
     assert found.verdict == "outside_library"

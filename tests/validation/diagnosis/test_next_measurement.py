@@ -25,7 +25,7 @@ from validation.diagnosis.signatures import conditions_of
 
 
 def test_another_temperature_separates_expansion_from_length():
-    """d'(I + J C J')^-1 d with d = alpha L 10 K / sigma along the bar, by hand.
+    """d'(I + J C J')^-1 d by hand, where d = alpha L 10 K / sigma along the bar.
 
     R readings at T leave the length sigma^2 / R and the expansion that much over
     (L T)^2; at T + 10 K the latter is open by ((T + 10) / T)^2 / R.
@@ -46,7 +46,7 @@ def test_another_temperature_separates_expansion_from_length():
 
 
 @pytest.mark.parametrize(("power", "worth"), [(1.5, True), (0.9, False)])
-def test_next_measurement_needs_a_power_of_one(power, worth):
+def test_next_measurement_is_suggested_from_a_power_of_one(power, worth):
     """Expansion against length, for an expansion of given power."""
     R, T = 8, 5.0
     heat = {"temperature": np.full(R, T)}
@@ -67,7 +67,7 @@ def test_equal_models_have_no_next_measurement():
 
 
 def test_next_configuration_lies_between_the_measured_ones():
-    """A turned encoder and an eccentric one at 0 and at 2 pi: e = e cos q.
+    """An encoder offset and an eccentricity are equal at 0 and at 2 pi: e = e cos q.
 
     Between, they differ by e (1 - cos q) in the direction of either, of information
     I = 1 / sr^2 + L^2 / st^2 a reading; the offset is open by 1 / (2 I).
@@ -97,7 +97,8 @@ def test_next_configuration_lies_between_the_measured_ones():
 
 
 def test_next_temperature_exceeds_the_range_by_half():
-    """20 to 60: low, middle, or 20 + 1.5 times 40, which is the farthest."""
+    """For 20 to 60 K the candidates are low,
+    middle and 20 + 1.5 times 40, the most distant."""
     heat = {"temperature": np.linspace(20.0, 60.0, 8)}
     plain = bar(link=BEAM, **heat)
     seen = fit_of(plain, 2e-6 * LENGTH) * heat["temperature"][:, None]
@@ -109,8 +110,9 @@ def test_next_temperature_exceeds_the_range_by_half():
         assert found.covariates == {"temperature": 80.0}
 
 
-def test_next_load_is_half_as_large_again():
-    """A drive that gives under M against one that is turned: by 1.5 M, or -1.5 M."""
+def test_next_load_is_one_and_a_half_times_the_largest():
+    """A compliant drive under M against a drive with an offset:
+    1.5 M or -1.5 M separates them."""
     M, k = 30.0, 2e5
     campaign = gives_way(M, k)
     here = conditions_of(campaign)

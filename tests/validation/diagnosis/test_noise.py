@@ -38,7 +38,7 @@ def test_noise_scale_equals_that_of_the_residual(true):
     assert abs(tau - true) < 4 * std
 
 
-def test_repeats_scatter_by_their_own_mean():
+def test_repeat_scatter_is_about_the_mean_of_each_set():
     z = np.array([1.0, 3.0, 10.0, 10.0, 7.0])
     rms, freedom = repeat_scatter(z, np.array([4, 4, 2, 2, 9]))
     assert freedom == 2
@@ -50,7 +50,7 @@ def test_repeats_scatter_by_their_own_mean():
     (0.4, (0.5, 40), ["residual"]),
     (1.0, (2.0, 40), ["repeatable"]), (1.0, (2.0, 2), []),
 ])  # fmt: skip
-def test_noise_other_than_stated_is_a_finding(tau, repeats, told):
+def test_noise_that_differs_from_the_stated_sigma_is_reported(tau, repeats, told):
     found = findings(tau, 0.03, repeats, memory=False)
     assert len(found) == len(told)
     assert all(word in one for word, one in zip(told, found, strict=True))
@@ -59,7 +59,7 @@ def test_noise_other_than_stated_is_a_finding(tau, repeats, told):
 @pytest.mark.parametrize(("common", "words"), [
     ((1.2e-5, 5e-6), "5 um, 12 urad"), ((0.0, 2.54e-5), "25.4 um"), ((0.0, 0.0), ""),
 ])  # fmt: skip
-def test_common_noise_is_a_finding_with_its_sizes(common, words):
+def test_common_noise_is_reported_with_its_sizes(common, words):
     told = findings(1.0, 0.03, (1.0, 40), memory=False, common=common)
     head = "noise common to the points of a row: "
     assert told == ((head + words,) if words else ())

@@ -46,7 +46,8 @@ def design(campaign, rng):
 
 @pytest.mark.parametrize("sessions", [None, np.repeat([0, 1], ROWS // 2)])
 def test_covariance_is_that_of_least_squares_under_known_noise(sessions, rng):
-    """H G'R G H with the full R; generalised least squares has a smaller covariance.
+    """H G'R G H with the full R;
+    generalised least squares would have a smaller covariance.
 
     (Gauss-Markov.)  With R = 1 the covariance is unchanged.
     """
@@ -74,11 +75,11 @@ def test_mean_of_an_ornstein_uhlenbeck_process_has_the_textbook_variance():
 
 
 @pytest.mark.slow
-def test_intervals_cover_nine_campaigns_in_ten(rng):
-    """Estimated share and constant; by white noise hardly more than half hold.
-
-    200 campaigns of three unknowns: 0.9 +- 0.012 were they independent; what the fit
-    takes away makes the noise look shorter, so that a little less is to be expected.
+def test_intervals_of_90_per_cent_cover_the_truth_under_correlated_noise(rng):
+    """The share and the time constant are estimated; intervals for white noise would
+    cover little more than half. For 200 campaigns of three independent unknowns the
+    rate is 0.9 +- 0.012. The fit removes part of the correlation, so that a slightly
+    lower rate is expected.
     """
     campaign = session()
     G = design(campaign, rng)
@@ -99,7 +100,7 @@ def test_intervals_cover_nine_campaigns_in_ten(rng):
 
 
 @pytest.mark.parametrize("covariates", [{}, {"time": np.zeros(ROWS)}])
-def test_rows_without_times_that_differ_give_no_correlation(covariates, rng):
+def test_noise_in_time_is_none_without_different_times(covariates, rng):
     campaign = session()
     z = np.linalg.cholesky(covariance_of(campaign)) @ rng.normal(size=2 * ROWS)
     campaign.covariates = covariates
@@ -131,7 +132,7 @@ def by_definition(campaign, z):
 
 
 @pytest.mark.parametrize("sessions", [None, np.repeat([0, 1, 1], 12)])
-def test_the_likelihood_is_that_of_the_covariance_written_out(sessions, rng):
+def test_likelihood_equals_that_of_the_full_covariance_matrix(sessions, rng):
     """Rows in any order, at unequal steps of time."""
     campaign = session(36, (1, 3), sessions)
     campaign.covariates["time"] = rng.permutation(np.cumsum(rng.integers(0, 40, 36)))
@@ -146,7 +147,7 @@ def test_the_likelihood_is_that_of_the_covariance_written_out(sessions, rng):
 
 
 def test_noise_in_time_is_independent_between_points(rng):
-    """Two points, read in turns, are two independent series."""
+    """Two points that are read alternately are two independent series."""
     one, both = session(40), session(80)
     both.point = np.tile(["p", "q"], 40)
     both.covariates["time"] = np.repeat(one.covariates["time"], 2)

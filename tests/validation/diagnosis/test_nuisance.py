@@ -30,8 +30,8 @@ def of_both_kinds(campaign, conditions, response):
     return small.take(~small.spring), small.take(small.spring)
 
 
-def test_geometry_and_springs_that_readings_show_are_listed_with_their_bounds(loaded):
-    """30 N along z at the end of the bar bend it about x and y of the base."""
+def test_nuisance_parameters_are_the_visible_geometry_and_springs_with_bounds(loaded):
+    """A force of 30 N along z at the end of the bar bends it about x and y."""
     campaign, conditions, response = loaded
     geometry, springs = of_both_kinds(campaign, conditions, response)
     assert not geometry.declared
@@ -75,8 +75,8 @@ def test_unloaded_or_unread_directions_have_no_unknowns():
     assert geometry.columns.shape == (8, 4)
 
 
-def test_columns_sum_to_the_readings_of_a_changed_robot(loaded):
-    """Small errors and springs, built into the robot."""
+def test_nuisance_columns_sum_to_the_readings_of_a_changed_robot(loaded):
+    """The robot is built with small errors and springs."""
     campaign, conditions, response = loaded
     geometry, springs = of_both_kinds(campaign, conditions, response)
     rng = np.random.default_rng(1)
@@ -98,7 +98,7 @@ def test_springs_of_no_compliance_stay_as_declared():
 
 
 def test_springs_of_passive_joints_leave_their_own_motion_free():
-    """1e-7 m/N in series with a rigid bearing that is free to rotate."""
+    """A compliance of 1e-7 m/N in series with a rigid bearing that rotates freely."""
     hinge = Frame("hinge", "base", joint="revolute")
     robot = Robot("a", "tip", (hinge, Frame("tip", "hinge")))
     first, axes = np.zeros(2, int), np.array([2, 4])

@@ -56,7 +56,9 @@ def campaign(tmp_path_factory):
         ("modulus_scale", "two", 0.8, 40.0),
     ],
 )
-def test_implausible_parameters_are_named(campaign, effect, name, fair, absurd):
+def test_implausible_parameter_is_reported_by_name(
+    campaign, effect, name, fair, absurd
+):
     def said(value):
         return implausible(campaign, found({effect: {name: value}}))
 
@@ -66,7 +68,7 @@ def test_implausible_parameters_are_named(campaign, effect, name, fair, absurd):
     assert "declared stiffness" in one
 
 
-def test_device_frame_may_be_anywhere(campaign):
+def test_device_frame_at_any_distance_is_plausible(campaign):
     frame, C = device_frame(conditions_of(campaign)), np.eye(6)
     x = np.array([0.0, 0.0, 0.0, 29.0, 0.0, 0.0])
     for device, doubted in ((False, 1), (True, 0)):
@@ -77,12 +79,12 @@ def test_device_frame_may_be_anywhere(campaign):
 
 
 def test_geometric_errors_of_a_fiftieth_of_the_robot_are_implausible(campaign):
-    """An arm of about 1 m: frames that are all off by 5 cm were not made like that."""
+    """For an arm of about 1 m, errors of 5 cm in all frames are implausible."""
     for size, doubted in ((2e-3, 0), (5e-2, 1)):
         assert len(implausible(campaign, made_badly(1e-3, size))) == doubted
 
 
-def test_temperatures_far_from_the_median_are_flagged(campaign):
+def test_temperatures_far_from_the_median_are_reported(campaign):
     """150 K from the median, in kelvin or degrees."""
     for usual in (0.0, 293.0):
         heat = np.full(len(campaign), usual)

@@ -17,7 +17,7 @@ def _case(seed=1):
     return X, group, X @ x + rng.normal(size=60)
 
 
-def test_sizes_are_where_the_density_is_largest():
+def test_best_prior_sizes_maximise_the_density():
     X, group, z = _case()
 
     def cost(logs):
@@ -30,7 +30,7 @@ def test_sizes_are_where_the_density_is_largest():
     assert [found.of_group[g] for g in (0, 1)] == pytest.approx(expected, rel=0.05)
 
 
-def test_given_prior_size_is_kept_at_no_cost():
+def test_given_prior_size_is_kept_without_penalty():
     X, group, z = _case()
     given, inf = np.full(12, 2.0), np.full(12, np.inf)
     found = best_sizes(Grouped(X.T @ X, X.T @ z, z @ z, 60, group, given, inf))

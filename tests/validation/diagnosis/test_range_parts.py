@@ -65,7 +65,7 @@ def test_range_errors_equal_those_of_refits():
     assert found.without == pytest.approx(refitted(nothing, np.zeros(0), z, wet))
 
 
-def test_a_variable_of_few_values_has_no_parts():
+def test_range_of_a_variable_with_few_values_has_no_parts():
     wet = np.repeat([0.0, 1.0], ROWS // 2)
     one = model(wet[:, None], np.ones(1), wet, wet)
     assert range_error(function_of("cov.wet"), one, one, np.arange(ROWS)) is None

@@ -34,8 +34,8 @@ def test_without_a_position_the_shift_is_zero():
 
 
 @pytest.mark.parametrize("cell", range(6))
-def test_rows_that_lack_a_cell_do_not_take_part(cell):
-    """The other cells of such a row are wrong here."""
+def test_registration_ignores_rows_with_a_missing_cell(cell):
+    """The other cells of such a row are wrong in this test."""
     seen = seen_by(TURN, SHIFT)
     kind = slice(0, 3) if cell < 3 else slice(3, 6)
     seen[2, kind] += 0.3
@@ -51,9 +51,11 @@ def test_rows_that_lack_a_cell_do_not_take_part(cell):
     assert list(guess.values()) == pytest.approx([*TURN, *SHIFT], abs=1e-9)
 
 
-def test_device_rotation_is_found_next_to_a_turned_model():
-    """R = D M: the device's rotation D follows from R and the model's rotation M;
-    of several that differ, the mean."""
+def test_device_rotation_is_found_from_a_rotated_model():
+    """R = D M: the device's rotation D follows from R and the model's rotation M.
+
+    It is the mean where rows differ.
+    """
     model = np.array([0.02, -0.03, 0.04])
     own = Rotation.from_rotvec(model)
     spread = Rotation.from_rotvec(np.outer([-1, 1] * 4, [0, 2e-3, 1e-3]))
@@ -67,7 +69,7 @@ def test_device_rotation_is_found_next_to_a_turned_model():
 
 
 @pytest.mark.parametrize("points", [2, 3, 4])
-def test_three_points_off_one_line_are_enough(points):
+def test_registration_needs_three_points_that_are_not_collinear(points):
     seen = seen_by(TURN, SHIFT)
     seen[:, :3], seen[points:] = np.nan, np.nan
     campaign = bar(measured=seen)
@@ -80,8 +82,8 @@ def test_three_points_off_one_line_are_enough(points):
 
 
 @pytest.mark.parametrize("known", ["campaign", "conditions"])
-def test_sessions_missing_on_one_side_share_one_device(known):
-    """All rows share one device frame."""
+def test_sessions_known_to_one_side_only_share_one_device_frame(known):
+    """Only the campaign or only the prediction states sessions."""
     seen, sessions = seen_by(TURN, SHIFT), np.array(["a", "b"] * 4)
     campaign = bar(measured=seen)
     conditions = conditions_of(campaign)
@@ -95,7 +97,7 @@ def test_sessions_missing_on_one_side_share_one_device(known):
 
 @pytest.mark.parametrize("turn", [[0.6, -0.5, 0.62], [0.0, 3.0, 0.0]])
 @pytest.mark.parametrize("cells", ["all", "points", "one rotation"])
-def test_a_device_anywhere_in_the_room_is_found_exactly(turn, cells):
+def test_device_frame_far_from_the_base_is_found_exactly(turn, cells):
     """p' = R p + t and R' = R without noise: 1 rad and 3 m."""
     campaign = bar()
     R, t = Rotation.from_rotvec(turn), np.array([2.0, -2.0, 1.0])
@@ -115,7 +117,7 @@ def test_a_device_anywhere_in_the_room_is_found_exactly(turn, cells):
 
 
 def test_collinear_points_do_not_determine_the_device_rotation():
-    """Five places of a slide half a metre from the base, without rotations."""
+    """Five positions of a slide half a metre from the base, without rotations."""
     robot = Robot("slide", "tip", (
         Frame("rail", translation=[0.3, 0.5, -0.2], rotation=[0.4, 0.2, 0]),
         Frame("slide", "rail", joint="prismatic", actuated=True),
@@ -150,7 +152,7 @@ def test_device_is_found_next_to_declared_errors():
     assert list(guess.values()) == pytest.approx([*turn, *t], abs=1e-8)
 
 
-def test_each_session_has_a_device_of_its_own():
+def test_each_session_has_its_own_device_frame():
     """Two device frames in two sessions; a session without rows is refused."""
     plain, sessions = bar(), np.array(["a", "b"] * 4)
     p, seen = LENGTH * along(plain), np.zeros((8, 6))

@@ -46,7 +46,7 @@ def known(columns, z=NOTHING):
     return Relinearisation(columns.tangents, models)
 
 
-def test_effects_together_move_the_bar_by_finite_motions(columns):
+def test_combined_effects_move_the_bar_by_finite_motions(columns):
     elements, xs = effects(columns)
     assert known(columns).combined(elements, xs) == pytest.approx(moved(), abs=0.02)
 
@@ -76,7 +76,7 @@ def test_relinearised_model_finds_values_that_a_linear_one_misses(columns):
         assert abs(e.values(mean) - x) < 4 * spread
 
 
-def test_spring_of_a_drive_is_an_effect_and_not_a_nuisance(columns):
+def test_spring_of_a_drive_is_an_effect_instead_of_a_nuisance_parameter(columns):
     loaded = replace(CAMPAIGN, loads=np.tile([0, 0, 5.0, 0, 9.0, 0], (20, 1)))
     loose = columns_of(loaded)
     small, robot = loose.nuisance, CAMPAIGN.robot

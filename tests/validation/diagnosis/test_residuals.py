@@ -20,7 +20,7 @@ def noisy(rng, rows=40, sets=10, size=1.0):
     return campaign_of(z * SIGMA, SIGMA, np.arange(rows) % sets)
 
 
-def test_probabilities_of_noise_are_uniform(rng):
+def test_lack_of_fit_probabilities_of_noise_are_uniform(rng):
     """The rate of false alarms is the stated one."""
     found = []
     for _ in range(300):
@@ -34,8 +34,9 @@ def test_probabilities_of_noise_are_uniform(rng):
     assert not any(one.significant for one in found)
 
 
-def test_scatter_between_repeats_by_hand():
-    """1 and 3: squares of 2 about their mean, one degree of freedom."""
+def test_scatter_between_repeats_equals_hand_calculation():
+    """Readings 1 and 3:
+    squared deviations of 2 about their mean, one degree of freedom."""
     seen = np.full((3, 6), np.nan)
     seen[:, 4] = [1.0, 3.0, 50.0]
     campaign = campaign_of(seen, repeat=[0, 0, 1])
@@ -46,7 +47,7 @@ def test_scatter_between_repeats_by_hand():
 
 
 def test_equal_repeats_make_any_residual_a_lack_of_fit():
-    """Repeats of a device that rounds: any residual is a lack of fit."""
+    """The device rounds its readings, so that repeats are equal."""
     seen = np.full((4, 6), np.nan)
     seen[:, 4] = [1.0, 1.0, 3.0, 3.0]
     campaign = campaign_of(seen, repeat=[0, 0, 1, 1])
@@ -68,8 +69,9 @@ def test_campaign_without_repeats_has_no_repeat_scatter():
 
 
 @pytest.mark.parametrize("from_zero", [-40.0, 0.0, 300.0])
-def test_same_command_on_a_warmer_day_is_no_repeat(from_zero):
-    """Within a thirtieth of the range it is, from any zero; time does not count."""
+def test_same_command_at_another_temperature_is_not_a_repeat(from_zero):
+    """A difference within a thirtieth of the range counts as a repeat,
+    from any zero of the scale; time does not count."""
     seen = np.full((4, 6), np.nan)
     seen[:, 4] = [1.0, 3.0, 50.0, 7.0]
     temperature = from_zero + np.array([0.0, 0.2, 9.0, 10.0])
@@ -80,7 +82,7 @@ def test_same_command_on_a_warmer_day_is_no_repeat(from_zero):
     assert (found.repeats_freedom, found.repeats) == (1, pytest.approx(np.sqrt(2)))
 
 
-def test_a_device_worse_than_stated_is_no_lack_of_fit(rng):
+def test_noise_above_the_stated_sigma_is_no_lack_of_fit(rng):
     campaign = noisy(rng, 120, 20, size=2.0)
     found = lack_of_fit(campaign, whiten(campaign, campaign.measured), 0)
     assert found.probability < SIGNIFICANT
@@ -130,8 +132,9 @@ def varied(rng, rows=120):
     )  # fmt: skip
 
 
-def test_noise_shows_a_trend_as_rarely_as_stated(rng, monkeypatch):
-    """Over all trends; at 5 % instead of 0.1 %, for which 100 campaigns suffice."""
+def test_false_alarm_rate_of_trends_is_the_stated_one(rng, monkeypatch):
+    """Over all trends;
+    tested at 5 % instead of 0.1 %, for which 100 campaigns suffice."""
     monkeypatch.setattr(module, "UNLIKELY", 0.05)
     alarms = 0
     for _ in range(100):

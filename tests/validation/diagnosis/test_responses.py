@@ -30,11 +30,11 @@ def turns_of(campaign):
 
 
 @pytest.mark.parametrize("rows", [1, 50, 51, 120])
-def test_responses_carry_screws_along_the_bar_and_loads_back(rows):
+def test_responses_equal_hand_calculation_for_screws_and_wrenches(rows):
     """For any number and order of postures.
 
-    A drive's screw rotates the whole bar, in base axes; the tip's is read in the
-    axes of the bar.  The wrench at the drive has the moment of the forces at the tip.
+    The screw of a drive rotates the whole bar, in base axes; the tip's screw is in the
+    axes of the bar. The wrench at the drive has the moment of the forces at the tip.
     """
     campaign, once = loaded(rows)
     order = np.append(np.arange(rows)[::-1], np.arange(0, rows, 3))
@@ -54,7 +54,8 @@ def test_responses_carry_screws_along_the_bar_and_loads_back(rows):
 
 
 def test_readings_of_small_screws_follow_the_device_frame():
-    """R (t + r x arm), with the arm to the measured point; rotations by Rodrigues."""
+    """R (t + r x arm), where the arm ends at the measured point;
+    rotations by Rodrigues."""
     campaign, conditions = loaded()
     b, point, tool = np.array([0.4, -0.9, 0.7]), [0.1, -0.2, 0.3], [0.05, 0.02, -0.1]
     conditions = replace(
@@ -97,7 +98,7 @@ def test_row_without_a_solution_has_zero_response():
 
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("closed", [False, True])
-def test_resting_clearance_changes_no_response(held, closed):
+def test_clearance_closed_by_the_load_changes_no_response(held, closed):
     """To first order the joint stays where the load has shifted it.
 
     For an open and a closed chain.
@@ -127,7 +128,7 @@ def test_resting_clearance_changes_no_response(held, closed):
 
 
 def test_clearance_of_one_of_two_parallel_springs_shifts_no_load():
-    """Each carries half: responses are those without clearance."""
+    """Each spring carries half: responses equal those without clearance."""
     spring = np.eye(6) * 1e6
     robot = Robot("pair", "end_a", (
         Frame("a", joint_stiffness=spring, clearance=Clearance(radial=1e-5)),
@@ -139,7 +140,7 @@ def test_clearance_of_one_of_two_parallel_springs_shifts_no_load():
 
 
 def test_wrenches_are_proportional_to_small_loads():
-    """Zero is what is rounding beside the largest, and not beside 1 N."""
+    """A wrench counts as zero relative to the largest one, not relative to 1 N."""
     load = np.array([0, 0, 3.0, 0, 5.0, 0])
     one = responses(conditions_of(bar(load, link=BEAM)))
     tiny = responses(conditions_of(bar(1e-12 * load, link=BEAM)))

@@ -27,8 +27,8 @@ def diagnosis(campaign, fit, **more):
     return SimpleNamespace(campaign=campaign, fit=fit, robot=fit.robot, **more)
 
 
-def test_an_effect_has_values_deviations_and_intervals_of_nine_in_ten():
-    """1.645 standard deviations either way."""
+def test_effect_table_has_values_deviations_and_90_per_cent_intervals():
+    """The intervals extend 1.645 standard deviations to either side."""
     fit = fitted(bar().robot, [TURNED, LONGER], [3e-4, -2e-4], [2e-5, 1e-5])
     one = diagnosis(bar(), fit, probability={"link_length": 0.9})
     turned, length = module.effects(one)
@@ -43,8 +43,8 @@ def test_an_effect_has_values_deviations_and_intervals_of_nine_in_ten():
     assert "found" not in number
 
 
-def test_a_declared_effect_has_what_was_declared_and_what_was_found():
-    """0.5 mrad in the file, 0.3 mrad more in the machine: 0.8 are saved."""
+def test_effect_table_has_declared_value_difference_and_corrected_value():
+    """0.5 mrad in the file and 0.3 mrad more in the machine: 0.8 mrad are saved."""
     campaign = bar()
     robot = replace(campaign.robot, effects={"encoder_offset": {"drive": 5e-4}})
     campaign = replace(campaign, robot=robot)
@@ -57,11 +57,9 @@ def test_a_declared_effect_has_what_was_declared_and_what_was_found():
     assert number["found"] == pytest.approx(expected)
 
 
-def test_small_unknowns_are_told_by_frame_and_one_by_one():
-    """Frames of which hardly anything is known are left out; units by kind.
-
-    Known of each: 1 minus its variance over that of its prior.
-    """
+def test_nuisance_parameters_are_listed_by_frame_and_individually():
+    """Frames about which the readings say hardly anything are left out; units follow
+    the kind. The reported share is 1 minus the variance over that of the prior."""
     geometry = Small(GEOMETRY, np.array([0, 0, 1, 1]), np.array([2, 3, 0, 5]),
                      np.array([1e-4, 2e-4, 1e-4, 2e-4]))  # fmt: skip
     springs = Small(SPRINGS, np.zeros(2, int), np.array([1, 4]), np.array([1e-7, 1e-9]))
@@ -91,7 +89,7 @@ def test_small_unknowns_are_told_by_frame_and_one_by_one():
     assert module.small(one, "nothing") is None
 
 
-def test_steps_are_in_metres_or_where_none_was_read_in_radians():
+def test_step_errors_are_in_metres_or_in_radians_without_positions():
     errors = Errors(1e-5, 2e-6, 3.0), Errors(float("nan"), 4e-6, 5.0)
     one = SimpleNamespace(
         sequence=[Step(f"step {k}", k, e) for k, e in enumerate(errors)]

@@ -64,14 +64,15 @@ def with_gain(campaign, gain):
     return replace(campaign, robot=replace(campaign.robot, functions=(turn,)))
 
 
-def test_known_gain_of_a_measured_motion_leaves_noise(rocking):
-    """1 mrad at 0.7 m is some twenty sigma; a gain too large by 0.2 mrad, some four."""
+def test_prediction_with_the_known_gain_of_a_motion_has_the_error_of_noise(rocking):
+    """1 mrad at 0.7 m is about twenty sigma,
+    a gain that is too large by 0.2 about four sigma."""
     assert predict(rocking).error.normalised > 8
     assert 0.85 < predict(with_gain(rocking, GAIN)).error.normalised < 1.15
     assert predict(with_gain(rocking, 1.0)).error.normalised > 2
 
 
-def test_an_unknown_gain_is_learned(rocking):
+def test_unknown_gain_of_a_measured_motion_is_learned(rocking):
     """240 readings of rotations of 1 mrad determine the gain to a few thousandths."""
     found = diagnose(rocking)
     assert found.verdict == "learned"

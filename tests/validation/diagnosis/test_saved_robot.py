@@ -1,4 +1,4 @@
-"""The saved robot has the printed errors."""
+"""Saved robots: their predictions have the printed errors."""
 
 import json
 from dataclasses import asdict, replace
@@ -49,7 +49,7 @@ def saved(found, tmp_path_factory):
 
 
 def test_saved_robot_predicts_the_printed_errors(found, saved):
-    """To the ten digits of the file, over all rows but outliers."""
+    """To the ten digits of the file, over all rows except outliers."""
     again = predict(replace(found.campaign, robot=saved).take(~found.outliers))
     printed = asdict(found.saved)
     assert asdict(again.error) == pytest.approx(printed, rel=1e-6)
@@ -57,8 +57,8 @@ def test_saved_robot_predicts_the_printed_errors(found, saved):
     assert written["error"]["saved"] == pytest.approx(printed)
 
 
-def test_error_after_is_of_a_fit_without_the_held_out_rows(found):
-    """The same unknowns, fitted to the other rows alone."""
+def test_error_after_comes_from_a_fit_without_the_held_out_rows(found):
+    """The same unknowns are fitted to the other rows alone."""
     assert found.held.how == "split"
     used = ~found.held.rows & ~found.outliers
     blind = np.where(found.held.rows[:, None], np.nan, found.campaign.measured)
@@ -82,7 +82,7 @@ def test_saved_robot_is_fitted_to_all_rows(found, saved):
 
 
 @pytest.mark.parametrize("change", ["noise", "anything"])
-def test_readings_held_out_change_nothing_but_the_errors(found, change):
+def test_held_out_readings_change_only_the_stated_errors(found, change):
     """Effects, functions, probabilities and unknowns are selected without them."""
     rng = np.random.default_rng(8)
     held, readings = found.held.rows, found.campaign.measured.copy()
@@ -135,7 +135,7 @@ def test_folds_are_fitted_without_their_held_out_readings(monkeypatch):
 
 
 def test_saved_robot_keeps_the_measured_point(found, saved):
-    """Predictions at another point name the point of identification."""
+    """Predictions at another point report the point of identification."""
     point = tuple(found.campaign.reference_point.tolist())
     assert saved.reference_point == pytest.approx(point)
     same = predict(replace(found.campaign, robot=saved)).table()
@@ -176,7 +176,7 @@ def test_table_without_campaign_uses_the_point_of_the_saved_robot(found, tmp_pat
 
 
 def test_predicted_intervals_cover_nine_readings_in_ten(found, saved):
-    """120 new rows: intervals of covariance and noise.
+    """For 120 new rows; intervals include covariance and noise.
 
     720 readings whose errors of the model are common: five standard errors of 0.011.
     """
@@ -190,7 +190,7 @@ def test_predicted_intervals_cover_nine_readings_in_ten(found, saved):
 
 
 def test_saved_robot_has_the_covariance_of_its_parameters(found, saved):
-    """Of every fitted parameter."""
+    """The covariance includes every fitted parameter."""
     known = read_covariance(saved)
     assert len(known.numbers) == len(found.fit.x)
     assert np.linalg.eigvalsh(known.covariance).min() > -1e-20
@@ -198,8 +198,8 @@ def test_saved_robot_has_the_covariance_of_its_parameters(found, saved):
     assert any(kind == "geometric_error" for kind, _ in names)
 
 
-def test_unmeasured_components_are_named_and_uncertain(tmp_path):
-    """Heights alone are measured: x and y are uncertain by the errors of frames."""
+def test_unmeasured_components_are_reported_as_uncertain(tmp_path):
+    """Only heights are measured: x and y are uncertain by the errors of frames."""
     seen = read(commanded(arm(), 24))
     blind = seen.measured.copy()
     blind[:, :5] = np.nan

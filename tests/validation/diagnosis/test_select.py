@@ -38,7 +38,7 @@ def found(columns, readings, seed=0, *, noise=1.0):
 
 
 @pytest.mark.parametrize("noise", [0.5, 1.0, 2.0, 3.0])
-def test_noise_of_any_scale_selects_nothing(columns, noise):
+def test_noise_of_any_scale_leads_to_no_selection(columns, noise):
     selected = found(columns, np.zeros((ROWS, 6)), noise=noise)
     assert selected.hypotheses == selected.functions == ()
     assert max(selected.probability.values(), default=0.0) < 0.1
@@ -65,7 +65,7 @@ def test_waves_of_a_gear_are_found_with_their_number(columns):
     assert one.probability > 0.9
 
 
-def test_growth_with_time_is_not_a_drift_of_the_reading(columns):
+def test_growth_with_time_is_learned_at_a_body_instead_of_the_reading(columns):
     sigma = CAMPAIGN.sigma[0, 3]
     grown = 12 * sigma * (TIME / TIME.max())[:, None] * along(CAMPAIGN)
     selected = found(columns, np.hstack([np.zeros((ROWS, 3)), grown]))
@@ -99,7 +99,7 @@ def test_joint_scores_of_functions_equal_single_scores(columns):
     assert together == pytest.approx(alone, rel=1e-6)
 
 
-def test_places_seen_by_rounding_alone_are_excluded():
+def test_places_visible_only_by_rounding_are_excluded():
     campaign = bar(link=BEAM, rows=ROWS, spread=0.0, time=TIME)
     measured = np.full((ROWS, 6), np.nan)
     measured[:, 3] = 0.0  # along the bar: turning the drive moves it by rounding

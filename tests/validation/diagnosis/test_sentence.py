@@ -1,4 +1,4 @@
-"""A learned function as a formula a person can read."""
+"""Learned functions and verdicts as readable text."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -14,7 +14,7 @@ from validation.diagnosis.lack_of_fit import Trend
 from validation.diagnosis.sentence import calibration_text, formula, open_text, sentence
 
 
-def test_a_product_of_two_variables_names_both():
+def test_formula_of_a_product_names_both_variables():
     numbers = {"0.0": 1.0, "1.0": 2.0, "0.1": 3.0, "2.1": -4.0}
     function = Function("drive", ("rz",), ("q.drive", "cov.bed"), "powers", numbers)
     assert formula(function) == "rz = 1 + 2 drive + 3 bed + -4 drive^2 bed"
@@ -37,12 +37,12 @@ def test_a_product_of_two_variables_names_both():
         ("step", {"size": 2.0, "at": 0.5}, "rz = 2 step.size(drive)"),
     ],
 )  # fmt: skip
-def test_numbers_stand_before_what_they_multiply(form, parameters, expected):
+def test_formula_has_each_coefficient_before_its_factor(form, parameters, expected):
     function = Function("drive", ("rz",), ("q.drive",), form, parameters)
     assert formula(function) == expected
 
 
-def test_a_calibration_is_said_in_shares():
+def test_calibration_text_states_counts_and_shares():
     tally = Calibration(
         20, {"none_needed": 19, "explained": 1}, {"explained": 18, "ambiguous": 2},
         0.85, 0.025,
@@ -56,7 +56,7 @@ def test_a_calibration_is_said_in_shares():
     assert "named the" not in unnamed
 
 
-def test_a_compliance_is_said_to_be_times_the_wrench():
+def test_formula_of_a_compliance_states_the_factor_of_the_wrench():
     function = Function(
         "drive", ("rz", "tx"), ("q.drive",), "powers",
         {"rz.1": 2e-3, "tx.1": 3e-3}, "compliance",
@@ -77,8 +77,10 @@ SAID = [
 
 
 @pytest.mark.parametrize(("changes", "expected"), SAID)
-def test_a_verdict_is_said_with_what_it_rests_on(monkeypatch, changes, expected):
-    """Six names, four sets and three trends at most."""
+def test_verdict_sentence_states_the_supporting_findings(
+    monkeypatch, changes, expected
+):
+    """At most six names, four sets and three trends."""
     monkeypatch.setattr(module, "titles", lambda one: [f"t{k}" for k in range(6)])
     sets = ("a",), (), ("a", "b"), ("c",), ("d",)
     one = SimpleNamespace(**{
@@ -98,5 +100,5 @@ def test_a_verdict_is_said_with_what_it_rests_on(monkeypatch, changes, expected)
     assert "on the rows fitted, too few to hold any out" in sentence(one)
 
 
-def test_open_rows_are_counted():
+def test_text_states_the_number_of_rows_with_a_free_motion():
     assert "free in 2 of 3 rows" in open_text(np.array([True, False, True]))

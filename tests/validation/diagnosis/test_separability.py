@@ -10,8 +10,8 @@ def columns(*vectors):
     return 10 * np.array(vectors, dtype=float).T
 
 
-def test_cosine_of_two_lines_is_that_of_their_angle():
-    """60 degrees between two lines in a plane."""
+def test_cosine_of_two_lines_is_the_cosine_of_their_angle():
+    """The angle between two lines in a plane is 60 degrees."""
     found = compare_signatures({
         "a": columns([1, 0, 0]), "b": columns([0.5, np.sqrt(0.75), 0])
     })  # fmt: skip
@@ -21,8 +21,8 @@ def test_cosine_of_two_lines_is_that_of_their_angle():
     assert found.classes() == found.imitated() == found.overlapping() == []
 
 
-def test_planes_that_share_a_line_overlap_and_a_line_in_a_plane_is_imitated():
-    """Half of the square of (e1, e2) is in the plane (e1, e3)."""
+def test_planes_with_a_common_line_overlap_and_a_line_in_a_plane_is_imitated():
+    """Half of the squared length of (e1 + e2) is in the plane (e1, e3)."""
     found = compare_signatures({
         "plane": columns([1, 0, 0], [0, 1, 0]),
         "other": columns([1, 0, 0], [0, 0, 1]),
@@ -46,7 +46,7 @@ def test_equal_column_spaces_form_a_class(rng):
 
 
 def test_nuisance_columns_are_projected_out(rng):
-    """Without the common column two are orthogonal, and a third vanishes."""
+    """Without the common column two effects are orthogonal, and a third vanishes."""
     out = rng.normal(size=(40, 2))
     Q, _ = np.linalg.qr(np.column_stack([out, rng.normal(size=(40, 2))]))
     found = compare_signatures(

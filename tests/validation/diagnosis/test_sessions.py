@@ -74,7 +74,7 @@ def parameters(found, name, session=None):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("known", [True, False])
-def test_zeros_and_tool_are_found_for_each_session(known, tmp_path):
+def test_encoder_offsets_and_tool_are_found_for_each_session(known, tmp_path):
     """A common spring is found together with them, and saved."""
     spring = Hidden("drive_compliance", {"j2": SPRING})
     hidden = {
@@ -151,7 +151,7 @@ def test_drift_is_found_for_each_session(tmp_path):
 
 @pytest.mark.slow
 def test_per_session_effects_are_read_from_the_campaign(tmp_path):
-    """A load cell with another gain each day, 10 % and -8 %."""
+    """The load cell has another gain in each session, 10 % and -8 %."""
     gains = {"monday": 1.1, "tuesday": 0.92}
     hidden = {s: [Hidden("load_gain", {"factor": g})] for s, g in gains.items()}
     folder = measured(tmp_path, hidden)

@@ -101,7 +101,7 @@ def said(campaign):
 
 @pytest.mark.parametrize("unknown", [False, True])
 @pytest.mark.parametrize("joint", range(6))
-def test_joint_with_its_sign_reversed_is_named(rng, joint, unknown):
+def test_joint_with_a_reversed_sign_is_reported_by_name(rng, joint, unknown):
     machine = Machine(rng, unknown=unknown)
     machine.q[:, joint] *= -1
     (one,) = found(machine.campaign())
@@ -112,7 +112,7 @@ def test_joint_with_its_sign_reversed_is_named(rng, joint, unknown):
 
 @pytest.mark.parametrize("joint", [1, 2, 4])
 @pytest.mark.parametrize("quarters", [1, 2, 3])
-def test_joint_whose_zero_is_quarter_turns_off_is_named(rng, joint, quarters):
+def test_joint_offset_by_quarter_turns_is_reported_by_name(rng, joint, quarters):
     machine = Machine(rng, unknown=True)
     machine.q[:, joint] -= quarters * np.pi / 2
     (one,) = found(machine.campaign())
@@ -120,7 +120,7 @@ def test_joint_whose_zero_is_quarter_turns_off_is_named(rng, joint, quarters):
     assert f"with {(90, 180, -90)[quarters - 1]} degrees added" in one.sentence
 
 
-def test_zero_of_the_first_joint_cannot_be_told_from_where_the_device_stood(rng):
+def test_quarter_turn_of_the_first_joint_is_reported_only_for_a_known_device(rng):
     machine = Machine(rng, unknown=True, force=0.0)
     machine.q[:, 0] += np.pi / 2
     assert said(machine.campaign()) == set()
@@ -130,14 +130,14 @@ def test_zero_of_the_first_joint_cannot_be_told_from_where_the_device_stood(rng)
 
 
 @pytest.mark.parametrize("pair", [(0, 1), (1, 2), (3, 5)])
-def test_exchanged_joints_are_named(rng, pair):
+def test_exchanged_joints_are_reported_by_name(rng, pair):
     machine = Machine(rng, unknown=True)
     machine.q[:, list(pair)] = machine.q[:, list(pair)[::-1]]
     names = tuple(f"q.joint{k + 1}" for k in pair)
     assert said(machine.campaign()) == {("exchanged", names)}
 
 
-def test_two_set_up_blunders_are_both_named(rng):
+def test_two_set_up_blunders_are_both_reported(rng):
     machine = Machine(rng, unknown=True)
     machine.q[:, 1] *= -1
     machine.q[:, 3] += np.pi / 2
@@ -154,7 +154,7 @@ LOADS = tuple(f"load.{c}" for c in ("mx", "my", "mz", "fx", "fy", "fz"))
      (9.81, "unit", "times 0.1019"), (1e-3, "unit", "times 1000"),
      (1e3, "unit", "times 0.001")],
 )  # fmt: skip
-def test_loads_that_are_reactions_or_in_another_unit_are_named(
+def test_loads_given_as_reactions_or_in_another_unit_are_reported(
     rng, factor, kind, words
 ):
     machine = Machine(rng, force=1e3, unknown=True)
@@ -169,7 +169,7 @@ def test_loads_that_are_reactions_or_in_another_unit_are_named(
     [(25.4, "times 0.03937"), (1 / 25.4, "times 25.4"), (1e3, "times 0.001"),
      (1e-3, "times 1000")],
 )  # fmt: skip
-def test_positions_in_another_unit_are_named(rng, factor, words):
+def test_positions_in_another_unit_are_reported(rng, factor, words):
     machine = Machine(rng, unknown=True)
     machine.points = factor * machine.points
     (one,) = found(machine.campaign())
@@ -191,7 +191,7 @@ ROTATIONS = ("meas.rx", "meas.ry", "meas.rz")
          "quaternion", "w taken first, not last"),
     ],
 )  # fmt: skip
-def test_rotations_that_were_misread_are_named(rng, change, kind, words):
+def test_misread_rotations_are_reported(rng, change, kind, words):
     machine = Machine(rng)
     machine.turns = change(Rotation.from_matrix(machine.turns)).as_matrix()
     (one,) = found(machine.campaign(rotations=True))
@@ -205,15 +205,15 @@ def test_rotations_that_were_misread_are_named(rng, change, kind, words):
                        for n in ("delta", "hexapod"))],
 )  # fmt: skip
 @pytest.mark.parametrize("unknown", [False, True])
-def test_machine_that_is_only_inaccurate_has_no_blunder(rng, name, unknown):
+def test_inaccurate_machine_has_no_reported_blunder(rng, name, unknown):
     """Errors of a millimetre, a hundred sigma, are no blunder."""
     machine = Machine(rng, name, spread=0.005, unknown=unknown)
     assert said(machine.campaign(rotations=True)) == set()
 
 
 @pytest.mark.slow
-def test_drives_of_a_closed_chain_are_named(rng):
-    """A Delta whose second drive was written down reversed."""
+def test_reversed_drive_of_a_closed_chain_is_reported_by_name(rng):
+    """A Delta whose second drive was recorded with the opposite sign."""
     machine = Machine(rng, "delta", spread=0.05)
     machine.q[:, 1] *= -1
     (name,) = [f"q.{f.name}" for f in machine.robot.frames if f.actuated][1:2]
@@ -231,15 +231,15 @@ def test_campaign_within_its_noise_has_no_blunder(rng):
     assert found(Machine(rng, own=0.0).campaign()) == ()
 
 
-def test_springs_that_do_not_respond_are_no_blunder_of_units(rng):
-    """The declared drives are soft, the machine is stiff."""
+def test_missing_compliance_is_not_reported_as_a_blunder_of_units(rng):
+    """The declared drives are compliant, the machine is stiff."""
     machine = Machine(rng, force=1e3)
     T, _ = machine.declared(machine.q, machine.loads)
     machine.points = T[:, :3, 3] + T[:, :3, :3] @ POINT
     assert said(machine.campaign()) == set()
 
 
-def test_heights_alone_name_a_joint_where_the_device_is_known(rng):
+def test_reversed_joint_is_found_from_heights_alone_with_a_known_device(rng):
     machine = Machine(rng)
     machine.q[:, 2] *= -1
     machine.points[:, :2] = np.nan
@@ -268,7 +268,7 @@ def commanded_by_pose(machine, change):
 
 
 @pytest.mark.slow
-def test_commanded_rotations_that_were_transposed_are_named(rng):
+def test_transposed_commanded_rotations_are_reported(rng):
     machine = Machine(rng, "hexapod", spread=0.01)
     campaign = commanded_by_pose(
         machine, lambda p, R: np.hstack([p, R.inv().as_rotvec()])
@@ -280,8 +280,8 @@ def test_commanded_rotations_that_were_transposed_are_named(rng):
 
 
 @pytest.mark.slow
-def test_commanded_places_in_another_unit_are_named(rng):
-    """Inches taken for a length that is 25.4 times longer; struts have no limits."""
+def test_commanded_positions_in_another_unit_are_reported(rng):
+    """Positions are 25.4 times too large; struts have no limits."""
     machine = Machine(rng, "hexapod", spread=0.01)
 
     def change(p, R):
@@ -292,7 +292,7 @@ def test_commanded_places_in_another_unit_are_named(rng):
     assert "times 0.03937" in one.sentence
 
 
-def test_orientations_alone_of_two_sessions_show_a_reversed_joint(rng):
+def test_reversed_joint_is_found_from_orientations_of_two_sessions(rng):
     """The device frame changes between sessions; no position is measured."""
     machine = Machine(rng, unknown=True)
     machine.q[:, 4] *= -1

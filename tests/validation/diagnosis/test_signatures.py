@@ -22,7 +22,7 @@ from validation.diagnosis.trace import FINITE
 
 
 def test_weight_has_the_direction_of_the_gravity_covariates():
-    """Zero where there are none."""
+    """The weight is zero without these covariates."""
     along = {"gravity.x": np.arange(8.0), "gravity.z": np.full(8, -9.81)}
     here = conditions_of(bar(**along))
     expected = np.column_stack([np.arange(8.0), np.zeros(8), np.full(8, -9.81)])
@@ -32,8 +32,8 @@ def test_weight_has_the_direction_of_the_gravity_covariates():
 
 @pytest.mark.parametrize("name", ["bed", "approach"])
 @pytest.mark.parametrize("given", [True, False])
-def test_a_function_of_a_covariate_needs_its_column(name, given):
-    """Except ``approach``, which follows from the rows before."""
+def test_function_of_a_covariate_requires_its_column(name, given):
+    """Except ``approach``, which follows from the preceding rows."""
     function = (
         Function("reading", ("tx",), ("q.drive",), "reversal", {"0": 1e-6})
         if name == "approach"
@@ -49,7 +49,7 @@ def test_a_function_of_a_covariate_needs_its_column(name, given):
             conditions_of(campaign)
 
 
-def test_components_of_the_load_that_act_anywhere_are_named():
+def test_loaded_components_are_those_that_act_in_any_row():
     loads = np.zeros((8, 6))
     loads[3, 4], loads[:, 2] = -2.0, 1.0
     assert loaded_components(replace(bar(), loads=loads)) == ["mz", "fy"]
@@ -71,8 +71,8 @@ def test_residual_is_reading_minus_declared_prediction():
     assert len(tangents.declared) == 46
 
 
-def test_a_visible_effect_without_unknowns_is_an_offset():
-    """A soft drive with a large rotation."""
+def test_visible_effect_without_unknowns_becomes_an_offset():
+    """A compliant drive with a large rotation."""
     spring = np.diag([np.inf, np.inf, 2e3, np.inf, np.inf, np.inf])
     campaign = bar([0, 0, 0, 0, 150.0, 0], spring=spring)
     tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
@@ -83,8 +83,8 @@ def test_a_visible_effect_without_unknowns_is_an_offset():
 
 
 @pytest.mark.parametrize("x", [0.0, 3e-4, -2e-3])
-def test_a_length_has_the_same_tangent_about_any_value(x):
-    """1 / sigma along the bar, and nothing at zero; another length beside it too."""
+def test_tangent_of_a_length_is_the_same_at_any_value(x):
+    """1 / sigma along the bar, also about zero and together with another effect."""
     campaign = bar(link=BEAM)
     tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
     expected = whiten(campaign, fit_of(campaign, 1.0))

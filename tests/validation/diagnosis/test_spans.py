@@ -59,11 +59,11 @@ def heated(tmp_path_factory):
     return diagnosed(folder, read, covariates), noise
 
 
-def test_causes_are_learned_in_their_simplest_form(heated):
-    """Noise correlated in time makes splines and functions of time likelier.
+def test_causes_are_learned_as_polynomials(heated):
+    """Noise correlated in time would favour splines and functions of time.
 
-    The gain of the bed: to five of its standard errors by the noise, 2.5 um, whose
-    correlation leaves of the 180 rows fitted some forty that are independent.
+    The tolerance of the bed's gain is five of its standard errors. The noise is 2.5 um,
+    and its correlation leaves about forty independent rows of the 180 rows fitted.
     """
     diagnosis, _ = heated
     functions = corrected(diagnosis).functions
@@ -81,7 +81,7 @@ def test_causes_are_learned_in_their_simplest_form(heated):
 
 
 def test_held_out_spans_of_time_are_predicted_to_the_noise(heated):
-    """Some sixty independent rows: within 1.5 times their noise."""
+    """About sixty independent rows: the error is below 1.5 times the noise."""
     diagnosis, noise = heated
     kept = diagnosis.held.rows
     left = np.sqrt(np.mean(noise[kept] ** 2))
@@ -90,7 +90,7 @@ def test_held_out_spans_of_time_are_predicted_to_the_noise(heated):
 
 
 def test_many_outliers_do_not_prevent_learning(tmp_path):
-    """Eleven outliers, each two thirds of the one before."""
+    """Eleven outliers, each two thirds as large as the one before."""
     rng = np.random.default_rng(9)
     warm = np.sin(np.linspace(0, 20, 320))
     read = 80e-6 * warm**2 + 1e-6 * rng.normal(size=320)

@@ -1,4 +1,4 @@
-"""What the terminal shows of a made-up diagnosis, line by line."""
+"""Terminal text of a made-up diagnosis, line by line."""
 
 from types import SimpleNamespace
 
@@ -59,8 +59,9 @@ def shown(monkeypatch):
     return lines
 
 
-def test_what_is_not_there_is_not_said(shown):
-    """Head, sets by probability, errors before and after, and every step."""
+def test_diagnosis_text_omits_absent_sections(shown):
+    """The header, sets by probability, errors before and after,
+    and every step remain."""
     said = shown()
     assert said[:2] == ["arm: none_needed", "Enough."]
     at = said.index("sets of effects, by probability:")
@@ -80,8 +81,8 @@ def test_what_is_not_there_is_not_said(shown):
     ]
 
 
-def test_one_step_alone_reduces_nothing(shown):
-    """Where only rotations were read its rms is one of angles."""
+def test_model_sequence_of_one_step_has_no_reduction(shown):
+    """Where only rotations were read, the rms is one of angles."""
     declared = step("declared", 0, 2e-6, 7.0, "rad")
     assert [line.split() for line in shown(**{"ladder": [declared]})[-2:]] == [
         ["model", "unknowns", "rad", "sigma", "reduction"],
@@ -89,8 +90,8 @@ def test_one_step_alone_reduces_nothing(shown):
     ]
 
 
-def test_errors_with_outliers_are_given_where_one_was_held_out(shown):
-    """An outlier among the rows fitted is named all the same."""
+def test_errors_with_outliers_are_printed_only_for_held_out_outliers(shown):
+    """An outlier among the fitted rows is named all the same."""
     fitted = shown(outliers=["m1"])
     assert "left out as outliers: m1" in fitted
     assert not any(line.startswith("with outliers") for line in fitted)
@@ -100,20 +101,20 @@ def test_errors_with_outliers_are_given_where_one_was_held_out(shown):
     assert more.split() == ["with", "outliers", "8", "2.25", "1.2"]
 
 
-def test_components_that_no_row_has_are_named(shown):
-    """Not as 0 +- 0: they were not measured."""
+def test_components_without_readings_are_listed_as_not_measured(shown):
+    """They are not printed as 0 +- 0."""
     missing = ["rx", "ry", "rz", "ty"]
     assert "not measured: rx, ry, rz, ty" in shown(not_measured=missing)
     assert not any("not measured" in line for line in shown())
 
 
-def test_rows_that_would_decide_are_said(shown):
+def test_text_states_the_measurement_that_would_decide(shown):
     assert "measurement that would decide: 16 configurations" in shown(
         needed="16 configurations"
     )
 
 
-def test_noise_is_said_where_it_scatters_more_or_time_correlates(shown):
+def test_noise_is_printed_only_if_large_or_correlated_in_time(shown):
     assert not any("scatter" in line or "correlated" in line for line in shown())
     large = {"findings": ["the residual is large"], "normalised": 1.0}
     assert "the residual is large" in shown(noise_scale=large)
@@ -125,7 +126,7 @@ def test_noise_is_said_where_it_scatters_more_or_time_correlates(shown):
     assert "35 % of its variance over 60 s" in line
 
 
-def test_what_is_left_and_what_to_measure_is_said_last(shown):
+def test_text_ends_with_residual_trends_and_the_next_measurement(shown):
     following = {
         "why": "a and b differ", "configuration": {"q.one": 0.5},
         "load": [0.0, 0, 0, 10.0, 0, 0], "covariates": {"temperature": 5.0},
@@ -144,8 +145,8 @@ def test_what_is_left_and_what_to_measure_is_said_last(shown):
     assert load_text((0.0,) * 6) == "none"
 
 
-def test_effects_and_functions_are_listed_with_their_numbers(shown):
-    """Geometry has lines of its own; a long formula is cut at 160 letters."""
+def test_text_lists_effects_and_functions_with_their_values(shown):
+    """Geometry has lines of its own; a long formula is cut at 160 characters."""
     number = {"name": "one", "value": 2e-5, "std": 1e-6, "unit": "rad"}
     effect = {"name": "encoder_offset", "probability": 0.98, "parameters": [number]}
     function = {
@@ -168,7 +169,7 @@ def test_effects_and_functions_are_listed_with_their_numbers(shown):
     ]
 
 
-def test_the_figures_of_a_diagnosis_name_the_three_likeliest():
+def test_summary_of_a_diagnosis_names_the_three_most_likely_effects():
     rows = type("Rows", (), {"name": "arm", "__len__": lambda self: 4})()
     error = SimpleNamespace(normalised=1.0)
     one = SimpleNamespace(

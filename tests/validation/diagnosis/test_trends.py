@@ -92,7 +92,7 @@ def by_least_squares(X, z):
     return 1 - squares[1] / squares[0], f.sf(ratio, extra, freedom)
 
 
-def test_every_trend_is_the_f_test_of_its_name(varied, monkeypatch):
+def test_probability_of_every_trend_equals_an_f_test(varied, monkeypatch):
     monkeypatch.setattr(module, "UNLIKELY", 2.0)
     monkeypatch.setattr(module, "_MOST", 100)
     found = trends(varied, conditions_of(varied), varied.measured * varied.sigma)
@@ -110,7 +110,7 @@ def test_every_trend_is_the_f_test_of_its_name(varied, monkeypatch):
     assert shares == sorted(shares, reverse=True)
 
 
-def test_six_trends_are_named_at_most(varied, rng):
+def test_at_most_six_trends_are_listed(varied, rng):
     noise = rng.normal(size=(ROWS, 6))
     lines = {f"c{k}": varied.covariates["humidity"] for k in range(9)}
     many = replace(varied, covariates=lines)
@@ -118,8 +118,8 @@ def test_six_trends_are_named_at_most(varied, rng):
     assert len(trends(many, conditions_of(many), rest)) == 6
 
 
-def test_quadratic_trend_is_seen_far_from_zero(rng):
-    """A megakelvin and up to one more, or half a second of time."""
+def test_quadratic_trend_is_found_far_from_zero(rng):
+    """Temperatures between 1e6 and 1e6 + 1, and times within half a second."""
     x = rng.uniform(0, 1, 40)
     hot = bar(rows=40, heat=1e6 + x)
     rest = ((x - 0.5) ** 2)[:, None] * hot.sigma

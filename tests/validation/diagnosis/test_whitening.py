@@ -1,4 +1,4 @@
-"""Whitening of noise that points of one measurement have in common."""
+"""Whitening of noise that is common to the points of one measurement."""
 
 from dataclasses import replace
 
@@ -39,7 +39,7 @@ def test_cells_are_independent_after_whitening(k):
     assert whiten.inverse(whiten(values)) == pytest.approx(values, rel=1e-10)
 
 
-def test_noise_in_common_of_size_zero_changes_nothing():
+def test_whitening_with_common_noise_of_zero_scales_only():
     root = np.random.default_rng(0).uniform(0.2, 2, 11)
     whiten = whitening(root, np.zeros((11, 6)), VISIT)
     values = np.arange(22.0).reshape(11, 2)
@@ -65,7 +65,7 @@ def two_points(rows=40):
     return replace(campaign, measured=measured)
 
 
-def test_motions_of_the_platform_are_about_the_points_centre():
+def test_platform_motions_rotate_about_the_centre_of_the_points():
     """A rotation of the platform moves each point by its arm, but not their mean."""
     campaign = two_points()
     motions = platform_motions(campaign, _reading(campaign))
@@ -88,13 +88,13 @@ def _reading(campaign):
     return np.stack(columns, axis=2)
 
 
-def test_one_point_in_every_row_has_no_noise_in_common():
+def test_single_point_per_row_has_no_common_noise():
     campaign = bar()
     assert platform_motions(campaign, np.zeros((8, 6, 6))) is None
     assert np.array_equal(size_of_noise(campaign), campaign.sigma)
 
 
-def test_a_residual_of_noise_in_common_is_independent_of_unit_variance():
+def test_whitened_residual_of_common_noise_is_independent_with_unit_variance():
     campaign = two_points(400)
     rng = np.random.default_rng(4)
     common = np.zeros((800, 6, 3))

@@ -87,11 +87,13 @@ def test_damaged_bag_is_refused_in_one_line(tmp_path):
         assert "\n" not in str(error.value)
 
 
-def test_missing_rosbags_names_the_package_to_install(tmp_path, monkeypatch):
+def test_bag_without_rosbags_is_refused_with_the_package_to_install(
+    tmp_path, monkeypatch
+):
     monkeypatch.setitem(__import__("sys").modules, "rosbags.highlevel", None)
     with pytest.raises(BadInput, match=r"install forcefit\[ros\], or export"):
         read_bag(tmp_path / "lab.bag")
 
 
-def test_overlong_name_is_no_bag():
+def test_overlong_name_is_not_taken_for_a_bag():
     assert not is_bag("x" * 300)

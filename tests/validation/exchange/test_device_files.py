@@ -176,8 +176,8 @@ def test_export_of_a_device_program_is_read_exactly(lab, run, name):
 
 
 @pytest.mark.parametrize("before", [None, "{k}", "{k}.5"])
-def test_rows_of_numbers_are_targets_in_their_order(lab, run, before):
-    """A counter or a time before them is recognised by the targets' distances."""
+def test_rows_without_names_are_assigned_to_targets_in_order(lab, run, before):
+    """A preceding counter or time is recognised by the distances between targets."""
     body = [row + ",35.1,-2.5,0.4" for row in rows(line=before)]
     assert imported(lab, run, "\n".join(body))["readings"] == 39
     assert_exact(lab, 39)
@@ -209,7 +209,7 @@ def test_motive_rigid_body_is_read_without_its_markers(lab, run):
     assert_exact(lab, 13)
 
 
-def test_unit_stated_in_the_file_and_another_declared_are_refused(lab, run):
+def test_declared_unit_that_contradicts_the_file_is_refused(lab, run):
     line = refused(lab, run, "Units: Inches\nname;x;y;z\nA;1;2;3")
     assert 'line 1: found the unit "in", the targets file says "mm"' in line
 
@@ -272,7 +272,7 @@ def test_reading_without_coordinates_is_missing_and_keeps_its_place(lab, run, no
     assert "p6" not in lab.table()["id"]
 
 
-def test_repeated_reading_is_named(lab, run):
+def test_repeated_reading_is_left_out_and_reported(lab, run):
     body = list(points(line=SPATIAL_ANALYZER))
     table = imported(lab, run, "\n".join([*body, body[4]]))
     assert table["readings"] == 39
@@ -280,7 +280,7 @@ def test_repeated_reading_is_named(lab, run):
     assert 'line 40 ("Main::p1::B"): the same reading twice' in line
 
 
-def test_surplus_reading_is_named(lab, run):
+def test_surplus_reading_is_refused_with_its_line(lab, run):
     """Joined by order, a repeated line shifts all later readings."""
     body = list(points("A", "{name} {x!r} {y!r} {z!r}"))
     lab.targets("A")
@@ -289,7 +289,7 @@ def test_surplus_reading_is_named(lab, run):
     assert line.endswith("; line 7 repeats line 6")
 
 
-def test_duplicates_in_the_commands_are_named(lab, run):
+def test_duplicate_commands_are_reported(lab, run):
     path = lab.folder / "commands.csv"
     text = path.read_text()
     path.write_text(text.replace("p5", "p3"))
@@ -331,8 +331,8 @@ def test_left_handed_coordinates_are_refused(lab, run, axis):
     (lambda p: p * [1, -1, 1], "where y is the device's -y"),
     (lambda p: p[[1, 0, 2]], "where x is the device's y, y is the device's x"),
 ])  # fmt: skip
-def test_axes_of_a_known_registration_are_named(lab, run, change, words):
-    """With known base axes the reversed one is named."""
+def test_reversed_axis_of_a_known_registration_is_reported(lab, run, change, words):
+    """The base axes are known."""
     lab.targets(registration='"known"')
 
     def base(k, name, p):
@@ -373,7 +373,7 @@ REMARKS = {
 
 
 @pytest.mark.parametrize("case", REMARKS)
-def test_readings_that_do_not_fit_targets_or_commands_are_remarked(lab, run, case):
+def test_readings_that_do_not_match_targets_or_commands_are_reported(lab, run, case):
     names, lines, remark = REMARKS[case]
     lab.targets(names)
     lab.export("\n".join(lines))
@@ -431,7 +431,7 @@ ORIENTATIONS = {
 
 @pytest.mark.filterwarnings("ignore:Gimbal")
 @pytest.mark.parametrize("kind", ORIENTATIONS)
-def test_orientations_become_rotations_of_the_platform(lab, run, kind):
+def test_target_orientations_become_rotations_of_the_platform(lab, run, kind):
     """The mount of the target is found from commanded poses."""
     head, values, keys = ORIENTATIONS[kind]
     lab.targets("A", noise_rotation=1e-4, **keys)
@@ -443,7 +443,7 @@ def test_orientations_become_rotations_of_the_platform(lab, run, kind):
     assert (campaign.sigma[:, :3] == 1e-4).all()
 
 
-def test_declared_mount_gives_the_rotations_themselves(lab, run, rng):
+def test_rotations_relative_to_a_declared_mount_are_unchanged(lab, run, rng):
     head, values, _ = ORIENTATIONS["quaternion"]
     lab.targets("A", noise_rotation=1e-4)
     with (lab.folder / "smr.toml").open("a") as file:
@@ -482,7 +482,7 @@ def test_orientations_without_stated_noise_are_ignored(lab, run):
 
 
 def test_orientation_of_one_target_is_that_of_the_platform(lab, run):
-    """Wide: A has a quaternion, B and C are points."""
+    """In a wide table A has a quaternion, B and C are points."""
     head = "A x,A y,A z,A qw,A qx,A qy,A qz,B x,B y,B z,C x,C y,C z"
     lab.targets(noise_rotation=1e-4)
     body = []
@@ -500,8 +500,8 @@ def test_orientation_of_one_target_is_that_of_the_platform(lab, run):
 # -- cells and clocks ---------------------------------------------------------------
 
 
-def test_delimiter_is_the_mark_of_most_lines(tmp_path):
-    """A preamble with other marks and quoted marks do not count."""
+def test_delimiter_is_the_one_of_most_lines(tmp_path):
+    """A preamble with other delimiters and quoted delimiters do not count."""
     path = tmp_path / "a.txt"
     path.write_text('a title, of a file\n"p, 1";2;3\n"p, 2";4;5\n"p, 3";6;7\n')
     cells = [cells for _, cells in read_sheet(path).rows]

@@ -88,8 +88,8 @@ def points(names="ABC", line="{name}", change=lambda k, name, p: p):
 SPATIAL_ANALYZER = "Main::p{k}::{name}, {x!r}, {y!r}, {z!r}"
 
 
-def test_spatial_analyzer_text_joined_by_name(lab, run):
-    """Exact readings: deviations are rounding, and the device frame is found."""
+def test_spatial_analyzer_text_is_joined_to_commands_by_name(lab, run):
+    """With exact readings deviations are rounding, and the device frame is found."""
     lab.export("// a comment\n" + "\n".join(points(line=SPATIAL_ANALYZER)))
     status, out, err = run(*lab.words(), "--json", "-")
     assert status == 0, err
@@ -109,7 +109,7 @@ def test_spatial_analyzer_text_joined_by_name(lab, run):
     assert 'robot = "../robot.toml"' in declared
 
 
-def test_import_diagnoses_a_device_file(lab, run):
+def test_import_with_diagnose_writes_a_report(lab, run):
     """Readings of the declared arm with noise."""
     noise = np.random.default_rng(1).normal(size=(len(ANGLES), 3))
     lab.export("\n".join(points(
@@ -129,7 +129,7 @@ def test_import_diagnoses_a_device_file(lab, run):
     assert report.stat().st_size < 5e6
 
 
-def test_a_german_table_with_times_and_uncertainty(lab, run):
+def test_german_table_with_times_and_uncertainty_is_read(lab, run):
     """Semicolons, decimal commas, dates with dots; U95 is two standard deviations."""
     lab.targets("A", unit=None, noise=None, decimal='","')
     lab.commands([f"22.11.2026 10:{k:02d}:00" for k in range(13)])
@@ -156,7 +156,7 @@ def test_a_german_table_with_times_and_uncertainty(lab, run):
     assert campaign.covariates["time"] == pytest.approx(60.0 * np.arange(13))
 
 
-def test_known_registration_gives_the_deviations_themselves(lab, run):
+def test_deviations_with_a_known_registration_are_unchanged(lab, run):
     lab.targets("B", registration='"known"', unit='"m"')
     lines = [
         "B\t{}\t{}\t{}".format(*(attained(a, TARGETS["B"]) + [1e-4, 2e-4, k * 1e-6]))
@@ -169,8 +169,8 @@ def test_known_registration_gives_the_deviations_themselves(lab, run):
     assert campaign.measured[:, 3:] == pytest.approx(np.array(expected), abs=1e-14)
 
 
-def test_exchanged_targets_and_blunders_are_named_and_left_out(lab, run, rng):
-    """At p3 A and B are taken for each other, at p7 C is 30 mm off."""
+def test_exchanged_targets_and_blunders_are_left_out_and_reported(lab, run, rng):
+    """At p3 the targets A and B are exchanged, at p7 C is 30 mm off."""
 
     def change(k, name, p):
         if k == 3 and name in "AB":
@@ -201,8 +201,8 @@ def test_targets_exchanged_in_every_row_are_refused(lab, run):
     assert not (lab.folder / "campaign").exists()
 
 
-def test_readings_joined_by_order_and_read_twice(lab, run):
-    """Two files with the same points; names without commands are joined by order."""
+def test_readings_are_joined_by_order_and_repeated_files_become_repeats(lab, run):
+    """Names without commands are joined by order; two files have the same points."""
     lab.export("\n".join(points(line="{name} {x!r} {y!r} {z!r}")))
     assert run(*lab.words())[0] == 0
     lab.folder.joinpath("campaign/measurements.csv").unlink()
@@ -261,7 +261,7 @@ def test_import_does_not_overwrite_a_campaign(lab, run):
     assert "expected a new folder" in err
 
 
-def test_points_on_the_ground_and_misnamed_readings_are_named(lab, run):
+def test_import_reports_ground_points_and_unmatched_names(lab, run):
     lines = list(points(line=SPATIAL_ANALYZER))
     lines[5] = lines[5].replace("p1", "pl")
     lab.export("\n".join(["Ground::nest1, 1, 2, 3", *lines]))
@@ -274,7 +274,7 @@ def test_points_on_the_ground_and_misnamed_readings_are_named(lab, run):
     assert "nest1" in ground
 
 
-def test_readings_far_from_any_command_are_named(lab, run):
+def test_readings_far_from_any_command_are_reported(lab, run):
     lab.targets("A", window=3)
     lab.commands(range(0, 130, 10))
     lines = [f"{line};{10 * k + 1 + 3 * (k == 5)}" for k, line in enumerate(
@@ -296,5 +296,5 @@ def test_readings_far_from_any_command_are_named(lab, run):
         ("2026-11-22T11:30:00+01:00", None), ("1795343400", None),
     ],
 )  # fmt: skip
-def test_times_are_read_as_they_are_written(text, dates):
+def test_times_of_every_notation_are_read(text, dates):
     assert parse_time("", text, Writing(dates=dates)) == 1795343400.0

@@ -1,4 +1,4 @@
-"""What a design can and cannot tell, said of designs made to be so."""
+"""Remarks of an inspection, for designs with a known weakness."""
 
 import json
 
@@ -111,12 +111,12 @@ SAYINGS = {
 
 
 @pytest.mark.parametrize("case", SAYINGS)
-def test_weakness_of_a_design_is_remarked(case, rng):
+def test_weakness_of_a_design_is_reported(case, rng):
     changes, sentence = SAYINGS[case]
     assert any(sentence in text for text in texts(sound(rng, **changes)))
 
 
-def test_sound_design_has_one_remark(rng):
+def test_design_without_weaknesses_has_one_remark(rng):
     """The only remark is that each configuration has one load."""
     found = [t for t in texts(sound(rng)) if " fine: " not in t]
     assert found == [
@@ -125,7 +125,7 @@ def test_sound_design_has_one_remark(rng):
     ]
 
 
-def test_noise_other_than_the_stated_sigma_is_remarked(rng):
+def test_noise_that_differs_from_the_stated_sigma_is_remarked(rng):
     noisy = sound(rng, measured=rng.normal(size=(60, 6)) * 2e-5)
     assert any("repeats careful: Repeats scatter 2.0" in t or "Repeats scatter 1.9" in t
                for t in texts(noisy))  # fmt: skip
@@ -155,7 +155,7 @@ def test_rounded_readings_are_remarked(rng):
 
 
 def test_deviations_of_implausible_size_are_remarked(rng):
-    """30 mm on a post of 1 m."""
+    """A deviation of 30 mm on a post of 1 m."""
     large = rng.uniform(-0.03, 0.03, (60, 6))
     assert any("is the unit m, and is" in t for t in texts(sound(rng, measured=large)))
 
@@ -195,7 +195,7 @@ def test_constant_temperature_does_not_separate_expansion_from_length(tmp_path, 
 
 
 def test_unknown_registration_absorbs_the_first_encoder_offset(tmp_path, rng):
-    """Turning the first joint about the base's z is what base.rz does."""
+    """Rotating the first joint about the base's z axis is equivalent to base.rz."""
     known = inspect_campaign(elastic_campaign(tmp_path / "a", rng)).separability
     i = known.names.index("encoder_offset")
     assert known.rank[i] == 2
@@ -207,8 +207,8 @@ def test_unknown_registration_absorbs_the_first_encoder_offset(tmp_path, rng):
     assert 0 < unknown.left[i] < 0.9 < known.left[i]
 
 
-def test_device_that_cannot_be_located_is_remarked(tmp_path):
-    """One angle in two rows."""
+def test_device_frame_that_cannot_be_determined_is_reported(tmp_path):
+    """Two rows measure a single angle."""
     rows = ["a,0.1,0.2,1e-5", "b,0.1,0.2,2e-5"]
     folder = write_campaign(tmp_path, "id,q.one,q.two,meas.rz", rows,
                             toml={"registration": '"unknown"'})  # fmt: skip
@@ -217,8 +217,9 @@ def test_device_that_cannot_be_located_is_remarked(tmp_path):
     assert "The registration cannot be found." in first.text
 
 
-def test_signature_is_the_derivative_by_hand(tmp_path, rng):
-    """The second encoder 1e-5 rad off: the tool turns about the elbow by so much."""
+def test_signature_of_an_encoder_offset_equals_hand_calculation(tmp_path, rng):
+    """An offset of the second encoder by 1e-5 rad turns the tool about the elbow by
+    that angle."""
     campaign = elastic_campaign(tmp_path, rng)
     found = design_signatures(campaign).columns["encoder_offset"]
     elbow, tool = (campaign.transforms[:, campaign.robot.index(n), :3, 3]
@@ -236,7 +237,8 @@ def test_signature_is_the_derivative_by_hand(tmp_path, rng):
 
 @pytest.mark.parametrize("registration", ["known", "unknown"])
 def test_expansion_does_not_enter_the_noise_estimate(registration, tmp_path, rng):
-    """12 sigma of expansion, in the axes of a device rotated by 2 rad, 5 m away."""
+    """12 sigma of expansion,
+    in the axes of a device that is rotated by 2 rad and 5 m away."""
     device = None
     if registration == "unknown":
         device = Rotation.from_rotvec([0.5, -1.2, 1.5]), np.array([3.0, -4.0, 1.0])

@@ -29,7 +29,7 @@ def test_criterion_of_two_unknowns_is_the_schur_complement():
     assert np.isnan(np.diag(apart)).all()
 
 
-def test_plan_writes_a_campaign_to_be_measured(tmp_path, run):
+def test_plan_writes_a_campaign_with_empty_readings(tmp_path, run):
     robot = tmp_path / "arm.toml"
     robot.write_text(ARM)
     folder, answer = tmp_path / "plan", tmp_path / "plan.json"

@@ -32,8 +32,9 @@ def inspections():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_noise_from_repeats_is_the_noise_that_was_drawn(name, inspections):
-    """The truth's is 1: chi-square's tails of 1/1000 each, six campaigns."""
+def test_noise_from_repeats_agrees_with_the_simulated_noise(name, inspections):
+    """The true ratio is 1;
+    the bounds are chi-square tails of 1/1000 each, for six campaigns."""
     noise = inspections[name].noise
     squares = noise.degrees * noise.ratio**2
     assert 1e-3 < chi2.cdf(squares, noise.degrees) < 1 - 1e-3
@@ -42,9 +43,9 @@ def test_noise_from_repeats_is_the_noise_that_was_drawn(name, inspections):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_signatures_have_the_angles_of_the_exact_program(name, inspections):
-    """To 4e-4, what finite motions and secants differ by; where the unknowns are the
-    same: contacts have another exponent there, moduli may be grouped."""
+def test_angles_between_signatures_agree_with_the_exact_program(name, inspections):
+    """To 4e-4, the difference between finite motions and secants, for effects with
+    equal unknowns: contacts have another exponent there, and moduli may be grouped."""
     hidden = {
         e["name"]: {p["name"]: p["value"] for p in e["parameters"]}
         for e in TRUTH[name]["effects"]
@@ -71,7 +72,7 @@ def test_signatures_have_the_angles_of_the_exact_program(name, inspections):
     assert compared >= 7 or not hidden
 
 
-def test_heat_at_a_constant_temperature_is_a_longer_link(inspections):
+def test_expansion_at_constant_temperature_is_equivalent_to_a_longer_link(inspections):
     classes = inspections["p06_confounded"].separability.classes()
     assert ("thermal_expansion", "delayed_expansion", "link_length") in classes
     for name in ("p02_self_weight", "p03_thermal_expansion"):

@@ -1,4 +1,4 @@
-"""Noise from repeats: textbook variances, drift kept out, outliers named."""
+"""Noise from repeats: textbook variances, removal of drift, outliers."""
 
 from dataclasses import replace
 
@@ -33,8 +33,8 @@ def test_noise_is_the_pooled_variance():
     np.testing.assert_allclose(noise.component_interval[3], [low, high])
 
 
-def test_missing_cell_lowers_only_its_component():
-    """Two rows, one of them without tx: five components repeat."""
+def test_missing_cell_reduces_only_the_freedom_of_its_component():
+    """One of two rows has no tx: five components repeat."""
     measured = np.zeros((2, 6))
     measured[1] = 2.0
     measured[0, 3] = np.nan
@@ -52,7 +52,8 @@ def test_rows_without_repeats_give_no_noise():
 
 
 def test_noise_equals_that_of_a_joint_least_squares_fit(rng):
-    """The same by a column for every set and a general solver, cells missing."""
+    """The reference has a column for every set and a general solver;
+    some cells are missing."""
     repeat = interleaved(rng, 40, 15)
     measured = rng.normal(size=(40, 6))
     measured[rng.random((40, 6)) < 0.2] = np.nan
@@ -74,8 +75,8 @@ def test_noise_equals_that_of_a_joint_least_squares_fit(rng):
     assert found.component_degrees.sum() == pytest.approx(found.degrees)
 
 
-def test_drift_does_not_enter_the_noise(rng):
-    """Settling of 20 sigma and 5 sigma a kelvin, repeats interleaved."""
+def test_drift_does_not_enter_the_noise_estimate(rng):
+    """Settling of 20 sigma and 5 sigma per kelvin, with interleaved repeats."""
     time = np.arange(120.0)
     temperature = 3 * np.sin(time / 17)
     drift = np.outer(1 - np.exp(-time / 25), [20, -20, 0, 10, 5, -10])
@@ -106,8 +107,9 @@ def test_intervals_cover_the_truth_at_the_stated_rate(rng):
     assert suspected / 400 <= 0.025
 
 
-def test_time_without_effect_is_reported_at_the_stated_rate(rng):
-    """Chances of noise alone are uniform: 5 % +- 3 standard deviations of 300."""
+def test_time_without_effect_is_reported_at_the_false_alarm_rate(rng):
+    """Probabilities for noise alone are uniform:
+    5 % +- 3 standard deviations of 300."""
     time = np.arange(60.0)
     below = 0
     for _ in range(300):
@@ -117,8 +119,8 @@ def test_time_without_effect_is_reported_at_the_stated_rate(rng):
     assert 0.012 <= below / 300 <= 0.088
 
 
-def test_outliers_are_named_and_left_out(rng):
-    """One in a set of three, one in a set of two: there it can be either row."""
+def test_outliers_among_repeats_are_reported_and_left_out(rng):
+    """One in a set of three, and one in a set of two, where it can be either row."""
     repeat = np.r_[np.repeat(np.arange(30), 3), [30, 30]]
     readings = rng.normal(size=(92, 6)) * SIGMA
     readings[4, 5] += 12 * SIGMA[5]
@@ -129,8 +131,8 @@ def test_outliers_are_named_and_left_out(rng):
     assert noise.interval[0] < 1 < noise.interval[1]
 
 
-def test_few_repeats_fit_no_slow_changes(rng):
-    """Three pairs tell 18 numbers, slow changes in time alone would take 24."""
+def test_slow_changes_are_not_fitted_to_few_repeats(rng):
+    """Three pairs have 18 readings; slow changes in time alone would need 24."""
     readings = rng.normal(size=(20, 6)) * SIGMA
     repeat = np.r_[np.arange(17), [0, 1, 2]]
     noise = repeat_noise(campaign_of(readings, SIGMA, repeat))
@@ -138,7 +140,7 @@ def test_few_repeats_fit_no_slow_changes(rng):
     assert noise.degrees == 18
 
 
-def test_constant_covariates_are_not_fitted():
+def test_constant_covariates_are_not_fitted_to_repeats():
     campaign = campaign_of(np.zeros((4, 6)), temperature=np.full(4, 6.0),
                            approach=np.array([1.0, -1, 1, 1]))  # fmt: skip
     assert set(slow_changes(campaign)) == {"time", "approach"}
@@ -160,8 +162,9 @@ def test_revisits_classify_the_order_of_repeats(rng):
     assert revisits(row, np.r_[np.zeros(59), 1]).order == "back to back"
 
 
-def test_points_read_at_once_are_one_visit():
-    """Twenty configurations, gone round three times, three points read at each."""
+def test_points_read_at_once_count_as_one_visit():
+    """Twenty configurations are visited three times,
+    with three points read at each visit."""
     ids = tuple(f"m{i}{end}" for i in range(60) for end in ("", ":left", ":right"))
     points = {"left": np.array([0, 0.1, 0]), "right": np.array([0, -0.1, 0])}
     configuration = np.repeat(np.tile(np.arange(20), 3), 3)
@@ -181,7 +184,7 @@ def test_points_read_at_once_are_one_visit():
 
 
 def test_revisits_use_time_instead_of_file_order(rng):
-    """Rows sorted by repeat in the file, measured in passes."""
+    """Rows are sorted by repeat in the file, and were measured in passes."""
     order = np.tile(np.arange(20), 3)
     sort = np.argsort(order, kind="stable")
     campaign = campaign_of(np.zeros((60, 6)), repeat=order[sort],

@@ -32,7 +32,7 @@ def in_pieces(posture, pieces):
     return replace(posture, robot=robot.with_links(links))
 
 
-def test_a_beam_with_a_mass_at_its_end_vibrates_as_geometrically_exact_elements():
+def test_frequencies_of_a_beam_with_a_tip_mass_agree_with_exudyns_beam_elements():
     """Bending in both planes, three modes each, the highest to 1e-4."""
     link = BeamLink({"width": 0.02, "height": 0.03}, 70e9, 0.3, 2700.0)
     tip = Frame("tip", translation=[1.0, 0, 0], link=link, mass=0.2,
@@ -44,7 +44,7 @@ def test_a_beam_with_a_mass_at_its_end_vibrates_as_geometrically_exact_elements(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["four_bar", "orthoglide"])
-def test_robots_vibrate_as_in_the_simulation(name):
+def test_frequencies_of_robots_agree_with_the_simulation(name):
     """Closed loops of beams and joint springs, six modes."""
     posture = home_posture(load_robot(name))
     ours = natural_modes(in_pieces(posture, 4), 6).frequencies

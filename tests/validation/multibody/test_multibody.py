@@ -42,7 +42,7 @@ def cantilever(link, length=0.5, **more):
     ("row", "stiffness"), [(0, G * 2 * SECOND / 0.8), (3, E * AREA / 0.8)]
 )
 def test_an_axial_or_twist_misfit_stores_half_g_squared_k(row, stiffness):
-    """E = g^2 EA / (2 (2 L)), and GJ for a twist: exact at any size of g."""
+    """E = g^2 EA / (2 (2 L)), with GJ for a twist: exact for any size of g."""
     error = np.zeros(6)
     error[row] = 1e-3
     assembly = simulate_assembly(coaxial(error))
@@ -78,8 +78,8 @@ def test_a_small_general_misfit_stores_the_series_energy(rng):
 
 @pytest.mark.parametrize("elements", [1, 2, 5])
 @pytest.mark.parametrize("theory", ["timoshenko", "euler"])
-def test_the_corrected_element_bends_exactly(elements, theory):
-    """P L^3 / 3EI + P L / GA for any number of elements; up is y: height 0.05 m."""
+def test_corrected_beam_element_bends_exactly(elements, theory):
+    """P L^3 / 3EI + P L / GA for any number of elements; up is y, the height 0.05 m."""
     L, P = 0.5, 1e-3
     posture = cantilever(replace(FLAT, theory=theory))
     along, across = 0.05**3 * 0.02 / 12, 0.02**3 * 0.05 / 12
@@ -94,7 +94,8 @@ def test_the_corrected_element_bends_exactly(elements, theory):
 
 
 def test_an_end_moment_bends_a_beam_to_an_arc():
-    """Curvature M/EI is constant, so the tip is at (sin a, 1 - cos a) L / a: a = 1."""
+    """The curvature M / EI is constant:
+    the tip is at (sin a, 1 - cos a) L / a, with a = 1."""
     L = 0.5
     moment = E * SECOND / L
     assembly = simulate_assembly(cantilever(ROUND), load=[0, 0, moment, 0, 0, 0])
@@ -103,7 +104,7 @@ def test_an_end_moment_bends_a_beam_to_an_arc():
 
 
 @pytest.mark.parametrize("kind", ["link", "joint_stiffness"])
-def test_a_full_stiffness_matrix_deforms_by_its_inverse(rng, kind):
+def test_body_with_a_full_stiffness_matrix_deforms_by_its_inverse(rng, kind):
     """screw = K^-1 w and E = w K^-1 w / 2, for a link and for a joint."""
     K = random_stiffness(rng)
     wrench = 1e-3 * rng.normal(size=6)  # turns by 4e-8 rad: linear to 1e-7
@@ -126,7 +127,7 @@ def test_a_full_stiffness_matrix_deforms_by_its_inverse(rng, kind):
 
 @pytest.mark.parametrize("links", ["beam", "spring"])
 @pytest.mark.parametrize("elements", [1, 3])
-def test_a_cantilever_sags_under_its_weight(links, elements):
+def test_sag_of_a_heavy_cantilever_equals_its_closed_form(links, elements):
     """q L^4 / 8EI + q L^2 / 2GA, for elements and for a 6 by 6 spring.
 
     Scaled down to 1e-4 m/s^2, where the sag is linear to 1e-9.
@@ -148,11 +149,9 @@ def test_a_cantilever_sags_under_its_weight(links, elements):
     assert assembly.platform_screw[4] == pytest.approx(-expected, rel=1e-6)
 
 
-def test_a_heavy_beam_converges_with_the_fourth_order():
-    """Between nodes weight acts as on a cubic; as moments that do not turn: order 2.
-
-    A steel wire of 1 m and 8 mm under 3 g turns by 0.05 rad.
-    """
+def test_deflection_of_a_heavy_beam_converges_with_the_fourth_order():
+    """Weight between nodes acts as on a cubic; with moments of constant direction the
+    order would be 2. A steel wire of 1 m and 8 mm under 3 g turns by 0.05 rad."""
     wire = BeamLink({"radius": 0.004}, 200e9, 0.3, density=7800.0)
     posture = home_posture(
         Robot("wire", "tip", (Frame("tip", translation=[1.0, 0, 0], link=wire),))
@@ -170,8 +169,8 @@ def test_a_heavy_beam_converges_with_the_fourth_order():
         assert np.log2(left[1] / left[2]) == pytest.approx(4, abs=0.1)
 
 
-def test_a_couple_of_dead_forces_does_the_work_of_its_sine():
-    """A spring of 2 N m/rad about z and a couple of 1: 2 angle = cos(angle)."""
+def test_couple_of_dead_forces_acts_with_the_cosine_of_the_angle():
+    """A spring of 2 N m/rad about z and a couple of 1 N m: 2 angle = cos(angle)."""
     frames = (
         Frame(
             "tip", translation=[0.3, 0, 0], rotation=[0.4, -0.3, 0.7], joint="revolute",
@@ -187,8 +186,8 @@ def test_a_couple_of_dead_forces_does_the_work_of_its_sine():
     assert 2 * turn == pytest.approx(np.cos(turn), rel=1e-9)
 
 
-def test_an_infinite_stiffness_locks_its_axis():
-    """A drive that is compliant only about z, by M / k."""
+def test_infinite_joint_stiffness_locks_its_axis():
+    """A drive that is compliant only about z turns by M / k."""
     K = np.diag([np.inf, np.inf, 2e3, np.inf, np.inf, np.inf])
     frames = (
         Frame(
@@ -206,7 +205,8 @@ def test_an_infinite_stiffness_locks_its_axis():
 
 @pytest.mark.parametrize("clearance", [None, Clearance(radial=1e-5)])
 def test_bearing_turns_freely_and_is_elastic_otherwise(clearance):
-    """A bar from a bearing to a wall that is askew by up to 3e-3 rad and 0.2 mm.
+    """A bar between a bearing and a wall that is misaligned by up to 3e-3 rad and 0.2
+    mm.
 
     Finite rotations change 1e-3 of it, contacts yield 1e-3 of their size.
     """
@@ -236,8 +236,9 @@ def test_bearing_turns_freely_and_is_elastic_otherwise(clearance):
     assert assembly.clearance_screws[0][2] == pytest.approx(turned, rel=1e-3)
 
 
-def test_a_serial_chain_composes_its_errors_exactly():
-    """Placement, error, own motion, frame by frame; errors of 0.3 rad, not small."""
+def test_serial_chain_composes_its_errors_exactly():
+    """Placement, error and own motion, frame by frame;
+    the errors of 0.3 rad are not small."""
     error = np.array([0.3, -0.2, 0.1, 0.01, 0.02, -0.03])
     frames = (
         Frame("turn", translation=[0, 0, 1], rotation=[0.2, 0, 0], joint="revolute",
@@ -263,7 +264,7 @@ def test_a_serial_chain_composes_its_errors_exactly():
         np.testing.assert_allclose(T, expected.as_matrix(), rtol=0, atol=1e-14)
 
 
-def test_a_four_bar_with_a_long_coupler_closes_as_trigonometry_says():
+def test_four_bar_with_a_long_coupler_closes_at_the_intersection_of_two_circles():
     """Rigid bars, free pins: crank 1 at 90 deg, coupler 2 + 0.02, rocker 2, base 2.
 
     The rocker's end is where circles about (0, 1) and (2, 0) meet.

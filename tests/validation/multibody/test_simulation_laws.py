@@ -1,4 +1,4 @@
-"""Laws of the simulation: equilibrium, axes, failures, motion, memory, relaxation."""
+"""Properties of the simulation: equilibrium, axes, failures, memory, relaxation."""
 
 import math
 from dataclasses import replace
@@ -51,8 +51,9 @@ def overconstrained(rng, errors):
     return home_posture(Robot("table", "leg0.tip", tuple(legs), tuple(closures)))
 
 
-def test_every_spring_carries_what_its_closures_say(rng):
-    """Statics on the deformed table: a wrench is the sum of the closures' beyond it."""
+def test_wrench_of_every_spring_balances_the_closures_beyond_it(rng):
+    """Statics at the deformed pose:
+    a wrench is the sum of the closure wrenches beyond it."""
     posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     load = np.array([3.0, -2.0, 5.0, 40.0, 30.0, -100.0])
     assembly = simulate_assembly(posture, load=load)
@@ -76,8 +77,8 @@ def test_every_spring_carries_what_its_closures_say(rng):
             )
 
 
-def test_turning_the_whole_robot_turns_its_answer(rng):
-    """Objectivity: the ground's orientation is nothing physical."""
+def test_turning_the_whole_robot_turns_its_results(rng):
+    """Objectivity: results do not depend on the orientation of the ground."""
     errors = rng.uniform(-2e-3, 2e-3, (3, 6))
     posture = overconstrained(rng, errors)
     turn = np.array([1.0, -2.0, 1.5])
@@ -98,8 +99,8 @@ def test_turning_the_whole_robot_turns_its_answer(rng):
     np.testing.assert_allclose(screw, placed.platform_screw, rtol=0, atol=1e-10)
 
 
-def test_spring_links_are_beam_links_to_first_order(rng):
-    """Their difference is of second order: a tenth of the errors, a hundredth of it."""
+def test_spring_links_agree_with_beam_links_to_first_order(rng):
+    """At a tenth of the errors, the difference is a hundredth."""
     errors = rng.uniform(-2e-3, 2e-3, (3, 6))
     posture = overconstrained(rng, errors)
     K = {
@@ -117,7 +118,7 @@ def test_spring_links_are_beam_links_to_first_order(rng):
     assert slope > 1.8
 
 
-def test_repeats_are_bit_identical(rng):
+def test_repeated_simulations_are_bit_identical(rng):
     posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     first, second = simulate_assembly(posture), simulate_assembly(posture)
     assert np.array_equal(first.platform_screw, second.platform_screw)
@@ -125,7 +126,7 @@ def test_repeats_are_bit_identical(rng):
     assert first.energy == second.energy
 
 
-def test_rigid_parts_that_do_not_fit_are_a_named_failure():
+def test_simulation_fails_with_the_robots_name_if_rigid_parts_do_not_fit():
     frames = (
         Frame("a", translation=[1, 0, 0]),
         Frame("b", translation=[1, 0, 0], geometric_error=[0, 0, 0, 1e-4, 0, 0]),
@@ -138,7 +139,7 @@ def test_rigid_parts_that_do_not_fit_are_a_named_failure():
     assert error.value.robot == "block"
 
 
-def test_a_load_that_nothing_resists_is_a_named_failure():
+def test_simulation_fails_for_a_load_that_nothing_resists():
     """A free pin under 10 N m."""
     frames = (Frame("pin", joint="revolute"), Frame("tip", "pin"))
     posture = home_posture(Robot("pendulum", "tip", frames))
@@ -165,8 +166,8 @@ def test_without_clearance_keeps_passive_joints_free():
     assert without_clearance(robot).frames[0].passive
 
 
-def test_the_logarithm_undoes_the_exponential(rng):
-    """Also at the angle 1e-3, where the series takes over."""
+def test_logarithm_inverts_the_exponential_map(rng):
+    """Also near the angle 1e-3, below which the series is used."""
     for size in (0.0, 1e-9, 0.999e-3, 1.001e-3, 0.1, 3.0):
         direction = rng.normal(size=3)
         turn = size * direction / np.linalg.norm(direction)
@@ -206,7 +207,8 @@ def resident():
 
 @pytest.mark.slow
 def test_repeated_simulations_do_not_leak_memory(rng):
-    """Resident memory after the first fifty, in MiB; a leaked model is half of one."""
+    """Resident memory in MiB after the first fifty simulations;
+    a leaked model takes half a MiB."""
     posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     for _ in range(50):
         simulate_assembly(posture)
@@ -260,8 +262,8 @@ def relax(model, start, _steps):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["coaxial beams", "table on three legs", "irsbot2"])
-def test_dynamic_relaxation_comes_to_rest_at_the_same_place(case, rng, monkeypatch):
-    """Another solver of the same model: time steps until nothing moves any more."""
+def test_dynamic_relaxation_reaches_the_same_equilibrium(case, rng, monkeypatch):
+    """Another solver of the same model: time steps until all parts are at rest."""
     if case == "irsbot2":
         robot = load_robot("irsbot2")
         errors = np.zeros((len(robot.frames), 6))

@@ -42,7 +42,7 @@ def test_tangent_without_load_is_the_nominal_compliance(name, links):
 
 @pytest.mark.parametrize("share", [-0.8, 0.5, 0.9])
 def test_loaded_bar_on_a_torsion_spring_has_stiffness_k_minus_force(share):
-    """A rigid bar of 1 m, pulled or pushed: 1 / C_yy = k - F."""
+    """A rigid bar of 1 m in tension or compression: 1 / C_yy = k - F."""
     k = 50.0
     link = MatrixLink(np.diag([1e9, 1e9, k, 1e9, 1e9, 1e9]))
     frames = (Frame("foot", link=link), Frame("tip", "foot", [1.0, 0, 0]))
@@ -57,7 +57,7 @@ def test_loaded_bar_on_a_torsion_spring_has_stiffness_k_minus_force(share):
 
 @pytest.mark.parametrize("size", [1e-3, 0.05, 0.3])
 def test_wrench_of_a_bent_spring_is_the_gradient_of_its_energy(size):
-    """On both of its ends, along six twists of the far one."""
+    """At both ends, along six twists of the far end."""
     rng = np.random.default_rng(3)
     B = rng.normal(size=(6, 6))
     K = B @ B.T + np.eye(6)
@@ -79,8 +79,9 @@ def test_wrench_of_a_bent_spring_is_the_gradient_of_its_energy(size):
     np.testing.assert_allclose(far, near, atol=1e-14 * np.abs(near).max())
 
 
-def test_spring_bent_by_half_a_radian_has_the_stiffness_of_its_energy():
-    """Its shift across the turn times the force is a couple that Exudyn leaves out."""
+def test_tangent_of_a_spring_bent_by_half_a_radian_follows_from_its_energy():
+    """The force times the spring's shift across the rotation is a couple,
+    which Exudyn omits."""
     K = np.diag([40.0, 50.0, 60.0, 300.0, 400.0, 500.0])
     frames = (
         Frame("foot", translation=[0.5, 0, 0], link=MatrixLink(K)),
@@ -114,8 +115,9 @@ def soft_four_bar():
     return home_posture(robot.with_errors(errors))
 
 
-def test_the_weak_springs_of_free_joints_do_not_move_the_robot(monkeypatch):
-    """Joints turn by radians, and springs of 1e-4 N m/rad would bend it elsewhere."""
+def test_weak_springs_of_free_joints_do_not_change_the_tangent(monkeypatch):
+    """Joints turn by radians,
+    and springs of 1e-4 N m/rad would bend the robot elsewhere."""
     weak = (Regularisation(1e8, 1e-4),)
     monkeypatch.setattr(tangent, "_REGULARISATIONS", weak)
     posture = soft_four_bar()
@@ -139,7 +141,7 @@ def loaded_orthoglide(share):
 
 
 def test_a_closure_of_finite_stiffness_keeps_its_wrench():
-    """It deforms by a millimetre under 1e5 N."""
+    """The closure deforms by a millimetre under 1e5 N."""
     equilibrium, load = loaded_orthoglide(0.5)
     posture = equilibrium.posture
     model = link_models(posture.robot, "spring")
@@ -167,7 +169,7 @@ def test_smaller_load_steps_lead_to_the_stable_equilibrium(monkeypatch):
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-3, 1.0, 3.0, 3.14159265])
-def test_turn_of_recovers_a_rotation_vector(angle):
+def test_rotation_vector_is_recovered_from_its_matrix(angle):
     for axis in np.vstack([np.eye(3), [[0.6, -0.8, 0.0], [-1 / 3, 2 / 3, 2 / 3]]]):
         R = turned(angle * axis)
         np.testing.assert_allclose(turn_of(R), angle * axis, rtol=1e-7, atol=1e-15)

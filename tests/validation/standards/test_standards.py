@@ -19,7 +19,7 @@ from validation.standards.iso9283 import (
 )
 
 
-def test_pose_accuracy_and_repeatability_worked_by_hand():
+def test_pose_accuracy_and_repeatability_equal_hand_calculation():
     """Barycentre (3, 4, 0): AP = 5; l = 1, 1, 2, 2: mean 1.5, S = sqrt(1/3)."""
     d = np.array([[4, 4, 0], [2, 4, 0], [3, 6, 0], [3, 2, 0]], dtype=float)
     assert position_accuracy(d) == pytest.approx(5.0, rel=1e-15)
@@ -27,15 +27,15 @@ def test_pose_accuracy_and_repeatability_worked_by_hand():
     assert position_repeatability(d) == pytest.approx(expected, rel=1e-14)
 
 
-def test_orientation_figures_worked_by_hand():
+def test_orientation_accuracy_and_repeatability_equal_hand_calculation():
     angles = np.array([[1, 0, 5], [3, 0, 5], [5, 3, 5]], dtype=float)
     assert orientation_accuracy(angles) == pytest.approx([3, 1, 5], rel=1e-15)
     expected = [3 * 2, 3 * np.sqrt(3), 0]
     assert orientation_repeatability(angles) == pytest.approx(expected, rel=1e-14)
 
 
-def test_distance_accuracy_worked_by_hand():
-    """Distances 5, 7, 6 for 5.5 asked: AD = 0.5, S = 1."""
+def test_distance_accuracy_equals_hand_calculation():
+    """Distances 5, 7, 6 for a commanded distance of 5.5: AD = 0.5, S = 1."""
     first = np.zeros((3, 3))
     second = [[3, 4, 0], [0, 0, 7], [6, 0, 0]]
     accuracy, repeatability = distance_accuracy(first, second, 5.5)
@@ -50,7 +50,7 @@ def test_drift_is_the_largest_change_from_the_first_block():
     assert accuracy_drift(d[:19]) is None
 
 
-def test_reversal_and_repeatability_worked_by_hand():
+def test_reversal_and_repeatability_of_an_axis_equal_hand_calculation():
     """Two positions, three approaches a side; s = 1 and 2 up, 1 and 0 down.
 
     Means up 1, 4; down 0, 6.  B_i = 1, -2: B = 2, mean -0.5.  R up = 4 x 2, down 4 x 1;
@@ -76,8 +76,9 @@ def campaign(tmp_path, rows):
     return write_campaign(tmp_path / "lab", head=HEAD, rows=rows)
 
 
-def test_iso_command_computes_the_standards_figures(run, tmp_path):
-    """The arm of 1 m and 0.8 m, stretched along x and along y: 1.8 sqrt(2) m apart."""
+def test_iso_command_reports_the_figures_of_the_standards(run, tmp_path):
+    """The arm of 1 m and 0.8 m, stretched along x and along y:
+    poses 1.8 sqrt(2) m apart."""
     quarter = repr(np.pi / 2)
     rows = [
         f"{name}{k}{side},{angle},0,{x + side * 1e-5 + k * 1e-6},0,0,{t},{side}"
@@ -119,7 +120,7 @@ def test_iso_command_refuses_a_campaign_without_repeats(run, tmp_path):
 
 
 def test_repeatability_does_not_depend_on_the_device_frame(tmp_path, rng):
-    """A law: turned and shifted readings have the same RP and distances."""
+    """Rotated and shifted readings have the same RP and distances."""
     d = rng.normal(size=(30, 3))
     Q = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     assert position_repeatability(d @ Q + 5) == pytest.approx(position_repeatability(d))
@@ -139,7 +140,7 @@ TWO_POSES = [("a", "0"), ("b", repr(np.pi / 2))]
 
 
 def test_distance_accuracy_pairs_poses_of_one_load_only(tmp_path):
-    """A load moves both poses by 1 mm alike: every distance is the one commanded."""
+    """A load moves both poses by 1 mm: every distance is the commanded one."""
     rows = [
         f"{name}{fx}{k},{angle},0,{0.001 * (fx > 0)},0,0,{fx}"
         for name, angle in TWO_POSES for fx in (0, 100) for k in range(2)
@@ -150,7 +151,7 @@ def test_distance_accuracy_pairs_poses_of_one_load_only(tmp_path):
 
 
 def test_distance_accuracy_pairs_poses_of_one_session_only(tmp_path):
-    """On Tuesday the device stood 2 m elsewhere."""
+    """In the second session the device is 2 m elsewhere."""
     rows = [
         f"{name}{day}{k},{day},{angle},0,{shift},0,0"
         for name, angle in TWO_POSES
@@ -165,7 +166,8 @@ def test_distance_accuracy_pairs_poses_of_one_session_only(tmp_path):
 
 
 def test_positioning_of_an_axis_is_separate_for_each_load(tmp_path):
-    """A deflection of 1 mm under a load is no deviation along the axis: E = 20 um."""
+    """A deflection of 1 mm under a load is not a deviation along the axis:
+    E = 20 um."""
     rows = [
         f"{name}{fx}{side}{k},{angle},0,{1e-5 * (fx + side)},0,0,{side},{fx}"
         for name, angle in TWO_POSES

@@ -23,7 +23,8 @@ def chain(*parts):
 
 
 def test_governing_rows_are_bounds_without_one_imperfection():
-    """Along x errors 3 and -1, along z clearances 4: sqrt(2^2 + 4^2) of 0.1 mm."""
+    """Errors 3 and -1 along x and clearances 4 along z:
+    sqrt(2^2 + 4^2) times 0.1 mm."""
     rows = governing(chain((3e-4, None), (-1e-4, None), (0.0, 4e-4)))
     seen = [(one["part"], one["what"], one["translation"]) for one in rows]
     expected = [
@@ -38,7 +39,7 @@ def test_governing_rows_are_bounds_without_one_imperfection():
     assert [one["rotation"] for one in rows] == pytest.approx([0.0] * 3, abs=1e-12)
 
 
-def test_own_motion_of_a_joint_is_not_a_clearance():
+def test_governing_rows_exclude_the_own_motion_of_a_joint():
     posture = chain((0.0, None), (1e-4, None))
     first, second = posture.robot.frames
     hinge = replace(first, joint="revolute", clearance=Clearance(spin=0.1))

@@ -1,4 +1,4 @@
-"""A study's robot at work: load, stiffness, frequencies; maps of many axes."""
+"""Study of a robot in service: load, stiffness, frequencies, maps over several axes."""
 
 import json
 from dataclasses import replace
@@ -28,8 +28,8 @@ def study_of(folder, text):
     return results, parse((folder / "out" / "report.html").read_text())
 
 
-def test_two_springs_side_by_side_give_by_the_load_over_their_sum(tmp_path):
-    """400 N on 1e6 and 3e6 N/m: 0.1 mm; the errors' own 0.05 mm stay apart."""
+def test_deflection_of_parallel_springs_is_the_load_over_their_sum(tmp_path):
+    """400 N on 1e6 and 3e6 N/m: 0.1 mm, separate from the 0.05 mm of the errors."""
     write_robot(coaxial_beams(np.zeros(6), (1e6, 3e6)), tmp_path / "beams.toml")
     text = (
         'robot = "beams.toml"\n[errors.explicit]\ntwo = [0, 0, 0, 2e-4, 0, 0]\n'
@@ -50,7 +50,7 @@ def test_two_springs_side_by_side_give_by_the_load_over_their_sum(tmp_path):
     assert table["service"]["load"] == [0, 0, 0, 400, 0, 0]
 
 
-def test_a_load_that_nothing_carries_does_not_pass(tmp_path):
+def test_study_with_a_load_that_nothing_carries_does_not_pass(tmp_path):
     """The platform of a single free pin turns under a moment about it."""
     (tmp_path / "pin.toml").write_text(
         'platform = "tip"\n[[frame]]\nname = "pin"\nparent = "base"\n'
@@ -81,7 +81,7 @@ def five_bar(tmp_path_factory):
 
 
 def test_deflection_over_the_grid_is_compliance_times_load(five_bar):
-    """C w of K_C, whose method shares nothing with the equilibrium under load."""
+    """K_C^-1 w, by a method independent of the equilibrium under load."""
     robot, _, results, _ = five_bar
     for tx, ty in ((-0.02, 0.13), (0.02, 0.14)):
         posture = ff.place_robot(robot, {"tx": tx, "ty": ty})
@@ -92,7 +92,7 @@ def test_deflection_over_the_grid_is_compliance_times_load(five_bar):
         )
 
 
-def test_maps_at_work_are_layers_rows_and_variables_of_the_file(five_bar):
+def test_service_maps_on_the_page_equal_those_in_the_file(five_bar):
     _, folder, results, page = five_bar
     (drawn,) = (one for one in page.figures if "layers" in one)
     layers = {one["key"]: np.array(one["values"], float) for one in drawn["layers"]}
@@ -107,7 +107,7 @@ def test_maps_at_work_are_layers_rows_and_variables_of_the_file(five_bar):
     assert results_table(results)["maps"]["stiffness.FX"][2] == along.max()
 
 
-def test_frequencies_at_the_pose_are_those_of_the_grid_there(tmp_path):
+def test_frequencies_at_the_pose_equal_closed_form_and_grid(tmp_path):
     """k / m: a mass of 4 kg on 1e6 and 3e6 N/m, along each axis."""
     robot = coaxial_beams(np.zeros(6), (1e6, 3e6))
     write_robot(robot, tmp_path / "beams.toml")
@@ -124,7 +124,7 @@ def test_frequencies_at_the_pose_are_those_of_the_grid_there(tmp_path):
     assert page.table("mode")[1][1].value == pytest.approx(expected, rel=1e-6)
 
 
-def test_a_grid_of_three_axes_is_drawn_where_its_largest_error_is(tmp_path):
+def test_grid_of_three_axes_is_drawn_at_its_largest_error(tmp_path):
     text = (
         'robot = "orthoglide"\n'
         'grid = "tx=-0.05:0.05:0.05,ty=-0.05:0.05:0.05,tz=-0.05:0.05:0.1"\n'
@@ -164,8 +164,8 @@ def test_wrong_service_keys_are_refused_in_one_line(tmp_path, line, message):
     assert str(path) in str(error.value)
 
 
-def test_shares_in_the_chart_add_up(tmp_path):
-    """Of all twelve parts of a hexapod, not of the eight largest."""
+def test_shares_of_all_parts_in_the_chart_add_up_to_100_per_cent(tmp_path):
+    """All twelve parts of a hexapod, not only the eight largest."""
     _, page = study_of(tmp_path, 'robot = "hexapod"\n')
     rows = page.table("part", "rx")[1:]
     for column in range(1, 7):
@@ -174,7 +174,7 @@ def test_shares_in_the_chart_add_up(tmp_path):
         assert total == pytest.approx(100.0, abs=0.05 * len(rows))
 
 
-def test_parts_beyond_the_largest_are_one_row_of_others():
+def test_parts_beyond_the_largest_are_summed_in_one_row():
     shares = {f"part {k}": [0.5**k] * 6 for k in range(1, 30)}
     rows = largest_rows(shares)
     assert list(rows)[-1] == "17 others"

@@ -1,4 +1,4 @@
-"""Study files, the folder a study writes, and every message of a bad one."""
+"""Study files, the folder that a study writes, and the messages for wrong files."""
 
 import html
 import json
@@ -55,7 +55,7 @@ def results(tmp_path_factory):
 
 
 @pytest.mark.exudyn
-def test_study_agrees_with_the_reference(results):
+def test_study_agrees_with_the_reference_numbers(results):
     outcome, _, steps = results
     point = NUMBERS["cases"][0]["points"][0]
     assert outcome.solution["energy"] == pytest.approx(point["energy"], rel=1e-10)
@@ -71,13 +71,13 @@ def test_study_agrees_with_the_reference(results):
 
 
 @pytest.mark.exudyn
-def test_results_show_themselves_on_a_few_lines(results):
+def test_repr_of_study_results_is_short(results):
     outcome, _, _ = results
     assert all(len(repr(thing)) < 1500 for thing in (outcome, outcome.crosscheck))
 
 
 @pytest.mark.exudyn
-def test_the_folder_holds_a_self_contained_report_and_results(results):
+def test_study_folder_has_a_self_contained_report_and_results(results):
     outcome, folder, _ = results
     names = {p.name for p in folder.iterdir()}
     assert names == {"report.html", "results.json", "results.nc"}
@@ -103,7 +103,7 @@ def test_the_folder_holds_a_self_contained_report_and_results(results):
 
 
 @pytest.mark.exudyn
-def test_the_figures_on_the_page_are_the_results(results):
+def test_numbers_on_the_study_page_equal_the_results(results):
     outcome, folder, _ = results
     seen = parse((folder / "report.html").read_text())
     table = json.loads((folder / "results.json").read_text())
@@ -138,7 +138,7 @@ def test_the_figures_on_the_page_are_the_results(results):
 
 
 @pytest.mark.exudyn
-def test_the_page_names_things_in_words(results):
+def test_study_page_shows_words_instead_of_keys(results):
     _, folder, _ = results
     seen = parse((folder / "report.html").read_text())
     shown = " ".join(c.text for table in seen.tables for row in table for c in row)
@@ -148,7 +148,7 @@ def test_the_page_names_things_in_words(results):
     )
 
 
-def test_a_study_of_a_robot_file_with_explicit_errors(tmp_path):
+def test_study_of_explicit_errors_has_the_energy_by_hand(tmp_path):
     write_robot(coaxial_beams(np.zeros(6)), tmp_path / "beams.toml")
     text = (
         'robot = "beams.toml"\n[errors.explicit]\ntwo = [0, 0, 0, 2e-4, 0, 0]\n'
@@ -167,7 +167,7 @@ def test_a_study_of_a_robot_file_with_explicit_errors(tmp_path):
 ODD = "$l_1 <b>&amp; \\$"
 
 
-def test_a_report_shows_a_links_name_as_it_is_written(tmp_path):
+def test_study_report_shows_an_unusual_link_name_unchanged(tmp_path):
     robot = coaxial_beams(np.zeros(6))
     write_robot(robot, tmp_path / "beams.toml")
     text = (tmp_path / "beams.toml").read_text().replace('"two"', f"'{ODD}'")
@@ -193,10 +193,10 @@ QUIET = "[checks]\npicture = false\n"
         for name in BUILT_IN
     ],
 )
-def test_a_study_of_a_robot_without_errors_says_that_nothing_was_checked(
+def test_study_of_a_robot_without_errors_reports_that_nothing_was_checked(
     tmp_path, name
 ):
-    """Every built-in robot."""
+    """For every built-in robot."""
     text = f'robot = "{name}"\nscales = [1.0, 0.5]\n{QUIET}'
     if name == "irsbot2":
         text += "[pose]\ntx = 0.0\ntz = -0.5\n"
@@ -224,7 +224,7 @@ most = [1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4]
 
 
 @pytest.mark.exudyn
-def test_a_study_of_a_just_constrained_robot_says_what_could_not_be_checked(tmp_path):
+def test_study_of_a_just_constrained_robot_reports_the_unchecked_parts(tmp_path):
     """Its errors store no energy: only the simulation can check it."""
     text = JUST_CONSTRAINED + QUIET
     results = run_study(read_study(study_file(tmp_path, text)))
@@ -243,7 +243,7 @@ def test_a_study_of_a_just_constrained_robot_says_what_could_not_be_checked(tmp_
     assert not results.passed
 
 
-def test_a_map_without_a_point_in_reach_does_not_pass(tmp_path):
+def test_study_whose_map_has_no_reachable_point_does_not_pass(tmp_path):
     text = SMALL.replace("tz=-0.5:-0.4:0.1", "tz=-5:-4:0.5") + QUIET
     text += "crosscheck = false\n"
     results = run_study(read_study(study_file(tmp_path, text), tmp_path / "out"))
@@ -254,7 +254,7 @@ def test_a_map_without_a_point_in_reach_does_not_pass(tmp_path):
     assert "No point has an answer" in (tmp_path / "out" / "report.html").read_text()
 
 
-def test_a_reference_without_an_answer_does_not_pass(tmp_path, monkeypatch):
+def test_study_whose_reference_has_no_answer_does_not_pass(tmp_path, monkeypatch):
     import assembly.linear.reference.as_printed
 
     def lost(*_):
@@ -270,7 +270,8 @@ def test_a_reference_without_an_answer_does_not_pass(tmp_path, monkeypatch):
 
 
 def test_headline_is_the_worst_clearance_over_the_map(tmp_path):
-    """At a pose the bound of ``assembly error``, over the map the largest of these."""
+    """At a pose it is the bound of ``assembly error``,
+    over the map the largest of these bounds."""
     text = 'robot = "five_bar"\ngrid = "tx=-0.01:0.01:0.01,ty=0.15"\n'
     text += QUIET + "crosscheck = false\nreference = false\n"
     text += "[pose]\ntx = 0.0\nty = 0.15\n"
@@ -296,7 +297,7 @@ def test_headline_is_the_worst_clearance_over_the_map(tmp_path):
     assert "largest translation, eq. (27), over all clearances" in page
 
 
-def test_a_manipulator_that_cannot_be_assembled_is_reported_not_raised(tmp_path):
+def test_study_reports_a_manipulator_that_cannot_be_assembled(tmp_path):
     from assembly.model.robot import Frame, Robot
 
     frames = (Frame("a"), Frame("b", geometric_error=[0, 0, 0, 1e-3, 0, 0]))
@@ -348,14 +349,14 @@ def test_wrong_study_file_is_refused_in_one_line(tmp_path, old, new, message):
     assert [p.name for p in tmp_path.iterdir()] == ["study.toml"]
 
 
-def test_an_output_that_is_a_file_is_refused_before_the_work(tmp_path):
+def test_study_output_that_is_a_file_is_refused_before_computation(tmp_path):
     (tmp_path / "taken").write_text("mine")
     path = study_file(tmp_path, SMALL)
     with pytest.raises(BadInput, match="found a file, expected a folder or nothing"):
         read_study(path, tmp_path / "taken")
 
 
-def test_a_pose_out_of_reach_is_refused_before_the_work(tmp_path):
+def test_study_pose_out_of_reach_is_refused_before_computation(tmp_path):
     path = study_file(tmp_path, SMALL.replace("tz = -0.5", "tz = -0.9"))
     seen = []
     with pytest.raises(BadInput, match="cannot be reached"):
@@ -365,7 +366,7 @@ def test_a_pose_out_of_reach_is_refused_before_the_work(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.exudyn
-def test_the_example_runs_with_finite_elements(tmp_path):
+def test_example_study_with_finite_elements_has_the_converged_stiffness(tmp_path):
     """K_RX of the solid cylinder by finite elements is 1 032 277 N m/rad, converged;
     its beam, without shear, 1 067 585.
     """

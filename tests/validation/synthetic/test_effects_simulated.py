@@ -102,7 +102,7 @@ def test_every_effect_of_the_library_is_tested():
 def test_effect_adds_the_deviation_of_a_machine_that_has_it(
     name, program, robot, machine
 ):
-    """With finite motions to 30 nm or nrad, of up to 500 um and urad.
+    """Deviations up to 500 um and urad agree with finite motions to 30 nm and nrad.
 
     What is left is how screws of 1e-4 compound (1e-8), and the beams' own bending.
     A beam built longer is also softer, which the effect does not say: no load there.

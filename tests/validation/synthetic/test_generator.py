@@ -73,7 +73,7 @@ def test_perfect_robot_without_load_has_no_deviation(point):
 
 
 def test_declared_error_is_read_exactly():
-    """A turn by e about the drive's axis: the tip goes to L (cos, sin)(q + e)."""
+    """A rotation by e about the drive's axis moves the tip to L (cos, sin)(q + e)."""
     q, e = 0.3, 0.02
     contribution = simulate_readings(
         one_link(error=np.array([0, 0, e, 0, 0, 0])), np.zeros(3), [row(q)]
@@ -83,8 +83,8 @@ def test_declared_error_is_read_exactly():
 
 
 @pytest.mark.parametrize("g", [9.81, 3.0])
-def test_weight_bends_a_beam_with_a_body_at_its_end(added, g):
-    """w L^4/8EI + w L^2/2kGA of the beam, m g L^3/3EI + m g L/kGA of the body.
+def test_deflection_of_a_heavy_beam_with_a_tip_mass_equals_its_closed_form(added, g):
+    """w L^4/8EI + w L^2/2kGA for the beam, m g L^3/3EI + m g L/kGA for the body.
 
     A bent beam is also shorter, by less than s^2/L = 2.4e-8 m: second order.
     """
@@ -100,30 +100,33 @@ def test_weight_bends_a_beam_with_a_body_at_its_end(added, g):
     ("name", "parameter", "longer"),
     [("thermal_expansion", 2e-5, 2e-5 * 5 * L), ("link_length", 3e-4, 3e-4)],
 )
-def test_a_beam_is_longer_along_itself(added, name, parameter, longer):
-    """Alpha T L of a warm beam, exact."""
+def test_longer_or_warmer_beam_moves_the_tip_along_the_beam(
+    added, name, parameter, longer
+):
+    """alpha T L for a warm beam, exact."""
     q = 0.7
     contribution = added(name, {"tip": parameter}, row(q))
     close(contribution, longer * np.array([0, 0, 0, np.cos(q), np.sin(q), 0]), 1e-9)
 
 
-def test_a_longer_beam_also_bends_more(added):
-    """P (L + d)^3 / 3EI + P (L + d) / kGA beside the same with d = 0, across."""
+def test_deflection_of_a_longer_beam_equals_its_closed_form(added):
+    """P (L + d)^3 / 3EI + P (L + d) / kGA minus the same with d = 0,
+    across the beam."""
     P, d = 1.0, 1e-2
     contribution = added("link_length", {"tip": d}, row(load=(0, 0, 0, 0, 0, -P)))
     more = ((L + d) ** 3 - L**3) / (3 * E * SECOND) + d / SHEAR
     assert contribution[5] == pytest.approx(-P * more, rel=1e-4)
 
 
-def test_an_elastic_drive_turns_under_the_moment_it_holds(added):
-    """F L / k, beside the declared spring and not instead of it."""
+def test_elastic_drive_turns_by_moment_over_stiffness(added):
+    """F L / k, in addition to the declared spring."""
     F, k = 10.0, 5e4
     contribution = added("drive_compliance", {"drive": k}, row(load=(0, 0, 0, 0, F, 0)))
     close(contribution[[2, 4]], [F * L / k, F * L**2 / k], 1e-4)
 
 
-def test_a_foundation_shifts_and_tilts(added):
-    """A force F along y at (L, 0, 0): F/k_t along y, F L / k_r about z."""
+def test_base_compliance_shifts_and_tilts_the_tip(added):
+    """A force F along y at (L, 0, 0): F / k_t along y, F L / k_r about z."""
     F = 10.0
     springs = {"rx": 1e6, "ry": 1e6, "rz": 2e5, "tx": 1e8, "ty": 4e6, "tz": 1e8}
     given = {f"stiffness.{k}": v for k, v in springs.items()}
@@ -132,7 +135,7 @@ def test_a_foundation_shifts_and_tilts(added):
 
 
 @pytest.mark.parametrize("name", ["offset", "eccentricity", "wobble"])
-def test_an_encoder_that_reads_wrong_turns_the_beam(added, name):
+def test_encoder_error_turns_the_beam_by_that_angle(added, name):
     """Exact: the tip is at L (cos, sin)(q + d)."""
     q, size, phase = 0.6, 2e-3, 0.9
     given = {"drive.amplitude": size, "drive.phase": phase}
@@ -147,8 +150,8 @@ def test_an_encoder_that_reads_wrong_turns_the_beam(added, name):
     close(contribution, [0, 0, d, L * dx, L * dy, 0], 1e-9)
 
 
-def test_registration_moves_measuring_frame_and_target(added):
-    """Exact: B R and B (p + R tool); a turn by b about z, then a shift."""
+def test_registration_moves_device_frame_and_target(added):
+    """Exact: B R and B (p + R tool); a rotation by b about z, then a shift."""
     q, b, shift, tool = 0.5, 0.01, [1e-3, -2e-3, 3e-3], [2e-3, 0, 1e-3]
     given = {"base.rz": b, "base.tx": shift[0], "base.ty": shift[1]}
     given |= {"base.tz": shift[2], "tool.tx": tool[0], "tool.tz": tool[2]}
@@ -159,7 +162,7 @@ def test_registration_moves_measuring_frame_and_target(added):
     close(contribution, [0, 0, b, x, y, shift[2] + tool[2]], 1e-12)
 
 
-def test_a_softer_beam_bends_more(added):
+def test_deflection_of_a_softer_beam_equals_its_closed_form(added):
     """(1/f - 1) (P L^3/3EI + P L/kGA): G falls with E."""
     P, f = 1.0, 0.8
     contribution = added("modulus_scale", {"tip": f}, row(load=(0, 0, 0, 0, 0, P)))
@@ -177,13 +180,13 @@ def test_load_shifts_a_joint_by_its_clearance(added, side):
     close(contribution, [0, 0, 0, 3e-5 * side, 0, 0], 2e-3, 1e-8)
 
 
-def test_clearance_without_load_moves_nothing(added):
+def test_clearance_without_load_has_no_deviation(added):
     clearance = {"drive.radial": 3e-5, "drive.axial": 1e-5, "drive.tilt": 1e-4}
     assert np.abs(added("joint_clearance", clearance, row())).max() < 1e-9
 
 
 @pytest.mark.parametrize("approach", [1.0, -1.0])
-def test_friction_holds_an_elastic_joint_back(added, approach):
+def test_friction_turns_an_elastic_joint_against_its_approach(added, approach):
     """- tau x approach / k about the joint's axis."""
     tau = 0.5
     contribution = added("friction_hysteresis", {"drive": tau}, row(approach=approach))
@@ -193,7 +196,7 @@ def test_friction_holds_an_elastic_joint_back(added, approach):
 @pytest.mark.parametrize("exponent", [1.5, 1.0, 2.0])
 @pytest.mark.parametrize("force", [10.0, -0.1])
 def test_contact_deforms_by_its_power_law(added, exponent, force):
-    """F L = c d^n beside all else that yields."""
+    """F L = c d^n, in addition to all other compliances."""
     c = 2e7
     given = {"drive.coefficient": c, "drive.exponent": exponent}
     contribution = added("contact_stiffening", given, row(load=(0, 0, 0, 0, force, 0)))
@@ -201,7 +204,7 @@ def test_contact_deforms_by_its_power_law(added, exponent, force):
     close(contribution[[2, 4]], [d, d * L], 1e-4)
 
 
-def test_load_gain_and_offset_bend_the_beam(added):
+def test_load_gain_and_offset_deflect_the_beam_by_the_extra_force(added):
     """((f - 1) P + offset) (L^3/3EI + L/kGA)."""
     P, f, more = 2.0, 1.1, 0.3
     given = {"factor": f, "offset.fz": more}
@@ -218,7 +221,7 @@ def test_drift_rises_exponentially(added):
 
 @pytest.mark.parametrize("program", ["multibody", "springs"])
 def test_geometric_stiffening_adds_the_finite_rotation(program):
-    """A turn by e: L (cos e - 1) along the beam, L (sin e - e) across."""
+    """For a rotation by e: L (cos e - 1) along the beam, L (sin e - e) across."""
     e = 0.02
     robot = one_link(error=np.array([0, 0, e, 0, 0, 0]))
     design = CampaignDesign(configurations=2, rows=2, load=0.0)
@@ -234,7 +237,8 @@ def test_geometric_stiffening_adds_the_finite_rotation(program):
 
 
 def test_effects_outside_the_library_follow_their_formulas(added):
-    """A drive's softness (1 + cos 3q)/2, swelling, T^2, a stand, a sagging target."""
+    """A drive's compliance times (1 + cos 3q) / 2, swelling,
+    T^2, a stand, a sagging target."""
     q, F = 0.3, 10.0
     pushed = row(q, load=(0, 0, 0, -F * math.sin(q), F * math.cos(q), 0))
     turn = F * L / 1e5 * (1 + math.cos(3 * q)) / 2
@@ -266,7 +270,7 @@ def two_walls():
     return Robot("walls", "a", frames, (("a", "b"),))
 
 
-def test_closed_loop_shares_a_misfit_by_stiffness(added):
+def test_closed_loop_divides_a_misfit_by_stiffness(added):
     """Equal springs: half of a length, of an offset, of a strain; F / (k1 + k2)."""
     robot = two_walls()
     rest = {f.name: 0.0 for f in robot.frames}

@@ -1,4 +1,4 @@
-"""Synthetic campaigns as a whole: plans, strengths, files, truths, rivals, command."""
+"""Synthetic campaigns: plans, strengths, files, truths, equivalent effects, command."""
 
 import csv
 import json
@@ -64,8 +64,9 @@ def quick(wanted, robot=None, **given):
     return generate_campaign(robot, wanted, design, program="springs", **given)
 
 
-def test_a_plan_is_interleaved_with_repeats_and_rests():
-    """Each pass visits every configuration once; some loads come again, some are 0."""
+def test_plan_interleaves_configurations_with_repeats_and_zero_loads():
+    """Each pass visits every configuration once;
+    some loads are repeated, some are 0."""
     plan = plan_campaign(two_axes(), SMALL, np.random.default_rng(0))
     passes = plan.configuration.reshape(5, 8)
     assert all(sorted(p) == list(range(8)) for p in passes.tolist())
@@ -79,7 +80,7 @@ def test_a_plan_is_interleaved_with_repeats_and_rests():
 
 
 @pytest.mark.parametrize("name", [*LIBRARY, *OUTSIDE])
-def test_every_effect_reaches_its_strength(name):
+def test_every_simulated_effect_has_the_requested_strength(name):
     design = varied_for(SMALL, [name])
     robot = sliding() if name in SLIDING else two_axes()
     campaign = quick({name: 5.0}, robot, design=design, seed=4)
@@ -87,8 +88,9 @@ def test_every_effect_reaches_its_strength(name):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_effect_that_the_loads_do_not_show_is_drawn_again(seed):
-    """Forces at a point on the wrist's axis do not twist it: another drive is soft."""
+def test_effect_that_the_loads_do_not_excite_is_drawn_again(seed):
+    """Forces at a point on the wrist's axis do not twist it:
+    another drive gets the compliance."""
     arm = two_axes()
     wrist = Frame("j3", "tool", joint="revolute", actuated=True, joint_stiffness=SPRING)
     robot = Robot("wristed", "j3", (*arm.frames, wrist))
@@ -100,8 +102,9 @@ def test_effect_that_the_loads_do_not_show_is_drawn_again(seed):
     assert set(campaign.effects[0].parameters) & {"j1", "j2"}
 
 
-def test_noise_has_the_requested_standard_deviation():
-    """240 x 6 readings: their rms is 1 within 3/sqrt(2 x 1440) = 0.06 at 3 sigma."""
+def test_simulated_noise_has_the_requested_standard_deviation():
+    """240 x 6 readings:
+    their rms is 1 within 3 / sqrt(2 x 1440) = 0.06, three standard deviations."""
     design = replace(SMALL, rows=240)
     campaign = quick({}, design=design, noise=Noise(3e-5, 2e-6), seed=2)
     noise = (campaign.readings - campaign.exact) / np.repeat([3e-5, 2e-6], 3)
@@ -109,7 +112,7 @@ def test_noise_has_the_requested_standard_deviation():
     assert np.abs(campaign.added).max() == 0.0
 
 
-def test_two_effects_add_up_to_first_order():
+def test_contributions_of_two_effects_add_up_to_first_order():
     both = quick({"encoder_offset": 5.0, "thermal_expansion": 5.0}, seed=3)
     alone = sum(
         quick([(effect, both.strength[effect.name])], seed=3).added
@@ -120,8 +123,8 @@ def test_two_effects_add_up_to_first_order():
 
 @pytest.mark.exudyn
 @pytest.mark.parametrize("name", ["3rrr", "hexapod", "arm6"])
-def test_multibody_and_springs_give_the_same_readings(name):
-    """Beams and springs differ by what a beam's own bending adds: second order."""
+def test_multibody_and_spring_programs_give_the_same_readings(name):
+    """Beams and springs differ by the beam's own bending, which is of second order."""
     rng = np.random.default_rng(5)
     robot = without_clearance(load_robot(name))
     robot = robot.with_errors(5e-5 * rng.uniform(-1, 1, (len(robot.frames), 6)))
@@ -137,8 +140,9 @@ def test_multibody_and_springs_give_the_same_readings(name):
 
 
 @pytest.mark.parametrize("name", ["3rrr", "hexapod", "arm6"])
-def test_springs_and_the_exact_equilibrium_agree_at_any_size(name):
-    """Two programs, one model: finite motions, a load that goes with its point."""
+def test_spring_program_and_exact_equilibrium_agree_for_large_errors(name):
+    """Two programs of one model:
+    finite motions, and a load that moves with its point."""
     rng = np.random.default_rng(6)
     robot = without_clearance(load_robot(name))
     robot = robot.with_errors(2e-3 * rng.uniform(-1, 1, (len(robot.frames), 6)))
@@ -221,10 +225,11 @@ def test_truth_has_the_keys_of_the_practice_campaigns():
 
 @pytest.mark.parametrize("name", sorted(TRUTH))
 def test_committed_campaigns_agree_with_their_truth(name):
-    """Made by the multibody simulation, explained by springs: the noise is left.
+    """The multibody simulation made them,
+    and springs explain them down to the noise.
 
-    Its rms is the truth's within 1e-3, and without the hidden effects it is the one
-    before within 1e-3 of it.
+    The rms of the noise is the truth's within 1e-3.  Without the hidden effects the rms
+    is the truth's error before, also within 1e-3.
     """
     truth, campaign = TRUTH[name], read_campaign(CAMPAIGNS / name)
     names = [frame.name for frame in campaign.robot.frames]
@@ -253,7 +258,7 @@ def left(campaign):
     return {one.names[0]: one.residual for one in alternatives(campaign)}
 
 
-def test_a_warm_link_is_a_long_one_only_while_the_temperature_stays():
+def test_expansion_is_equivalent_to_length_only_at_constant_temperature():
     hidden = [(Hidden("thermal_expansion", {"tool": 2e-5}), 5.0)]
     steady = left(quick(hidden, design=replace(SMALL, temperature="constant")))
     assert steady["thermal_expansion"] < 0.1
@@ -263,7 +268,7 @@ def test_a_warm_link_is_a_long_one_only_while_the_temperature_stays():
     assert swinging["link_length"] > 100
 
 
-def test_softer_links_are_a_larger_load_if_nothing_else_yields():
+def test_softer_links_are_equivalent_to_a_larger_load_only_with_rigid_joints():
     rigid = left(quick({"load_gain": 5.0}, two_axes(spring=None), seed=2))
     assert rigid["modulus_scale"] < 0.1
     elastic = left(quick({"load_gain": 5.0}, seed=2))
@@ -280,7 +285,7 @@ QUICK = ("self_weight", "drive_compliance", "encoder_offset", "registration",
     [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow)
      for name in LIBRARY if name not in ("joint_clearance", "geometric_stiffening")],
 )  # fmt: skip
-def test_hidden_effect_is_its_own_best_alternative(name):
+def test_simulated_effect_is_its_own_best_alternative(name):
     design = varied_for(SMALL, [name])
     readings = alternatives(quick({name: 5.0}, design=design, seed=6))
     own = min(one.residual for one in readings if one.names[0].startswith(name))
@@ -309,7 +314,8 @@ def test_effect_that_the_robot_cannot_have_is_refused():
 
 
 def test_strengthened_effects_keep_shape_parameters():
-    """Springs softer, errors larger; phases, exponents and time constants stay."""
+    """Springs become softer and errors larger;
+    phases, exponents and time constants stay."""
     given = {"a.coefficient": 1e6, "a.exponent": 1.5}
     stronger = strengthened(Hidden("contact_stiffening", given), 4.0).parameters
     assert stronger == {"a.coefficient": 1e6 / 8, "a.exponent": 1.5}
