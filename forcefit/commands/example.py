@@ -125,7 +125,9 @@ def example(
     for path in absent:
         (output / path).parent.mkdir(parents=True, exist_ok=True)
         write_bytes((root / path).read_bytes(), output / path)
-    print(f"{len(absent)} files written to {output.resolve()}; begin there with")
+    print(
+        f"{len(absent)} files written to {output.resolve()}; start in that folder with"
+    )
     for name in names:
         print(f"  {EXAMPLES[name].first}")
 
@@ -156,7 +158,8 @@ def _is_absent(target: Path, source: Path) -> bool:
         return True
     if not target.is_file() or target.read_bytes() != source.read_bytes():
         raise BadInput(
-            f"{target}: found another content than the example's; expected the same, "
-            "or nothing there: it is not overwritten"
+            f"{target}: found a file with other content than the example's; expected "
+            "the same content or no file: it is not overwritten, choose another "
+            "folder"
         )
     return False

@@ -173,7 +173,10 @@ def check_new_folder(folder: Path | str) -> None:
     folder = Path(folder)
     check_writable(folder.parent / f"{folder.name}.new")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise BadInput(f"{folder}: found something there, expected a new folder")
+        raise BadInput(
+            f"{folder}: found a file or a folder that is not empty, expected a new "
+            "folder"
+        )
 
 
 @contextmanager

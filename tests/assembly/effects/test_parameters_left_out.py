@@ -131,6 +131,6 @@ def test_covariates_that_functions_need(form, variables, needed):
 def test_finite_motions_belong_to_the_exact_model():
     robot = replace(arm(K), effects={"geometric_stiffening": {}})
     check_covariates(robot, {}, finite=True)
-    with pytest.raises(BadInput, match="asks for finite motions"):
+    with pytest.raises(BadInput, match="is defined for finite motions only"):
         check_covariates(robot, {})
     check_covariates(arm(K), {})

@@ -173,4 +173,4 @@ def test_bad_input_is_one_line_and_exit_2(
 def test_a_robot_without_errors_has_none_to_judge(run):
     status, _, err = run("assembly", "tolerances", "four_bar", "--grid", "tx=0.2")
     assert status == 2
-    assert "no errors to judge" in err
+    assert "found no geometric_error of a frame" in err

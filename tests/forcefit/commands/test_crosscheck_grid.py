@@ -95,7 +95,7 @@ def test_the_command_takes_a_grid(tmp_path, capsys, monkeypatch):
     with pytest.raises(SystemExit) as done:
         command.main()
     assert done.value.code == 2
-    assert "--grid: not together with" in capsys.readouterr().err
+    assert "--grid: found together with" in capsys.readouterr().err
 
 
 def test_a_pose_where_nothing_is_compared_is_not_passed():

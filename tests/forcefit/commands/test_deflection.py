@@ -60,7 +60,7 @@ def test_a_followed_path_turns_by_itself(run):
         "--back",
     )  # fmt: skip
     assert status == 2
-    assert "--follow: not with --back" in err
+    assert "--follow: found together with --back" in err
 
 
 @pytest.mark.parametrize(

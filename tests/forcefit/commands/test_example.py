@@ -66,7 +66,7 @@ def test_written_again_nothing_changes_and_another_content_is_kept(run, tmp_path
     mine.write_text("mine")
     status, out, err = run("example", "campaign", "irsbot2", "-o", tmp_path)
     assert (status, out, err.count("\n")) == (2, "", 1)
-    assert f"{mine}: found another content" in err
+    assert f"{mine}: found a file with other content" in err
     assert files_of(tmp_path) == before
 
 

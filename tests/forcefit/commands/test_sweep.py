@@ -88,7 +88,7 @@ def test_a_saved_sweep_is_drawn_without_solving(run, tmp_path, monkeypatch):
     [
         (["sweep", "five_bar", "-o", "x.nc"], "expected --grid or --poses"),
         (["sweep", "five_bar", "--grid", "tx=0", "-o", "x.nc", "--workers", "2",
-          "--scheduler", "tcp://h:1"], "found --workers and --scheduler, expected one"),
+          "--scheduler", "tcp://h:1"], "found both --workers and --scheduler"),
         (["sweep", "five_bar", "--poses", "no.csv", "-o", "x.nc"],
          "no.csv: cannot be read: No such file"),
         (["sweep", "five_bar", "--grid", "tx=0", "--vary", "left.elbow.young=1",

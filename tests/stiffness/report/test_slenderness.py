@@ -131,7 +131,7 @@ def test_without_poissons_ratio_tension_has_no_ends():
         (["--section", "radius=1,rdius=2"], 'unknown "rdius"; did you mean "radius"'),
         (
             ["--section", "radius=1", "--radius", "1"],
-            "found with --radius, expected one",
+            "found together with --radius",
         ),
         (["--section", "width=1"], "--section: found width, expected one of"),
     ],
@@ -248,7 +248,7 @@ def test_a_curve_file_that_is_none_is_refused(tmp_path, change, message):
 def test_a_surface_goes_with_a_curve_or_a_section_not_both(tmp_path):
     path = curve_file(tmp_path, L_BRACKET)
     command = ["compare", "x.stl", "--base", "z=0", "--tip", "x=0.15", *MATERIAL]
-    with pytest.raises(BadInput, match="--curve: its file has the sections"):
+    with pytest.raises(BadInput, match="--curve: found together with options"):
         CliRunner().invoke(
             app,
             [*command, "--curve", str(path), "--radius", "0.1"],

@@ -152,7 +152,7 @@ def test_validity_over_poses_reports_median_and_largest(run, tmp_path):
 
 @pytest.mark.parametrize(("words", "message"), [
     (["--grid", "tx=0", "--pose", "tx=0"], "expected one of --pose or --joint"),
-    (["--figure", "a.png"], "--figure: expected --solids too"),
+    (["--figure", "a.png"], "--figure: found without --solids"),
     (["--grid", "qx=0"], "unknown pose component"),
 ])  # fmt: skip
 def test_options_that_exclude_each_other_are_refused(run, words, message):
