@@ -16,7 +16,7 @@ from assembly.kinematics.singular_posture import is_singular
 from assembly.model.robot import Robot
 from assembly.model.statuses import BEYOND_LIMITS, BEYOND_SINGULARITY, SINGULAR
 
-SINGULAR_WORDS = "singular posture: first order decides nothing"
+SINGULAR_WORDS = "singular posture: the first-order analysis is inconclusive"
 _FAR_SIDE = "not connected to home without passing a singularity"
 _ROUNDING = 1e-8  # [rad, reference lengths] accepted excess over a limit
 

@@ -229,7 +229,7 @@ def test_links_that_are_not_solved_leave_the_files_alone(folder):
         ("length0.3", "length0.4", r'"wrist"\.link\.library: .*no entry'),
         ('"elbow"\nparent = "crank"\ntranslation = [0.3, 0, 0]',
          '"elbow"\nparent = "crank"\ntranslation = [0.31, 0, 0]',
-         r'"elbow"\.link\.mesh: the tip interface.s centre lies at'),
+         r'"elbow"\.link\.mesh: the centre of the mesh.s tip interface'),
     ],
 )  # fmt: skip
 def test_a_file_of_a_link_that_is_not_usable_is_refused(

@@ -133,7 +133,7 @@ def test_a_rigid_linkage_cannot_take_up_errors_out_of_its_plane(row, size):
 
 def test_clearance_is_refused():
     robot = coaxial_beams(np.zeros(6), clearance=Clearance(radial=1e-5))
-    with pytest.raises(ValueError, match="has clearance, which is not linear"):
+    with pytest.raises(ValueError, match="found a clearance, expected a robot without"):
         flexibility(at_home(robot))
 
 

@@ -187,4 +187,4 @@ def test_the_contact_length_is_named_with_the_pose_errors(contact_length):
     assert summary["contact_length"] == data.attrs["contact_length"] == length
     text = summary_text(summary)
     assert f"moments / {length:g} m, contact length" in text
-    assert "the load of service (--load)" in text
+    assert "the service load (--load)" in text

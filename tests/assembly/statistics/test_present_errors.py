@@ -140,4 +140,4 @@ def test_postures_that_may_not_be_used_are_left_out_and_counted():
     )
     assert [round(p.pose()["tx"], 6) for p in postures] == [-0.02, 0.02]
     assert left_out == {"singular": 1}
-    assert "first order decides nothing" in left_out_text(left_out)
+    assert "the first-order analysis is inconclusive" in left_out_text(left_out)

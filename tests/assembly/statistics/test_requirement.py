@@ -70,8 +70,8 @@ def test_a_limit_within_the_clearance_of_perfect_parts_is_refused(
         requirement.perfect_parts()
     assert str(error.value) == (
         "limit translation: even perfect parts reach 0.0001 m by clearances alone at "
-        "tx = 0.4; expected at most 9e-05 m (or --clearance least, if clearances stay "
-        "as solved)"
+        "tx = 0.4; expected at most 9e-05 m; tighten the clearances, loosen the limit, "
+        "or use --clearance least"
     )
 
 
@@ -104,6 +104,7 @@ def test_an_error_that_nothing_takes_up_is_named(limit, places, named):
     with pytest.raises(BadInput) as error:
         requirement.check_taken_up()
     assert str(error.value) == (
-        f"limit {limit}: no clearance or spring takes up an error {named}; leave "
-        "it out, or limit the energy of a robot that is elastic there"
+        f"limit {limit}: found an error {named} that no clearance or spring can "
+        "close; leave this error out, or limit the energy of a robot with a spring "
+        "there"
     )

@@ -35,7 +35,7 @@ def drawn_sweep(grid):
 def test_a_worker_with_another_question_refuses_it():
     """As when a mesh differs there: its content is in the hash."""
     question = drawn_sweep("tx=0,ty=0.13").question
-    with pytest.raises(BadInput, match="a worker reads another robot"):
+    with pytest.raises(BadInput, match="found another robot on a worker"):
         solve_task(pickle.dumps(question), "0" * 64, [])
 
 

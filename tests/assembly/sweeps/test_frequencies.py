@@ -30,7 +30,7 @@ def test_each_point_has_the_frequencies_of_its_posture_and_design():
     ("robot", "count", "message"),
     [
         ("delta", 0, "--frequencies: found 0, expected 1 to 100"),
-        ("irsbot2", 2, "found no mass that moves"),
+        ("irsbot2", 2, "found no moving mass"),
     ],
 )
 def test_robots_without_frequencies_are_refused(robot, count, message):

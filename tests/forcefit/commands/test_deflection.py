@@ -48,7 +48,7 @@ def test_a_path_is_followed_past_its_limit_point(run, tmp_path):
     answer = json.loads(out)
     assert status == 0
     first, second = answer["events"]
-    assert first["what"].startswith("limit point, the load turns: platform along")
+    assert first["what"].startswith("limit point, an extremum of the load: platform")
     assert first["load"] == pytest.approx(-second["load"], rel=1e-6)
     assert min(answer["deflection"]) < -0.2
     assert picture.stat().st_size > 1000

@@ -25,7 +25,7 @@ def test_a_robot_without_mass_is_bad_input(run):
     status, out, err = run("assembly", "frequencies", "irsbot2")
     assert status == 2
     assert out == ""
-    assert 'irsbot2: found no mass that moves; expected "density"' in err
+    assert 'irsbot2: found no moving mass; expected "density"' in err
 
 
 def test_frequencies_without_exact_say_that_gravity_is_left_out(run, tmp_path):
