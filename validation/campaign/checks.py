@@ -21,7 +21,7 @@ _WARMEST = 250.0
 _LATEST = 3e8  # [s] ten years; larger is a date
 _ROOM = 1000.0  # [m] largest distance of a measuring device
 _FINEST = 1e-15  # [rad, m] finer than any device
-_UNITS = "; if it is in other units say so in [units] of campaign.toml"
+_UNITS = "; declare other units in [units] of campaign.toml"
 
 
 def check_commands(table: MeasurementTable, robot: Robot) -> None:
@@ -110,7 +110,8 @@ def check_readings(table: MeasurementTable, point: str, sigma: NDArray,
         ]:
             key = "rotation" if k < 3 else "position"
             message = (
-                f"no sigma; expected a cell here or [noise] {key} in campaign.toml"
+                "found no standard deviation; expected one in this cell or "
+                f"[noise] {key} in campaign.toml"
             )
             raise table.bad(int(i), f"sigma{at}.{name}", message)
         unit, largest = ("rad", np.pi) if k < 3 else ("m", extent)

@@ -122,7 +122,7 @@ def test_beam_refuses_with_the_options_name(options, message):
         (["--part", "solid=/young=1e9,poisson=0.3"], "--part: found 'solid=/young"),
         (
             ["--part", "solid=end/young=1e9,poisson=0.3"],
-            'found a material of solid "end", expected a STEP file of several solids',
+            'found a material of solid "end", expected a STEP file whose solids',
         ),
         (["--mass", "1.5"], "--mass: found '1.5', expected"),
         (["--mass", "-1/0,0,0"], "--mass: found -1"),

@@ -85,7 +85,7 @@ def test_a_surface_is_an_entry_with_its_files_digest_and_error(bar_stl, tmp_path
     assert np.abs(scaled(inverted(compliance) - entry.stiffness, beam)).max() < 1e-12
     row = next(csv.DictReader(io.StringIO(library_csv([entry]))))
     assert (row["key"], float(row["young"])) == ("bar", 6e10)
-    with pytest.raises(BadInput, match="only entries of surfaces, expected a grid"):
+    with pytest.raises(BadInput, match="only entries of single surfaces, expected"):
         look_up([entry], {"young": 6e10})
 
 

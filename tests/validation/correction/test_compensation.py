@@ -199,5 +199,5 @@ def test_a_correction_larger_than_the_robot_is_refused(off, tmp_path, run):
     assert float(row["q.carriage"]) == 0.3
     ((label, reason),) = [one.values() for one in told]
     assert label == "a"
-    assert "larger than the robot" in reason
+    assert "the robot's size" in reason
     assert reason in text

@@ -164,5 +164,5 @@ def test_each_session_has_a_device_of_its_own():
     left = campaign.measured - predict(found).deviation
     assert np.abs(left[:, 3:]).max() < 1e-9
     unknown = replace(campaign, session=np.array(["a"] * 8))
-    with pytest.raises(BadInput, match='session "b" has no row'):
+    with pytest.raises(BadInput, match='no usable row in session "b"'):
         register(unknown, conditions_of(campaign))
