@@ -208,8 +208,8 @@ def _built_in(conversion: Conversion) -> tuple[Conversion, RobotAndMechanism]:
         placed = replace(placed, mechanism=replace(mechanism, joints=joints))
     if after >= 1e-6:
         left_out.append(
-            f"loops stay open by {after:.2g} rad or m with the calibrated geometry: "
-            "rigid bodies cannot close them, forced assembly does"
+            f"with the calibrated geometry the loops stay open by {after:.2g} "
+            "rad or m: rigid bodies cannot close them, forced assembly can"
         )
     positions = dict(zip((f.name for f in robot.frames), home, strict=True))
     frames = (replace(f, position=float(positions[f.name])) for f in robot.frames)

@@ -107,9 +107,9 @@ def posture_remarks(posture: Posture) -> list[str]:
     home = home_posture(robot)
     if home_is_singular(robot) and np.abs(q - home.coordinates).max() > _ROUNDING:
         remarks.append(
-            "home is a singular posture, where operation modes meet; this one is "
-            f"{_mode(home, posture)} (give the other components of the pose for "
-            "another)"
+            "home is a singular posture, where operation modes meet; this "
+            f"posture belongs to {_mode(home, posture)} (specify the other "
+            "components of the pose to select another mode)"
         )
     if passed := limits_passed(robot, q):
         remarks.append(f"beyond the limits of its joints: {passed}")

@@ -113,9 +113,9 @@ def example(
         return
     for name in names:
         if name not in EXAMPLES:
-            raise BadInput(f"example: no {quoted(name)}{nearest(name, EXAMPLES)}")
+            raise BadInput(f"example: found {quoted(name)}{nearest(name, EXAMPLES)}")
     if not output.is_dir():
-        raise BadInput(f"{output}: no such folder; expected one that exists")
+        raise BadInput(f"{output}: found no such folder; expected an existing folder")
     root = _root()
     files = dict.fromkeys(
         path for name in names for part in EXAMPLES[name].files

@@ -84,7 +84,9 @@ def check_measured(table: MeasurementTable, points: Iterable[str]) -> None:
     groups = ["meas", *(f"meas.{point}" for point in points)]
     measured = np.hstack([table.stack(group, READING, np.nan) for group in groups])
     for i in np.flatnonzero(np.isnan(measured).all(axis=1))[:1]:
-        message = "no measured cell; expected at least one of meas.rx ... meas.tz"
+        message = (
+            "found no reading in this row; expected at least one of meas.rx ... meas.tz"
+        )
         raise table.bad(int(i), "", message)
 
 

@@ -73,8 +73,8 @@ def test_written_again_nothing_changes_and_another_content_is_kept(run, tmp_path
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["irsbot"], 'example: no "irsbot"; did you mean "irsbot2"?'),
-        (["irsbot2", "-o", "nowhere"], "nowhere: no such folder"),
+        (["irsbot"], 'example: found "irsbot"; did you mean "irsbot2"?'),
+        (["irsbot2", "-o", "nowhere"], "nowhere: found no such folder"),
     ],
 )
 def test_a_wrong_name_or_folder_is_one_message(

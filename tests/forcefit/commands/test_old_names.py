@@ -99,4 +99,4 @@ def test_an_old_flag_gives_the_answer_of_its_new_option(run):
 def test_looking_up_without_a_place_is_refused(run):
     status, out, err = run("stiffness", "library", "look-up", "folder")
     assert (status, out) == (2, "")
-    assert "--at: missing; expected such as radius=0.02" in err
+    assert "--at: missing; expected parameters such as" in err

@@ -236,7 +236,7 @@ def test_ask_sweep_takes_paths_as_text_or_as_paths(tmp_path):
          "NetCDF file of forcefit: .nc"),
         (["-o", "x"], "x: found no ending, expected a NetCDF file of forcefit: .nc"),
         (["-o", "other.nc"], "other.nc: found a file that is not a NetCDF file of "
-         "forcefit; expected one, or nothing there: it is not overwritten"),
+         "forcefit; expected one, or no file: it is not overwritten"),
         (["-o", "measured.nc"], "measured.nc: found a NetCDF file that is not one of a "
          "sweep by forcefit"),
         (["-o", "x.nc", "--figure", "x.xyz"], 'x.xyz: found the ending ".xyz", '
@@ -249,8 +249,8 @@ def test_ask_sweep_takes_paths_as_text_or_as_paths(tmp_path):
         (["-o", "x.nc", "--json", "full.json"], "full.json: found a device, pipe or "
          "socket, expected a regular file"),
         (["-o", "pipe.nc"], "pipe.nc: found a device, pipe or socket"),
-        (["-o", "no/x.nc"], "no/x.nc: no folder no; expected one that exists"),
-        (["-o", "robot.toml/x.nc"], "no folder robot.toml"),
+        (["-o", "no/x.nc"], "no/x.nc: found no folder no; expected an existing"),
+        (["-o", "robot.toml/x.nc"], "found no folder robot.toml"),
         (["-o", f"{'x' * 300}.nc"], "cannot be written: File name too long"),
     ],
 )  # fmt: skip

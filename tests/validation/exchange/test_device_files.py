@@ -463,7 +463,7 @@ def test_declared_mount_gives_the_rotations_themselves(lab, run, rng):
          "found no unit of angles"),
         ("qw,qx,qy,qz", lambda R: [1, 2, 3, 4], {}, "found a quaternion of norm 5.477"),
         ("qw,qx,qy,qz", lambda R: np.roll(R.inv().as_quat(), 1), {},
-         "the orientations fit far better inverted"),
+         "found inverted orientations"),
         ("rx,ry,rz", lambda R: [1, 2, 3], {"orientation": '"zzx"'},
          "orientation: found"),
     ],
