@@ -111,7 +111,7 @@ def stiffness_spread_text(report: Mapping[str, Any]) -> str:
     """Return the spread as text, a line for each axis."""
     lines = [f"stiffness of the platform, {report['means']}:"]
     for name, one in report["axes"].items():
-        text = "nothing resists"
+        text = "no resistance"
         if "quantiles" in one:
             low, half, high = (
                 one["quantiles"][q]["value"] for q in ("0.05", "0.5", "0.95")

@@ -89,7 +89,7 @@ def diagnose(
         write_report(diagnosis, report, tally, provenance(folder))
     if save is not None:
         if not diagnosis.better:
-            typer.echo(f"{save}: not written, {_worse(diagnosis)}", err=True)
+            typer.echo(f"{save}: not written, because {_worse(diagnosis)}", err=True)
             raise typer.Exit(1)
         save_robot(diagnosis, save)
 

@@ -67,7 +67,7 @@ def test_a_saved_sweep_reads_back_with_units_and_provenance(data, tmp_path):
 
 
 def test_a_folder_that_is_not_there_is_refused(data, tmp_path):
-    with pytest.raises(BadInput, match="no folder .*nowhere; expected one"):
+    with pytest.raises(BadInput, match="no folder .*nowhere; expected an existing"):
         save_dataset(data, tmp_path / "nowhere" / "map.nc")
 
 

@@ -208,7 +208,7 @@ def test_show_draws_a_picture(run, robot_file, tmp_path):
         (["assembly", "sweep", "irsbot2", "--grid", "tx=0:1:0", "-o", "x.nc"],
          "grid tx: found a step of 0"),
         (["assembly", "sweep", "irsbot2", "--grid", "tx=0", "-o", "/nowhere/x.nc"],
-         "/nowhere/x.nc: no folder /nowhere"),
+         "/nowhere/x.nc: found no folder /nowhere"),
         (["assembly", "solve", "irsbot2", "--poze", "tx=0"],
          "--pose"),
         (["assembly", "solve", "irsbot2", "--po\nze"], r"--po\x0aze"),
