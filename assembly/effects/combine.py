@@ -95,14 +95,18 @@ def _drift(declared: Values, found: Values) -> dict[str, float]:
     """Return the amplitudes of one time constant."""
     constant = declared["time_constant"]
     if not math.isclose(found["time_constant"], constant, rel_tol=1e-9):
-        raise ValueError("drifts of different time constants are no single drift")
+        raise ValueError(
+            "two drifts of different time constants cannot be combined into one drift"
+        )
     return {**_sum(declared, found), "time_constant": constant}
 
 
 def _contact(declared: Values, found: Values) -> dict[str, float]:
     """Return the contact laws of different joints."""
     if set(declared) & set(found):
-        raise ValueError("two contact laws in series are no single contact law")
+        raise ValueError(
+            "two contact laws of one joint in series cannot be combined into one law"
+        )
     return {**declared, **found}
 
 
@@ -112,7 +116,10 @@ def _delayed(declared: Values, found: Values) -> dict[str, float]:
     for key in set(declared) & set(found):
         if key.endswith(".time_constant"):
             if not math.isclose(found[key], declared[key], rel_tol=1e-9):
-                raise ValueError("two delays of one body are no single delay")
+                raise ValueError(
+                    "two delayed expansions of one body with different time "
+                    "constants cannot be combined into one"
+                )
             both[key] = declared[key]
     return both
 

@@ -115,8 +115,8 @@ def check_covariates(
     finite_ones = [name for name in robot.effects if LIBRARY[name].finite]
     if finite_ones and not finite:
         raise BadInput(
-            f'{robot.name}: effect "{finite_ones[0]}" asks for finite '
-            "motions; expected forcefit assembly solve --state exact"
+            f'{robot.name}: effect "{finite_ones[0]}" is defined for finite motions '
+            "only; expected forcefit assembly solve --state exact"
         )
     for name in (*robot.effects, *robot.session_effects.get(str(session), ())):
         needed |= dict.fromkeys(LIBRARY[name].needs, name)

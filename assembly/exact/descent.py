@@ -256,7 +256,8 @@ def advance(
             damping = max(8.0 * damping, _FIRST_DAMPING * least)
     raise NotConverged(
         problem_name(start, local.loads),
-        f"no step lowers the energy; open by {start.largest_gap:.2g}",
+        "no step lowers the energy; the closures are open by "
+        f"{start.largest_gap:.2g} rad or m",
     )
 
 
@@ -291,7 +292,10 @@ def _solve(local: Expansion, damping: float, near: bool, method: Method) -> Step
     )
     step = clearance_step(problem, near, method)
     if step is None:
-        status = "no clearance within its bounds closes what no spring can"
+        status = (
+            "the closures stay open: neither a spring nor a clearance within "
+            "its bounds can close them"
+        )
         raise NotConverged(problem_name(at, local.loads), status)
     u, rigid = step
     z = np.concatenate([u, -relaxed[:, nu] - relaxed[:, :nu] @ u])

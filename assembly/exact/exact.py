@@ -345,8 +345,9 @@ def solve_exact(
         start.posture is not posture or not start.has_loads(wrench, bodies, gravity)
     ):
         raise ValueError(
-            "solve_exact: start is the linear answer of another posture or load, "
-            "expected that of these; leave it out to have it computed"
+            "solve_exact: start: found the linear solution of another posture "
+            "or load, expected that of this posture and load; leave start out "
+            "to have it computed"
         )
     placed = posture
     if cut.robot is not posture.robot:
@@ -373,8 +374,9 @@ def _refuse_compiled(*starts: Assembly | ExactAssembly | None) -> None:
     """Reject to start the reference's steps from a compiled solution."""
     if any(start is not None and start.method != "reference" for start in starts):
         raise ValueError(
-            "solve_exact: start or near is a compiled answer, expected one of method "
-            "'reference'; leave it out to have it computed"
+            "solve_exact: start or near: found a solution of the compiled "
+            "kernels, expected one of method 'reference'; leave it out to have "
+            "it computed"
         )
 
 

@@ -157,7 +157,10 @@ def _without_base(mechanism: Mechanism) -> Mechanism:
     joints = tuple(
         replace(j, name=other) if j.name == BASE else j for j in mechanism.joints
     )
-    taken = f'joint "{BASE}" is frame "{other}": "{BASE}" is what stands still'
+    taken = (
+        f'joint "{BASE}" becomes frame "{other}", because "{BASE}" is the name '
+        "of the fixed base"
+    )
     return replace(mechanism, joints=joints, taken=(*mechanism.taken, taken))
 
 

@@ -70,12 +70,13 @@ class Comparison:
         what = f"bodies {self.bodies}, masses {self.masses}, loops {self.loops}"
         if not self.agrees:
             return (
-                f"{self.reader} reads {self.file} otherwise: {self.where} differs by "
-                f"{self.difference:.2g}; find out which is right"
+                f"{self.reader} reads {self.file} otherwise: {self.where} "
+                f"differs by {self.difference:.2g}; check which of the two "
+                "programs reads the file correctly"
             )
         return (
-            f"{self.reader} reads {self.file} alike within {self.difference:.1e} in "
-            f"{POSTURES} random postures: {what}"
+            f"{self.reader} reads {self.file} alike: largest difference "
+            f"{self.difference:.1e} in {POSTURES} random postures; {what}"
         )
 
 

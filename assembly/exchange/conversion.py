@@ -67,15 +67,19 @@ class Conversion:
         lines = [
             f"{robot.name}: {len(robot.frames)} frames, "
             f"{count} loop{'s' * (count != 1)}, platform {quoted(robot.platform)}",
-            f"read back in 100 random postures: bodies within {self.difference:.1e} "
-            "(by forcefit itself: nothing was lost in writing)",
+            (
+                "read back in 100 random postures: largest difference of the "
+                f"bodies' poses {self.difference:.1e} (computed by forcefit itself, "
+                "to check the written file)"
+            ),
             *(comparison.text() for comparison in self.comparisons),
         ]
         if count:
-            moved = "" if self.drives_held else "; the drives had to move"
+            moved = "" if self.drives_held else "; the drives' coordinates were changed"
             lines.append(
-                f"home: loops open by {self.open_before:.2g} rad or m in the file's "
-                f"own, {self.open_after:.1e} in the one found{moved}"
+                f"home: loops open by {self.open_before:.2g} rad or m in the "
+                f"file's own pose, {self.open_after:.1e} in the computed "
+                f"pose{moved}"
             )
         lines += [f"taken: {line}" for line in self.taken]
         lines += [f"left out: {line}" for line in self.left_out]

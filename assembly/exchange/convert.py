@@ -88,14 +88,18 @@ def convert(
     if source.suffix.lower() in READERS:
         if close is not None:
             raise BadInput(
-                f"{source}: found with --rest or --mismatch, expected a robot file; a "
-                "home that closes is looked for here anyway"
+                f"{source}: found together with --rest or --mismatch, expected "
+                "a robot file (.toml); remove the option, because the "
+                "conversion computes a home pose that closes"
             )
         conversion, placed = robot_of_file(source, loops, overlay, points)
         return _written(conversion, placed, target)
     for option, given in (("--points", points), ("--loops", loops)):
         if given:
-            raise BadInput(f"{option}: found some beside {source}, which says its own")
+            raise BadInput(
+                f"{option}: found together with the robot file {source}, which "
+                "declares its own; remove the option"
+            )
     robot = load_robot(source, close)
     if overlay is not None:
         content = robot_table(robot, Path(overlay).parent)
@@ -176,8 +180,9 @@ def _written(
                 raise BadInput(f"{comparison.text()}; nothing is written")
     if not difference <= FAITHFUL:
         raise BadInput(
-            f"{target}: what was written is another robot: bodies are off by "
-            f"{difference:.2g}, expected at most {FAITHFUL:g}; nothing is written"
+            f"{target}: the written file describes another robot: its bodies "
+            f"differ by {difference:.2g} rad or m, expected at most "
+            f"{FAITHFUL:g}; nothing is written"
         )
     if not texts:
         write_robot(robot, target)
@@ -203,8 +208,8 @@ def _built_in(conversion: Conversion) -> tuple[Conversion, RobotAndMechanism]:
         placed = replace(placed, mechanism=replace(mechanism, joints=joints))
     if after >= 1e-6:
         left_out.append(
-            f"loops stay open by {after:.2g} rad or m with the calibrated geometry: "
-            "rigid bodies cannot close them, forced assembly does"
+            f"with the calibrated geometry the loops stay open by {after:.2g} "
+            "rad or m: rigid bodies cannot close them, forced assembly can"
         )
     positions = dict(zip((f.name for f in robot.frames), home, strict=True))
     frames = (replace(f, position=float(positions[f.name])) for f in robot.frames)

@@ -64,8 +64,9 @@ def leaders_first(couplings: Sequence[Coupling], file: str) -> tuple[Coupling, .
     for coupling in couplings:
         if coupling.follower in of:
             raise BadInput(
-                f"{file}: joint {quoted(coupling.follower)}: found two rules by which "
-                "it follows, expected one"
+                f"{file}: joint {quoted(coupling.follower)}: found two "
+                "couplings in which it follows another joint, expected one; "
+                "remove one of them"
             )
         of[coupling.follower] = coupling
     order: list[Coupling] = []
@@ -76,8 +77,9 @@ def leaders_first(couplings: Sequence[Coupling], file: str) -> tuple[Coupling, .
             if one in path:
                 ring = " -> ".join(quoted(c.follower) for c in path)
                 raise BadInput(
-                    f"{file}: joint {quoted(one.follower)}: found that it follows "
-                    f"itself ({ring}), expected another joint"
+                    f"{file}: joint {quoted(one.follower)}: found a cycle of "
+                    f"couplings in which it follows itself ({ring}), expected "
+                    "it to follow another joint"
                 )
             path.append(one)
             one = of.get(one.leader or "")

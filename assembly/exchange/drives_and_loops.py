@@ -57,8 +57,8 @@ def with_loops(
         if first == second:
             raise BadInput(
                 f"{loops.file}: closed_loop[{i}]: found {quoted(pair[0])} and "
-                f"{quoted(pair[1])}, both of which end at {quoted(first)}; expected "
-                "two places"
+                f"{quoted(pair[1])}, both on the link {quoted(first)}; expected "
+                "two different links"
             )
         closed.append(Loop(f"loop{count + i}", first, second, point=point))
     platform = loops.platform
@@ -104,8 +104,9 @@ def _followed(
         given = loops.home.get(name, value)
         if abs(given - value) > 1e-9 * max(1.0, abs(value)):
             raise BadInput(
-                f"{loops.file}: home.{name}: found {given:g}, but it follows another "
-                f"joint ({coupling.text()}); expected {value:.12g} or none"
+                f"{loops.file}: home.{name}: found {given:g}, but the joint "
+                f"follows another one ({coupling.text()}); expected "
+                f"{value:.12g}, or remove this entry"
             )
         at[name] = value
     return tuple(replace(joint, position=at[joint.name]) for joint in joints)
@@ -117,7 +118,10 @@ def _couplings_said(
     """Report joints with a rule that become independent drives."""
     driven = {joint.name for joint in joints if joint.actuated}
     for coupling in couplings:
-        line = f"mimic: {coupling.text()} is a drive of its own: command it so"
+        line = (
+            f"mimic: {coupling.text()} becomes an independent drive; command it "
+            "by this rule"
+        )
         if coupling.leader is not None and coupling.leader not in driven:
             line += (
                 f" ({coupling.leader} is passive: no force passes from one to the "

@@ -62,7 +62,10 @@ def robot_of_file(
     beside = None if loops is None else read_loops(loops)
     if points:
         if beside is None:
-            raise BadInput(f"--points: found some, but {source} has no loops file")
+            raise BadInput(
+                f"--points: found loops, but {source} has no loops file; add "
+                "--loops FILE or remove --points"
+            )
         beside = with_points(beside, points)
     mechanism = READERS[source.suffix.lower()](source, beside)
     if len(mechanism.joints) > MOST_FRAMES:
@@ -70,7 +73,9 @@ def robot_of_file(
             f"{source}: found {len(mechanism.joints)} joints, expected at most "
             f"{MOST_FRAMES}"
         )
-    comparison = Comparison("", source.name, "it was not asked")
+    comparison = Comparison(
+        "", source.name, "no other program was asked to read the file"
+    )
     if ask or mechanism.unweighed:
         comparison = compare(mechanism, source)
     mechanism = _weighed(mechanism, comparison)
@@ -133,9 +138,11 @@ def _closed(
             raise error from None
         reason = str(error).removeprefix(f"{source}: ")
         taken = (
-            "every loop for a point (3d): all of them are said to be 6d, which is what "
-            f"generators write, and so they cannot close ({reason}); --points says "
-            "which are",
+            (
+                "every loop as 3d (a point without orientation): the file declares "
+                "all as 6d, which generators write by default, but as 6d they "
+                f"cannot close ({reason}); declare with --points which loops are 3d"
+            ),
         )
         return loose, home, held, taken
 
@@ -171,8 +178,9 @@ def _left_out(placed: RobotAndMechanism, named: str | None) -> tuple[str, ...]:
         lines.append(f"mass of the root link {mechanism.root}: {weight:g} kg")
     if named is None:
         lines.append(
-            f"no platform is named: {placed.robot.platform} was taken, the end of the "
-            "longest chain (an overlay's platform says another)"
+            f"no platform is named: {placed.robot.platform}, the end of the "
+            'longest chain, was taken; an overlay with platform = "NAME" '
+            "selects another"
         )
     return tuple(lines)
 

@@ -57,8 +57,9 @@ def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
         coordinates, residual, held = nearest_closed(mechanism, _STARTS)
     if residual >= CLOSED:
         raise BadInput(
-            f"{file}: its {len(mechanism.loops)} loops cannot close together: at best "
-            f"they are open by {residual:.3g} rad or m"
+            f"{file}: its {len(mechanism.loops)} loops cannot close together: "
+            f"the smallest gap found is {residual:.3g} rad or m; expected loops "
+            "that close: check the lengths and the types 6d and 3d (--points)"
         )
     return coordinates, held
 
@@ -70,9 +71,9 @@ def _check_alone(mechanism: Mechanism, file: str) -> None:
     if residual >= CLOSED:
         ends = f"({quoted(loop.first)}, {quoted(loop.second)})"
         raise BadInput(
-            f"{file}: {loop.name} {ends} cannot close, not even alone: at best it is "
-            f"open by {residual:.3g} rad or m; expected more joints, or type 3d "
-            "(--points)"
+            f"{file}: {loop.name} {ends} cannot close even alone: the smallest "
+            f"gap found is {residual:.3g} rad or m; expected more joints, or "
+            "type 3d (--points)"
         )
 
 

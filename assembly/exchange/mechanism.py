@@ -155,16 +155,20 @@ def parents_first(joints: Sequence[Joint], bodies: Mapping[str, Body], file: str
                 )
         if joint.child in carried:
             raise BadInput(
-                f"{file}: link {quoted(joint.child)}: found two joints that carry it, "
-                f"{quoted(carried[joint.child].name)} and {quoted(joint.name)}; "
-                "expected one, and the other as a loop"
+                f"{file}: link {quoted(joint.child)}: found two joints with it "
+                f"as child, {quoted(carried[joint.child].name)} and "
+                f"{quoted(joint.name)}; expected one, and the other declared as "
+                "a loop"
             )
         carried[joint.child] = joint
         below[joint.parent].append(joint)
     roots = [name for name in bodies if name not in carried]
     if len(roots) != 1:
-        names = " and ".join(map(quoted, roots[:3])) or "none (a ring of parents)"
-        raise BadInput(f"{file}: found as root {names}, expected exactly one link")
+        names = " and ".join(map(quoted, roots[:3])) or "none (a cycle of parents)"
+        raise BadInput(
+            f"{file}: found as root link {names}, expected exactly one link "
+            "that is no child of a joint"
+        )
     order, waiting = [], list(reversed(below[roots[0]]))
     while waiting:
         joint = waiting.pop()
@@ -174,8 +178,8 @@ def parents_first(joints: Sequence[Joint], bodies: Mapping[str, Body], file: str
         reached = {joint.name for joint in order}
         lost = next(joint for joint in joints if joint.name not in reached)
         raise BadInput(
-            f"{file}: joint {quoted(lost.name)}: found a ring of parents, expected "
-            f"them to lead to {quoted(roots[0])}"
+            f"{file}: joint {quoted(lost.name)}: found a cycle of parents, "
+            f"expected parents that lead to the root {quoted(roots[0])}"
         )
     return roots[0], tuple(order)
 

@@ -87,7 +87,11 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     root = expanded(read_xml(path, "mujoco"))
     for node in root.descendants():
         if node.tag in _REFUSED:
-            raise node.bad("", "found it; expected rigid bodies written out")
+            raise node.bad(
+                "",
+                f"found {node.tag}, which generates bodies; expected rigid "
+                "bodies written out in the file",
+            )
     reading = _Reading(MassRules.of(root), _defaults(root))
     if root.child("worldbody") is None:
         raise root.bad("worldbody", "missing")

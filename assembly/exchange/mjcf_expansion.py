@@ -50,14 +50,20 @@ def expanded(root: Node, depth: int = 0) -> Node:
             too many, or a model or body to be attached is not there.
     """
     if depth > _DEEPEST:
-        raise BadInput(f"{root.file}: found models more than {_DEEPEST} deep")
+        raise BadInput(
+            f"{root.file}: found attached models nested more than {_DEEPEST} "
+            f"deep, expected at most {_DEEPEST}"
+        )
     _include(root.element, root, Path(root.file).parent, 0)
     _attach(root, depth)  # before attached elements are copied
     angles = Angles.of(root)
     for world in root.children("worldbody"):
         _replicate(world.element, root, angles)
     if sum(1 for _ in root.element.iter()) > _MOST_ELEMENTS:
-        raise BadInput(f"{root.file}: found more than {_MOST_ELEMENTS} elements")
+        raise BadInput(
+            f"{root.file}: found more than {_MOST_ELEMENTS} elements with all "
+            "copies, expected fewer"
+        )
     return root
 
 
@@ -71,7 +77,11 @@ def _include(element: Any, root: Node, folder: Path, depth: int) -> None:
             continue
         node = Node(inner, root.file)
         if depth == _DEEPEST:
-            raise node.bad("file", f"found files more than {_DEEPEST} deep")
+            raise node.bad(
+                "file",
+                f"found included files nested more than {_DEEPEST} deep, "
+                f"expected at most {_DEEPEST}",
+            )
         other = read_xml(folder / node.text("file"), "mujocoinclude", "mujoco")
         _include(other.element, other, folder, depth + 1)
         inside += other.element
@@ -155,10 +165,12 @@ def _attach(root: Node, depth: int) -> None:
         if node.has("model"):
             name = node.text("model")
             if name not in others:
-                raise node.bad("model", f"found {quoted(name)}, no model asset")
+                raise node.bad(
+                    "model", f"found {quoted(name)}, expected the name of a model asset"
+                )
             file, element = others[name]
         elif not node.has("frame"):
-            raise node.bad("model", "missing; expected a model asset")
+            raise node.bad("model", "missing; expected the name of a model asset")
         other = Node(copy.deepcopy(element), file)
         outer[list(outer).index(inner)] = _attached(node, root, other)
 
@@ -184,7 +196,11 @@ def _attached(node: Node, root: Node, other: Node) -> Any:
             all_of_it = [one for body in held for one in body.iter(tag)]
             held = [one for one in all_of_it if one.get("name") == wanted][:1]
             if not held:
-                raise node.bad(tag, f"found {quoted(node.text(tag))}, no {tag} of it")
+                raise node.bad(
+                    tag,
+                    f"found {quoted(node.text(tag))}, expected the name of a "
+                    f"{tag} of the attached model",
+                )
     # its own defaults; without them none of this model's
     for default in [d.element for d in other.children("default")] or [
         Element("default")

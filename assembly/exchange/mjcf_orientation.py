@@ -58,13 +58,15 @@ def orientation(node: Node, angles: Angles) -> NDArray:
     if node.has("quat"):
         q = node.numbers("quat", 4, "-")
         if not q.any():
-            raise node.bad("quat", "found zero, expected a rotation")
+            raise node.bad(
+                "quat", "found 0 0 0 0, expected a quaternion with a norm above 0"
+            )
         return from_quaternion(q)
     if node.has("axisangle"):
         x, y, z, angle = node.numbers("axisangle", 4, "-, angle")
         axis = np.array([x, y, z])
         if not axis.any():
-            raise node.bad("axisangle", "found no axis, expected a direction")
+            raise node.bad("axisangle", "found the axis 0 0 0, expected a direction")
         return rotation_matrix(angle * angles.unit * axis / np.linalg.norm(axis))
     if node.has("euler"):
         given = node.numbers("euler", 3, "angle") * angles.unit
@@ -104,6 +106,8 @@ def site_pose(node: Node, angles: Angles) -> NDArray:
     length = float(np.linalg.norm(along))
     if node.has("pos") or length < 1e-12:
         raise node.bad(
-            "fromto", "expected two different points, and no pos beside them"
+            "fromto",
+            "found equal points, or pos together with fromto; expected two "
+            "different points and no pos",
         )
     return placed((ends[:3] + ends[3:]) / 2, onto(along / length))

@@ -47,10 +47,18 @@ def lay_over(robot: Mapping[str, Any], overlay: Path | str) -> Table:
         ]
         if not names:
             hint = nearest(pattern, frames)
-            raise table.bad("name", f"found {quoted(pattern)}, no frame{hint}")
+            raise table.bad(
+                "name",
+                f"found {quoted(pattern)}, expected the name of a frame of the "
+                f"robot{hint}",
+            )
         for key, value in table.content.items():
             if key in _PLACED:
-                raise table.bad(key, "found it in an overlay, which places no frame")
+                raise table.bad(
+                    key,
+                    f"found {key} in an overlay, which cannot place frames; "
+                    "remove it, or edit the robot file",
+                )
             if key != "name":
                 for name in names:
                     frames[name][key] = value

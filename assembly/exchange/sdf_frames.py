@@ -81,7 +81,11 @@ class Frames:
         if name not in self.poses:
             node, scope = self.named[name].node, self.named[name].scope
             if name in asked:
-                raise node.bad("pose", "found a ring of relative_to")
+                raise node.bad(
+                    "pose",
+                    "found a cycle of relative_to, expected poses that lead to "
+                    "the model's frame",
+                )
             own = node.child("pose")
             relative = ""
             if own is not None:  # called "frame" until 1.6
@@ -112,7 +116,10 @@ class Frames:
         if node.tag == "link":
             return name
         if name in asked:
-            raise node.bad("attached_to", "found a ring of frames")
+            raise node.bad(
+                "attached_to",
+                "found a cycle of attached frames, expected frames that lead to a link",
+            )
         if node.tag == "model":
             return self._canonical(name.removesuffix(MODEL), node)
         to = self._default(name)
@@ -219,7 +226,11 @@ def included(node: Node) -> tuple[Node, bool]:
         BadInput: the file does not exist, or is no file of one model.
     """
     if node.optional("merge") in {"true", "1"}:
-        raise node.bad("merge", "found it; expected a model with names of its own")
+        raise node.bad(
+            "merge",
+            "found true, which is not supported; expected false: an included "
+            "model keeps its own names",
+        )
     address = word(node, "uri")
     path = address.removeprefix("model://").removeprefix("file://")
     folder = Path(node.file).absolute().parent
@@ -228,7 +239,11 @@ def included(node: Node) -> tuple[Node, bool]:
     places = [p / "model.sdf" if p.is_dir() else p for p in places]
     found = next((place for place in places if place.is_file()), None)
     if found is None:
-        raise node.bad("uri", f"found {quoted(address)}, no file or folder near this")
+        raise node.bad(
+            "uri",
+            f"found {quoted(address)}, expected a file or folder next to this "
+            "file or in a folder above it",
+        )
     root = read_xml(found, "sdf")
     models = list(root.children("model"))
     if len(models) != 1:

@@ -68,8 +68,9 @@ def _of_shapes(
         if shape is None or shape.tag not in _SIZES:
             what = "no shape" if shape is None else shape.tag
             raise collision.bad(
-                "geometry", f"found {what}, of which no automatic inertia is made here;"
-                f" expected {' | '.join(_SIZES)}, or a written mass"
+                "geometry", f"found {what}, for which forcefit computes no automatic "
+                f"inertia; expected {' | '.join(_SIZES)}, or a mass written in "
+                "the file"
             )  # fmt: skip
         T = _placed(frames, named, collision)
         sizes = _sizes(shape)

@@ -44,7 +44,7 @@ def other_springs(mechanism: Mechanism) -> tuple[str, ...]:
         for joint in springs
         if not joint.actuated and not _at_rest(joint)
     ]
-    what = "springs wound up at home, not converted, though they may carry load"
+    what = "springs preloaded at home, not converted, though they may carry load"
     return counted("springs beside drives", driven) + counted(what, loaded)
 
 

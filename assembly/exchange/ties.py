@@ -26,8 +26,9 @@ def refuse_ties(node: Node, owners: Mapping[str, str]) -> None:
     named = node.names_in(owners)
     if len({owners[name] for name in named}) > 1:
         raise node.bad(
-            "", f"found it between {quoted(named[0])} and {quoted(named[1])}: it may "
-            "tie them, and is not converted; expected joints, or a file without it"
+            "", f"found an element between {quoted(named[0])} and "
+            f"{quoted(named[1])} that may connect them and is not converted; "
+            "expected joints: declare a joint or a loop, or remove the element"
         )  # fmt: skip
 
 
@@ -48,7 +49,7 @@ def may_tie(node: Node, names: Container[str]) -> str:
     """
     unknown = node.tag == "plugin" or not _is_harmless(node)
     if unknown and len(node.names_in(names)) > 1:
-        return ", not converted, though it may tie or move what it names"
+        return ", not converted, though it may connect or move the bodies that it names"
     if node.tag == "springStiffness":  # of Gazebo, at a joint of the URDF
         return ", not converted, though it may carry load"
     return ""

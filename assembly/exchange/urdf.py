@@ -51,7 +51,11 @@ def read_urdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     root = read_xml(path, "robot")
     for node in root.descendants():
         if node.tag.startswith("xacro:"):
-            raise node.bad("", "found a macro, expected the URDF that xacro makes")
+            raise node.bad(
+                "",
+                "found a macro, expected the URDF without macros that the "
+                "program xacro writes",
+            )
     bodies: dict[str, Body] = {}
     for node in root.children("link"):
         body = _body(node)
@@ -147,7 +151,8 @@ def _couplings(nodes: list[Node], joints: dict[str, Joint]) -> Iterator[Coupling
         for one in (leader, name):
             if one not in joints or joints[one].kind == "fixed":
                 raise mimic.bad(
-                    "joint", f"found {quoted(one)}, no joint of one freedom"
+                    "joint",
+                    f"found {quoted(one)}, expected a joint with one degree of freedom",
                 )
         factor = mimic.number("multiplier", "-", 1.0)
         yield Coupling(name, leader, (mimic.number("offset", "rad or m", 0.0), factor))

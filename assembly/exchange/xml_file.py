@@ -216,7 +216,10 @@ def read_xml(path: Path | str, *roots: str) -> Node:
     while layer:
         layer, depth = [inner for outer in layer for inner in outer], depth + 1
         if depth > _DEEPEST:
-            raise BadInput(f"{path}: elements stand more than {_DEEPEST} deep")
+            raise BadInput(
+                f"{path}: found elements nested more than {_DEEPEST} deep, "
+                f"expected at most {_DEEPEST}"
+            )
     return Node(element, str(path))
 
 
@@ -227,8 +230,8 @@ def _parsed(text: str, path: Path | str) -> Any:
 
     def refuse(*_: object) -> int:
         raise ValueError(
-            "found a document type or an entity, expected neither: what they name "
-            "would be read too"
+            "found a document type or an entity, expected neither: they could "
+            "load other files; remove them"
         )
 
     builder = TreeBuilder()

@@ -38,7 +38,8 @@ def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
         session = table.text("session", longest=200) if table.has("session") else None
         if session is not None and not LIBRARY[name].by_row:
             raise table.bad(
-                "session", f"found one, and {name} changes the robot in all"
+                "session",
+                f"found a session, but {name} acts in all sessions; remove session",
             )
         effects = everywhere if session is None else sessions.setdefault(session, {})
         if name in effects:

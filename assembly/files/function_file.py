@@ -148,7 +148,10 @@ def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
         raise table.bad("variables", message)
     first = function.variables[0]
     if form.remembers and first.startswith("wrench."):
-        message = f"found {quoted(first)}, and {form.name} needs what was before"
+        message = (
+            f"found {quoted(first)}, expected a variable that is no wrench, "
+            f"because {form.name} depends on its history"
+        )
         raise table.bad("variables", f"{message}; expected no wrench")
     shapes = shape_names(form, count)
     for component in function.components:
@@ -171,7 +174,9 @@ def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
     waving = turning_variables(function)
     unturned = any(whole_unit(variable_unit(robot, name)) != "rad" for name in waving)
     if unturned and "period" not in function.parameters:
-        message = '"period" is missing; waves of a variable that is no angle need it'
+        message = (
+            '"period" is missing; expected it, because the variable is no angle in rad'
+        )
         raise table.bad("parameters", message)
 
 
@@ -181,12 +186,15 @@ def _check_knots(table: Table, function: Function, component: str) -> None:
     indices = np.array([column_indices(name) for name in names])
     wanted = math.prod(indices.max(axis=0).tolist()) if names else 2
     if len(names) != wanted or len(names) < 2:
-        message = f"found {len(names)} values, expected one at each knot, 1 to n"
+        message = f"found {len(names)} values, expected one for each knot, at least two"
         raise table.bad("parameters", message)
     own = parameters_of(function, component)
     for end in ("", ".1", ".2"):
         if f"first{end}" in own and not own[f"first{end}"] < own[f"last{end}"]:
-            message = f'found "first{end}" not below "last{end}"; expected it below'
+            message = (
+                f'found "first{end}" >= "last{end}"; expected "first{end}" < '
+                f'"last{end}"'
+            )
             raise table.bad("parameters", message)
 
 

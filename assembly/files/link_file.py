@@ -132,7 +132,10 @@ def _mesh_link(link: Table, frame: Table) -> MeshLink:
     spelt = [table for table in (frame, link) if table.has("up")]
     frame_up = _direction(spelt[0], "up") if spelt else None
     if len(spelt) == 2:
-        raise link.bad("up", "found it in the frame too; expected one of the two")
+        raise link.bad(
+            "up",
+            'found "up" in the frame and in its link; expected only one of the two',
+        )
     if (up is None) != (frame_up is None):
         message = 'missing; expected the "up" of the mesh and of the frame, or neither'
         raise (mesh if up is None else frame).bad("up", message)

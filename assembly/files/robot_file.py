@@ -228,8 +228,8 @@ def _frame(table: Table) -> Frame:
     given = [key for key in ("position", "limits") if table.has(key)]
     if joint == "fixed" and (actuated or given):
         key = "actuated" if actuated else given[0]
-        message = 'found one on a fixed joint; expected joint = "revolute" | '
-        raise table.bad(key, message + '"prismatic", or no such key')
+        message = f'found {key} on a fixed joint; expected joint = "revolute" | '
+        raise table.bad(key, message + f'"prismatic", or no {key}')
     translation, rotation = _placement(table)
     passive = joint != "fixed" and not actuated
     own = (5 if joint == "prismatic" else 2) if passive else None
@@ -251,7 +251,11 @@ def _frame(table: Table) -> Frame:
         centre_of_mass=_numbers(table, "centre_of_mass", 3, "m"),
     )
     if not isinstance(frame.link, MeshLink) and "up" in table.content:
-        raise table.bad("up", "found one without a mesh; it fixes the roll of a mesh")
+        raise table.bad(
+            "up",
+            'found "up" in a frame without a mesh link; remove it, because it '
+            "only orients a mesh about its axis",
+        )
     table.finish()
     return frame
 
@@ -293,7 +297,10 @@ def _placement(table: Table) -> tuple[NDArray, NDArray]:
             _numbers(table, "rotation", 3, "rad"),
         )
     if given:
-        message = 'found it beside "dh", which places the frame; expected one of them'
+        message = (
+            f'found {given[0]} together with "dh"; both place the frame, '
+            "expected only one of them"
+        )
         raise table.bad(given[0], message)
     dh = table.table("dh")
     units = {"theta": "rad", "d": "m", "a": "m", "alpha": "rad"}

@@ -164,14 +164,15 @@ def _check_place(frame: Frame, link: MeshLink, mesh_span: NDArray) -> None:
     try:
         section_axes(mesh_span, link.up)
     except BadInput as error:
-        raise BadInput(f"{error}; expected another direction") from None
+        raise BadInput(f'{error}; expected another direction of "up"') from None
     tip, wanted = mesh_turn(frame, mesh_span) @ mesh_span, between_origins(frame)
     most = 1e-6 + 1e-3 * float(np.linalg.norm(wanted))
     if link.axis is None and np.linalg.norm(tip - wanted) > most:
         raise BadInput(
-            f"the tip interface's centre lies at {_point(tip)} from the base's, the "
-            f"frame's origin at {_point(wanted)} from its parent's; expected the same "
-            "point within 1e-6 m + 0.1 % of the length"
+            f"the centre of the mesh's tip interface lies at {_point(tip)} from "
+            f"that of its base, but the frame's origin lies at {_point(wanted)} "
+            "from its parent's; expected the same point within 1e-6 m + 0.1 % "
+            "of the length"
         )
 
 

@@ -89,8 +89,8 @@ def rest_in(robot: Robot, name: str) -> Robot:
             own = np.linalg.inv(T[row])
             return _corrected(robot, row, own @ to @ np.linalg.inv(at) @ T[row])
     raise BadInput(
-        f'--rest: frame "{name[:60]}" is in no loop that is open; expected one between '
-        "the two frames of a closure that does not hold"
+        f'--rest: frame "{name[:60]}": found no open loop through it; expected '
+        "a frame between the two frames of a closure that does not hold"
     )
 
 
@@ -103,8 +103,9 @@ def _corrected(robot: Robot, row: int, X: NDArray) -> Robot:
     screw = np.concatenate([rotation_vector(D[:3, :3]), D[:3, 3]])
     if np.abs(screw).max() > _SMALL:
         raise BadInput(
-            f"--rest: frame {frame.name}: closing needs {np.abs(screw).max():.3g} rad "
-            f"or m, expected a small motion, < {_SMALL:g}"
+            f"--rest: frame {frame.name}: closing the loop needs a motion of "
+            f"{np.abs(screw).max():.3g} rad or m, expected a small motion, < "
+            f"{_SMALL:g}"
         )
     moved = replace(
         frame, translation=body[:3, 3], rotation=rotation_vector(body[:3, :3]),
@@ -113,8 +114,8 @@ def _corrected(robot: Robot, row: int, X: NDArray) -> Robot:
     frames = (*robot.frames[:row], moved, *robot.frames[row + 1 :])
     turned = float(np.abs(rotation_vector(X[:3, :3])).max())
     remark = (
-        f"what the closure leaves open, {np.abs(X[:3, 3]).max():.3g} m and "
-        f"{turned:.3g} rad, is a geometric error of {frame.name}"
+        f"the gap of the closure, {np.abs(X[:3, 3]).max():.3g} m and "
+        f"{turned:.3g} rad, becomes a geometric error of {frame.name}"
     )
     return replace(robot, frames=frames, remarks=(*robot.remarks, remark))
 
@@ -149,8 +150,9 @@ def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
     closes = near.reached[0] and there.mismatch[0] <= _OPEN
     if not closes or np.abs(differs).max() > _SMALL:
         raise BadInput(
-            f"{robot.name}: no posture near these drive coordinates closes; expected "
-            "coordinates that fit but for their rounding"
+            f"{robot.name}: no posture near these drive coordinates closes; "
+            "expected coordinates at which all loops close except for their "
+            "rounding"
         )
     closed = _positioned(robot, there.coordinates[0])
     frames = []
@@ -160,8 +162,9 @@ def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
         own = frame.own_stiffness
         if abs(value) > _OPEN and (own is None or np.isinf(own)):
             raise BadInput(
-                f"--mismatch spring: drive {frame.name} is rigid and {value:.3g} rad "
-                "or m away; expected a joint_stiffness about its own axis"
+                f"--mismatch spring: drive {frame.name}: found a rigid drive "
+                f"whose coordinate is {value:.3g} rad or m off; expected a "
+                "joint_stiffness about its own axis"
             )
         frames.append(replace(frame, geometric_error=error))
     count = redundant_drives(robot, there.transforms[0])

@@ -260,8 +260,8 @@ def _way_out(robot: Robot, T: NDArray, left_open: float = 0.0) -> str:
         return ""
     drives = sum(f.actuated for f in robot.frames)
     return (
-        f"; {count} of {drives} drives redundant: with --mismatch spring elastic "
-        "drives take up what does not fit"
+        f"; {count} of {drives} drives are redundant: with --mismatch spring, "
+        "elastic drives close the gap"
     )
 
 
@@ -411,9 +411,9 @@ def unreached(robot: Robot, track: Track, target: Target, i: int) -> str:
     if target.pose is None:
         remaining = (1.0 - track.progress[i]) * 100
         return (
-            f"these joint coordinates cannot be reached: the closures stop holding "
-            f"{remaining:.3g} % of the way before them; {NOT_CLOSED}"
-            f"{_way_out(robot, home_posture(robot).transforms)}"
+            "these joint coordinates cannot be reached: the closures cease to "
+            f"hold {remaining:.3g} % of the path from home before the target; "
+            f"{NOT_CLOSED}{_way_out(robot, home_posture(robot).transforms)}"
         )
     goal = target.pose[i]
     reached = pose_components(track.transforms[i, robot.index(robot.platform)])

@@ -16,7 +16,7 @@ from assembly.kinematics.singular_posture import is_singular
 from assembly.model.robot import Robot
 from assembly.model.statuses import BEYOND_LIMITS, BEYOND_SINGULARITY, SINGULAR
 
-SINGULAR_WORDS = "singular posture: first order decides nothing"
+SINGULAR_WORDS = "singular posture: the first-order analysis is inconclusive"
 _FAR_SIDE = "not connected to home without passing a singularity"
 _ROUNDING = 1e-8  # [rad, reference lengths] accepted excess over a limit
 
@@ -107,9 +107,9 @@ def posture_remarks(posture: Posture) -> list[str]:
     home = home_posture(robot)
     if home_is_singular(robot) and np.abs(q - home.coordinates).max() > _ROUNDING:
         remarks.append(
-            "home is a singular posture, where operation modes meet; this one is "
-            f"{_mode(home, posture)} (give the other components of the pose for "
-            "another)"
+            "home is a singular posture, where operation modes meet; this "
+            f"posture belongs to {_mode(home, posture)} (specify the other "
+            "components of the pose to select another mode)"
         )
     if passed := limits_passed(robot, q):
         remarks.append(f"beyond the limits of its joints: {passed}")

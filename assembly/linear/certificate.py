@@ -86,11 +86,12 @@ def unproved(assembly: Assembly) -> str:
     # written so that NaN counts as not proved
     if not gap <= allowed:
         sentences.append(
-            f"the energy is proved least to {gap:.1e} J only, expected {allowed:.1e} J"
+            f"the minimum of the energy is certified to {gap:.1e} J only, "
+            f"expected {allowed:.1e} J"
         )
     if not residual <= LARGEST_RESIDUAL:
         sentences.append(
-            f"a closure stays open by {residual:.1e} (rad, or m per length)"
+            f"a closure stays open by {residual:.1e} rad or reference lengths"
         )
     if not excess <= LARGEST_EXCESS:
         sentences.append(f"a clearance is exceeded by {excess:.1e} of its size")
@@ -113,10 +114,14 @@ def unproved_screw(assembly: Assembly, bound: ScrewBound) -> list[str]:
     """
     allowed = _allowed(assembly)
     spread = stiffness_spread(assembly.joints, assembly.linearisation.size)
-    why = f"; stiffnesses differ {spread:.0e} times" if spread > SPREAD else ""
+    why = (
+        f"; the stiffest spring is {spread:.0e} times as stiff as the softest"
+        if spread > SPREAD
+        else ""
+    )
     return [
-        f"the platform's {part} is proved to {error:.1e} {unit} only, expected "
-        f"{most:.1e}{why}"
+        f"the platform's {part} is certified to {error:.1e} {unit} only, "
+        f"expected {most:.1e} {unit}{why}"
         for part, error, unit, most in (
             ("rotation", bound.rotation_error, "rad", allowed[0]),
             ("translation", bound.translation_error, "m", allowed[1]),

@@ -234,15 +234,20 @@ def massless(robot: Robot, gravity: ArrayLike | None) -> list[str]:
     ]  # fmt: skip
     if without:
         return [
-            f"the weight of {', '.join(map(quoted, without))}, given by a mesh, is "
-            'left out, and so is its stress: expected "mass" and "centre_of_mass" of '
-            "the frame; forcefit stiffness stress --gravity finds that stress"
+            (
+                f"the weight of {', '.join(map(quoted, without))}, whose stiffness "
+                "is computed from a mesh, and the stress due to it are left out: "
+                'expected "mass" and "centre_of_mass" of the frame; forcefit '
+                "stiffness stress --gravity computes that stress"
+            )
         ]
     if _masses(robot)[:, [0, 4]].any():
         return []
     return [
-        'nothing has a mass: gravity changes nothing; expected "density" of links or '
-        '"mass" of frames'
+        (
+            "gravity has no effect, because no frame has a mass; expected "
+            '"density" of links or "mass" of frames'
+        )
     ]
 
 

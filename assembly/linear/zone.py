@@ -98,7 +98,7 @@ class Zone(PointResults, Generic[N]):
         text = np.array(self.reason, dtype=object, ndmin=1)
         for i in np.flatnonzero(~proved & (margin != bound) & (text == "")):
             least = f"{bound[i]:.9g}"
-            text[i] = f"the margin {margin[i]:.9g} is proved down to {least} only"
+            text[i] = f"the margin {margin[i]:.9g} is certified down to {least} only"
         return text if self.of_many else text[0]
 
 

@@ -121,7 +121,7 @@ def _platform_screws(
         unsolved = ~solved
         screws[unsolved], reason[unsolved] = (
             np.nan,
-            "does not close together with others",
+            "the closures do not close when all rows are solved together",
         )
     for row in np.flatnonzero(unsolved)[:one_by_one].tolist():
         try:

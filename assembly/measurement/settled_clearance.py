@@ -75,7 +75,9 @@ def with_clearances_at_rest(conditions: Conditions) -> Conditions:
         ValueError: no ``rest`` is given.
     """
     if conditions.rest is None:
-        raise ValueError("conditions have no rest positions of the clearances")
+        raise ValueError(
+            "conditions.rest: missing; expected the rest positions of the clearances"
+        )
     clearance_screws = conditions.rest * _component_bounds(conditions.robot)
     robot = without_joint_clearances(conditions.robot)
     return replace(

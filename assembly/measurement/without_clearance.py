@@ -270,7 +270,10 @@ def _factorise(content: Content) -> Flexibility:
     robot = postures.robot
     joints = virtual_joints(robot)
     if joints.cones.shape[1]:
-        raise ValueError(f"{robot.name} has clearance, which is not linear")
+        raise ValueError(
+            f"{robot.name}: found a clearance, expected a robot without "
+            "clearance, whose model is linear"
+        )
     n, count = len(robot.frames), len(postures.transforms)
     size = size_of(robot)
     scale = in_reference_lengths(size)

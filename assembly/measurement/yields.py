@@ -106,7 +106,9 @@ class Yields:
         try:
             return np.linalg.solve(J, lack[..., None])[..., 0]
         except np.linalg.LinAlgError:
-            raise SolverFailed("yields", "springs that give without end") from None
+            raise SolverFailed(
+                "yields", "the compliance of the effects has no finite equilibrium"
+            ) from None
 
 
 def with_deflections(
@@ -154,7 +156,7 @@ def settle_yields(
         if not step.any():
             return solution
         give += step
-    raise SolverFailed("yields", f"deflections that do not settle in {_STEPS} steps")
+    raise SolverFailed("yields", f"the deflections do not converge in {_STEPS} steps")
 
 
 def with_springs(conditions: Conditions, row: int) -> Conditions:

@@ -276,7 +276,10 @@ def _rows(table: Table, robot: Robot) -> list[tuple]:
         if kind == "truncated":
             most = table.array("most", (6,), "rad, m")
             if not (most[scale > 0] > 0).all():
-                raise table.bad("most", "expected more than 0 where deviation is")
+                raise table.bad(
+                    "most",
+                    "expected a bound > 0 in every component whose deviation is > 0",
+                )
             limit = most / np.where(scale > 0, scale, 1.0)
     if not (scale >= 0).all():
         key = "most" if kind == "uniform" else "deviation"

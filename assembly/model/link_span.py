@@ -63,8 +63,10 @@ def _check_mesh(frame: Frame, link: MeshLink, shift: float) -> None:
     """Check that a mesh has a direction, and that another one fixes its rotation."""
     if link.axis is None and shift:
         raise BadInput(
-            f"frame {quoted(frame.name)}.link.mesh: found it below a prismatic joint "
-            f'whose home position is {shift:g} m; expected 0 or an "axis", base to tip'
+            f"frame {quoted(frame.name)}.link.mesh: found a mesh on a frame "
+            f"below a prismatic joint whose home position is {shift:g} m; "
+            'expected a home position of 0, or the "axis" of the mesh from '
+            "base to tip"
         )
     axis = _span(frame, 0.0) if link.axis is None else np.array(link.axis)
     try:
@@ -81,7 +83,7 @@ def _span(frame: Frame, shift: float) -> NDArray:
         mesh = isinstance(frame.link, MeshLink)
         given = 'mesh with "axis"' if mesh else 'beam with "length" and "axis"'
         raise BadInput(
-            f"frame {quoted(frame.name)}.link: found no distance from the parent; "
-            f"expected a translation, or a {given}"
+            f"frame {quoted(frame.name)}.link: found a distance of 0 m from the "
+            f"parent; expected a translation, or a {given}"
         )
     return span

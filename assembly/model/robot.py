@@ -225,8 +225,8 @@ def parents_first(frames: Iterable[Frame]) -> tuple[Frame, ...]:
             row = rows.get(frame.name)
             whose = "the root" if row is None else f"frame[{row + 1}]"
             raise BadInput(
-                f"frame[{i + 1}].name: found {quoted(frame.name)}, already the name of "
-                f"{whose}; expected another"
+                f"frame[{i + 1}].name: found {quoted(frame.name)}, already the "
+                f"name of {whose}; expected another name"
             )
         rows[frame.name] = i
     for frame in frames:
@@ -249,8 +249,9 @@ def parents_first(frames: Iterable[Frame]) -> tuple[Frame, ...]:
     for frame in frames:
         if frame.name not in depth:
             raise BadInput(
-                f"frame {quoted(frame.name)}.parent: found {quoted(frame.parent)}, and "
-                'from there on a ring of parents; expected them to lead to "base"'
+                f"frame {quoted(frame.name)}.parent: found "
+                f"{quoted(frame.parent)}, which leads to a cycle of parents; "
+                'expected parents that lead to "base"'
             )
     return _stable(frames, depth)
 

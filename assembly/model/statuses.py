@@ -19,18 +19,19 @@ NOT_PROVED = "not proved"
 
 MEANINGS = {
     OK: "there is an answer",
-    OUT_OF_REACH: "no posture has this pose",
-    CANNOT_ASSEMBLE: "the errors cannot be closed, whatever the energy",
-    NO_EQUILIBRIUM: "a load drives a motion that nothing resists",
-    SOLVER_FAILED: "no answer whose certificate is good enough was found",
-    SIMULATION_FAILED: "the multibody program gave no answer",
-    INVALID_ROBOT: "the numbers varied make no valid robot",
-    SINGULAR: "the robot has more freedoms than near by: first order decides nothing",
-    BEYOND_LIMITS: "a joint stands beyond its limits",
-    BEYOND_SINGULARITY: "not connected to home without passing a singularity",
-    FREE_MOTION: "the platform moves without resistance",
+    OUT_OF_REACH: "no posture of the robot has this pose",
+    CANNOT_ASSEMBLE: "the errors do not close, neither by springs nor by clearances",
+    NO_EQUILIBRIUM: "a load drives a free motion, which no joint or spring resists",
+    SOLVER_FAILED: "the search found no solution with a sufficient certificate",
+    SIMULATION_FAILED: "the multibody simulation failed",
+    INVALID_ROBOT: "the varied numbers are not those of a valid robot",
+    SINGULAR: "the posture is singular (more freedoms than nearby): the first-order "
+    "analysis is inconclusive",
+    BEYOND_LIMITS: "a joint's coordinate is beyond its limits",
+    BEYOND_SINGULARITY: "home and this posture are separated by a singularity",
+    FREE_MOTION: "the platform has a free motion, without resistance",
     UNSTABLE: "the equilibrium has a direction of negative stiffness",
-    NOT_PROVED: "an answer whose certificate is not good enough",
+    NOT_PROVED: "the certificate of the solution is not sufficient",
 }
 # statuses of the points of a sweep; a file stores the index in this list
 OF_POINTS = (

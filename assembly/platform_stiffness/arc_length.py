@@ -190,7 +190,7 @@ def follow_load(
             if step < _SMALLEST / count:
                 raise NotConverged(
                     f"path of {posture.robot.name}",
-                    f"no equilibrium follows that at {places[-1].load:.6g}",
+                    f"no equilibrium was found after the load {places[-1].load:.6g}",
                 )
             continue
         if there.unstable != places[-1].unstable:
@@ -300,7 +300,7 @@ def _critical(path: _Path, low: _Place, high: _Place, step: float) -> Event:
     more = high if high.unstable > low.unstable else low
     soft = more.unstable - 1
     bent = more.modes[:, soft]
-    what = "limit point, the load turns" if turns else "branch point, buckles"
+    what = "limit point, an extremum of the load" if turns else "branch point, buckles"
     model = more.local.placement.model
     words = mode_text(
         platform_moves(more.local) @ more.modes, soft, bent[model.springs],

@@ -159,7 +159,7 @@ class PlatformStiffness:
     def free_text(self) -> str:
         """Motions without resistance, in words; empty if there are none."""
         screws = ", ".join(numbers(screw) for screw in self.free.T)
-        return f"nothing resists the platform's motion {screws} [rad, m]" * bool(screws)
+        return f"the platform moves freely along {screws} [rad, m]" * bool(screws)
 
     @property
     def rigid(self) -> NDArray:

@@ -137,7 +137,7 @@ def check_masses(robot: Robot) -> None:
 def _no_mass(robot: Robot) -> str:
     """Return the message for a robot without masses."""
     return (
-        f'{robot.name}: found no mass that moves; expected "density" of beams or '
+        f'{robot.name}: found no moving mass; expected "density" of beams or '
         'meshes, or "mass" of frames'
     )
 

@@ -54,7 +54,10 @@ def first_order_status(
     elif change > MOST_ENERGY:
         words = off_by(change)
     elif "relative_energy" not in linearisation and moved > _LARGE:
-        words = f"first order decides nothing here: it moves a joint by {moved:.3g} rad"
+        words = (
+            "the first-order analysis is not valid here: a joint moves by "
+            f"{moved:.3g} rad"
+        )
     else:
         return {}
     return {"status": SINGULAR, "reason": f"{words}; finite motions: {finite}"}
@@ -103,8 +106,8 @@ def singular_status(
 def off_by(change: float) -> str:
     """Return the reason where first order is wrong by a share of the energy."""
     return (
-        f"first order decides nothing here: it is off by {100 * abs(change):.3g} % of "
-        "the energy"
+        "the first-order analysis is not valid here: its energy is wrong by "
+        f"{100 * abs(change):.3g} %"
     )
 
 

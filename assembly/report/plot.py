@@ -45,8 +45,9 @@ def plot_assembly(
         reach = reachable_screws(assembly, assumption)
         if reach.unbounded(PARTS[errors].start):
             raise BadInput(
-                f"{assembly.posture.robot.name}: its platform moves freely, so its "
-                f"{errors} error has no bound; expected none to be plotted"
+                f"{assembly.posture.robot.name}: found a free motion of the "
+                f"platform, so its {errors} error has no bound; expected a "
+                "robot without one, or no plot of the error"
             )
         body = error_body(reach, errors)
         size = 0.15 * float(np.ptp(assembly.posture.transforms[:, :3, 3], axis=0).max())

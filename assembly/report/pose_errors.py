@@ -53,8 +53,9 @@ def pose_error_of(
     loaded = bool(np.any(load) or np.any(gravity))
     if loaded and "budget" in (assumptions or ()):
         raise BadInput(
-            "assumption budget: found a load; expected frozen or free (the budget is a "
-            "factor on the energy of closing alone)"
+            "assumption budget: found a load, expected none; use frozen or "
+            "free, because the budget is a factor on the energy of a robot "
+            "without load"
         )
     assumptions = assumptions or (ASSUMPTIONS[:2] if loaded else ASSUMPTIONS)
     results: dict[str, Any] = {

@@ -43,7 +43,10 @@ _ZONE = (
     "zone.assemblable zone.margin zone.assemblable_free zone.margin_free zone.status "
     "zone.reason"
 )
-_UNSTABLE = "the potential decreases along a motion, as beyond a critical load"
+_UNSTABLE = (
+    "the potential energy decreases along a motion: the equilibrium is unstable, as "
+    "beyond a critical load"
+)
 
 
 def zone_of(posture: Posture) -> dict[str, Any]:

@@ -40,7 +40,7 @@ _STOP = 1e-2  # share of this gap at which Newton's method stops
 _STEPS, _FIRST_SIGMA = 150, 1e6  # most steps of Newton's method, and its first sigma
 _RESIDUAL = 1e-11  # accepted residual of a row without springs
 _LARGEST_FACTOR = 1e8  # on the clearances: infeasibility is proved up to this factor
-_UNPROVED = "PrimalInfeasible, which its multipliers do not prove"
+_UNPROVED = "PrimalInfeasible, but its multipliers do not prove it"
 
 
 class SolverFailed(RuntimeError):

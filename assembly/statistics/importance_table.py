@@ -187,9 +187,9 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
         results: dict[str, Any] = {"largest_share_left_out": most}
         if most > MOST_FAILED:
             results["reason"] = (
-                f"no indices where more than {MOST_FAILED:.0%} of the draws have no "
-                f"answer: up to {most:.1%} were left out, and the errors of the others "
-                "are not independent"
+                f"no indices are computed if more than {MOST_FAILED:.0%} of the "
+                f"draws have no answer: up to {most:.1%} were left out, and the "
+                "errors of the other draws are not independent"
             )
         elif np.isnan(of_quantity["total_index"]).all():
             results["reason"] = "it does not vary"

@@ -131,12 +131,12 @@ def perfect_text(summary: Mapping[str, Any]) -> list[str]:
     if alone:
         reach = ", ".join(f"{k} {_size_text(v)}{_of_text(v)}" for k, v in alone.items())
         lines.append(f"perfect parts, {why}: {reach}")
-    advice = "" if summary.get("load") else ", or give the load of service (--load)"
+    advice = "" if summary.get("load") else ", or specify the service load (--load)"
     for key, one in summary.get("perfect_parts_break", {}).items():
         lines.append(
             f"warning: perfect parts reach a {key} {_size_text(one)}, limit "
-            f"{one['limit']:.4g} {one['unit']}: no tolerance of the errors meets it; "
-            f"tighten the clearances{advice}"
+            f"{one['limit']:.4g} {one['unit']}: no tolerance of the errors "
+            f"meets it; tighten the clearances{advice}"
         )
     return lines
 

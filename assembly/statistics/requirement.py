@@ -284,9 +284,10 @@ class Requirement:
             if value > limits[key]:
                 unit = UNITS[key]
                 raise BadInput(
-                    f"limit {key}: even perfect parts reach {value:.4g} {unit} by "
-                    f"clearances alone at {where}; expected at most {limits[key]:g} "
-                    f"{unit} (or --clearance least, if clearances stay as solved)"
+                    f"limit {key}: even perfect parts reach {value:.4g} {unit} "
+                    f"by clearances alone at {where}; expected at most "
+                    f"{limits[key]:g} {unit}; tighten the clearances, loosen "
+                    "the limit, or use --clearance least"
                 )
 
     def check_taken_up(self) -> None:
@@ -305,7 +306,7 @@ class Requirement:
                 if residual.max(initial=0.0) > 1e-9:
                     name = sources.labels[int(residual.argmax())]
                     raise BadInput(
-                        f"limit {key}: no clearance or spring takes up an error "
-                        f"{name}; leave it out, or limit the energy of a robot that is "
-                        "elastic there"
+                        f"limit {key}: found an error {name} that no clearance "
+                        "or spring can close; leave this error out, or limit "
+                        "the energy of a robot with a spring there"
                     )

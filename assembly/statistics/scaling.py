@@ -114,7 +114,10 @@ def scale_uniformly(
         if low > 0 and high <= low * (1 + precision):
             break
         if low == 0 and high < 1e-9:
-            raise BadInput("tolerances: even perfect parts violate a limit")
+            raise BadInput(
+                "tolerances: even perfect parts violate a limit; loosen the "
+                "limit or tighten the clearances"
+            )
         if (
             0 < utilisation < np.inf
             and 0 < previous[1] < np.inf
@@ -152,7 +155,7 @@ def _allowed_failures(draws: int, asked: float) -> int:
         low, high = (middle, high) if held else (low, middle)
     if low < 0:
         raise BadInput(
-            f"tolerances: {draws} draws cannot show a yield of {asked:g} even if none "
-            "fails; ask for more draws"
+            f"tolerances: {draws} draws are too few to show a yield of "
+            f"{asked:g}, even if none fails; use more draws"
         )
     return low

@@ -111,7 +111,7 @@ def stiffness_spread_text(report: Mapping[str, Any]) -> str:
     """Return the spread as text, a line for each axis."""
     lines = [f"stiffness of the platform, {report['means']}:"]
     for name, one in report["axes"].items():
-        text = "nothing resists"
+        text = "no resistance"
         if "quantiles" in one:
             low, half, high = (
                 one["quantiles"][q]["value"] for q in ("0.05", "0.5", "0.95")
@@ -123,5 +123,8 @@ def stiffness_spread_text(report: Mapping[str, Any]) -> str:
         lines.append(f"  {name}: {text}" + (f"; free in {free:.3g}" if free else ""))
     for one in report["free_motions"]:
         screw = numbers(one["screw"])
-        lines.append(f"  nothing resists {screw} [rad, m] in {one['draws']} draws")
+        lines.append(
+            f"  the platform moves freely along {screw} [rad, m] in "
+            f"{one['draws']} draws"
+        )
     return "\n".join(lines)

@@ -134,7 +134,10 @@ def _yields(
     met, failed, exceeds = solved.copy(), ~solved, {}
     for key, limit in limits.items():
         if key not in data or not data[key].size:
-            raise BadInput(f"limit {key}: not among what was computed")
+            raise BadInput(
+                f"limit {key}: found a quantity that was not computed; expected "
+                "one of the computed quantities"
+            )
         values, lower = _worst(data, key), f"{key}_lower"
         over = ~(values <= limit)
         # for a largest pose error the draws hold two bounds, otherwise one value
@@ -206,13 +209,14 @@ def summary_text(summary: Mapping[str, Any]) -> str:
     ]
     if summary["clearance"] == "contact" and not summary.get("load"):
         lines.append(
-            "the contact length decides which clearances close; with the load of "
-            "service (--load) they close as it presses them"
+            "the contact length determines which clearances close; with the "
+            "service load (--load) they close as this load presses them"
         )
     if summary.get("clearance_not_mixed"):
         lines.append(
-            f"warning: in {summary['clearance_not_mixed']} draws uniform clearances "
-            "are not mixed when their walk ends: their pose errors are too narrow"
+            f"warning: in {summary['clearance_not_mixed']} draws the random "
+            "walk of the uniform clearances has not mixed: the spread of these "
+            "pose errors is underestimated"
         )
     lines += [f"{WORDS[k]}: {_share(v)}" for k, v in summary["assembles"].items()]
     for key, results in summary["exceeds"].items():

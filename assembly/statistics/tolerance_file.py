@@ -107,7 +107,10 @@ def _groups(root: Table, tables: Sequence[Table], robot: Robot) -> _Groups:
         least.append(tightest)
         table.finish()
     if len(set(names)) < len(names):
-        raise root.bad("tolerance", "two of them share a name; expected different ones")
+        raise root.bad(
+            "tolerance",
+            "found two tolerances of the same name, expected different names",
+        )
     return groups
 
 
@@ -142,7 +145,10 @@ def _places(table: Table, robot: Robot) -> tuple[list[tuple[int, int]], int]:
             raise table.bad("components", f"found {quoted(part)}{nearest(part, SCREW)}")
     units = {int(SCREW.index(part) >= 3) for part in parts}
     if len(units) != 1:
-        raise table.bad("components", "expected angles only or lengths only, not none")
+        raise table.bad(
+            "components",
+            "expected components that are all angles or all lengths, at least one",
+        )
     try:
         frames = frames_named(robot, names)
     except BadInput as error:

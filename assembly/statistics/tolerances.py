@@ -45,7 +45,10 @@ def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int
     postures, reasons = place_many(robot, goals)
     reached = [p for p in postures if p is not None]
     if not reached:
-        raise BadInput(f"grid: no posture is reached; the first: {reasons[0]}")
+        raise BadInput(
+            "grid: found no posture that the robot reaches, expected at least "
+            f"one; the reason for the first: {reasons[0]}"
+        )
     said = verdicts(
         robot, Target(pose=goals[[p is not None for p in postures]]),
         np.array([p.coordinates for p in reached]),

@@ -121,8 +121,8 @@ def _distribute_connected(
         yield from _distribute(client, sweep, blocks, report)
     except (CommClosedError, CancelledError):
         raise BadInput(
-            "sweep: the connection to the scheduler was lost; finished points are in "
-            "the journal, the same command goes on"
+            "sweep: the connection to the scheduler was lost; finished points "
+            "are in the journal: run the same command again to continue"
         ) from None
 
 
@@ -157,8 +157,9 @@ def _distribute(
             seconds, solved = future.result()
         except KilledWorker:
             raise BadInput(
-                "sweep: some points killed every worker they were given to, as "
-                "when memory runs out; the journal keeps all others"
+                "sweep: some points ended every worker that computed them, for "
+                "example because memory ran out; the journal keeps all other "
+                "points"
             ) from None
         future.release()
         flying -= 1
@@ -240,7 +241,7 @@ def _question(content: bytes, digest: str) -> Question:
     question = replace(asked, robot=solve_links(asked.robot))
     if question_hash(question) != digest:
         raise BadInput(
-            "sweep: a worker reads another robot; expected its meshes and stiffness "
-            "libraries to be the same there, at the same paths"
+            "sweep: found another robot on a worker; expected the same meshes "
+            "and stiffness libraries there, at the same paths"
         )
     return question

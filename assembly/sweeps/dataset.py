@@ -239,8 +239,9 @@ def check_dataset(path: Path | str, what: str) -> None:
     path = Path(path)
     if path.is_file() and path.stat().st_size and not _is(path, what):
         raise BadInput(
-            f"{path}: found a NetCDF file that is not one of {what} by forcefit; "
-            "expected one, or nothing there: it is not overwritten"
+            f"{path}: found a NetCDF file that is not one of {what} by "
+            "forcefit; expected such a file or none: it is not overwritten, "
+            "write to another file"
         )
 
 

@@ -212,11 +212,15 @@ def _difference(first_line: bytes, header: bytes) -> str:
     expected = json.loads(header.rpartition(b" ")[0])
     line, _, check = first_line.rstrip(b"\n").rpartition(b" ")
     if not first_line.startswith(b'{"kind": "forcefit sweep journal'):
-        return "found no journal of a sweep; expected one, or no such file"
+        return (
+            "found a file that is no journal of a sweep; expected a journal or "
+            "no file: delete it or write to another file"
+        )
     if check != b"%08x" % zlib.crc32(line):
         return (
-            "the first line does not fit its check sum: a damaged journal, or one of "
-            "another version; expected this sweep's (delete it to begin again)"
+            "the check sum of the first line is wrong: the journal is damaged "
+            "or of another version; expected this sweep's journal (delete the "
+            "file to start again)"
         )
     other = json.loads(line)
     keys = [k for k in expected if other.get(k) != expected[k]]

@@ -41,7 +41,9 @@ def figure_of(
         BadInput: an axis or a quantity is unknown, or more than two axes are left.
     """
     if "status" not in data:
-        raise BadInput("figure: found no status; expected that of a sweep")
+        raise BadInput(
+            "figure: found no variable status; expected the NetCDF file of a sweep"
+        )
     view, note = part_of_sweep(data, at or {})
     axes = {str(d): view.sizes[d] for d in view["status"].dims}
     check_axes(axes)
@@ -65,11 +67,13 @@ def check_axes(sizes: Mapping[str, int]) -> None:
     if len(long) > 2:
         named = ", ".join(f"{name} ({n})" for name, n in long.items())
         raise BadInput(
-            f"figure: found axes {named}, expected one or two; forcefit assembly plot "
-            "plots a part of the file, with --at AXIS=VALUE"
+            f"figure: found axes {named}, expected one or two; select a part of "
+            "the file with forcefit assembly plot --at AXIS=VALUE"
         )
     if not long:
-        raise BadInput("figure: found a single point; expected an axis or two")
+        raise BadInput(
+            "figure: found a single point; expected one or two axes of several points"
+        )
 
 
 def part_of_sweep(

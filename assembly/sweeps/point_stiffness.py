@@ -119,7 +119,11 @@ def tangent_stiffnesses(
 def _tangent(conditions: Conditions, i: int, state: str) -> PlatformStiffness:
     """Return the tangent at one point, on the compliant side of a contact change."""
     if conditions.laws or any(not place.linear for place in conditions.yields):
-        raise SolverFailed("tangent", "an effect gives by a law that is no spring")
+        raise SolverFailed(
+            "tangent",
+            "the law of an effect is nonlinear, so that no tangent stiffness "
+            "is computed",
+        )
     assembly = assemble_row(replace(conditions, exact=state == "exact"), i)
     if isinstance(assembly, ExactAssembly):
         return exact_tangent(assembly, "letting go")

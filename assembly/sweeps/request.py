@@ -85,8 +85,8 @@ def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
     if close is not None and options.vary:
         option = "--rest" if options.rest is not None else "--mismatch"
         raise BadInput(
-            f"{option}: found --vary, which replaces the errors that it makes; "
-            "expected one of them"
+            f"{option}: found together with --vary, which replaces the errors "
+            f"that {option} computes; expected only one of them"
         )
     if isinstance(robot, Robot):
         if options.vary:
@@ -107,8 +107,9 @@ def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
     targets = _targets(machine, options.grid, options.poses)
     if options.mismatch is not None and of_joints(targets.names):
         raise BadInput(
-            "--mismatch: found points given by drives, which would be preloaded "
-            "otherwise at each; expected poses, or assembly solve --joint for one"
+            "--mismatch: found points given by drive coordinates, at which the "
+            "preload differs from point to point; expected poses, or assembly "
+            "solve --joint for one point"
         )
     question = Question(
         machine,
@@ -171,7 +172,9 @@ def _sources(
 ) -> "ErrorSources | None":
     """Return the distributions of the errors drawn; None if none are drawn."""
     if (options.errors is None) != (options.draws is None):
-        raise BadInput("sweep: --errors and --draws go together; found one of them")
+        raise BadInput(
+            "sweep: found only one of --errors and --draws, expected both or neither"
+        )
     if options.errors is None:
         return None
     from assembly.model.error_distributions import read_sources
@@ -181,7 +184,10 @@ def _sources(
     sources = read_sources(options.errors, machine, fixed)
     drawn = [path for path in varied if ".geometric_error." in path]
     if drawn:
-        raise BadInput(f"--vary {drawn[0]}: found beside --errors, which draws it")
+        raise BadInput(
+            f"--vary {drawn[0]}: found together with --errors, whose draws "
+            "replace this number; remove one of the two"
+        )
     return sources
 
 
@@ -197,9 +203,9 @@ def _check_assumption(question: Question) -> None:
     )
     if is_loaded(home) and (question.assumption or question.clearance_only):
         raise BadInput(
-            "--assumption: the robot is loaded (--load, --gravity or an effect), and "
-            "the bounds of the pose error are those of an unloaded one; expected "
-            "--assumption none, and no bounds by clearances alone"
+            "--assumption: found a loaded robot (--load, --gravity or an "
+            "effect), but the bounds of the pose error hold for an unloaded "
+            "one; expected --assumption none, and no bounds by clearances alone"
         )
 
 
@@ -228,7 +234,9 @@ def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
         parts = [parse_values(f"--vary {path}", spec) for spec in specs.split(",")]
         values = np.concatenate(parts)
         if len(np.unique(values)) < len(values):
-            raise BadInput(f"--vary {path}: found a value twice")
+            raise BadInput(
+                f"--vary {path}: found the same value twice, expected different values"
+            )
         for value in (float(values.min()), float(values.max())):
             design.check({path: value})
         values_by_path[path] = values

@@ -68,7 +68,8 @@ def stiffness_slopes(
         values = [design.values[full] for full in design.find(path)]
         if len(set(values)) > 1:
             raise BadInput(
-                f"--by {path}: the legs' numbers differ; expected full paths"
+                f"--by {path}: found different values in the legs; expected the "
+                f"full path of one of them, such as {design.find(path)[0]}"
             )
         step = _STEP * (abs(values[0]) or 1.0)
         if ".geometric_error." in path:
@@ -89,5 +90,8 @@ def _cannot_change(path: str, reason: str) -> str:
     instead = ""
     if len(keys) == 2 and keys[0] in _AS_ERROR and keys[1] in {"x", "y", "z"}:
         error = f"{frame}.geometric_error.{_AS_ERROR[keys[0]]}{keys[1]}"
-        instead = f"; forced together as an error it is --by {error}"
+        instead = (
+            "; its change as a geometric error, which forced assembly closes, "
+            f"is --by {error}"
+        )
     return f"{path} cannot change alone: {reason}{instead}"

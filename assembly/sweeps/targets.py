@@ -166,7 +166,10 @@ def parse_values(whose: str, spec: str) -> NDArray:
         return np.array(numbers)
     start, stop, step = numbers
     if step == 0 or (stop - start) / step < 0:
-        raise BadInput(f"{whose}: step {step:g} never leads from {start:g} to {stop:g}")
+        raise BadInput(
+            f"{whose}: found a step of {step:g} that does not lead from "
+            f"{start:g} to {stop:g}; expected another sign, not 0"
+        )
     count = (stop - start) / step
     if count > LARGEST_GRID:
         raise BadInput(f"{whose}: {count:.3g} points; is the step too small?")
@@ -192,7 +195,7 @@ def read_targets(path: Path | str, robot: Robot) -> Targets:
     if len(rows) < 2:
         content = "only a header" if rows else "nothing"
         raise BadInput(
-            f"{path}: found {content}; expected one and a row for each posture"
+            f"{path}: found {content}; expected a header and a row for each posture"
         )
     header = [cell.strip() for cell in rows[0][1]]
     names = [cell.removeprefix("pose.") for cell in header if cell != "id"]

@@ -170,8 +170,8 @@ def show(
     loaded = wrench is not None and any(wrench)
     if loaded and error_body is not None and assumption == "budget":
         raise BadInput(
-            "--assumption: found budget with --load, and a loaded robot has no such "
-            "assumption; expected frozen or free"
+            "--assumption: found budget together with --load, but the budget bound "
+            "is defined for a robot without load; expected frozen or free"
         )
     assumption = assumption or ("frozen" if loaded else "budget")
     posture = posture_of(robot, pose, joint, rest, mismatch)

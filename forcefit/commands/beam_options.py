@@ -48,7 +48,8 @@ class BeamOptions:
             if given:
                 name = next(iter(given)).replace("_", "-")
                 raise BadInput(
-                    f"--section: found with --{name}, expected one of the two"
+                    f"--section: found together with --{name}; expected only one of "
+                    "them, remove the other"
                 )
             constants = parse_assignments([self.section_text], "--section")
             check_section("--section", constants)
@@ -56,13 +57,21 @@ class BeamOptions:
         rectangle = "width" in given or "height" in given
         if ("radius" in given) == rectangle:
             raise BadInput(
-                "give either --radius, or --width and --height, or --section"
+                "no single section found; expected either --radius, or --width and "
+                "--height, or --section"
             )
         if rectangle and "inner_radius" in given:
-            raise BadInput("--inner-radius: found with a rectangle, expected --radius")
+            raise BadInput(
+                "--inner-radius: found together with --width and --height; expected "
+                "--radius of a tube (a box has --section "
+                "width=...,height=...,wall=...)"
+            )
         for name in ("width", "height") if rectangle else ("radius",):
             if name not in given:
-                raise BadInput(f"--{name}: missing; a rectangle has both")
+                raise BadInput(
+                    f"--{name}: missing; a rectangular section needs both --width and "
+                    "--height [m]"
+                )
             checked(f"--{name}", given[name], "m", above=0)
         if "inner_radius" in given:
             inner = given["inner_radius"]

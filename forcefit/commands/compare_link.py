@@ -47,8 +47,8 @@ def compare(
     ratios: Annotated[
         str | None,
         typer.Option(
-            help="Instead of a SURFACE: slenderness ratios L / r of straight bars of "
-            "the section, such as 5,10,20,40."
+            help="Instead of a SURFACE: straight bars of the section with these "
+            "slenderness ratios L / r, such as 5,10,20,40."
         ),
     ] = None,
     radius: Radius = None,
@@ -99,9 +99,15 @@ def compare(
         _compare_bars(options, ratios, accuracy, interface, figure, json)
         return
     if surface is None:
-        raise BadInput("SURFACE: missing; expected one, or a section and --ratios")
+        raise BadInput(
+            "SURFACE: missing; expected a file of the surface, or a section and "
+            "--ratios"
+        )
     if curve is not None and (options.has_section() or up is not None):
-        raise BadInput("--curve: its file has the sections and their axes")
+        raise BadInput(
+            "--curve: found together with options of the section or --up; the file "
+            "defines the sections and their axes: remove these options"
+        )
     accuracy = 0.005 if accuracy is None else accuracy
     mesh = (surface, base, tip, unit or "m", accuracy, interface)
     _compare_surface(options, mesh, curve, up, figure, json)
@@ -112,7 +118,10 @@ def _check_no_surface(**values: object) -> None:
     for name, value in values.items():
         if value is not None:
             option = name if name == "SURFACE" else f"--{name}"
-            raise BadInput(f"{option}: found with --ratios, whose bars have none")
+            raise BadInput(
+                f"{option}: found together with --ratios, which compares straight "
+                "bars without a surface file; remove one of the two"
+            )
 
 
 def _compare_surface(

@@ -82,7 +82,9 @@ def _about(table: dict[str, Any]) -> list[str]:
         )
     if table["not_measured"]:
         names = ", ".join(table["not_measured"])
-        lines.append(f"not measured where the robot was identified: {names}")
+        lines.append(
+            f"components without readings when the robot was identified: {names}"
+        )
     if table["registration"] != "known":
         lines.append(f"registration: {table['registration']}")
     if table["identified_at"] is not None:
@@ -173,8 +175,12 @@ def _left(path: Path) -> dict[str, float]:
         after = loads(read_text(path))["error"]["after"]
         return {key: float(after[key] or 0.0) for key in ("position", "rotation")}
     except (ValueError, KeyError, TypeError):
-        expected = "expected the answer of forcefit validation diagnose --json"
-        raise BadInput(f"{path}: found no error after; {expected}") from None
+        expected = (
+            "expected the JSON file that forcefit validation diagnose --json writes"
+        )
+        raise BadInput(
+            f"{path}: found no error of the identified robot; {expected}"
+        ) from None
 
 
 def carry(
@@ -255,7 +261,10 @@ def explain(
         check_writable(figure, PICTURE)
     machine = load_robot(robot)
     if not machine.functions:
-        raise BadInput(f"{robot}: has no function to explain")
+        raise BadInput(
+            f"{robot}: found no learned function to show; expected a robot saved by "
+            "forcefit validation diagnose --save that has one"
+        )
     shown = curves.curves_of(machine, _ranges(machine.functions, over or []))
     if figure is not None:
         save_figure(curves.figure_of(shown), figure)

@@ -74,7 +74,10 @@ def deflection(
     )
 
     if follow and back:
-        raise BadInput("--follow: not with --back; the path turns by itself")
+        raise BadInput(
+            "--follow: found together with --back; remove --back, because a followed "
+            "path turns at its limit points"
+        )
     if figure is not None:
         check_writable(figure, PICTURE)
     exact = parse_state(state, ("contact", "exact")) == "exact"

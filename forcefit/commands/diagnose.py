@@ -31,7 +31,8 @@ def diagnose(
     finite_motions: Annotated[
         bool,
         typer.Option(
-            "--finite-motions", help="Use finite motions of the declared model."
+            "--finite-motions",
+            help="Compute the declared model with finite instead of small motions.",
         ),
     ] = False,
     without: Annotated[
@@ -40,7 +41,7 @@ def diagnose(
     ] = None,
     only: Annotated[
         list[str] | None,
-        typer.Option(help="Consider these alone, named as for --without."),
+        typer.Option(help="Consider only these effects; names as for --without."),
     ] = None,
     prior: Annotated[
         list[str] | None,
@@ -88,7 +89,7 @@ def diagnose(
         write_report(diagnosis, report, tally, provenance(folder))
     if save is not None:
         if not diagnosis.better:
-            typer.echo(f"{save}: not written, {_worse(diagnosis)}", err=True)
+            typer.echo(f"{save}: not written, because {_worse(diagnosis)}", err=True)
             raise typer.Exit(1)
         save_robot(diagnosis, save)
 
@@ -122,7 +123,7 @@ def _odds(without: list[str], only: list[str], prior: list[str]) -> dict[str, fl
 def _worse(diagnosis: "Diagnosis") -> str:
     """Return why the identified robot is not saved."""
     if not len(diagnosis.fit.unknowns) and not diagnosis.effects:
-        return "nothing was found that the declared robot lacks"
+        return "no error or effect was found that the declared robot lacks"
     after, before = diagnosis.after.normalised, diagnosis.before.normalised
     return (
         "the identified robot predicts the held-out rows no better than the declared "

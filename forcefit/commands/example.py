@@ -118,9 +118,9 @@ def example(
         return
     for name in names:
         if name not in EXAMPLES:
-            raise BadInput(f"example: no {quoted(name)}{nearest(name, EXAMPLES)}")
+            raise BadInput(f"example: found {quoted(name)}{nearest(name, EXAMPLES)}")
     if not output.is_dir():
-        raise BadInput(f"{output}: no such folder; expected one that exists")
+        raise BadInput(f"{output}: found no such folder; expected an existing folder")
     root = _root()
     files = dict.fromkeys(
         path for name in names for part in EXAMPLES[name].files
@@ -130,7 +130,9 @@ def example(
     for path in absent:
         (output / path).parent.mkdir(parents=True, exist_ok=True)
         write_bytes((root / path).read_bytes(), output / path)
-    print(f"{len(absent)} files written to {output.resolve()}; begin there with")
+    print(
+        f"{len(absent)} files written to {output.resolve()}; start in that folder with"
+    )
     for name in names:
         print(f"  {EXAMPLES[name].first}")
 
@@ -161,7 +163,8 @@ def _is_absent(target: Path, source: Path) -> bool:
         return True
     if not target.is_file() or target.read_bytes() != source.read_bytes():
         raise BadInput(
-            f"{target}: found another content than the example's; expected the same, "
-            "or nothing there: it is not overwritten"
+            f"{target}: found a file with other content than the example's; expected "
+            "the same content or no file: it is not overwritten, choose another "
+            "folder"
         )
     return False

@@ -30,7 +30,7 @@ def import_(
         bool,
         typer.Option(
             "--diagnose",
-            help="Then run validation diagnose, which writes --json and --report.",
+            help="Then run validation diagnose; --json and --report write its results.",
         ),
     ] = False,
     report: ReportOption = None,
@@ -43,7 +43,10 @@ def import_(
     from validation.exchange.tracker import import_readings
 
     if report is not None and not diagnose:
-        raise BadInput("--report: expected --diagnose with it, whose report it is")
+        raise BadInput(
+            "--report: found without --diagnose; add --diagnose, because the report "
+            "shows the diagnosis"
+        )
     imported = import_readings(files, targets, commands, output)
     if not diagnose:
         write_json(imported.table(), json)

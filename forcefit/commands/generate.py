@@ -87,11 +87,16 @@ def generate(
     error_size: Annotated[
         float,
         typer.Option(
-            help="[rad] Largest declared error drawn; of lengths 0.5 mm per mrad."
+            help="[rad] Largest declared error of an angle; that of a length is 0.5 mm "
+            "per mrad of it."
         ),
     ] = 0.0,
-    outliers: Annotated[int, typer.Option(help="Number of outlying rows.", min=0)] = 0,
-    missing: Annotated[float, typer.Option(help="Share of empty cells.")] = 0.0,
+    outliers: Annotated[
+        int, typer.Option(help="Number of outliers: rows with a large error.", min=0)
+    ] = 0,
+    missing: Annotated[
+        float, typer.Option(help="Share of the readings that are missing, from 0 to 1.")
+    ] = 0.0,
     hidden_frame: Annotated[
         float, typer.Option(help="[rad, m] Size of the measuring frame's unknown pose.")
     ] = 0.0,
@@ -146,7 +151,8 @@ def generate(
     check_json(str(truth))
     if folder.resolve() in truth.resolve().parents:
         raise BadInput(
-            f"--truth {truth}: found a place inside {folder}, for all to see"
+            f"--truth {truth}: found a place inside {folder}, where the hidden "
+            "effects would be visible; expected a file outside that folder"
         )
     machine = without_clearance(load_robot(robot))
     if error_size:

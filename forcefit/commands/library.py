@@ -43,8 +43,8 @@ def read(
     at: Annotated[
         list[str] | None,
         typer.Option(
-            help="Interpolate K_E between entries, with its error, at parameters in "
-            "SI units such as radius=0.02,length=0.4."
+            help="Interpolate K_E between entries and estimate its error; "
+            "parameters in SI units, such as radius=0.02,length=0.4."
         ),
     ] = None,
     family: Annotated[
@@ -58,17 +58,24 @@ def read(
         ),
     ] = None,
     key: Annotated[
-        str | None, typer.Option(help="With --to: one entry; all for csv if absent.")
+        str | None,
+        typer.Option(
+            help="With --to: key of the entry to print. Default for csv: all entries."
+        ),
     ] = None,
     json: JsonOption = None,
 ) -> None:
     """List a library's entries, look up K_E between them, export them."""
     if at and to:
-        raise BadInput("library read: found --at and --to, expected one of them")
+        raise BadInput(
+            "library read: found both --at and --to, expected only one of them"
+        )
     for name, value, other in (("--family", family, at), ("--key", key, to)):
         if value and not other:
             needed = "--at" if name == "--family" else "--to"
-            raise BadInput(f"{name}: found without {needed}, expected both")
+            raise BadInput(
+                f"{name}: found without {needed}; add {needed} or remove {name}"
+            )
     if at:
         _look_up(folder, at, family, json)
     elif to is not None:
@@ -112,7 +119,10 @@ def _export(folder: Path, to: str, key: str | None, json: str | None) -> None:
     from stiffness.report.library import read_entry, read_library
 
     if json is not None and to != "json":
-        raise BadInput(f"--json: found with --to {to}, expected one of the two")
+        raise BadInput(
+            f"--json: found together with --to {to}; expected only one of the two, or "
+            "--to json"
+        )
     if to in {"csv", "json"}:
         entries = read_library(folder) if key is None else [read_entry(folder, key)]
         if to == "json":
@@ -121,5 +131,8 @@ def _export(folder: Path, to: str, key: str | None, json: str | None) -> None:
             print(library_csv(entries), end="")
         return
     if key is None:
-        raise BadInput("--key: missing; another program reads one entry at a time")
+        raise BadInput(
+            f"--key: missing; expected the key of one entry, because {to} reads one "
+            "entry at a time"
+        )
     print(stiffness_for(to, read_entry(folder, key).stiffness, key), end="")

@@ -26,7 +26,11 @@ def import_(
         str, typer.Option(help='Held interface: a node, or "z=0" [m] with --nodes.')
     ] = "1",
     tip: Annotated[
-        str, typer.Option(help="Interface at which the screw is read, likewise.")
+        str,
+        typer.Option(
+            help='Interface at which the screw is read: a node, or "z=0.4" [m] with '
+            "--nodes."
+        ),
     ] = "2",
     nodes: Annotated[
         Path | None,
@@ -89,7 +93,7 @@ def export(
         expected = ".npy" if to == "numpy" else "another than .npy"
         raise BadInput(
             f"--output: found {quoted(output.name)}, expected the ending {expected} "
-            f"for {to}: by it the file is read again"
+            f"for --to {to}, so that forcefit can read the file again"
         )
     # a matrix of the same format may be replaced, nothing else
     endings, begins = (output.suffix.lower(),), (content[:8].lower(),)

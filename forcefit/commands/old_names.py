@@ -113,7 +113,9 @@ def _with_new_command(words: list[str]) -> list[str]:
         if words[:count] == old.split():
             print(f"forcefit: {old} is now {' '.join(new)}", file=sys.stderr)
             if old.endswith("look-up") and not any(w.startswith("--at") for w in words):
-                raise BadInput("--at: missing; expected such as radius=0.02,length=0.4")
+                raise BadInput(
+                    "--at: missing; expected parameters such as radius=0.02,length=0.4"
+                )
             return [*new, *words[count:]]
     return words
 

@@ -95,7 +95,7 @@ RestOption = Annotated[
     str | None,
     typer.Option(
         "--rest",
-        help="Frame of a loop that does not close at home; the gap becomes its "
+        help="Frame in a loop that does not close at home; the gap becomes the frame's "
         "geometric error.",
     ),
 ]
@@ -264,8 +264,8 @@ def parse_direction(texts: list[str] | None) -> list[float] | None:
     length = math.hypot(*given.values())
     if length == 0.0 or len({name[0] for name, value in given.items() if value}) > 1:
         raise BadInput(
-            "--along: expected components of a translation or of a rotation, not "
-            "all zero, not of both"
+            "--along: expected components of a translation or of a rotation, "
+            "such as tx=1,tz=-1: not all zero, and not of both kinds"
         )
     return [given.get(name, 0.0) / length for name in names]
 
@@ -301,8 +301,8 @@ def posture_of(
     applied = apply_robot_effects(declared)
     if applied.gravity is not None or applied.load.any():
         raise BadInput(
-            f"{robot}: its effects load it; expected assembly solve or "
-            "validation crosscheck, which know loads"
+            f"{robot}: found effects that load the robot, which this command does not "
+            "compute; use assembly solve or validation crosscheck instead"
         )
     return applied.posture
 

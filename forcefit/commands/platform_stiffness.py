@@ -145,7 +145,8 @@ def _print_slopes(results: dict[str, Any]) -> None:
             text = f"dC/d({path}){name}"
             if (slope != slope).all():  # NaN
                 print(
-                    f"{text}: none; the platform moves freely, or clearances just touch"
+                    f"{text}: no derivative exists; the platform moves freely, or a "
+                    "clearance touches its bound without force"
                 )
             else:
                 print(f"{text}, diagonal: {slope.diagonal()}")

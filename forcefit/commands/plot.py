@@ -51,8 +51,9 @@ def plot(
     quantities: Annotated[
         list[str] | None,
         typer.Option(
-            help="For the figure, such as stiffness.FX,translation or "
-            "wrench.leg1.link_a.FZ. A variable alone: all components."
+            help="For the figure: variables or their components, such as "
+            "stiffness.FX,translation or wrench.leg1.link_a.FZ. The name of a "
+            "variable alone selects all its components."
         ),
     ] = None,
     rows: Annotated[
@@ -72,7 +73,9 @@ def plot(
     from assembly.sweeps.point_table import write_point_table
 
     if picture is None and csv is None:
-        raise BadInput("plot: expected --figure, --csv or both")
+        raise BadInput(
+            "plot: found no output to write; expected --figure, --csv or both"
+        )
     figure_options = {"--at": at, "--kind": kind, "--quantities": quantities}
     _check_goes_with("--figure", picture, figure_options)
     _check_goes_with("--csv", csv, {"--rows": rows})
@@ -87,7 +90,9 @@ def _check_goes_with(option: str, path: Path | None, others: dict[str, Any]) -> 
     """Refuse options of an output that is not written."""
     for name, value in others.items():
         if value and path is None:
-            raise BadInput(f"{name}: found without {option}, expected both")
+            raise BadInput(
+                f"{name}: found without {option}; add {option} or remove {name}"
+            )
 
 
 def _plot_file(

@@ -34,6 +34,6 @@ def schema(
         return
     wanted = " ".join(name)
     if wanted not in known:
-        raise BadInput(f"schema: no {quoted(wanted)}{nearest(wanted, known)}")
+        raise BadInput(f"schema: found {quoted(wanted)}{nearest(wanted, known)}")
     result = schema_of(known[wanted], f"forcefit {wanted}", file=wanted in files)
     print(json.dumps(result, indent=1))

@@ -108,8 +108,8 @@ def _check_margins(quantities: str, exact: bool, **loads: list[str] | None) -> N
     given = [name for name, texts in loads.items() if texts]
     for name in [*given, *(["state"] if exact else [])]:
         raise BadInput(
-            f"--{name}: found with --quantities {quantities}; margins have no loads "
-            "and are of small motions"
+            f"--{name}: found together with --quantities {quantities}; the margins "
+            f"are computed without loads and for small motions: remove --{name}"
         )
 
 

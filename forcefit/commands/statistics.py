@@ -303,7 +303,10 @@ def tolerances(
     _check_clearance_model(clearance, contact_length)
     _check_word("--quantities", quantities, tuple(MARGINS))
     if plan is None and (output or figure or csv):
-        raise BadInput("tolerances: --output, --figure and --csv need a --plan")
+        raise BadInput(
+            "tolerances: found --output, --figure or --csv without --plan; add "
+            "--plan FILE, because these options write the tolerances of a plan"
+        )
     if output or figure or csv:
         need("xarray")
     if output is not None:
@@ -343,8 +346,8 @@ def tolerances(
             texts.append(present_text(results["present"]))
         elif asked_plan is None:
             raise BadInput(
-                f"{machine.name}: its frames have no errors to judge; give them a "
-                "geometric_error, or give a --plan of tolerances"
+                f"{machine.name}: found no geometric_error of a frame; expected one "
+                "to be compared with the zone margin, or a --plan of tolerances"
             )
         if asked_plan is not None:
             whose = identity_of(postures, asked_plan, fresh)

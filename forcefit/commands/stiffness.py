@@ -94,7 +94,10 @@ def beam(
     if file is None:
         link = _straight_link(options, length, along or "x", up)
     elif options.has_section() or not length is along is up is None:
-        raise BadInput(f"{file}: a curve's file has all lengths, sections and axes")
+        raise BadInput(
+            f"{file}: found together with --length, --along, --up or options of a "
+            "section; the file defines them: remove these options"
+        )
     else:
         link, _, _ = curve_link(file, options)
     write_json(link_results(link), json)
@@ -112,7 +115,10 @@ def _straight_link(
     from forcefit.inputs.errors import checked
 
     if length is None:
-        raise BadInput("--length: missing; expected [m], or a FILE of a curve's pieces")
+        raise BadInput(
+            "--length: missing; expected the length of a straight beam [m], or a "
+            "FILE with the pieces of a curved beam"
+        )
     axis = parse_axis("--along", along)
     tip = checked("--length", length, "m", above=0) * axis / np.linalg.norm(axis)
     return options.link(np.zeros(3), tip, parse_up(up))
@@ -146,7 +152,10 @@ def fea(
 
     if part and "list" in part:
         if part != ["list"] or base or tip or mass or young or poisson:
-            raise BadInput("--part list: found other options, expected it alone")
+            raise BadInput(
+                "--part list: found together with other options; expected it alone, "
+                "because it only lists the solids of a STEP file"
+            )
         _list_solids(surface, json)
         return
     held, moved = parse_interfaces(base, tip)
@@ -199,7 +208,8 @@ def stress(
     gravity: Annotated[
         list[str] | None,
         typer.Option(
-            help="Gravity in the file's axes, for the own weight: z=-9.81 [m/s^2]."
+            help="Gravity in the file's axes [m/s^2], such as z=-9.81, for stresses "
+            "due to the link's own weight."
         ),
     ] = None,
     away: Annotated[
@@ -239,11 +249,18 @@ def stress(
         materials[0].E, materials[0].nu, radius, inner_radius, width, height, section
     )
     if not wrench and not gravity:
-        raise BadInput("--wrench: missing; expected one, or --gravity")
+        raise BadInput(
+            "--wrench: missing; expected a wrench [N, N m] such as fx=10, or --gravity"
+        )
     if part and options.has_section():
-        raise BadInput("--part: found with a section, whose beam has one material")
+        raise BadInput(
+            "--part: found together with a section; the compared beam has one "
+            "material only: remove --part or the section"
+        )
     if gravity and figure is not None:
-        raise BadInput("--figure: found with --gravity, expected one of the two")
+        raise BadInput(
+            "--figure: found together with --gravity, expected only one of the two"
+        )
     load = np.array(parse_load(wrench or ["fx=0"], "--wrench"))
     g = parse_gravity(gravity)
     declared = options.declared() if options.has_section() else None

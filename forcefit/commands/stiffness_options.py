@@ -23,7 +23,9 @@ Young = Annotated[float, typer.Option(help="Young's modulus [Pa].")]
 Poisson = Annotated[float, typer.Option(help="Poisson's ratio.")]
 YoungOfRest = Annotated[
     float | None,
-    typer.Option("--young", help="Young's modulus [Pa], outside every --part."),
+    typer.Option(
+        "--young", help="Young's modulus [Pa] of all material that no --part declares."
+    ),
 ]
 PoissonOfRest = Annotated[
     float | None, typer.Option("--poisson", help="Poisson's ratio, likewise.")
@@ -148,7 +150,7 @@ def parse_materials(
 
     others = [parse_part("--part", text) for text in parts or ()]
     if (young is None) != (poisson is None):
-        raise BadInput("--young, --poisson: found one of them, expected both")
+        raise BadInput("--young, --poisson: found only one of them, expected both")
     if young is None or poisson is None:
         if not (others and others[0].solid):
             raise BadInput(

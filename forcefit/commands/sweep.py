@@ -91,9 +91,9 @@ def sweep(
     quantities: Annotated[
         list[str] | None,
         typer.Option(
-            help="Names of data variables to compute and store, such as "
-            "energy,margin; default: those stored without this option; list prints "
-            "all.",
+            help="Names of data variables to compute and store, such as energy,margin. "
+            "Default: the variables of a sweep without this option. list prints all "
+            "names.",
             callback=_list_quantities,
             is_eager=True,
         ),
@@ -155,7 +155,9 @@ def sweep(
     from assembly.sweeps.sweep import journal_path, run_sweep
 
     if workers is not None and scheduler is not None:
-        raise BadInput("sweep: found --workers and --scheduler, expected one of them")
+        raise BadInput(
+            "sweep: found both --workers and --scheduler, expected only one of them"
+        )
     check_dataset(output, "a sweep")
     if figure is not None:
         check_writable(figure, PICTURE)
@@ -198,8 +200,8 @@ def sweep(
             run_sweep(asked, output, note, solver, held)
     except KeyboardInterrupt:
         print(
-            f"forcefit: interrupted; {done[0]} of {asked.size} points are kept in "
-            f"{journal_path(output)}: the same command continues",
+            f"forcefit: interrupted; {done[0]} of {asked.size} points are kept "
+            f"in {journal_path(output)}: run the same command again to continue",
             file=sys.stderr,
         )
         raise typer.Exit(130) from None

@@ -62,7 +62,8 @@ def validation() -> None:
 ErrorsOption = Annotated[
     Path | None,
     typer.Option(
-        help="Distributions of errors (TOML); one draw replaces the robot's own errors."
+        help="Distributions of errors (TOML); one draw from them replaces the robot's "
+        "declared errors."
     ),
 ]
 SeedOption = Annotated[
@@ -122,8 +123,8 @@ def crosscheck(
     scale: Annotated[
         str,
         typer.Option(
-            help="Factors on errors and load; smaller ones are added where these "
-            "leave a check undecided."
+            help="Factors on errors and load. Smaller factors are added if a check is "
+            "undecided with these."
         ),
     ] = "1,0.5,0.25,0.125",
     links: Annotated[
@@ -169,15 +170,24 @@ def crosscheck(
     scales, wrench = parse_scales(scale), parse_load(load)
     g, covariates = parse_gravity(gravity), parse_covariates(under)
     if with_clearance and figure is not None:
-        raise BadInput("--figure: with --with-clearance there is no slope to draw")
+        raise BadInput(
+            "--figure: found together with --with-clearance; no slope is computed "
+            "with clearances: remove one of the two"
+        )
     if state is not None:
         parse_state(state, ("exact",))
     if state is not None and (figure is not None or grid is not None):
-        raise BadInput("--state: not with --figure or --grid")
+        raise BadInput(
+            "--state: found together with --figure or --grid; remove these options, "
+            "because the stiffness is compared at one pose"
+        )
     if figure is not None:
         check_writable(figure, PICTURE)
     if grid is not None and (pose or joint or figure):
-        raise BadInput("--grid: not together with --pose, --joint or --figure")
+        raise BadInput(
+            "--grid: found together with --pose, --joint or --figure; expected only "
+            "one of them"
+        )
 
     own = errors is None or rest is mismatch is None
 
@@ -287,10 +297,16 @@ def validity(
 
     given = [bool(pose or joint), grid is not None, poses is not None]
     if sum(given) > 1:
-        raise BadInput("expected one of --pose or --joint, --grid, --poses")
+        raise BadInput(
+            "found more than one option for poses; expected one of --pose or "
+            "--joint, --grid, --poses"
+        )
     if figure is not None:
         if not solids:
-            raise BadInput("--figure: expected --solids too; nothing else is drawn")
+            raise BadInput(
+                "--figure: found without --solids; add --solids, because the figure "
+                "shows the error that solids reveal"
+            )
         check_writable(figure, PICTURE)
     wrench, g = parse_load(load), parse_gravity(gravity)
     own = errors is None or rest is mismatch is None

@@ -59,5 +59,8 @@ def _temporary() -> Path:
     folder.mkdir(mode=0o700, exist_ok=True)
     found = folder.lstat()
     if hasattr(os, "getuid") and (found.st_uid != user or found.st_mode & 0o022):
-        raise PermissionError(f"{folder}: belongs to somebody else")
+        raise PermissionError(
+            f"{folder}: found a folder of another user or one that others can write "
+            "to; expected a private folder: set FORCEFIT_CACHE"
+        )
     return folder

@@ -88,7 +88,9 @@ def check_writable(path: Path | str, kind: Kind | None = None) -> None:
     except (OSError, ValueError) as error:
         raise BadInput(unwritable(path, error)) from None
     if not folder.is_dir():
-        raise BadInput(f"{path}: no folder {path.parent}; expected one that exists")
+        raise BadInput(
+            f"{path}: found no folder {path.parent}; expected an existing folder"
+        )
     if mode is not None:
         _check_there(path, mode, kind)
     if not os.access(folder, os.W_OK):
@@ -115,8 +117,8 @@ def _check_there(path: Path, mode: int, kind: Kind | None) -> None:
         raise BadInput(unwritable(path, error)) from None
     if not head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(kind.begins):
         raise BadInput(
-            f"{path}: found a file that is not {kind.name}; expected one, or nothing "
-            "there: it is not overwritten"
+            f"{path}: found a file that is not {kind.name}; expected one, or no "
+            "file: it is not overwritten, write to another file"
         )
 
 
@@ -173,7 +175,10 @@ def check_new_folder(folder: Path | str) -> None:
     folder = Path(folder)
     check_writable(folder.parent / f"{folder.name}.new")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise BadInput(f"{folder}: found something there, expected a new folder")
+        raise BadInput(
+            f"{folder}: found a file or a folder that is not empty, expected a new "
+            "folder"
+        )
 
 
 @contextmanager

@@ -163,8 +163,8 @@ def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
     """
     if "area" in section:
         raise BadInput(
-            "stress: a section given by area, I_y, I_z, J says nothing of its outer "
-            f"fibres; expected {_SHAPES}"
+            "stress: found a section given by area, I_y, I_z, J, whose outline "
+            f"is unknown; expected {_SHAPES}"
         )
     known = {"radius", "inner_radius", "width", "height", "wall"}
     if not {"radius"} <= set(section) <= {"radius", "inner_radius"} and not (

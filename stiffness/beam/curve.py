@@ -176,8 +176,8 @@ def curve_compliance(
             return (finer + finer.T) / 2
         parts, C = 2 * parts, finer
     raise BadInput(
-        f"curve_compliance: the integral did not settle to {tolerance:g}; cut the "
-        "pieces where the section jumps"
+        "curve_compliance: the integral did not converge to a relative error "
+        f"of {tolerance:g}; split the pieces where the section jumps"
     )
 
 

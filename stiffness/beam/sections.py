@@ -155,7 +155,10 @@ def box_section(width: float, height: float, wall: float, nu: float) -> Section:
     _check(width=width, height=height, wall=wall)
     check_poisson("box_section", nu)
     if not 2 * wall < min(width, height):
-        raise BadInput(f"box_section: wall = {wall:g} m must leave a hole")
+        raise BadInput(
+            f"box_section: found wall = {wall:g} m, expected less than half of "
+            "width and of height"
+        )
     inner_width, inner_height = width - 2 * wall, height - 2 * wall
     b, h = width - wall, height - wall
     return Section(
@@ -203,7 +206,10 @@ def i_section(
     _check(width=width, height=height, web=web, flange=flange)
     check_poisson("i_section", nu)
     if not (web < width and 2 * flange < height):
-        raise BadInput("i_section: web or flange is thicker than the section allows")
+        raise BadInput(
+            f"i_section: found web = {web:g} m and flange = {flange:g} m, "
+            "expected web < width and 2 flange < height"
+        )
     clear, h = height - 2 * flange, height - flange
     area = 2 * width * flange + clear * web
     m, n = 2 * width * flange / (h * web), width / h
@@ -262,7 +268,10 @@ def check_section(place: str, given: Mapping[str, float]) -> None:
     if set(given) in _SECTIONS:
         for name, value in given.items():
             if not (value == 0 or 1e-40 <= abs(value) <= LARGEST):
-                raise BadInput(f"{place}.{name}: found {value:g}, no size of a section")
+                raise BadInput(
+                    f"{place}.{name}: found {value:g}, expected 0 or a size "
+                    f"from 1e-40 to {LARGEST:g} in SI units"
+                )
         return
     known = set().union(*_SECTIONS)
     for name in given:

@@ -74,13 +74,13 @@ def harwell_boeing(path: Path, text: str) -> csr_array:
         or (starts[0], starts[-1]) != (1, entries + 1)
     ):
         raise BadInput(
-            f"{path}: found {found[1]} places and {found[2]} values of {columns} "
-            f"columns, expected {entries}"
+            f"{path}: found {found[1]} row indices and {found[2]} values of "
+            f"{columns} columns, expected {entries} of each"
         )
     i = places.astype(int) - 1
     j = np.repeat(np.arange(columns), np.diff(starts).astype(int))
     if i.min(initial=0) < 0 or i.max(initial=0) >= rows:
-        raise BadInput(f"{path}: found a row beyond {rows}")
+        raise BadInput(f"{path}: found a row number above {rows}, expected 1 to {rows}")
     half = csr_array(coo_array((values, (i, j)), shape=(rows, columns)))
     return both_halves(half) if kind.upper() == "RSA" else half
 
@@ -143,7 +143,10 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
         row, node = (_whole(path, word) for word in words[:2])
         freedoms[row] = node, LABELS.index(label) + 1
     if sorted(freedoms) != list(range(1, len(freedoms) + 1)) or not freedoms:
-        raise BadInput(f"{path}: found rows that do not run from 1 on")
+        raise BadInput(
+            f"{path}: found rows with gaps or repeated numbers, expected rows "
+            "numbered from 1 without gaps"
+        )
     return [freedoms[row] for row in sorted(freedoms)]
 
 

@@ -46,7 +46,10 @@ def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
     text = read_text(path)
     head = _WORKBENCH.match(text)
     if head and abs(_LENGTHS.get(head[1], 0.0) - unit) > 1e-9 * unit:
-        raise BadInput(f"{path}: found lengths in {head[1]}, expected that as --unit")
+        raise BadInput(
+            f"{path}: found lengths in {head[1]}, but another --unit; expected "
+            "the same unit"
+        )
     for number, words, line in _node_lines(text):
         try:
             place = np.array([real(path, word) for word in words[1:4]])
@@ -131,7 +134,8 @@ def interface_rows(
     interface = parse_interface(asked, option)
     if nodes is None:
         raise BadInput(
-            f"{option}: an interface needs the places of nodes: --nodes FILE"
+            f"{option}: found an interface without positions of the nodes; add "
+            "--nodes FILE"
         )
     known = [node for node in nodes if (node, 1) in row]
     places = np.array([nodes[node] for node in known]).reshape(-1, 3)
@@ -188,7 +192,10 @@ def condensed(
     fields, free = np.zeros((n, 12)), np.ones(n, dtype=bool)
     for k, (rows, motions) in enumerate(ends):
         if not free[rows].all():
-            raise BadInput(f"{matrix.file}: base and tip share freedoms")
+            raise BadInput(
+                f"{matrix.file}: found degrees of freedom that base and tip "
+                "share, expected interfaces without a common node"
+            )
         fields[rows, 6 * k : 6 * k + 6] = motions
         free[rows] = False
     K = matrix.matrix
@@ -198,13 +205,17 @@ def condensed(
         if loose.any():
             node, direction = np.array(matrix.freedoms)[free][int(np.argmax(loose))]
             raise BadInput(
-                f"{matrix.file}: freedom {direction} of node {node} has no stiffness; "
-                "expected a body in one piece"
+                f"{matrix.file}: freedom {direction} of node {node} has no "
+                "stiffness; expected a body in one piece, whose nodes are all "
+                "connected"
             )
         loads = -(K @ fields)[free]
         fields[free] = solve(triu(inner, format="csr"), loads)
         if not np.isfinite(fields).all():
-            raise BadInput(f"{matrix.file}: what lies between the interfaces is loose")
+            raise BadInput(
+                f"{matrix.file}: found a singular stiffness between the "
+                "interfaces; expected a body in one piece that connects them"
+            )
     # energy of the fields, in which errors of the solution are squared
     K12 = fields.T @ (K @ fields)
     return (K12 + K12.T) / 2, fields

@@ -37,14 +37,18 @@ def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         reason = one_line(str(error), 80)
         raise BadInput(
-            f"{path}: found no stiffness, base and tip ({reason}); expected what "
-            "stiffness beam, fea or import writes with --json"
+            f"{path}: found no stiffness, base and tip of a link ({reason}); "
+            "expected a file that stiffness beam, fea or import writes with "
+            "--json"
         ) from None
     if K.shape != (6, 6) or offset.shape != (3,) or not np.isfinite(K).all():
         raise BadInput(f"{path}: stiffness: expected 6 rows of 6 finite numbers")
     # their products must not overflow
     if not max(np.abs(K).max(), np.abs(offset).max()) < 1e100:
-        raise BadInput(f"{path}: found numbers above 1e100, expected a link's, in SI")
+        raise BadInput(
+            f"{path}: found numbers above 1e100, expected the stiffness of a "
+            "link in SI units"
+        )
     return K, offset
 
 
@@ -71,7 +75,10 @@ def link_file(
             raise BadInput(f"{option}: found {quoted(value)}{nearest(value, valid)}")
     if to in PROGRAMS:
         if unit != "m":
-            raise BadInput(f"--unit: {to} is written in SI, expected m")
+            raise BadInput(
+                f"--unit: found {quoted(unit)}, expected m, because --to {to} "
+                "is written in SI units"
+            )
         return stiffness_for(to, stiffness).encode()
     length = LENGTHS[unit]
     scale = np.tile(np.repeat([length, 1.0], 3), 2)

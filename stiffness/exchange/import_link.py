@@ -58,7 +58,10 @@ def import_link(
     node = matrix.freedoms[0][0]
     if set(matrix.freedoms) == {(node, direction) for direction in range(1, 7)}:
         if mass is not None:
-            raise BadInput("--mass: a stiffness of 6 rows has no body with a mass")
+            raise BadInput(
+                "--mass: found a stiffness of 6 rows, which has no nodes for a "
+                "mass matrix; expected the full matrix of a body, or no --mass"
+            )
         rows = interface_rows(matrix, str(node), "--tip", None)[0]
         K = matrix.matrix.toarray()[np.ix_(rows, rows)]
         check_definite(f"{path}: stiffness", K)
@@ -80,7 +83,10 @@ def import_link(
     row = {freedom: k for k, freedom in enumerate(matrix.freedoms)}
     strange = [freedom for freedom in heavy.freedoms if freedom not in row]
     if strange or len(heavy.freedoms) < len(row) and not heavy.named:
-        raise BadInput(f"{mass}: its freedoms are not those of {path}")
+        raise BadInput(
+            f"{mass}: found other degrees of freedom than in {path}, expected "
+            "the same nodes and directions"
+        )
     # a file of named degrees of freedom leaves out those without mass
     moved = fields[[row[freedom] for freedom in heavy.freedoms]]
     M12 = moved.T @ (heavy.matrix @ moved)

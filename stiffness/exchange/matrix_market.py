@@ -51,11 +51,15 @@ def matrix_market(path: Path, text: str) -> csr_array:
     if words[1] == "coordinate":
         if len(sizes) < 3 or len(rest) != 3 * sizes[2]:
             raise BadInput(
-                f"{path}: found {len(rest) / 3:g} entries, not as many as said"
+                f"{path}: found {len(rest) / 3:g} entries, expected the number "
+                "that the file states in its line of sizes; the file may be cut"
             )
         places = rest.reshape(-1, 3)[:, :2]
         if np.any((places != places.round()) | (places < 1) | (places > n)):
-            raise BadInput(f"{path}: found a place beyond {n} by {n}")
+            raise BadInput(
+                f"{path}: found a row or column outside 1 to {n}, expected "
+                f"whole numbers from 1 to {n}"
+            )
         i, j = places.astype(int).T - 1
         matrix = csr_array(coo_array((rest[2::3], (i, j)), shape=(n, n)))
     else:

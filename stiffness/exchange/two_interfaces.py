@@ -69,8 +69,9 @@ def link_of_both_ends(
         offset = np.asarray(base, dtype=float) - np.asarray(tip, dtype=float)
     if not (np.abs(offset) < _FARTHEST).all():
         raise BadInput(
-            f"{who}: its base would stand {np.abs(offset).max():.3g} m from its tip; "
-            "is it held elsewhere, or are order and unit others?"
+            f"{who}: the matrix implies a base {np.abs(offset).max():.3g} m "
+            "from its tip; check whether the body is held elsewhere, and the "
+            "order and units of the degrees of freedom"
         )
     ideal = both_ends(K, offset)
     size = np.sqrt(np.abs(np.diag(ideal)))
@@ -78,10 +79,11 @@ def link_of_both_ends(
     if not gap.max() < _BALANCED:
         i, j = np.unravel_index(int(np.argmax(gap)), gap.shape)
         raise BadInput(
-            f"{who}: the two interfaces do not balance: [{i + 1}, {j + 1}] is "
-            f"{K12[i, j]:.6e}, expected {ideal[i, j]:.6e} for a free body whose base "
-            f"is {offset[0]:.6g}, {offset[1]:.6g}, {offset[2]:.6g} m from its tip; is "
-            "it held elsewhere, or are order and unit others?"
+            f"{who}: the wrenches of the two interfaces do not balance: found "
+            f"[{i + 1}, {j + 1}] = {K12[i, j]:.6e}, expected {ideal[i, j]:.6e} "
+            f"for a free body whose base is {offset[0]:.6g}, {offset[1]:.6g}, "
+            f"{offset[2]:.6g} m from its tip; check whether the body is held "
+            "elsewhere, and the order and units of the degrees of freedom"
         )
     at = np.zeros(3) if tip is None else np.asarray(tip, dtype=float)
     return LinkStiffness(who, inverted(K), tip=at, base=at + offset)

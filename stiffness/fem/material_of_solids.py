@@ -37,13 +37,14 @@ def placed_materials(
     solids = surface.solids
     if solids is None:
         raise BadInput(
-            f"{surface.name}: found a material of solid {quoted(named[0].solid)}, "
-            "expected a STEP file of several solids, all of them as one: part.step#*"
+            f"{surface.name}: found a material of solid "
+            f"{quoted(named[0].solid)}, expected a STEP file whose solids are "
+            "read as one part, such as part.step#*"
         )
     if solids.overlaps:
         raise BadInput(
-            f"{surface.name}: {solids.overlaps[0]}, expected solids that touch: which "
-            "material counts there?"
+            f"{surface.name}: {solids.overlaps[0]}; expected solids that touch "
+            "without overlap, so that the material is unique"
         )
     members = [_members(surface.name, solids, material) for material in materials]
     if materials[0].solid:
@@ -51,8 +52,9 @@ def placed_materials(
         lacking = [name for name in solids.names if name not in given]
         if lacking:
             raise BadInput(
-                f"{surface.name}: solid {quoted(lacking[0])} has no material; expected "
-                "one of its own, or a first one that fills the link"
+                f"{surface.name}: solid {quoted(lacking[0])} has no material; "
+                "expected one of its own, or a first material for the whole "
+                "link"
             )
     placed = [
         _placed(solids, names, material) if material.solid else material

@@ -33,8 +33,8 @@ def with_own_weight(solved: MeshedLink) -> MeshedLink:
         raise BadInput("gravity: the link has no density, expected one [kg/m^3]")
     if held.kind == "distributing-both":
         raise BadInput(
-            "gravity: found distributing-both interfaces, expected rigid or "
-            "distributing: a base that holds"
+            "gravity: found distributing-both interfaces, whose base is not "
+            "clamped; expected rigid or distributing"
         )
     masses = _nodal_masses(mesh, density)
     loads = masses[:, None, None] * np.eye(3)

@@ -274,8 +274,9 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     far = gap >= distance * (1 - 1e-9)  # with nodes at just that distance
     if not far.any():
         raise BadInput(
-            f"stress: nothing of the link is {distance:.4g} m away from its "
-            f"interfaces; the furthest node is {gap.max():.4g} m"
+            f"stress: found no node {distance:.4g} m away from the interfaces; "
+            f"the furthest node is {gap.max():.4g} m away: use a smaller "
+            "--away"
         )
     off = off_shapes(level)[node]
     left_out = far & off if (far & ~off).any() else np.zeros_like(far)

@@ -56,8 +56,8 @@ def fit_to_patches(
     holes, expected = (euler_characteristic(f) for f in (faces, surface.triangles))
     if holes != expected:
         raise MeshFailed(
-            f"{surface.name}: the mesh has other holes than the surface: Euler "
-            f"characteristic {holes}, expected {expected}"
+            f"{surface.name}: the mesh has Euler characteristic {holes}, "
+            f"expected {expected}, that of the surface: details were lost"
         )
     for number, name in enumerate(("base", "tip")):
         if not (solid.patch == number).any():

@@ -131,11 +131,13 @@ def _tetrahedralize(
             )
         except subprocess.TimeoutExpired:
             raise MeshFailed(
-                f"{surface.name}: no mesh after {time_limit:g} s; the surface may be "
-                "finer than the part needs, or the time limit too short"
+                f"{surface.name}: found no mesh within {time_limit:g} s; use a "
+                "coarser surface or a longer time limit"
             ) from None
         mesh = _from_cache(made)
     if mesh is None or len(mesh[1]) == 0:
         last = run.stderr.decode(errors="replace").strip().splitlines()[-1:]
-        raise MeshFailed(f"{surface.name}: the mesher gave nothing {' '.join(last)}")
+        raise MeshFailed(
+            f"{surface.name}: the mesh generator ended without a mesh: {' '.join(last)}"
+        )
     return mesh

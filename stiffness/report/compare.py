@@ -137,8 +137,9 @@ def compare_link(
     if gap > 1e-6 + 1e-3 * length:
         ends = [", ".join(f"{v:.6g}" for v in link.tip) for link in (beam, fea)]
         raise BadInput(
-            f"compare: the beam ends at ({ends[0]}) m, the surface's tip is at "
-            f"({ends[1]}) m; both must be one point"
+            f"compare: the beam ends at ({ends[0]}) m, the tip of the surface "
+            f"is at ({ends[1]}) m; expected the same point: change the beam or "
+            "--base and --tip"
         )
     difference = scaled(fea.stiffness - beam.stiffness, beam.stiffness)
     return LinkComparison(beam, fea, difference, length, size)

@@ -75,9 +75,14 @@ def _entry(file: Path) -> Entry:
     try:
         about = json.loads(read_text(file))
         if about.get("format") != FORMAT:
-            raise BadInput(f'{file}: not an entry; expected format "{FORMAT}"')
+            raise BadInput(
+                f'{file}: found no entry of a library; expected format "{FORMAT}"'
+            )
         if about["screw"] != list(SCREW) or about["wrench"] != list(WRENCH):
-            raise BadInput(f"{file}: written in another order than {' '.join(SCREW)}")
+            raise BadInput(
+                f"{file}: found another order of the components, expected "
+                f"{' '.join(SCREW)}"
+            )
         arrays = [
             np.array(about[name], dtype=float)
             for name in ("stiffness", "stiffness_error", "tip")
@@ -93,7 +98,7 @@ def _entry(file: Path) -> Entry:
         raise BadInput(f"{file}: damaged entry ({type(error).__name__})") from None
     K, error_matrix, tip = arrays
     if K.shape != (6, 6) or error_matrix.shape != (6, 6) or tip.shape != (3,):
-        raise BadInput(f"{file}: a matrix has another shape than 6 by 6")
+        raise BadInput(f"{file}: found a matrix of another shape, expected 6 by 6")
     if not all(np.isfinite(array).all() for array in arrays):
         raise BadInput(f"{file}: a number is not finite")
     check_definite(f"{file}: stiffness", K)
@@ -169,18 +174,23 @@ def look_up(
             raise BadInput(
                 f"look-up: {entry.key} has the parameters "
                 f"{', '.join(entry.parameters) or 'none'}, {entries[0].key} "
-                f"{', '.join(names) or 'none'}; expected the same in all of a grid"
+                f"{', '.join(names) or 'none'}; expected the same parameters in "
+                "all entries of a grid"
             )
     axes = [sorted({e.parameters[name] for e in entries}) for name in names]
     single = {n: a[0] for n, a in zip(names, axes, strict=True) if len(a) == 1}
     wanted = single | dict(wanted)
     for name, axis in zip(names, axes, strict=True):
         if name not in wanted:
-            raise BadInput(f"look-up: {name}: missing; the grid has it")
+            raise BadInput(
+                f"look-up: {name}: missing; expected a value, because it is a "
+                "parameter of the grid"
+            )
         if not axis[0] <= wanted[name] <= axis[-1]:
             raise BadInput(
                 f"look-up: {name} = {wanted[name]:g} is outside the grid, "
-                f"{axis[0]:g} .. {axis[-1]:g}; nothing is extrapolated"
+                f"expected {axis[0]:g} .. {axis[-1]:g}: the stiffness is not "
+                "extrapolated"
             )
     if len(entries) != np.prod([len(axis) for axis in axes]):
         raise BadInput("look-up: the entries do not fill a grid of their parameters")
@@ -211,7 +221,10 @@ def _grid_of(entries: Sequence[Entry], family: str) -> list[Entry]:
         wanted = family or families[0]
         return [entry for entry in entries if entry.about.get("family") == wanted]
     if not grid:
-        raise BadInput("look-up: found only entries of surfaces, expected a grid")
+        raise BadInput(
+            "look-up: found only entries of single surfaces, expected entries "
+            "on a grid of parameters"
+        )
     return grid
 
 

@@ -149,14 +149,12 @@ def link_text(link: LinkStiffness) -> str:
     ]
     if mesh.get("flat_elements"):
         lines.append(
-            f"WARNING: {mesh['flat_elements']} elements are nearly flat, quality below "
-            "0.01: the surface has details much smaller than its walls, or facets that "
-            "are not smooth"
+            f"WARNING: {mesh['flat_elements']} elements are nearly flat "
+            "(quality below 0.01): the surface has details much smaller than "
+            "its walls, or facets that are not smooth"
         )
     if mesh.get("drawn_out"):
-        lines.append(
-            "the bar's section was extruded: its elements are long by intention"
-        )
+        lines.append("the section of the bar was extruded, so its elements are long")
     lines += [f"repaired: {repair}" for repair in mesh["repairs"]]
     if link.mass > 0:
         center = ", ".join(f"{v:.5g}" for v in link.center_of_mass)

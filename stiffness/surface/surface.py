@@ -179,7 +179,10 @@ def check_surface(
     _check_coordinates(points, triangles, name, unit)
     points, triangles, repairs = _merge(points, triangles, name)
     if len(triangles) < 4:
-        raise BadInput(f"{name}: {len(triangles)} proper triangles bound no solid")
+        raise BadInput(
+            f"{name}: found {len(triangles)} triangles with an area, expected "
+            "at least 4 to bound a solid"
+        )
     _check_closed(points, triangles, name)
     triangles, turned = _orient(points, triangles, name)
     from stiffness.surface.intersections import crossing_triangles
@@ -231,8 +234,9 @@ def _merge(
     tree, near = cKDTree(points), 1e-7 * size
     if tree.count_neighbors(tree, near) > _CROWD * len(points):  # too many to list
         raise BadInput(
-            f"{name}: most of its {len(points)} vertices are nearer than {near:.2g} m "
-            f"to each other, in a part {size:.4g} m across"
+            f"{name}: most of its {len(points)} vertices are less than "
+            f"{near:.2g} m apart in a part of {size:.4g} m; check the unit and "
+            "the file"
         )
     pairs = tree.query_pairs(near, output_type="ndarray")
     if len(pairs):
@@ -285,8 +289,9 @@ def _orient(
         cavity = k != main
         if cavity and not _inside(points[part[0, 0]], points, shells[main]):
             raise BadInput(
-                f"{name}: {len(shells)} separate bodies, the second near "
-                f"{_place(points[part].reshape(-1, 3).mean(axis=0))}; one link is one"
+                f"{name}: found {len(shells)} separate bodies, the second near "
+                f"{_place(points[part].reshape(-1, 3).mean(axis=0))}; expected "
+                "one body for one link"
             )
         if (volumes[k] < 0) != cavity:
             shells[k] = part[:, ::-1]

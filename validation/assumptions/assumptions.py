@@ -28,8 +28,8 @@ from validation.assumptions.validity import (
 from validation.crosscheck.spread_weight import energy_between_ends
 from validation.multibody.simulation import without_clearance
 
-_NOT_MESHED = "not meshed; --solids does"
-NOTHING = "nothing to compare: without errors and load neither model moves"
+_NOT_MESHED = "not computed without meshes; add --solids"
+NOTHING = "nothing to compare: without errors and load no model deforms"
 
 
 def assumption_costs(
@@ -101,7 +101,7 @@ def _solid_cost(posture: Posture, load: ArrayLike | None, solids: bool) -> Cost:
     meshed = {frame.name: solid_link(frame) for frame in beams}
     stiffness = {name: s.condensed for name, s in meshed.items() if s is not None}
     if not stiffness:
-        raise _NotApplicable("no beam of a known shape")
+        raise _NotApplicable("no beam has a known shape")
     return link_cost(posture, stiffness, load)
 
 

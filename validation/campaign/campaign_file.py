@@ -233,7 +233,10 @@ def _check_points(declared: _Declared, extent: float) -> None:
     points = {f"points.{name}": at for name, at in declared.points.items()}
     for place, at in ({"reference_point": declared.point} | points).items():
         if np.linalg.norm(at) > 10 * extent:
-            message = f"found {np.linalg.norm(at):g} m from the platform, the robot is "
+            message = (
+                f"found a point {np.linalg.norm(at):g} m from the platform, but "
+                "the robot is "
+            )
             message += f"{extent:.3g} m across; expected a point in m"
             raise declared.root.bad(place, message)
 

@@ -21,7 +21,7 @@ _WARMEST = 250.0
 _LATEST = 3e8  # [s] ten years; larger is a date
 _ROOM = 1000.0  # [m] largest distance of a measuring device
 _FINEST = 1e-15  # [rad, m] finer than any device
-_UNITS = "; if it is in other units say so in [units] of campaign.toml"
+_UNITS = "; declare other units in [units] of campaign.toml"
 
 
 def check_commands(table: MeasurementTable, robot: Robot) -> None:
@@ -84,7 +84,9 @@ def check_measured(table: MeasurementTable, points: Iterable[str]) -> None:
     groups = ["meas", *(f"meas.{point}" for point in points)]
     measured = np.hstack([table.stack(group, READING, np.nan) for group in groups])
     for i in np.flatnonzero(np.isnan(measured).all(axis=1))[:1]:
-        message = "no measured cell; expected at least one of meas.rx ... meas.tz"
+        message = (
+            "found no reading in this row; expected at least one of meas.rx ... meas.tz"
+        )
         raise table.bad(int(i), "", message)
 
 
@@ -110,7 +112,8 @@ def check_readings(table: MeasurementTable, point: str, sigma: NDArray,
         ]:
             key = "rotation" if k < 3 else "position"
             message = (
-                f"no sigma; expected a cell here or [noise] {key} in campaign.toml"
+                "found no standard deviation; expected one in this cell or "
+                f"[noise] {key} in campaign.toml"
             )
             raise table.bad(int(i), f"sigma{at}.{name}", message)
         unit, largest = ("rad", np.pi) if k < 3 else ("m", extent)

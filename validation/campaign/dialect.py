@@ -79,7 +79,10 @@ def read_dialect(root: Table) -> Dialect:
         delimiter = DELIMITERS[table.choice("delimiter", DELIMITERS, ",")]
         decimal = table.choice("decimal", (".", ","), ".")
         if decimal == delimiter:
-            message = 'found "," for both; decimal commas need delimiter = ";" or "tab"'
+            message = (
+                'found "," as decimal mark and as delimiter; expected '
+                'delimiter = ";" or "tab"'
+            )
             raise table.bad("decimal", message)
         table.finish()
     if root.has("units"):

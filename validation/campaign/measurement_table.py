@@ -93,11 +93,14 @@ def read_table(
     path = Path(path)
     lines, rows = _cells(path, dialect)
     if not rows:
-        raise BadInput(f"{path}: empty; expected a header and one row a measurement")
+        raise BadInput(
+            f"{path}: found an empty file; expected a header and one row for "
+            "each measurement"
+        )
     header = _header(path, rows[0], robot, tuple(points))
     lines, rows = lines[1:], rows[1:]
     if not rows:
-        raise BadInput(f"{path}: no rows; expected one row a measurement")
+        raise BadInput(f"{path}: found no rows; expected one row for each measurement")
     for line, row in zip(lines, rows, strict=True):
         if len(row) != len(header):
             raise BadInput(
@@ -204,14 +207,17 @@ def _header(
     if not any(name in known or name.startswith("cov.") for name in names):
         # not printed: the file may be no table at all
         raise BadInput(
-            f"{path}: line 1 names no column of a table of measurements"
-            f"{_other(names)}; expected id, q.<frame> or pose.tx ..., meas.tx ..."
+            f"{path}: line 1: found no column of a table of "
+            f"measurements{_other(names)}; expected id, q.<frame> or pose.tx "
+            "..., meas.tx ..."
         )
     for k, name in enumerate(names, 1):
         if not name:
             raise BadInput(f"{path}: line 1: column {k} has no name")
         if name in names[: k - 1]:
-            raise BadInput(f"{path}: line 1: column {quoted(name)} is there twice")
+            raise BadInput(
+                f"{path}: line 1: found column {quoted(name)} twice, expected it once"
+            )
         if name not in known and not (name.startswith("cov.") and name != "cov."):
             hint = nearest(name, known)
             raise BadInput(
@@ -236,8 +242,8 @@ def _other(names: list[str]) -> str:
     """Return the key that would make a header of one cell readable."""
     for word, mark in DELIMITERS.items():
         if len(names) == 1 and mark in names[0]:
-            return f'; it has {word} in it: if that parts the cells, say [table] ' \
-                   f'delimiter = "{word}" in campaign.toml'  # fmt: skip
+            return (f"; it contains {word}: if this separates the cells, set "
+                f'delimiter = "{word}" in [table] of campaign.toml')  # fmt: skip
     return ""
 
 
@@ -245,8 +251,8 @@ def _dialect_hint(row: list[str], expected: int, dialect: Dialect) -> str:
     """Return the likely cause of a row with another number of cells."""
     if dialect.delimiter == "," and len(row) > expected:
         return (
-            '; if decimals are written with a comma, part cells by ";" and say '
-            '[table] delimiter = ";", decimal = "," in campaign.toml'
+            '; if the decimal mark is a comma, separate cells by ";" and set '
+            'delimiter = ";", decimal = "," in [table] of campaign.toml'
         )
     return ""
 
@@ -282,7 +288,12 @@ def _numbers(
             values[i] = math.nan
             continue
         if not cell:
-            raise table.bad(i, name, "empty; only meas. and sigma. cells may be")
+            raise table.bad(
+                i,
+                name,
+                "found an empty cell, expected a value; only meas. and sigma. "
+                "cells may be empty",
+            )
         values[i] = parse_number(cell, table.dialect.decimal)
         if not abs(values[i]) <= LARGEST:
             expected = f"expected a finite number{f' [{unit}]' if unit else ''}"
@@ -298,10 +309,10 @@ def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
         written = quoted(cell.replace(other, dialect.decimal))
         setting = f'decimal = "{other}" in campaign.toml'
         if other == dialect.delimiter:  # in quotes: the comma would also separate cells
-            setting = f'delimiter = ";", {setting} and part cells by ";"'
+            setting = f'delimiter = ";", {setting} and separate cells by ";"'
         return (
-            f'; a decimal "{other}" is not read here: write {written}, or say [table] '
-            f"{setting}"
+            f'; the decimal mark here is not "{other}": write {written}, or set '
+            f"in [table] {setting}"
         )
     if cell.lower() in {"nan", "na", "n/a", "null", "none", "-"}:
         taken = name.startswith(("meas.", "sigma."))

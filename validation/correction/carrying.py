@@ -153,7 +153,9 @@ def _of(campaign: Campaign, session: str | None, setup: NDArray) -> NDArray:
         return own
     which = f"session {quoted(session)}" if session is not None else campaign.name
     rows = "nothing but set-up rows" if setup[own].any() else "no set-up rows"
-    raise BadInput(f"--setup: found {rows} in {which}; expected some, not all")
+    raise BadInput(
+        f"--setup: found {rows} in {which}; expected set-up rows and other rows"
+    )
 
 
 def _left_behind(robot: Robot, unknowns: SessionUnknowns) -> tuple[str, ...]:

@@ -57,8 +57,9 @@ def text(carried: CarriedRobot) -> str:
         lines.append(f"  others, as carried over: {readings_text(vars(one.error))}")
         lines.append(f"  others, declared robot: {readings_text(vars(one.declared))}")
         lines.append(
-            f"  uncertainty after the set-up rows: {in_unit(one.uncertainty, 'um')}; "
-            f"their residual: {in_unit(one.left, 'um')}, by the robot as saved "
+            "  uncertainty after the set-up rows: "
+            f"{in_unit(one.uncertainty, 'um')}; residual of the set-up rows: "
+            f"{in_unit(one.left, 'um')}, with the robot as saved "
             f"{in_unit(one.held, 'um')}"
         )
         lines += [
@@ -68,9 +69,12 @@ def text(carried: CarriedRobot) -> str:
         if not one.suffices:
             lines.append(
                 "  the set-up rows do not suffice to determine "
-                f"{', '.join(one.open_)}; expected rows at other places, in other "
-                "orientations"
+                f"{', '.join(one.open_)}; measure set-up rows at other places and in "
+                "other orientations"
             )
         elif not one.better:
-            lines.append("  worse than the declared robot: it does not carry over")
+            lines.append(
+                "  the error is larger than that of the declared robot: the "
+                "identified robot does not carry over to this session"
+            )
     return "\n".join(lines)

@@ -188,8 +188,9 @@ def _too_far(
         k = int(np.argmax(beyond[row]))
         unit = "m" if slides[k] else "rad"
         reason[row] = (
-            f"{robot.frames[driven[k]].name}: a correction of {change[row, k]:.3g} "
-            f"{unit}, larger than the robot ({most[k]:.3g} {unit})"
+            f"{robot.frames[driven[k]].name}: found a correction of "
+            f"{change[row, k]:.3g} {unit}, expected at most the robot's size "
+            f"({most[k]:.3g} {unit})"
         )
     return beyond.any(axis=1), reason
 
@@ -200,8 +201,8 @@ def _astray(robot: Robot, error: NDArray, reason: NDArray) -> NDArray:
     off = np.linalg.norm(error[:, 3:], axis=1)
     for row in np.flatnonzero((off > size) & (reason == "")):
         reason[row] = (
-            f"no command brings it nearer than {off[row]:.3g} m, larger than the robot "
-            f"({size:.3g} m)"
+            f"the smallest error that a command reaches is {off[row]:.3g} m, "
+            f"more than the robot's size ({size:.3g} m)"
         )
     return reason
 

@@ -159,14 +159,14 @@ def summary_text(compensation: Compensation, table: Mapping[str, Any]) -> str:
             lines.append(f"{words}: {readings_text(size)}")
     if table["error"]["expected"]["position"] is None:
         lines.append(
-            "expected: the residual of the robot's diagnosis (see --diagnosed); the "
-            "file states no uncertainty"
+            "expected: the residual of the robot's diagnosis (see "
+            "--diagnosed), because the file contains no uncertainty"
         )
     if table["not_measured"]:
         lines.append(
-            f"not measured where the robot was identified: "
-            f"{', '.join(table['not_measured'])}; expected errors there follow from "
-            "the sizes of geometric errors in the other directions"
+            "components without readings when the robot was identified: "
+            f"{', '.join(table['not_measured'])}; their expected errors are "
+            "computed from the geometric errors in the other directions"
         )
     if table["limited"]:
         lines.append(f"at a joint's limit: {', '.join(table['limited'][:10])}")

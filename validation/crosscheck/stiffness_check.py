@@ -204,13 +204,14 @@ class StiffnessCheck:
                 )
             )
             lines.append(
-                f"undecided: another equilibrium: the platform has moved by {ours}, in "
-                f"the simulation by {theirs}"
+                "undecided: the two models are at different equilibria: the "
+                f"platform has moved by {ours}, in the simulation by {theirs}"
             )
         elif self.mixed:
             lines.append(
-                f"undecided: {', '.join(self.mixed)} both locked and elastic, bent: "
-                "no one finite law"
+                f"undecided: {', '.join(self.mixed)} have both locked and "
+                "elastic axes and deform: their law for finite deformation is "
+                "not unique"
             )
         else:
             outcome = "passed" if self.passed else "FAILED"
@@ -219,8 +220,9 @@ class StiffnessCheck:
             lines.append(f"{outcome}: exact within {self.tolerance:.2g}")
             if outcome == "FAILED" and self.links == "beam" and self.bent:
                 lines.append(
-                    "one spring a link bends otherwise than a beam under a load: "
-                    '"pieces" of a link in the robot file make it one'
+                    "with one spring for each link a loaded link bends "
+                    'otherwise than a beam: declare more "pieces" of the link '
+                    "in the robot file"
                 )
         return "\n".join(lines)
 

@@ -53,15 +53,15 @@ def _implausible(campaign: Campaign, fit: MachineFit) -> Iterator[str]:
     force = float(np.abs(campaign.loads[:, 3:]).max())
     force += _G * sum(frame.mass for frame in robot.frames)
     moment = float(np.abs(campaign.loads[:, :3]).max()) + force * size
-    reach = ", under which the loads would move it out of reach"
+    reach = ", so compliant that the loads would move the platform out of reach"
     shift = LARGEST_SHIFT * size
     ranges = {  # by unit: least, largest, and the statement beyond them
         "rad": (-LARGEST_TURN, LARGEST_TURN, f", larger than {LARGEST_TURN:.2g}"),
         "m": (-shift, shift, f", larger than {shift:.2g}"),
         "N/m": (force / (_GIVES * size), np.inf, reach),
         "N m/rad": (moment / _GIVES, np.inf, reach),
-        "1/K": (-5e-4, 5e-4, ": engineering materials stay below 3e-4"),
-        "m/s^2": (-12.0, 12.0, ": weight is 9.8"),
+        "1/K": (-5e-4, 5e-4, ": engineering materials stay below 3e-4 1/K"),
+        "m/s^2": (-12.0, 12.0, ": gravity is 9.8 m/s^2"),
     }
     for effect, name, value in _parameters(campaign, fit):
         unit = LIBRARY[effect].unit(robot, name)

@@ -48,8 +48,8 @@ def register(campaign: Campaign, conditions: Conditions) -> Conditions:
         rows = campaign.session == session
         if not rows.any():
             raise BadInput(
-                f'{campaign.name}: session "{session}" has no row from which its '
-                "registration could be found; expected some"
+                f'{campaign.name}: found no usable row in session "{session}", '
+                "expected at least one from which its registration is computed"
             )
         device = _device(campaign.take(rows), own.take(rows))
         turned = apply_effects(conditions, device)
@@ -77,8 +77,9 @@ def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]
     thought = (nominal + model[:, 3:])[full]
     if not turned.any() and not off_one_line(thought):
         raise BadInput(
-            f"{campaign.name}: registration is unknown, and there are no rotations "
-            f"nor {_FEWEST_POINTS} measured points off one line; expected either"
+            f"{campaign.name}: registration is unknown, and there are neither "
+            f"rotations nor {_FEWEST_POINTS} measured points off one line; "
+            "expected one of the two"
         )
     parts = campaign.measured[turned, :3], model[turned, :3]
     turns = [rotation_matrix(vectors) for vectors in parts]

@@ -92,9 +92,10 @@ def calibration_text(tally: Calibration) -> str:
 def open_text(open_: NDArray) -> str:
     """Return a line on the number of rows whose pose is free within clearances."""
     return (
-        f"clearances leave the pose free in {int(open_.sum())} of {len(open_)} rows "
-        "(marked open): of the poses of least energy one is predicted there, in a "
-        "closed chain the nearest to nominal, in an open one that of centred clearances"
+        f"clearances leave the pose undetermined in {int(open_.sum())} of "
+        f"{len(open_)} rows (marked open): there one of the poses of least "
+        "energy is predicted, in a closed chain the pose nearest to nominal, "
+        "in an open chain that of centred clearances"
     )
 
 

@@ -128,8 +128,8 @@ def declaration(
         lines.append(f"reference_point = {next(iter(places.values()))}")
     if not np.isfinite(spread).all() and declared.noise is None:
         raise BadInput(
-            f"{declared.file}: noise: missing; expected one standard deviation [m]: "
-            "not every reading states its own"
+            f"{declared.file}: noise: missing; expected one standard deviation "
+            "[m], because some readings have none of their own"
         )
     if declared.noise is not None:
         lines += ["[noise]", f"position = {declared.noise!r}"]

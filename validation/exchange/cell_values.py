@@ -44,7 +44,8 @@ class CellValues:
             if LENGTHS[found] != LENGTHS[declared]:
                 raise BadInput(
                     f"{path}: line {self.header.unit_line}: found the unit "
-                    f"{quoted(found)}, the targets file says {quoted(declared)}"
+                    f"{quoted(found)}, expected {quoted(declared)} as declared "
+                    "in the targets file"
                 )
         unit = stated or declared or found
         if not unit:
@@ -67,8 +68,8 @@ class CellValues:
         hint = ""
         if np.isfinite(parse_number(cell, other)):
             hint = (
-                f'; if that is a decimal mark say decimal = "{other}" in the targets '
-                "file"
+                f'; if this is a decimal mark, set decimal = "{other}" in the '
+                "targets file"
             )
         raise BadInput(
             f"{self.sheet.file}: line {line}, {column}: found {describe(cell)}, "

@@ -41,8 +41,9 @@ def parse_time(place: str, text: str, writing: Writing) -> float:
             a, mark, b, year, rest = match.groups()
             if mark == "/" and writing.dates is None:
                 raise BadInput(
-                    f"{place}: found {describe(text)}; expected dates = "
-                    '"day_first" or "month_first" in the targets file'
+                    f"{place}: found {describe(text)}, whose order of day and "
+                    'month is unknown; expected dates = "day_first" or '
+                    '"month_first" in the targets file'
                 )
             swap = mark == "/" and writing.dates == "month_first"
             day, month = (b, a) if swap else (a, b)

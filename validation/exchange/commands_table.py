@@ -76,7 +76,9 @@ def read_commands(path: Path | str, robot: Robot, writing: Writing) -> Commands:
             raise BadInput(f"{path}: line 1: unknown column {quoted(name)}{hint}")
     twice = [name for name in header if header.count(name) > 1]
     if twice:
-        raise BadInput(f"{path}: line 1: column {quoted(twice[0])} is there twice")
+        raise BadInput(
+            f"{path}: line 1: found column {quoted(twice[0])} twice, expected it once"
+        )
     if "id" not in header:
         raise BadInput(f'{path}: line 1: missing column "id"')
     ids: dict[str, int] = {}  # the line of each label
@@ -100,7 +102,7 @@ def read_commands(path: Path | str, robot: Robot, writing: Writing) -> Commands:
                     given, hint = describe(cell), _decimal_hint(cell, sheet.decimal)
                     raise BadInput(f"{place}: found {given}, expected a number{hint}")
     if not ids:
-        raise BadInput(f"{path}: no rows; expected one a command")
+        raise BadInput(f"{path}: found no rows; expected one row for each command")
     postures = _placed(path, robot, [*ids], columns, joints)
     return Commands(str(path), tuple(ids), times, columns, postures)
 

@@ -52,8 +52,9 @@ def check_axes(
         rescaled = _scatter(factor * measured * mirror, nominal, known)
         if rescaled < _FAR_BETTER * scatter:
             raise BadInput(
-                f"{file}: unit: the readings fit far better times {factor:.4g}, "
-                f"{meant} (scatter {rescaled:.2g} m for {scatter:.2g})"
+                f"{file}: unit: the readings fit much better if multiplied by "
+                f"{factor:.4g}, {meant} (scatter {rescaled:.2g} m instead of "
+                f"{scatter:.2g} m); declare the right unit"
             )
     if known:
         _check_known_axes(file, measured, nominal, scatter)
@@ -61,9 +62,10 @@ def check_axes(
     mirrored = _scatter(measured * _MIRRORED, nominal, known)
     if mirrored < _FAR_BETTER * scatter:
         raise BadInput(
-            f"{file}: the device's axes are left-handed: the readings fit far better "
-            f"with one axis reversed, as y to -y (scatter {mirrored:.2g} m for "
-            f"{scatter:.2g}); export them right-handed"
+            f"{file}: found left-handed axes of the device: the readings fit "
+            "much better with one axis reversed, such as y to -y (scatter "
+            f"{mirrored:.2g} m instead of {scatter:.2g} m); export the readings "
+            "in right-handed axes"
         )
 
 
@@ -93,8 +95,9 @@ def check_targets(
         ratios.append(apart / declared)
         if np.median(np.abs(apart - declared)) > _APART * declared:
             remarks.append(
-                f"{names[i]} and {names[j]} are read {apart.min():.3g} .. "
-                f"{apart.max():.3g} m apart, declared {declared:.3g}"
+                f"the measured distance of {names[i]} and {names[j]} is "
+                f"{apart.min():.3g} .. {apart.max():.3g} m, declared "
+                f"{declared:.3g} m"
             )
     if remarks:
         ratio = np.concatenate(ratios)
@@ -102,8 +105,9 @@ def check_targets(
         if np.median(np.abs(ratio / factor - 1)) < _SCALED:
             _, meant = _units_of(factor)
             raise BadInput(
-                f"{file}: targets: {remarks[0]}: {factor:.4g} times as far, all alike"
-                f"{', ' if meant else ''}{meant}; expected places in m"
+                f"{file}: targets: {remarks[0]}: all distances are {factor:.4g} "
+                f"times as large as declared{', ' if meant else ''}{meant}; "
+                "expected places in m"
             )
     return remarks
 
@@ -158,6 +162,7 @@ def _check_known_axes(
             )
     if best < _FAR_BETTER * scatter:
         raise BadInput(
-            f'{file}: registration = "known": the readings fit far better where '
-            f"{found} (scatter {best:.2g} m for {scatter:.2g})"
+            f'{file}: registration = "known": the readings fit much better if '
+            f"{found} (scatter {best:.2g} m instead of {scatter:.2g} m); "
+            'correct the axes or set registration = "unknown"'
         )

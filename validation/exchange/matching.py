@@ -87,7 +87,10 @@ def match(
             table.setdefault((command, len(before)), {})[target] = reading
             before.append(reading)
     if not table and missing:
-        raise BadInput(f"{missing[0].place}: found no coordinates, nor in any reading")
+        raise BadInput(
+            f"{missing[0].place}: found no coordinates in this reading or in "
+            "any other, expected numbers"
+        )
     if not table:
         raise BadInput(
             f"{ours[0][0].place}: found no command within {window:g} s of any reading; "
@@ -154,9 +157,10 @@ def _in_order(ours: list[tuple[Reading, str]], commands: Commands) -> list[int]:
         if count != len(commands.ids):
             raise BadInput(
                 f"{first.file}: found {count} readings of {quoted(target)} for "
-                f"{len(commands.ids)} commands; expected the id of the command in "
-                "their names, times in both tables, or as many readings as commands "
-                f"(names such as {describe('::'.join(first.names))})"
+                f"{len(commands.ids)} commands; expected the id of the command "
+                "in the readings' names, times in both tables, or as many "
+                "readings as commands (found names such as "
+                f"{describe('::'.join(first.names))})"
                 f"{_repeated([r for r, t in ours if t == target])}"
             )
     at, seen = [], Counter[str]()

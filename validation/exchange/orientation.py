@@ -145,9 +145,10 @@ def turns_of(
     other = _turns(base @ np.swapaxes(seen, 1, 2), nominal, mount)
     if other.scatter < _FAR_BETTER * best.scatter:
         raise BadInput(
-            f"{file}: the orientations fit far better inverted (scatter "
-            f"{other.scatter:.2g} rad for {best.scatter:.2g}); expected the target's "
-            "axes seen from the device's"
+            f"{file}: found inverted orientations: their inverses fit much "
+            f"better (scatter {other.scatter:.2g} rad instead of "
+            f"{best.scatter:.2g} rad); expected the orientation of the target's "
+            "axes relative to the device's axes"
         )
     return best
 

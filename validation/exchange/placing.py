@@ -116,14 +116,14 @@ def _misfit(nominal: NDArray, measured: NDArray, scatter: float) -> list[str]:
     reach = float(np.sqrt(np.mean(spread**2)))
     if scatter < _ASTRAY * reach:
         return []
-    reason = "are they joined to the right ones?"
+    reason = "check whether the readings are joined to the right commands"
     # distances between targets do not depend on the commands
     apart = np.linalg.norm(measured - np.roll(measured, 1, axis=1), axis=2)
     known = apart[np.isfinite(apart).all(axis=1)]
     if len(known) and measured.shape[1] > 1 and np.ptp(known, axis=0).max() > scatter:
         reason = (
-            "the targets' distances differ from row to row, whatever was commanded: "
-            "are columns and targets the right ones?"
+            "the targets' distances differ from row to row, independently of "
+            "the commands: check columns and targets"
         )
     return [
         f"the readings scatter by {scatter:.3g} m about commands {reach:.3g} m apart: "
@@ -157,7 +157,10 @@ def _turns(
     for i in np.flatnonzero(sizes > 0).tolist():
         if is_gross(float(sizes[i]), turns.scatter):
             label, at = commands.ids[rows[i][0]], rows[i][1][name].place
-            reason = f"turned by {sizes[i]:.4g} rad, the others {turns.scatter:.2g}"
+            reason = (
+                f"found an orientation {sizes[i]:.4g} rad off, the scatter of "
+                f"the others is {turns.scatter:.2g} rad"
+            )
             left_out.append(f"{at}: orientation at {quoted(label)}: {reason}")
             deviation[i] = np.nan
     return deviation, rotation_vector(turns.mount)
@@ -192,8 +195,9 @@ def _frame(
         return _HERE, scatter_of(gaps)
     if not spans_a_plane(nominal[read]):
         raise BadInput(
-            f"{declared.file}: all readings are of points on one line, which cannot "
-            'say where the device stood; expected more, or registration = "known"'
+            f"{declared.file}: found only points on one line, from which the "
+            "pose of the device cannot be computed; expected other points too, "
+            'or registration = "known"'
         )
     check_axes(declared.file, measured[read], nominal[read], known=False)
     order = exchanged_throughout(
@@ -204,7 +208,7 @@ def _frame(
         wrong = [k for k in range(len(names)) if order[k] != k]
         order_text = ", ".join(f"{names[k]} is {names[order[k]]}" for k in wrong)
         raise BadInput(
-            f"{declared.file}: targets: they fit far better exchanged, in every row: "
-            f"{order_text}"
+            f"{declared.file}: targets: found targets that are exchanged in "
+            f"every row: {order_text}; correct their names"
         )
     return robust_frame(measured[read], nominal[read])

@@ -171,18 +171,18 @@ def _campaign(
 
 def _left_out(joined: Match, placed: Placed, total: int) -> list[str]:
     """Return the readings left out of the campaign, in words; refuse too many."""
-    why = {"time": "no command near it in time"}.get(
-        joined.how, "no command's id in its name"
+    why = {"time": "no command is near it in time"}.get(
+        joined.how, "its name contains no id of a command"
     )
     left_out = [f"{reading.place}: {why}" for reading in joined.unmatched]
-    left_out += [f"{r.place}: the same reading twice" for r in joined.duplicates]
+    left_out += [f"{r.place}: this reading occurs twice" for r in joined.duplicates]
     left_out += placed.left_out
     total -= len(joined.strangers) + len(joined.missing)
     if len(left_out) > _MOST_LEFT_OUT * total:
         raise BadInput(
-            f"{left_out[0]}; and {len(left_out) - 1} more of {total} readings, "
-            f"expected at most {_MOST_LEFT_OUT:.0%}; are targets, commands, units "
-            "right?"
+            f"{left_out[0]}; and {len(left_out) - 1} more of {total} readings "
+            f"are left out, expected at most {_MOST_LEFT_OUT:.0%}; check "
+            "targets, commands and units"
         )
     for readings, what in (
         (joined.missing, "without coordinates"), (joined.strangers, "of no target"),
@@ -198,9 +198,9 @@ def _remarks(declared: TargetsFile, joined: Match, placed: Placed) -> list[str]:
     remarks = []
     if joined.copies:
         remarks.append(
-            f"{len(joined.copies)} readings are in two files to the last digit, the "
-            f"first: {joined.copies[0].place}"
+            f"{len(joined.copies)} readings occur in two files with identical "
+            f"digits, the first: {joined.copies[0].place}"
         )
     if declared.writing.oriented and not placed.mounts:
-        remarks.append("noise_rotation is given, but no orientation was found")
+        remarks.append("noise_rotation is declared, but no orientation was found")
     return remarks

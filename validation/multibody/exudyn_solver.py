@@ -91,8 +91,8 @@ def close(model: Model, closures: list[Closure], shift: NDArray) -> None:
         equilibrate(model, 2.0, 1)
     raise SimulationFailed(
         model.robot,
-        f"a closure stays open by {largest_gap(model, closures):.2g} rad or m: rigid "
-        "parts do not fit",
+        f"a closure stays open by {largest_gap(model, closures):.2g} rad or m: "
+        "the rigid parts do not fit",
     )
 
 

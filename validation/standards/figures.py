@@ -151,8 +151,9 @@ def standard_figures(campaign: Campaign) -> StandardFigures:
     sets = [_in_time(campaign, rows) for rows in sets if len(rows) > 1]
     if not sets:
         raise BadInput(
-            f"campaign {quoted(campaign.name)}: found no command that was measured "
-            "twice; expected repeats, from which the standards' figures are made"
+            f"campaign {quoted(campaign.name)}: found no command that was "
+            "measured twice; expected repeats, from which the figures of the "
+            "standards are computed"
         )
     return StandardFigures(
         campaign.name,

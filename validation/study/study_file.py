@@ -286,6 +286,10 @@ def _checks(
     for check in chosen:
         if not possible.get(check, True):
             need = {"stiffness": "[links] surface", "maps": "grid"}.get(check, "scales")
-            raise table.bad(check, f'this check needs "{need}" in the study file')
+            raise table.bad(
+                check,
+                f'found true, but this check needs "{need}" in the study file; '
+                "add it or set this check to false",
+            )
     table.finish()
     return chosen, named

@@ -270,7 +270,8 @@ def _scaled_effect(
         reached = _rms((exact - declared) / sigma)
         if reached == 0.0:
             raise NotApplicable(
-                f"{effect.name}: adds nothing to any reading; try another"
+                f"{effect.name}: found no influence on any reading; choose "
+                "another effect"
             )
         if effect.name in _GIVEN_STRENGTH:
             return tried, exact, sigma * (reached / multiple)
@@ -279,8 +280,9 @@ def _scaled_effect(
         factor *= multiple / reached
         if factor > _MOST:
             raise NotApplicable(
-                f"{effect.name}: {multiple:g} times the noise takes over {_MOST:g} "
-                "times its plausible size; the robot or its loads hardly show it"
+                f"{effect.name}: {multiple:g} times the noise needs more than "
+                f"{_MOST:g} times the plausible size of the effect, because "
+                "this robot or its loads hardly show it; choose another effect"
             )
     return tried, exact, sigma
 

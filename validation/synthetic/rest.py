@@ -74,7 +74,10 @@ def rest_poses(
                     update(len(machines) - len(waiting), len(machines))
         if not waiting:
             return poses
-    raise SimulationFailed(machines[0].robot.name, "its joints' laws do not settle")
+    raise SimulationFailed(
+        machines[0].robot.name,
+        "the search for equilibrium with its joints' laws does not converge",
+    )
 
 
 def _updated(machine: Machine, equilibrium: Rest) -> tuple[Machine, float]:

@@ -122,13 +122,14 @@ def _minimise(reduced: Reduction) -> ConicSolution:
     beyond = ""
     if spread > _RIGID_BESIDE:
         beyond = (
-            f"; stiffnesses differ {spread:.0e} times, more than a double carries: the "
-            "stiffest count as rigid"
+            f"; the stiffest spring is {spread:.0e} times as stiff as the "
+            "softest, more than double precision resolves: the stiffest "
+            "springs count as rigid"
         )
     if reduced.inconsistent:
         raise CannotAssemble(
-            f"a rigid part stays open by {reduced.inconsistent:.3g} (rad, or m per "
-            f"reference length): no clearance or spring acts there{beyond}"
+            f"a rigid part stays open by {reduced.inconsistent:.3g} rad or "
+            f"reference lengths: no clearance or spring acts there{beyond}"
         )
     least = minimise_energy(
         reduced.G, reduced.h, reduced.d, reduced.H, reduced.k, joints.group,
@@ -136,6 +137,7 @@ def _minimise(reduced: Reduction) -> ConicSolution:
     )  # fmt: skip
     if not least.feasible:
         raise CannotAssemble(
-            f"no clearance within its bounds closes what no spring can{beyond}"
+            "the closures stay open: neither a spring nor a clearance within "
+            f"its bounds can close them{beyond}"
         )
     return least

@@ -255,10 +255,10 @@ def _motion_text(lin: Linearisation, screws: NDArray) -> str:
     platform = lin.platform @ screws
     turn, shift = np.linalg.norm(platform[:3]) * lin.size, np.linalg.norm(platform[3:])
     if max(turn, shift) <= _STILL * moved.max() * lin.size:
-        return f"{way}; the platform stands still"
+        return f"{way}; the platform is at rest"
     unit = platform / (turn / lin.size if turn > _STILL * shift else shift)
     unit = np.where(np.abs(unit) > _STILL * np.abs(unit).max(), unit, 0.0)
-    return f"{way}; the platform along {numbers(unit)} [rad, m]"
+    return f"{way}; the platform moves along {numbers(unit)} [rad, m]"
 
 
 def _rigid_rows(

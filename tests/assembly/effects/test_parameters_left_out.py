@@ -131,6 +131,6 @@ def test_functions_name_the_covariates_of_their_sessions(form, variables, needed
 def test_geometric_stiffening_without_finite_motions_is_refused():
     robot = replace(arm(K), effects={"geometric_stiffening": {}})
     check_covariates(robot, {}, finite=True)
-    with pytest.raises(BadInput, match="asks for finite motions"):
+    with pytest.raises(BadInput, match="is defined for finite motions only"):
         check_covariates(robot, {})
     check_covariates(arm(K), {})

@@ -58,7 +58,7 @@ def test_gap_larger_than_the_clearance_raises_not_converged():
     posture = home_posture(Robot("rigid", "tip", frames, (("tip", "end"),)))
     model = FiniteRobot(posture, virtual_joints(posture.robot))
     local = expand(place(model, np.zeros(1)), dead_loads(posture), np.zeros(6))
-    message = "rigid: no clearance within its bounds closes what no spring can"
+    message = "rigid: the closures stay open: neither a spring nor a clearance"
     with pytest.raises(NotConverged, match=message):
         advance(local, 1.0, 0.0, False)
 
@@ -70,5 +70,5 @@ def test_missing_descent_step_is_reported_with_the_open_distance(monkeypatch):
     with pytest.raises(NotConverged) as caught:
         advance(local, 1.0, 0.0, False)
     assert str(caught.value).startswith("exact equilibrium of random under [")
-    assert ": no step lowers the energy; open by " in str(caught.value)
+    assert ": no step lowers the energy; the closures are open by " in str(caught.value)
     assert caught.value.status.startswith("no step lowers")

@@ -258,7 +258,7 @@ def test_rigid_parts_that_cannot_close_are_refused():
 def test_a_start_of_another_problem_is_refused(load):
     posture = two_bars(0.01)
     start = solve_assembly(posture if load else two_bars(0.02))
-    with pytest.raises(ValueError, match="start is the linear answer of another"):
+    with pytest.raises(ValueError, match="start: found the linear solution of another"):
         solve_exact(posture, load, start)
 
 

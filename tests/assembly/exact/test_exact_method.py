@@ -119,7 +119,9 @@ def test_reference_method_refuses_a_compiled_start(start):
         }[start]
         for method in METHODS
     )
-    with pytest.raises(ValueError, match="start or near is a compiled answer, expec"):
+    with pytest.raises(
+        ValueError, match="start or near: found a solution of the compiled"
+    ):
         solve_exact(posture, LOAD, method="reference", **{start: compiled})
     found = solve_exact(posture, LOAD, method="reference", **{start: reference})
     assert found.method == "reference"

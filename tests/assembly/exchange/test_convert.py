@@ -36,7 +36,7 @@ def test_loops_of_the_generator_default_type_are_converted_to_points(tmp_path):
     assert answer.open_after < 1e-9
     assert answer.difference < 1e-12
     (taken,) = answer.taken
-    assert taken.startswith("every loop for a point (3d)")
+    assert taken.startswith("every loop as 3d (a point without")
     assert "loop2" in taken
 
 
@@ -210,9 +210,12 @@ def test_overlay_adds_platform_clearances_and_links_to_a_urdf(tmp_path):
     [
         (
             '[[frame]]\nname = "fre1"\nmass = 1\n',
-            'found "fre1", no frame; did you mean',
+            'found "fre1", expected the name of a frame',
         ),
-        ('[[frame]]\nname = "free1"\ntranslation = [0, 0, 1]\n', "places no frame"),
+        (
+            '[[frame]]\nname = "free1"\ntranslation = [0, 0, 1]\n',
+            "which cannot place frames",
+        ),
         ('[[frame]]\nname = "free1"\nmas = 1\n', 'unknown key "mas"'),
         ("[[link]]\n", 'unknown key "link"'),
         ('platform = "efector"\n', 'did you mean "effector"?'),

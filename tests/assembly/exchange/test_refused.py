@@ -55,11 +55,11 @@ REFUSED = {
     ("urdf", "an unknown link"): (urdf(child="c"),
         'joint "j": found "c", expected the name of a link; valid: a, b'),
     ("urdf", "a ring of parents"): (urdf(child="a"),
-        'joint "j": found a ring of parents, expected them to lead to "b"'),
+        'joint "j": found a cycle of parents, expected parents that lead '),
     ("urdf", "a joint to itself"): (urdf_with(urdf_joint("k", "c", "c", Z)),
-        'joint "k": found a ring of parents, expected them to lead to "a"'),
+        'joint "k": found a cycle of parents, expected parents that lead '),
     ("urdf", "two roots"): (urdf(links='<link name="c"/>'),
-        'found as root "a" and "c", expected exactly one link'),
+        'found as root link "a" and "c", expected exactly one link'),
     ("urdf", "a link twice"): (urdf(links='<link name="b"/>'),
         'link "b".name: found it twice; expected names that differ'),
     ("urdf", "two numbers for three"): (urdf(more='<origin xyz="0 0"/>'),
@@ -69,15 +69,15 @@ REFUSED = {
     ("urdf", "an axis of zero"): (urdf(more='<axis xyz="0 0 0"/>'),
         "axis.xyz: found [0.0, 0.0, 0.0], not a direction"),
     ("urdf", "an unknown leader"): (urdf(more='<mimic joint="k"/>'),
-        'mimic.joint: found "k", no joint of one freedom'),
+        'mimic.joint: found "k", expected a joint with one degree'),
     ("urdf", "a joint that follows itself"): (
         urdf_with(follower("k", "b", "c", "k", 1, 0)),
-        'joint "k": found that it follows itself ("k"), expected another joint'),
+        'joint "k": found a cycle of couplings in which it follows itself ("k")'),
     ("urdf", "joints that follow each other"): (
         urdf_with(follower("k", "b", "c", "l", 1, 0) + '<link name="d"/>'
                   + follower("l", "b", "d", "k", 1, 0)),
-        'joint "k": found that it follows itself ("k" -> "l"), expected another '
-        "joint"),
+        'joint "k": found a cycle of couplings in which it follows itself '
+        '("k" -> "l"), expected it to follow another joint'),
     ("urdf", "a link without a name"): ("<robot><link/></robot>",
         "link.name: missing; expected a text"),
     ("urdf", "no link"): ("<robot/>",
@@ -90,23 +90,23 @@ REFUSED = {
         "not valid XML: no element found"),
     ("urdf", "an entity"): (
         '<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot>&x;</robot>',
-        "not valid XML: found a document type or an entity, expected neither: what "
-        "they name would be read too"),
+        "not valid XML: found a document type or an entity, expected neither: they "
+        "could load other files; remove them"),
     ("urdf", "elements in elements"): (f"<robot>{'<a>' * 300}{'</a>' * 300}</robot>",
-        "elements stand more than 200 deep"),
+        "found elements nested more than 200 deep"),
     ("urdf", "a macro"): (urdf_with('<xacro:macro name="m"/>' + K),
-        'xacro:macro "m": found a macro, expected the URDF that xacro makes'),
+        'xacro:macro "m": found a macro, expected the URDF without macros'),
     ("urdf", "a constraint"): (urdf_with(K + TIE),
-        'constraint: found it between "a" and "c": it may tie them, and is not '
-        "converted; expected joints, or a file without it"),
+        'constraint: found an element between "a" and "c" that may connect '
+        "them and is not converted; expected joints: declare a joint or a loop"),
     ("urdf", "a constraint in gazebo"): (urdf_with(f"{K}<gazebo>{TIE}</gazebo>"),
-        'constraint: found it between "a" and "c": it may tie them, and is not '
-        "converted; expected joints, or a file without it"),
+        'constraint: found an element between "a" and "c" that may connect '
+        "them and is not converted; expected joints: declare a joint or a loop"),
     ("urdf", "a bushing"): (
         urdf_with(K + '<frame name="fa" link="a"/><frame name="fc" link="c"/>'
                   + BUSHING.format("fa", "fc")),
-        'drake:linear_bushing_rpy: found it between "fa" and "fc": it may tie them, '
-        "and is not converted; expected joints, or a file without it"),
+        'drake:linear_bushing_rpy: found an element between "fa" and "fc" that may '
+        "connect them and is not converted; expected joints: declare a joint"),
     ("urdf", "a screw in gazebo"): (
         urdf_with(K + '<gazebo><joint name="l" type="screw"><parent>a</parent>'
                   "<child>c</child></joint></gazebo>"),
@@ -125,8 +125,8 @@ REFUSED = {
         'closed_loop[1]: found "bb", expected a joint or link of the robot; did you '
         'mean "b"?'),
     ("yaml", "a loop of a joint and its link"): ("closed_loop: [[j, b]]",
-        'closed_loop[1]: found "j" and "b", both of which end at "b"; expected two '
-        "places"),
+        'closed_loop[1]: found "j" and "b", both on the link "b"; expected two '
+        "different links"),
     ("yaml", "a type of loop"): ("closed_loop: [[a, b]]\ntype: [5d]",
         "type: found '5d', expected \"6d\" or \"3d\""),
     ("yaml", "no type"): ("closed_loop: [[a, b]]\ntype: []",
@@ -154,26 +154,28 @@ REFUSED = {
     ("yaml", "code"): ("!!python/object/apply:os.getcwd []",
         "not valid YAML: could not determine a constructor for the tag"),
     ("xml", "soft bodies"): (mjcf("<worldbody><composite/></worldbody>"),
-        "composite: found it; expected rigid bodies written out"),
+        "composite: found composite, which generates bodies; expected rigid "
+        "bodies written out"),
     ("xml", "half a copy"): (mjcf('<worldbody><replicate count="0.5"/></worldbody>'),
         "replicate.count: found 0.5, expected a whole number from 1 to 10000"),
     ("xml", "an unknown model"): (
         mjcf('<worldbody><body name="a">[M]</body><attach model="m"/></worldbody>'),
-        'attach.model: found "m", no model asset'),
+        'attach.model: found "m", expected the name of a model asset'),
     ("xml", "an unknown frame"): (
         mjcf('<worldbody><frame name="f"/><attach frame="g" prefix="p"/></worldbody>'),
-        'attach.frame: found "g", no frame of it'),
+        'attach.frame: found "g", expected the name of a frame of the attached'),
     ("xml", "a weld of one body"): (mjcf(TWO.format('<weld body1="a" body2="a"/>')),
         'weld: found "a" twice, expected two bodies'),
     ("xml", "a joint that follows itself"): (
         mjcf(TWO.format('<joint joint1="j" joint2="j"/>')),
-        'joint "j": found that it follows itself ("j"), expected another joint'),
+        'joint "j": found a cycle of couplings in which it follows itself ("j")'),
     ("xml", "a flexible body"): (mjcf(TWO.format('<flex flex="c"/>')),
-        "flex: found it; expected rigid bodies written out"),
+        "flex: found flex, which generates bodies; expected rigid "
+        "bodies written out"),
     ("xml", "a place given twice"): (
         mjcf('<worldbody><site name="s" pos="0 0 0" fromto="0 0 0 1 0 0"/>'
              "</worldbody>"),
-        'site "s".fromto: expected two different points, and no pos beside them'),
+        'site "s".fromto: found equal points, or pos together with fromto'),
     ("sdf", "a screw"): (
         four_bar().replace('"pin_a" type="revolute"', '"pin_a" type="screw"'),
         "joint \"pin_a\".type: found 'screw', expected fixed | revolute | "
@@ -184,14 +186,14 @@ REFUSED = {
         'mean "coupler"?'),
     ("sdf", "a ring of frames"): (
         four_bar().replace('attached_to="coupler"', 'attached_to="tool"'),
-        'frame "tool".pose: found a ring of relative_to'),
+        'frame "tool".pose: found a cycle of relative_to'),
     ("sdf", "a word for a mass"): (
         four_bar().replace("<mass>0.5</mass>", "<mass>x</mass>"),
         "mass: found 'x', expected 1 finite number [kg]"),
     ("sdf", "an include of nothing"): (sdf("<include/>"),
         "include.uri: missing; expected the name of a link"),
     ("sdf", "an include of no file"): (sdf("<include><uri>model://x</uri></include>"),
-        'include.uri: found "model://x", no file or folder near this'),
+        'include.uri: found "model://x", expected a file or folder next to this'),
     ("sdf", "a link twice"): (sdf('<link name="base"/>'),
         'link "base".name: found it twice; expected names that differ'),
     ("sdf", "two models"): (four_bar().replace("</model>", '</model><model name="b"/>'),
@@ -208,14 +210,14 @@ REFUSED = {
         'joint "j".child: found "frme", expected a link or frame; did you mean '
         '"frame"?'),
     ("sdf", "a bushing"): (sdf(A + BUSHING.format("base", "a")),
-        'drake:linear_bushing_rpy: found it between "base" and "a": it may tie '
-        "them, and is not converted; expected joints, or a file without it"),
+        'drake:linear_bushing_rpy: found an element between "base" and "a" that may '
+        "connect them and is not converted; expected joints: declare a joint"),
     ("sdf", "a mesh without a mass"): (
         sdf(A.replace("/>", '><inertial auto="true"/><collision name="c"><geometry>'
                       "<mesh/></geometry></collision></link>", 1)),
-        'collision "c".geometry: found mesh, of which no automatic inertia is made '
-        "here; expected box | sphere | ellipsoid | cylinder | capsule | cone, or a "
-        "written mass"),
+        'collision "c".geometry: found mesh, for which forcefit computes no '
+        "automatic inertia; expected box | sphere | ellipsoid | cylinder | "
+        "capsule | cone, or a mass written in the file"),
 }  # fmt: skip
 
 

@@ -47,7 +47,7 @@ def test_converted_spring_deflects_by_load_over_stiffness(name, run, tmp_path):
     [
         (
             MJCF.format('axis="0 0 1" stiffness="2000" springref="90"'),
-            "springs wound up at home, not converted, though they may carry load: 1 "
+            "springs preloaded at home, not converted, though they may carry load: 1 "
             "(spring by -1.57 rad or m)",
         ),
         (

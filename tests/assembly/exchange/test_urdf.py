@@ -60,7 +60,7 @@ def test_joint_named_base_gets_a_frame_of_another_name(name, tmp_path):
     robot = read_robot(tmp_path / "out.toml")
     (drive,) = [frame.name for frame in robot.frames if frame.actuated]
     assert drive == "base.joint"
-    assert any('"base" is frame "base.joint"' in line for line in answer.taken)
+    assert any('"base" becomes frame "base.joint"' in line for line in answer.taken)
     end = place_robot(robot).transforms[robot.index("c")]
     assert end[:3, 3] == pytest.approx([0, 0, 0.3])
 
@@ -171,7 +171,9 @@ def test_chained_mimic_joints_follow_their_leaders_at_home(tmp_path):
     home = [robot.frame(name).position for name in "xyz"]
     assert home == pytest.approx([0.3, 0.8, 1.7])
     (tmp_path / "robot.yaml").write_text("closed_loop: []\nhome: {y: 0.3}\n")
-    with pytest.raises(BadInput, match=r"home.y: found 0.3, but it follows .* 0.5 or"):
+    with pytest.raises(
+        BadInput, match=r"home.y: found 0.3, but the joint follows .* 0.5, or"
+    ):
         convert(path, tmp_path / "out.toml")
 
 
@@ -225,8 +227,9 @@ def test_plugins_and_springs_of_gazebo_are_reported(tmp_path):
         <gazebo reference="k"><springStiffness>5</springStiffness></gazebo>"""
     text += '<closure type="gear"><first joint="j"/><second joint="k"/></closure>'
     left_out = read_urdf(file_of(tmp_path, text, "abc")).left_out
-    tie = "closure, not converted, though it may tie or move what it names: 1"
+    may = "not converted, though it may connect or move the bodies that it names"
+    tie = f"closure, {may}: 1"
     assert tie in left_out
-    tie = "plugin, not converted, though it may tie or move what it names: 1 (p)"
+    tie = f"plugin, {may}: 1 (p)"
     assert tie in left_out
     assert "springStiffness, not converted, though it may carry load: 1 (k)" in left_out

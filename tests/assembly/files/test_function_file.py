@@ -84,8 +84,8 @@ REFUSED = {
         '.parameters: "at": found 0, expected > 0'),
     "waves of a load": (PUBLIC, '["q.drive"]\nform = "waves"',
         '["approach", "load.fz"]\nform = "reversal_waves"',
-        '.parameters: "period" is missing; waves of a variable that is no angle need '
-        "it"),
+        '.parameters: "period" is missing; expected it, because the variable is no '
+        "angle in rad"),
     "a spread of no number": (PUBLIC, "session =",
         'std = { "2.sine" = 1.0 }\nsession =',
         '.std: found "2.sine", which is no parameter; did you mean "1.sine"?'),

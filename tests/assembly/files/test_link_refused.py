@@ -86,8 +86,8 @@ REFUSED_LINKS = {
         'frame "coupler".link.beam.up: up = '),
     "a beam between two origins that are one": (
         "mass = 1.2", f"[[frame]]\nname = 'x'\nparent = 'base'\n{LINK}",
-        'frame "x".link: found no distance from the parent; expected a '
-        'translation, or a beam with "length" and "axis"'),
+        'frame "x".link: found a distance of 0 m from the parent; expected '
+        'a translation, or a beam with "length" and "axis"'),
     "no pieces": (
         "poisson = 0.3 }", "poisson = 0.3, pieces = 0 }",
         'frame "coupler".link.pieces: found 0, expected a finite number >= 1'),
@@ -154,7 +154,7 @@ REFUSED_LINKS = {
         "or neither"),
     "up for a beam in the frame": (
         "mass = 1.2", "up = [0, 0, 1]",
-        'frame "coupler".up: found one without a mesh; it fixes the roll of a mesh'),
+        'frame "coupler".up: found "up" in a frame without a mesh link'),
     "a library without a key": (
         BEAM, 'library = "links.nc"',
         "frame \"coupler\".link.library: found 'links.nc', expected "

@@ -35,7 +35,7 @@ REFUSED = {
         'frame "coupler".limits: found [1, -1], expected the smaller one first'),
     "limits of a fixed joint": (
         "mass = 1.2", "mass = 1.2\nlimits = [-1.0, 1.0]",
-        'frame "coupler".limits: found one on a fixed joint'),
+        'frame "coupler".limits: found limits on a fixed joint'),
     "tolerance of another shape": (
         "mass = 1.2", "mass = 1.2\ntolerance = [1e-3]",
         'frame "coupler".tolerance: found [0.001] of length 1, expected 6 finite '),
@@ -83,19 +83,20 @@ REFUSED = {
         '"base"; did you mean "wrist"?'),
     "a frame that is its own parent": (
         'parent = "wrist"', 'parent = "seat"',
-        'frame "seat".parent: found "seat", and from there on a ring of parents; '
-        'expected them to lead to "base"'),
+        'frame "seat".parent: found "seat", which leads to a cycle of parents; '
+        'expected parents that lead to "base"'),
     "a ring of parents": (
         'name = "rocker"\nparent = "base"', 'name = "rocker"\nparent = "seat"',
-        'frame "rocker".parent: found "seat", and from there on a ring of parents; '
-        'expected them to lead to "base"'),
+        'frame "rocker".parent: found "seat", which leads to a cycle of parents; '
+        'expected parents that lead to "base"'),
     "a name given twice": (
         'name = "wrist"', 'name = "crank"',
         'frame[5].name: found "crank", already the name of frame[1]; expected '
-        "another"),
+        "another name"),
     "a frame called base": (
         'name = "wrist"', 'name = "base"',
-        'frame[5].name: found "base", already the name of the root; expected another'),
+        'frame[5].name: found "base", already the name of the root; expected '
+        'another name'),
     "an empty name": (
         'name = "wrist"', 'name = " "', "frame[5].name: found ' ', expected a string"),
     "a joint of another kind": (
@@ -107,12 +108,12 @@ REFUSED = {
         'frame "crank".actuated: found 1, expected true or false'),
     "a position of a fixed joint": (
         'joint = "revolute"\nactuated = true', "",
-        'frame "crank".position: found one on a fixed joint; expected joint = '
-        '"revolute" | "prismatic", or no such key'),
+        'frame "crank".position: found position on a fixed joint; expected joint = '
+        '"revolute" | "prismatic", or no position'),
     "an actuated fixed joint": (
         'joint = "revolute"\nactuated = true\nposition = 1.0', "actuated = true",
-        'frame "crank".actuated: found one on a fixed joint; expected joint = '
-        '"revolute" | "prismatic", or no such key'),
+        'frame "crank".actuated: found actuated on a fixed joint; expected joint = '
+        '"revolute" | "prismatic", or no actuated'),
     "a negative mass": (
         "mass = 1.2", "mass = -1.2",
         'frame "coupler".mass: found -1.2, expected a finite number >= 0 [kg]'),
@@ -126,12 +127,12 @@ REFUSED = {
         "size at most 1e+06 [m]"),
     "dh beside a translation": (
         "translation = [0.3, 0.0, 0.0]", "translation = [0.3, 0.0, 0.0]\ndh = {a = 1}",
-        'frame "wrist".translation: found it beside "dh", which places the frame; '
-        "expected one of them"),
+        'frame "wrist".translation: found translation together with "dh"; both '
+        "place the frame, expected only one of them"),
     "dh beside a rotation": (
         "translation = [0.3, 0.0, 0.0]", "rotation = [0, 0, 0]\ndh = {a = 1}",
-        'frame "wrist".rotation: found it beside "dh", which places the frame; '
-        "expected one of them"),
+        'frame "wrist".rotation: found rotation together with "dh"; both place '
+        "the frame, expected only one of them"),
     "a list for dh": (
         "translation = [0.3, 0.0, 0.0]", "dh = [0, 0, 0.3, 0]",
         'frame "wrist".dh: found [0, 0, 0.3, 0], expected a table'),

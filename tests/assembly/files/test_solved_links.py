@@ -231,7 +231,7 @@ def test_loading_without_links_reads_no_link_file(folder):
         ("length0.3", "length0.4", r'"wrist"\.link\.library: .*no entry'),
         ('"elbow"\nparent = "crank"\ntranslation = [0.3, 0, 0]',
          '"elbow"\nparent = "crank"\ntranslation = [0.31, 0, 0]',
-         r'"elbow"\.link\.mesh: the tip interface.s centre lies at'),
+         r'"elbow"\.link\.mesh: the centre of the mesh.s tip interface'),
     ],
 )  # fmt: skip
 def test_unusable_link_file_is_refused_before_finite_elements(

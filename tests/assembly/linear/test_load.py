@@ -123,7 +123,9 @@ def test_load_about_a_free_hinge_is_refused_with_its_unit_motion():
         Frame("hinge", joint="revolute"),
         Frame("tip", "hinge", [0.5, 0.25, 0.0], link=link),
     )
-    expected = r"it moves hinge rz; the platform along \[0 0 1 -0.25 0.5 0\] \[rad, m\]"
+    expected = (
+        r"it moves hinge rz; the platform moves along \[0 0 1 -0.25 0.5 0\] \[rad, m\]"
+    )
     with pytest.raises(FreeMotion, match=expected):
         solve_assembly(home_posture(Robot("r", "tip", frames)), [0, 0, 1, 0, 0, 0])
 

@@ -69,7 +69,7 @@ def test_point_without_solution_keeps_its_status_when_selected():
     twice = many[[1, 0, 1]]
     for some, i in ((many, 1), (twice, 0), (twice, 2)):
         assert np.isnan(some.energy[i])
-        with pytest.raises(CannotAssemble, match="no clearance within its bounds"):
+        with pytest.raises(CannotAssemble, match="neither a spring nor a clearance"):
             some[i]
     assert twice[1].energy == many[0].energy == 0.0
 

@@ -189,4 +189,4 @@ def test_infinite_margin_needs_no_proof():
     assert zones.assemblable.tolist() == [False] * 4
     assert [bool(text) for text in zones.unproved] == [False, False, True, True]
     assert [bool(zone.unproved) for zone in zones] == [False, False, True, True]
-    assert zones[2].unproved == "the margin 2 is proved down to 1.99 only"
+    assert zones[2].unproved == "the margin 2 is certified down to 1.99 only"

@@ -91,5 +91,5 @@ def test_clearance_at_rest_is_a_fraction_of_its_bounds():
     shares = fractions(robot, rest[0] * bounds)
     assert shares == pytest.approx(np.where(bounds > 0, rest[0], 0.0), rel=1e-9)
     assert not fractions(robot, np.ones((4, 6)))[bounds == 0].any()
-    with pytest.raises(ValueError, match="no rest positions of the clearances"):
+    with pytest.raises(ValueError, match="conditions.rest: missing"):
         with_clearances_at_rest(replace(given, rest=None))

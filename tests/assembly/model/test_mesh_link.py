@@ -123,9 +123,9 @@ def test_mesh_axis_below_a_moved_slide_is_read_and_written(ram, tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({}, 'link: found no distance from the parent; .*, or a mesh with "axis"'),
+        ({}, 'link: found a distance of 0 m from .*, or a mesh with "axis"'),
         ({"more": "translation = [0, 0, 0.1]", "position": 0.1},
-         'home position is 0.1 m; expected 0 or an "axis"'),
+         'home position is 0.1 m; expected a home position of 0'),
         ({"axis": ", axis = [0, 0, 0]"}, "mesh.axis: found .*, expected a direction"),
         ({"axis": ", axis = [0, 0, 1], up = [1, 0, 0]", "more": "up = [0, 0, 3]"},
          r'"tool".up: up = .* lies along the axis .*; expected another direction'),

@@ -81,7 +81,7 @@ def test_free_motion_has_nan_compliance_and_zero_stiffness():
     np.testing.assert_allclose(many.eigen_stiffnesses[0], [0, 1, 1, 1, 1, 1])
     assert [many.along(axis)[0] for axis in UNIT] == [1, 1, 1, 1, 1, 0]
     assert many.apart[0].free_text == (
-        "nothing resists the platform's motion [0 0 0 0 0 1] [rad, m]"
+        "the platform moves freely along [0 0 0 0 0 1] [rad, m]"
     )
 
 

@@ -17,7 +17,7 @@ from validation.study.report import verdict
 from validation.study.study import run_study
 from validation.study.study_file import read_study
 
-SAID = "singular posture: first order decides nothing; finite motions: 0 J"
+SAID = "singular posture: the first-order analysis is inconclusive; finite motions: 0 J"
 
 
 def test_solution_at_a_singular_posture_gives_the_energy_of_finite_motions():

@@ -75,7 +75,7 @@ def test_picture_shows_the_axes_of_driven_and_passive_joints():
         (["--figure", "x.xyz"],
          'x.xyz: found the ending ".xyz", expected a picture: .png'),
         (["--figure", "x.png", "--load", "fx=1", "--error-body", "translation",
-          "--assumption", "budget"], "--assumption: found budget with --load"),
+          "--assumption", "budget"], "--assumption: found budget together"),
         (["--figure", "x.png", "--exaggeration", "inf"], "--exaggeration: found inf"),
         (["--figure", "x.png", "--exaggeration", "1e300"],
          "--exaggeration: found 1e+300"),

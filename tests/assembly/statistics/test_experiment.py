@@ -187,4 +187,4 @@ def test_results_state_the_contact_length_of_pose_errors(contact_length):
     assert summary["contact_length"] == data.attrs["contact_length"] == length
     text = summary_text(summary)
     assert f"moments / {length:g} m, contact length" in text
-    assert "the load of service (--load)" in text
+    assert "the service load (--load)" in text

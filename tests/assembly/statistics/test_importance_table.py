@@ -98,8 +98,9 @@ def test_draws_without_a_solution_are_reported_with_the_reason():
             assert report["platform"]["tip.TX"]["translation_gain"] > 0.5
             continue
         assert one["reason"] == (
-            "no indices where more than 5% of the draws have no answer: up to 6.0% "
-            "were left out, and the errors of the others are not independent"
+            "no indices are computed if more than 5% of the draws have no answer: "
+            "up to 6.0% were left out, and the errors of the other draws are not "
+            "independent"
         )
         assert f"translation: {one['reason']}" in lines
         assert all(np.isnan(v).all() for v in one["total_index"].values())

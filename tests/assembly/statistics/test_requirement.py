@@ -70,8 +70,8 @@ def test_limit_within_the_clearances_of_perfect_parts_is_refused(
         requirement.perfect_parts()
     assert str(error.value) == (
         "limit translation: even perfect parts reach 0.0001 m by clearances alone at "
-        "tx = 0.4; expected at most 9e-05 m (or --clearance least, if clearances stay "
-        "as solved)"
+        "tx = 0.4; expected at most 9e-05 m; tighten the clearances, loosen the limit, "
+        "or use --clearance least"
     )
 
 
@@ -106,6 +106,7 @@ def test_error_that_no_clearance_or_spring_takes_up_is_refused_by_name(
     with pytest.raises(BadInput) as error:
         requirement.check_taken_up()
     assert str(error.value) == (
-        f"limit {limit}: no clearance or spring takes up an error {named}; leave "
-        "it out, or limit the energy of a robot that is elastic there"
+        f"limit {limit}: found an error {named} that no clearance or spring can "
+        "close; leave this error out, or limit the energy of a robot with a spring "
+        "there"
     )

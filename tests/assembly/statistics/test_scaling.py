@@ -104,7 +104,7 @@ def test_too_few_draws_for_a_yield_are_refused():
     with pytest.raises(BadInput) as error:
         draw_samples(requirement, 7, 2)
     assert str(error.value) == (
-        "tolerances: 58 draws cannot show a yield of 0.95 even if none fails; ask for "
-        "more draws"
+        "tolerances: 58 draws are too few to show a yield of 0.95, even if none "
+        "fails; use more draws"
     )
     assert draw_samples(requirement, 7, 3).allowed == 0

@@ -133,7 +133,9 @@ def test_stiffness_mean_needs_two_draws_that_resist(held, described):
     if described:
         assert one["mean"]["value"] == pytest.approx(3.0)
     text = stiffness_spread_text(said).splitlines()[4]
-    assert text.startswith("  fx: median 3 N/m, 90 %" if described else "  fx: nothing")
+    assert text.startswith(
+        "  fx: median 3 N/m, 90 %" if described else "  fx: no resistance"
+    )
     assert text.endswith(f"; free in {(4 - held) / 4:g}")
     assert said["axes"]["my"]["unit"] == "N m/rad"
 

@@ -54,7 +54,7 @@ def test_summary_counts_assembled_draws_with_unmixed_clearances():
     said = summarise(data)
     assert said["clearance_not_mixed"] == 2
     text = summary_text(said)
-    assert "warning: in 2 draws uniform clearances are not mixed when their" in text
+    assert "warning: in 2 draws the random walk of the uniform clearances" in text
     mixed = summarise(data.assign(clearance_mixed=("draw", [1, 1, 1, 0])))
     assert mixed["clearance_not_mixed"] == 0
     assert "warning" not in summary_text(mixed)
@@ -228,7 +228,9 @@ def test_summary_text_states_quantities_units_and_intervals():
 def test_limit_on_a_quantity_that_was_not_computed_is_refused(key):
     """The quantity is missing, or has no link."""
     data = draws(energy=[1.0, 2.0], stress=np.zeros((2, 0)))
-    with pytest.raises(BadInput, match=f"^limit {key}: not among what was computed$"):
+    with pytest.raises(
+        BadInput, match=f"^limit {key}: found a quantity that was not computed; "
+    ):
         summarise(data, {"energy": 1.0, key: 1.0})
 
 

@@ -152,9 +152,11 @@ REFUSED = {
     "a number for a component": ('["RX", "RY"]', "[3]",
         "tolerance[2].components: expected a list of names"),
     "no component": ('["RX", "RY"]', "[]",
-        "tolerance[2].components: expected angles only or lengths only, not none"),
+        "tolerance[2].components: expected components that are all angles or all "
+        "lengths, at least one"),
     "angles and lengths": ('["RX", "RY"]', '["RZ", "TX"]',
-        "tolerance[2].components: expected angles only or lengths only, not none"),
+        "tolerance[2].components: expected components that are all angles or all "
+        "lengths, at least one"),
     "an error twice in a table": ('"TX"', '"TX", "TX"',
         'tolerance[1]: found "leg1.link_a.TX" again, first in this table'),
     "an error in two tables": (
@@ -162,7 +164,7 @@ REFUSED = {
         '["leg2.link_a"]\ncomponents = ["TX"]',
         'tolerance[2]: found "leg2.link_a.TX" again, first in "length"'),
     "a name twice": ('["RX", "RY"]', '["TX"]\nname = "length"',
-        "tolerance: two of them share a name; expected different ones"),
+        "tolerance: found two tolerances of the same name, expected different names"),
     "no table": (FILE, "yield = 0.9",
         "tolerance: missing; expected tables [[tolerance]]"),
 }  # fmt: skip

@@ -35,7 +35,7 @@ def drawn_sweep(grid):
 def test_worker_refuses_a_task_of_another_robot():
     """For example, a mesh differs there: its content is part of the hash."""
     question = drawn_sweep("tx=0,ty=0.13").question
-    with pytest.raises(BadInput, match="a worker reads another robot"):
+    with pytest.raises(BadInput, match="found another robot on a worker"):
         solve_task(pickle.dumps(question), "0" * 64, [])
 
 

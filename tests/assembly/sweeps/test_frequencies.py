@@ -30,7 +30,7 @@ def test_swept_frequencies_equal_those_of_single_postures():
     ("robot", "count", "message"),
     [
         ("delta", 0, "--frequencies: found 0, expected 1 to 100"),
-        ("irsbot2", 2, "found no mass that moves"),
+        ("irsbot2", 2, "found no moving mass"),
     ],
 )
 def test_sweep_of_frequencies_without_mass_is_refused(robot, count, message):

@@ -65,7 +65,7 @@ def test_loaded_sweep_without_bounds_among_its_quantities_is_accepted():
     load = [0, 0, 0, 10.0, 0, 0]
     data = ff.sweep("five_bar", grid=GRID, load=load, quantities=["energy"])
     assert set(data.data_vars) == {"energy", *TEXTS}
-    with pytest.raises(ff.BadInput, match="--assumption: the robot is loaded"):
+    with pytest.raises(ff.BadInput, match="--assumption: found a loaded robot"):
         ff.sweep("five_bar", grid=GRID, load=load)
 
 

@@ -67,7 +67,7 @@ def test_saved_sweep_is_read_with_units_and_provenance(data, tmp_path):
 
 
 def test_saving_to_a_missing_folder_is_refused(data, tmp_path):
-    with pytest.raises(BadInput, match="no folder .*nowhere; expected one"):
+    with pytest.raises(BadInput, match="no folder .*nowhere; expected an existing"):
         save_dataset(data, tmp_path / "nowhere" / "map.nc")
 
 

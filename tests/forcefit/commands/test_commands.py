@@ -157,7 +157,7 @@ def test_exact_solution_reports_a_state_beyond_a_critical_load(run, tmp_path):
     column.write_text(COLUMN)
     for load, status, said in (
         ("fx=-80", 0, ""),
-        ("fx=-90", 1, "the potential decreases along a motion"),
+        ("fx=-90", 1, "the potential energy decreases along"),
         ("fx=-90,fy=0.1", 0, "%; this may be beyond a critical load"),
         ("fx=-20,fy=0.1", 0, ""),
     ):
@@ -207,9 +207,9 @@ def test_show_writes_a_figure(run, robot_file, tmp_path):
         (["assembly", "error", "irsbot2", "--tolerance-rotation", "-1"],
          "--tolerance-rotation: found -1.0, expected a finite number > 0"),
         (["assembly", "sweep", "irsbot2", "--grid", "tx=0:1:0", "-o", "x.nc"],
-         "grid tx: step 0"),
+         "grid tx: found a step of 0"),
         (["assembly", "sweep", "irsbot2", "--grid", "tx=0", "-o", "/nowhere/x.nc"],
-         "/nowhere/x.nc: no folder /nowhere"),
+         "/nowhere/x.nc: found no folder /nowhere"),
         (["assembly", "solve", "irsbot2", "--poze", "tx=0"],
          "--pose"),
         (["assembly", "solve", "irsbot2", "--po\nze"], r"--po\x0aze"),

@@ -95,7 +95,7 @@ def test_crosscheck_command_checks_the_poses_of_a_grid(tmp_path, capsys, monkeyp
     with pytest.raises(SystemExit) as done:
         command.main()
     assert done.value.code == 2
-    assert "--grid: not together with" in capsys.readouterr().err
+    assert "--grid: found together with" in capsys.readouterr().err
 
 
 def test_pose_without_a_comparable_difference_does_not_pass():

@@ -50,7 +50,7 @@ def test_followed_path_continues_past_its_limit_point(run, tmp_path):
     answer = json.loads(out)
     assert status == 0
     first, second = answer["events"]
-    assert first["what"].startswith("limit point, the load turns: platform along")
+    assert first["what"].startswith("limit point, an extremum of the load: platform")
     assert first["load"] == pytest.approx(-second["load"], rel=1e-6)
     assert min(answer["deflection"]) < -0.2
     assert picture.stat().st_size > 1000
@@ -62,7 +62,7 @@ def test_follow_option_is_refused_together_with_back(run):
         "--back",
     )  # fmt: skip
     assert status == 2
-    assert "--follow: not with --back" in err
+    assert "--follow: found together with --back" in err
 
 
 @pytest.mark.parametrize(

@@ -66,15 +66,15 @@ def test_example_files_are_unchanged_on_repeat_and_edited_files_are_kept(run, tm
     mine.write_text("mine")
     status, out, err = run("example", "campaign", "irsbot2", "-o", tmp_path)
     assert (status, out, err.count("\n")) == (2, "", 1)
-    assert f"{mine}: found another content" in err
+    assert f"{mine}: found a file with other content" in err
     assert files_of(tmp_path) == before
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["irsbot"], 'example: no "irsbot"; did you mean "irsbot2"?'),
-        (["irsbot2", "-o", "nowhere"], "nowhere: no such folder"),
+        (["irsbot"], 'example: found "irsbot"; did you mean "irsbot2"?'),
+        (["irsbot2", "-o", "nowhere"], "nowhere: found no such folder"),
     ],
 )
 def test_wrong_example_name_or_folder_gives_one_message(

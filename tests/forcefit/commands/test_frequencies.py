@@ -25,7 +25,7 @@ def test_frequencies_of_a_robot_without_mass_are_refused(run):
     status, out, err = run("assembly", "frequencies", "irsbot2")
     assert status == 2
     assert out == ""
-    assert 'irsbot2: found no mass that moves; expected "density"' in err
+    assert 'irsbot2: found no moving mass; expected "density"' in err
 
 
 def test_nominal_frequencies_report_that_gravity_is_left_out(run, tmp_path):

@@ -99,4 +99,4 @@ def test_old_flag_has_the_result_of_its_new_option(run):
 def test_library_look_up_without_parameters_is_refused(run):
     status, out, err = run("stiffness", "library", "look-up", "folder")
     assert (status, out) == (2, "")
-    assert "--at: missing; expected such as radius=0.02" in err
+    assert "--at: missing; expected parameters such as" in err

@@ -116,7 +116,7 @@ def test_study_of_an_open_closure_gives_its_energy(files, run, words, key, energ
     assert run("study", files / "study.toml")[0] == 0
     results = json.loads((files / "out" / "results.json").read_text())
     assert results["solution"]["energy"] == pytest.approx(energy, rel=RELATIVE)
-    assert "closure leaves open" in results["errors"] or "drives" in results["errors"]
+    assert "gap of the closure" in results["errors"] or "drives" in results["errors"]
 
 
 def test_study_adds_its_own_errors_to_the_gap_of_a_closure(run, tmp_path):
@@ -176,7 +176,7 @@ def test_sweep_over_drive_values_is_refused_with_mismatch(run, tmp_path):
     words = ["--mismatch", "spring", "--grid", "q.one=0.3", "-o", tmp_path / "x.nc"]
     status, _, err = run("assembly", "sweep", tmp_path / "robot.toml", *words)
     assert status == 2
-    assert "--mismatch: found points given by drives" in err
+    assert "--mismatch: found points given by drive" in err
     assert not (tmp_path / "x.nc").exists()
 
 
@@ -197,4 +197,4 @@ def test_convert_refuses_rest_for_files_of_other_programs(run, tmp_path):
     words = ["--rest", "a", "-o", tmp_path / "r.toml"]
     status, _, err = run("convert", tmp_path / "r.urdf", *words)
     assert status == 2
-    assert "found with --rest or --mismatch, expected a robot file" in err
+    assert "found together with --rest or --mismatch, expected a robot file" in err

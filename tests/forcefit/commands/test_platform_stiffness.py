@@ -78,7 +78,7 @@ def test_load_that_nothing_resists_has_exit_status_1_and_names_the_motion(
     )
     assert status == 1
     assert err == ""
-    assert "it moves slide tz; the platform along [0 0 0 0 0 1] [rad, m]" in out
+    assert "it moves slide tz; the platform moves along [0 0 0 0 0 1] [rad, m]" in out
 
 
 def test_sweep_names_the_free_motion(tmp_path):
@@ -91,7 +91,7 @@ def test_sweep_names_the_free_motion(tmp_path):
     )
     data = sweep_in_memory(asked).squeeze()
     assert str(data.reason.values) == (
-        "nothing resists the platform's motion [0 0 0 0 0 1] [rad, m]"
+        "the platform moves freely along [0 0 0 0 0 1] [rad, m]"
     )
     assert float(data.stiffness.sel(wrench_component="FZ")) == 0.0
     stretched = 7e10 * np.pi * 1e-4 / 0.5

@@ -86,7 +86,7 @@ def test_beam_options_are_passed_to_the_formula(options, section, axis, theory):
         (["--width", "1"], "--height: missing"),
         (
             ["--width", "1", "--height", "1", "--inner-radius", "0.1"],
-            "found with a rectangle",
+            "found together with --width and --height",
         ),
         (["--radius", "1", "--length", "inf"], "--length: found inf"),
         (["--radius", "1", "--young", "-1"], "--young: found -1"),
@@ -122,7 +122,7 @@ def test_beam_command_refuses_a_wrong_option_by_name(options, message):
         (["--part", "solid=/young=1e9,poisson=0.3"], "--part: found 'solid=/young"),
         (
             ["--part", "solid=end/young=1e9,poisson=0.3"],
-            'found a material of solid "end", expected a STEP file of several solids',
+            'found a material of solid "end", expected a STEP file whose solids',
         ),
         (["--mass", "1.5"], "--mass: found '1.5', expected"),
         (["--mass", "-1/0,0,0"], "--mass: found -1"),
@@ -140,7 +140,7 @@ def test_fea_refuses_wrong_options_before_meshing(change, message):
     ("change", "message"),
     [
         ([], "--young: missing; expected a modulus [Pa], or --part"),
-        (["--young", "1e9"], "--young, --poisson: found one of them, expected both"),
+        (["--young", "1e9"], "--young, --poisson: found only one of them"),
         (["--part", "z=0..1/young=1e9,poisson=0.3"], "--young: missing"),
     ],
 )
@@ -153,9 +153,9 @@ def test_fea_refuses_a_link_without_a_material_everywhere(change, message):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ([], "--wrench: missing; expected one, or --gravity"),
+        ([], "--wrench: missing; expected a wrench"),
         (["--gravity", "w=1"], "--gravity"),
-        (["--gravity", "z=-9.81", "--figure", "x.png"], "--figure: found with --gravi"),
+        (["--gravity", "z=-9.81", "--figure", "x.png"], "--figure: found together"),
         (
             [
                 "--wrench",
@@ -165,7 +165,7 @@ def test_fea_refuses_a_link_without_a_material_everywhere(change, message):
                 "--part",
                 "z=0..1/young=1,poisson=0",
             ],
-            "--part: found with a section",
+            "--part: found together with a section",
         ),
     ],
 )

@@ -88,7 +88,7 @@ def test_plot_draws_a_saved_sweep_without_solving(run, tmp_path, monkeypatch):
     [
         (["sweep", "five_bar", "-o", "x.nc"], "expected --grid or --poses"),
         (["sweep", "five_bar", "--grid", "tx=0", "-o", "x.nc", "--workers", "2",
-          "--scheduler", "tcp://h:1"], "found --workers and --scheduler, expected one"),
+          "--scheduler", "tcp://h:1"], "found both --workers and --scheduler"),
         (["sweep", "five_bar", "--poses", "no.csv", "-o", "x.nc"],
          "no.csv: cannot be read: No such file"),
         (["sweep", "five_bar", "--grid", "tx=0", "--vary", "left.elbow.young=1",
@@ -235,7 +235,7 @@ def test_ask_sweep_takes_paths_as_text_or_as_paths(tmp_path):
          "NetCDF file of forcefit: .nc"),
         (["-o", "x"], "x: found no ending, expected a NetCDF file of forcefit: .nc"),
         (["-o", "other.nc"], "other.nc: found a file that is not a NetCDF file of "
-         "forcefit; expected one, or nothing there: it is not overwritten"),
+         "forcefit; expected one, or no file: it is not overwritten"),
         (["-o", "measured.nc"], "measured.nc: found a NetCDF file that is not one of a "
          "sweep by forcefit"),
         (["-o", "x.nc", "--figure", "x.xyz"], 'x.xyz: found the ending ".xyz", '
@@ -248,8 +248,8 @@ def test_ask_sweep_takes_paths_as_text_or_as_paths(tmp_path):
         (["-o", "x.nc", "--json", "full.json"], "full.json: found a device, pipe or "
          "socket, expected a regular file"),
         (["-o", "pipe.nc"], "pipe.nc: found a device, pipe or socket"),
-        (["-o", "no/x.nc"], "no/x.nc: no folder no; expected one that exists"),
-        (["-o", "robot.toml/x.nc"], "no folder robot.toml"),
+        (["-o", "no/x.nc"], "no/x.nc: found no folder no; expected an existing"),
+        (["-o", "robot.toml/x.nc"], "found no folder robot.toml"),
         (["-o", f"{'x' * 300}.nc"], "cannot be written: File name too long"),
     ],
 )  # fmt: skip

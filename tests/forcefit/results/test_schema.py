@@ -106,7 +106,7 @@ def test_schema_and_reader_refuse_the_same_fault(fault, validator):
 def test_schema_command_lists_names_and_suggests_the_nearest(run):
     assert run("schema")[1].split("\n")[:3] == ["robot", "campaign", "assembly solve"]
     assert run("schema", "assembly", "sovle")[::2] == (
-        2, 'forcefit: schema: no "assembly sovle"; did you mean "assembly solve"?\n'
+        2, 'forcefit: schema: found "assembly sovle"; did you mean "assembly solve"?\n'
     )  # fmt: skip
     described = json.loads(run("schema", "assembly", "error")[1])["properties"]
     assert described["energy"]["description"].endswith("[J]")

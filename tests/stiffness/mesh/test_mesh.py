@@ -91,13 +91,15 @@ def test_failed_mesher_is_reported_with_its_last_output(
         return subprocess.CompletedProcess(command, status, b"", words.encode())
 
     monkeypatch.setattr(mesh_module.subprocess, "run", mesher)
-    with pytest.raises(MeshFailed, match=f"bar: the mesher gave nothing {told}$"):
+    with pytest.raises(
+        MeshFailed, match=f"bar: the mesh generator ended without a mesh: {told}$"
+    ):
         mesh_solid(bar(), *FACES, cache=tmp_path)
 
 
 def test_mesher_is_stopped_at_its_time_limit(tmp_path):
     """0.05 s is less than a Python process needs to start."""
-    with pytest.raises(MeshFailed, match=r"no mesh after 0.05 s"):
+    with pytest.raises(MeshFailed, match=r"no mesh within 0.05 s"):
         mesh_solid(bar(), *FACES, time_limit=0.05, cache=tmp_path)
     assert list(tmp_path.iterdir()) == []
 

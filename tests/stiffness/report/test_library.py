@@ -114,9 +114,9 @@ def test_look_up_at_a_grid_point_returns_its_entry(spec):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"radius": 0.05}, "radius = 0.05 is outside the grid, 0.01 .. 0.04"),
+        ({"radius": 0.05}, "radius = 0.05 is outside the grid, expected 0.01 .. 0.04"),
         ({"radios": 0.02}, 'unknown parameter "radios"; did you mean "radius"?'),
-        ({"radius": None}, "radius: missing; the grid has it"),
+        ({"radius": None}, "radius: missing; expected a value"),
     ],
 )
 def test_look_up_outside_the_grid_or_with_other_parameters_is_refused(
@@ -165,11 +165,11 @@ WRONG_ENTRIES = [
     (lambda _: "rubbish", "damaged entry"),
     (lambda _: "[]", "damaged entry"),
     (lambda _: "[" * 100_000, "damaged entry"),
-    (lambda _: "{}", 'not an entry; expected format "forcefit link 1"'),
+    (lambda _: "{}", 'found no entry of a library; expected format "forcefit link 1"'),
     (lambda _: '{"format": "forcefit link 1"}', "damaged entry (KeyError)"),
     (
         changed(lambda entry: entry.update(wrench=FORCES_FIRST)),
-        "another order than RX RY RZ TX TY TZ",
+        "another order of the components, expected RX",
     ),
     (
         changed(lambda entry: entry["stiffness"][0].__setitem__(0, -1.0)),
@@ -390,7 +390,7 @@ def test_shipped_library_refuses_a_length_outside_its_grid(length):
         app, ["library", "read", str(SHIPPED / "tube"), "--at", f"length={length}"]
     )
     assert isinstance(result.exception, BadInput)
-    assert "outside the grid, 0.2 .. 0.45" in str(result.exception)
+    assert "outside the grid, expected 0.2 .. 0.45" in str(result.exception)
 
 
 def test_failed_library_build_leaves_no_folder(tmp_path, monkeypatch):

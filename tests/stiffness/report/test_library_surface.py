@@ -87,7 +87,7 @@ def test_surface_entry_has_the_digest_of_its_file_and_an_error_estimate(
     assert np.abs(scaled(inverted(compliance) - entry.stiffness, beam)).max() < 1e-12
     row = next(csv.DictReader(io.StringIO(library_csv([entry]))))
     assert (row["key"], float(row["young"])) == ("bar", 6e10)
-    with pytest.raises(BadInput, match="only entries of surfaces, expected a grid"):
+    with pytest.raises(BadInput, match="only entries of single surfaces, expected"):
         look_up([entry], {"young": 6e10})
 
 

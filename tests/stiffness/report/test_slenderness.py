@@ -134,7 +134,7 @@ def test_axial_stiffness_at_zero_poissons_ratio_has_no_end_effect():
         (["--section", "radius=1,rdius=2"], 'unknown "rdius"; did you mean "radius"'),
         (
             ["--section", "radius=1", "--radius", "1"],
-            "found with --radius, expected one",
+            "found together with --radius",
         ),
         (["--section", "width=1"], "--section: found width, expected one of"),
     ],
@@ -153,7 +153,7 @@ def test_comparison_of_a_beam_with_another_tip_is_refused():
     C = beam_compliance(0.4, round_section(0.02, 0.3), 6e10, 0.3)
     one = LinkStiffness("beam", C, tip=[0.4, 0, 0], base=[0, 0, 0])
     other = LinkStiffness("fea", C, tip=[0.41, 0, 0], base=[0, 0, 0])
-    with pytest.raises(BadInput, match="the surface's tip is at"):
+    with pytest.raises(BadInput, match="the tip of the surface is at"):
         compare_link(one, other, 0.02)
 
 
@@ -255,7 +255,7 @@ def test_wrong_curve_file_is_refused_by_its_path(tmp_path, change, message):
 def test_compare_refuses_a_curve_file_together_with_a_section(tmp_path):
     path = curve_file(tmp_path, L_BRACKET)
     command = ["compare", "x.stl", "--base", "z=0", "--tip", "x=0.15", *MATERIAL]
-    with pytest.raises(BadInput, match="--curve: its file has the sections"):
+    with pytest.raises(BadInput, match="--curve: found together with options"):
         CliRunner().invoke(
             app,
             [*command, "--curve", str(path), "--radius", "0.1"],

@@ -174,25 +174,25 @@ BAD_TABLES = {
     "no id": (HEAD.replace("id,", "cov.id,"), ["1" + r[2:] for r in ROWS],
         r'line 1: missing column "id"'),
     "a column twice": (HEAD.replace("load.mx", "load.fx"), ROWS,
-        r'line 1: column "load.fx" is there twice'),
+        r'line 1: found column "load.fx" twice'),
     "a column without a name": (HEAD.replace("load.mx", " "), ROWS,
         r"line 1: column 5 has no name"),
-    "no header": (None, ROWS, r"line 1 names no column of a table of measurements"),
+    "no header": (None, ROWS, r"line 1: found no column of a table of measurements"),
     "semicolons": (HEAD.replace(",", ";"), [r.replace(",", ";") for r in ROWS],
-        r'it has ; in it: if that parts the cells, say \[table\] delimiter = ";"'),
+        r'it contains ;: if this separates the cells, set delimiter = ";"'),
     "decimal commas": (HEAD, [ROWS[0].replace("1.5", "1,5")],
-        r"line 2: found 12 cells, expected 11 as in the header; if decimals are writ"),
+        r"line 2: found 12 cells, expected 11 as in the header; if the decimal mark"),
     "quoted decimal commas": (HEAD, [ROWS[0].replace("1e-05", '"0,00001"'), *ROWS[1:]],
         r'line 2 \(id "m1"\), meas.tx: found "0,00001", expected a finite number \[m\]'
-        r'; a decimal "," is not read here: write "0.00001", or say \[table\] delimi'
-        r'ter = ";", decimal = "," in campaign.toml and part cells by ";"'),
+        r'; the decimal mark here is not ",": write "0.00001", or set in \[table\] '
+        r'delimiter = ";", decimal = "," in campaign.toml and separate cells by ";"'),
     "a NUL in a label": (HEAD, [ROWS[0].replace("m1", "m\0"), *ROWS[1:]],
         r"line 2 holds NUL; expected a text file"),
     "a line break in a label": (HEAD, [ROWS[0].replace("m1", '"m\n1"')],
         r"line 3, \"id\": found 'm\\n1', expected text without line breaks"),
     "ragged": (HEAD, [*ROWS[:2], "m9,0.1"], r"line 4: found 2 cells, expected 11 as"),
-    "empty": (None, [], r"measurements.csv: empty; expected a header"),
-    "no rows": (HEAD, [], r"measurements.csv: no rows; expected one row a measurement"),
+    "empty": (None, [], r"measurements.csv: found an empty file; expected a header"),
+    "no rows": (HEAD, [], r"measurements.csv: found no rows; expected one row"),
     "a word": (HEAD, [ROWS[0].replace("1e-05", "small")],
         r'line 2 \(id "m1"\), meas.tx: found "small", expected a finite number \[m\]'),
     "nan": (HEAD, [ROWS[0].replace("1e-05", "nan")],
@@ -200,9 +200,9 @@ BAD_TABLES = {
     "infinite": (HEAD, [ROWS[0].replace("1e-05", "inf")], r'meas.tx: found "inf"'),
     "underscores": (HEAD, [ROWS[0].replace("1e-05", "1_0")], r'meas.tx: found "1_0"'),
     "an empty command": (HEAD, [ROWS[0].replace(",0.1,", ",,")],
-        r"q.one: empty; only meas. and sigma. cells may be"),
+        r"q.one: found an empty cell, expected a value; only meas. and sigma"),
     "nothing measured": (HEAD, [ROWS[0].replace("1e-05,2e-05,3e-05", ",,")],
-        r'line 2 \(id "m1"\): no measured cell; expected at least one of meas.rx'),
+        r'line 2 \(id "m1"\): found no reading in this row; expected'),
     "an id twice": (HEAD, [*ROWS, ROWS[1]],
         r'line 6, id: found "m2", already the label of line 3; expected another'),
     "no label": (HEAD, [ROWS[0].replace("m1", " ")], r"line 2, id: empty"),
@@ -215,16 +215,16 @@ BAD_TABLES = {
     "absolute temperature": (HEAD, [ROWS[0].replace("1.5,0,1", "293.15,0,1")],
         r"cov.temperature: found 293.15, expected the deviation from the temperature"),
     "metres for micrometres": (HEAD, [ROWS[0].replace("1e-05", "153")],
-        r"meas.tx: found 153, expected a length in m, at most the robot's 1\.\d+; if "
-        r"it is in other units say so in \[units\]"),
+        r"meas.tx: found 153, expected a length in m, at most the robot's 1\.\d+; "
+        r"declare other units in \[units\]"),
     "degrees": (HEAD, [ROWS[0].replace(",0.1,", ",90,")],
-        r"q.one: found 90, expected an angle in rad; if it is in other units"),
+        r"q.one: found 90, expected an angle in rad; declare other units"),
     "a load of 1e9 N": (HEAD, [ROWS[0].replace(",0,0,1e", ",1e9,0,1e")],
         r"load.fx: found 1e\+09, expected a load in N"),
     "out of reach": ("id,pose.tx,pose.ty,meas.tx", ["a,0.5,1,0", "b,5,1,0"],
         r'line 3 \(id "b"\): pose tx=5, ty=1 cannot be reached'),
     "a pose in mm": ("id,pose.tx,pose.ty,meas.tx", ["a,500,1000,0"],
-        r"pose.tx: found 500, expected a position in m; if it is in other units"),
+        r"pose.tx: found 500, expected a position in m; declare other units"),
     "sigma of zero": ("id,q.one,q.two,meas.tx,sigma.tx", ["a,0,0,0,0"],
         r"sigma.tx: found 0 m, expected one standard deviation > 0"),
     "sigma of 5 m": ("id,q.one,q.two,meas.tx,sigma.tx", ["a,0,0,0,5"],
@@ -253,11 +253,11 @@ BAD_TOML = {
         r'did you mean "irsbot2"\?'),
     "no table": ({"measurements": '"m.csv"'}, NOISE, r"m.csv: cannot be read: No such"),
     "a point in mm": ({"reference_point": "[20, 0, 50]"}, NOISE,
-        r"reference_point: found 53.85.* m from the platform, the robot is 1\.\d+ m"),
+        r"reference_point: found a point 53.85.* m from the platform, but the robot"),
     "two numbers": ({"reference_point": "[0, 1]"}, NOISE, r"expected 3 finite numbers"),
     "registration": ({"registration": '"unknwon"'}, NOISE, r'did you mean "unknown"'),
     "noise": ({}, "[noise]\nrotatoin = 1\n", r'noise: unknown key "rotatoin"; did you'),
-    "no noise": ({}, "", r"sigma.tx: no sigma; expected a cell here or \[noise\] "),
+    "no noise": ({}, "", r"sigma.tx: found no standard deviation; expected one in"),
     "noise of 0": ({}, "[noise]\nposition = 0\n", r"noise.position: found 0, expected"),
     "unit": ({}, '[units]\nposition = "miles"\n', "found 'miles', expected .m. . .mm"),
     "unit of a covariate": ({}, "[units]\ncov.time = 'rad'\n",
@@ -266,7 +266,7 @@ BAD_TOML = {
         r"units.cov.tilt: found .tilt., expected a column of further covariates"),
     "no motion": ({}, "[units]\ncov.tilt = 'K'\n", r"cov.tilt: found 'K', expected"),
     "unknown unit": ({}, '[units]\npostion = "m"\n', r'did you mean "position"\?'),
-    "comma twice": ({}, '[table]\ndecimal = ","\n', r"decimal commas need delimiter"),
+    "comma twice": ({}, '[table]\ndecimal = ","\n', r"as decimal mark and as deli"),
     "delimiter": ({}, '[table]\ndelimiter = "/"\n', r"delimiter: found '/', expected"),
 }  # fmt: skip
 
@@ -284,7 +284,7 @@ def test_wrong_campaign_file_is_refused_in_one_line(case, tmp_path):
 def test_refusal_does_not_print_the_content_of_another_file(tmp_path):
     folder = write_campaign(tmp_path)
     (folder / "measurements.csv").write_text("root:secret:0:0\nother:words\n")
-    with pytest.raises(BadInput, match="names no column") as caught:
+    with pytest.raises(BadInput, match="found no column") as caught:
         read_campaign(folder)
     assert "secret" not in str(caught.value)
 
@@ -365,9 +365,9 @@ def test_each_of_several_tables_becomes_a_session(tmp_path):
     ("id,q.one,q.two,meas.C.tx", "m1,0,0,1e-5", POINTS, 'unknown column "meas.C.tx"'),
     ("id,q.one,q.two,meas.A.rx", "m1,0,0,1e-5", POINTS, 'unknown column "meas.A.rx"'),
     ("id,q.one,q.two,session,meas.tx", "m1,0,0,,1e-5", "", "session: empty"),
-    ("id,q.one,q.two,meas.A.tx", "m1,0,0,", POINTS, "no measured cell"),
+    ("id,q.one,q.two,meas.A.tx", "m1,0,0,", POINTS, "found no reading in this row"),
     ("id,q.one,q.two,meas.A.tx", "m1,0,0,1e-5", "[points]\nA = [900, 0, 0]\n",
-     "points.A: found 900 m from the platform"),
+     "points.A: found a point 900 m from the platform"),
     ("id,q.one,q.two,meas.tx", "m1,0,0,1e-5", "[points]\ntx = [0, 0, 0]\n",
      'points: found "tx"'),
 ])  # fmt: skip

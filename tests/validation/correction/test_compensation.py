@@ -201,5 +201,5 @@ def test_correction_larger_than_the_robot_keeps_the_command(off, tmp_path, run):
     assert float(row["q.carriage"]) == 0.3
     ((label, reason),) = [one.values() for one in told]
     assert label == "a"
-    assert "larger than the robot" in reason
+    assert "the robot's size" in reason
     assert reason in text

@@ -66,7 +66,7 @@ def test_function_of_two_variables_gives_three_curves(tmp_path, run):
 
 
 @pytest.mark.parametrize(("words", "effects", "message"), [
-    ((), (), "has no function to explain"),
+    ((), (), "found no learned function to show"),
     (("--over", "q.driv=0:1"), (PUBLIC,), 'did you mean "q.drive"'),
     (("--over", "q.drive=1:0"), (PUBLIC,), "expected LEAST:LARGEST"),
 ])  # fmt: skip

@@ -97,7 +97,7 @@ def test_failed_crosscheck_has_exit_status_1(monkeypatch):
 
 @pytest.mark.parametrize(("name", "message"), [
     ("slope.txt", "expected a picture: .png or .svg or .pdf"),
-    ("no/such/folder/slope.png", "no/such/folder; expected one that exists"),
+    ("no/such/folder/slope.png", "no/such/folder; expected an existing"),
 ])  # fmt: skip
 def test_crosscheck_refuses_a_figure_that_cannot_be_written(name, message, tmp_path):
     outcome = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100",

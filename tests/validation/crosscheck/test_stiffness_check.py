@@ -102,7 +102,7 @@ def test_stiffness_of_links_in_pieces_converges_to_that_of_beams():
         ]
         cut = home_posture(replace(robot, frames=tuple(frames)))
         answer = check_stiffness(cut, [0, 0, 0, 20, 0, -100], links="beam")
-        assert ('"pieces" of a link' in answer.text()) == (not answer.passed)
+        assert ('"pieces" of the link' in answer.text()) == (not answer.passed)
         off.append(answer.differences["linearised"])
     assert off[0] == pytest.approx(0.02, rel=0.1)
     assert np.array(off[:-1]) / off[1:] == pytest.approx(4.0, rel=0.1)
@@ -120,7 +120,7 @@ def test_stiffness_check_reports_another_equilibrium_at_another_pose():
     other = replace(answer, simulated=stiffer)
     assert not other.passed
     assert other.another_equilibrium
-    assert "undecided: another equilibrium" in other.text()
+    assert "undecided: the two models are at different equilibria" in other.text()
     assert "(unstable)" in other.text()
     stiffer = replace(answer.simulated, linearised=0.5 * elsewhere.linearised)
     other = replace(answer, simulated=stiffer)
@@ -162,4 +162,4 @@ def test_crosscheck_of_stiffness_reports_both_compliances(run):
         "x.png",
     )
     assert status == 2
-    assert "--state: not with" in err
+    assert "--state: found together with" in err

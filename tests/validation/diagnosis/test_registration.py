@@ -166,5 +166,5 @@ def test_each_session_has_its_own_device_frame():
     left = campaign.measured - predict(found).deviation
     assert np.abs(left[:, 3:]).max() < 1e-9
     unknown = replace(campaign, session=np.array(["a"] * 8))
-    with pytest.raises(BadInput, match='session "b" has no row'):
+    with pytest.raises(BadInput, match='no usable row in session "b"'):
         register(unknown, conditions_of(campaign))

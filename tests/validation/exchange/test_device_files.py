@@ -211,7 +211,7 @@ def test_motive_rigid_body_is_read_without_its_markers(lab, run):
 
 def test_declared_unit_that_contradicts_the_file_is_refused(lab, run):
     line = refused(lab, run, "Units: Inches\nname;x;y;z\nA;1;2;3")
-    assert 'line 1: found the unit "in", the targets file says "mm"' in line
+    assert 'line 1: found the unit "in", expected "mm" as declared' in line
 
 
 def test_decimal_is_declared_for_each_table(lab, run):
@@ -277,7 +277,7 @@ def test_repeated_reading_is_left_out_and_reported(lab, run):
     table = imported(lab, run, "\n".join([*body, body[4]]))
     assert table["readings"] == 39
     (line,) = table["left_out"]
-    assert 'line 40 ("Main::p1::B"): the same reading twice' in line
+    assert 'line 40 ("Main::p1::B"): this reading occurs twice' in line
 
 
 def test_surplus_reading_is_refused_with_its_line(lab, run):
@@ -297,7 +297,7 @@ def test_duplicate_commands_are_reported(lab, run):
     expected = 'line 7, id: found "p3", already the label of line 5'
     assert expected in refused(lab, run, body)
     path.write_text(text.replace("q.two", "q.one"))
-    assert 'column "q.one" is there twice' in refused(lab, run, body)
+    assert 'found column "q.one" twice' in refused(lab, run, body)
 
 
 # -- lengths and axes that are not what they are taken for ---------------------------
@@ -309,14 +309,14 @@ def changed(change):
 
 
 @pytest.mark.parametrize(("factor", "words"), [
-    (1 / 25.4, "times 25.4, as in taken for mm"),
-    (25.4, "times 0.03937, as mm taken for in"),
-    (1e-3, "times 1000, as m taken for mm"),
-    (1 / 304.8, "times 304.8, as ft taken for mm"),
+    (1 / 25.4, "if multiplied by 25.4, as in taken for mm"),
+    (25.4, "if multiplied by 0.03937, as mm taken for in"),
+    (1e-3, "if multiplied by 1000, as m taken for mm"),
+    (1 / 304.8, "if multiplied by 304.8, as ft taken for mm"),
 ])  # fmt: skip
 def test_lengths_of_another_unit_are_refused_with_the_factor(lab, run, factor, words):
     line = refused(lab, run, changed(lambda p: factor * p))
-    assert f"unit: the readings fit far better {words}" in line
+    assert f"unit: the readings fit much better {words}" in line
 
 
 @pytest.mark.parametrize("axis", range(3))
@@ -324,12 +324,12 @@ def test_left_handed_coordinates_are_refused(lab, run, axis):
     mirror = np.ones(3)
     mirror[axis] = -1
     line = refused(lab, run, changed(lambda p: mirror * p))
-    assert "left-handed: the readings fit far better with one axis reversed" in line
+    assert "the readings fit much better with one axis reversed" in line
 
 
 @pytest.mark.parametrize(("change", "words"), [
-    (lambda p: p * [1, -1, 1], "where y is the device's -y"),
-    (lambda p: p[[1, 0, 2]], "where x is the device's y, y is the device's x"),
+    (lambda p: p * [1, -1, 1], "if y is the device's -y"),
+    (lambda p: p[[1, 0, 2]], "if x is the device's y, y is the device's x"),
 ])  # fmt: skip
 def test_reversed_axis_of_a_known_registration_is_reported(lab, run, change, words):
     """The base axes are known."""
@@ -348,7 +348,7 @@ def test_targets_declared_in_millimetres_are_refused_with_the_factor(lab, run):
     places = [f"{n} = {[1e3 * x for x in at]}" for n, at in TARGETS.items()]
     (lab.folder / "smr.toml").write_text("\n".join([head, "[targets]", *places]))
     line = refused(lab, run, "\n".join(points(line=SPATIAL_ANALYZER)))
-    assert "0.001 times as far, all alike, as mm taken for m" in line
+    assert "0.001 times as large as declared, as mm taken for m" in line
 
 
 def moved_mount(k, name, p):
@@ -364,11 +364,11 @@ def no_target(k, name, p):
 SHUFFLED = list(points("A", "{x!r} {y!r} {z!r}"))
 REMARKS = {
     "other distances": ("ABC", points(line=SPATIAL_ANALYZER, change=moved_mount),
-        "remark: A and B are read 0.162 .. 0.162 m apart, declared 0.143"),
+        "remark: the measured distance of A and B is 0.162 .. 0.162 m"),
     "other order": ("A", SHUFFLED[::2] + SHUFFLED[1::2],
-        "are they joined to the right ones?"),
+        "check whether the readings are joined"),
     "no targets": ("ABC", points(line=SPATIAL_ANALYZER, change=no_target),
-        "distances differ from row to row, whatever was commanded"),
+        "distances differ from row to row, independently"),
 }  # fmt: skip
 
 
@@ -463,7 +463,7 @@ def test_rotations_relative_to_a_declared_mount_are_unchanged(lab, run, rng):
          "found no unit of angles"),
         ("qw,qx,qy,qz", lambda R: [1, 2, 3, 4], {}, "found a quaternion of norm 5.477"),
         ("qw,qx,qy,qz", lambda R: np.roll(R.inv().as_quat(), 1), {},
-         "the orientations fit far better inverted"),
+         "found inverted orientations"),
         ("rx,ry,rz", lambda R: [1, 2, 3], {"orientation": '"zzx"'},
          "orientation: found"),
     ],

@@ -152,7 +152,7 @@ def test_grid_of_three_axes_is_drawn_at_its_largest_error(tmp_path):
     ("stiffness = 1", "service.stiffness: found 1, expected true or false"),
     ("frequencies = -1", "service.frequencies: found -1, expected a whole number"),
     ("frequencies = 2000", "service.frequencies: found 2000, expected at most"),
-    ("frequencies = 3", "service.frequencies: irsbot2: found no mass that moves"),
+    ("frequencies = 3", "service.frequencies: irsbot2: found no moving mass"),
     ("lod = 1", 'service: unknown key "lod"; did you mean "load"?'),
 ])  # fmt: skip
 def test_wrong_service_keys_are_refused_in_one_line(tmp_path, line, message):

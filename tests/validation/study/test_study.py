@@ -328,7 +328,7 @@ def test_study_reports_a_manipulator_that_cannot_be_assembled(tmp_path):
         ("least = [1e-4,", "least = [", "errors.least: found"),
         ("[pose]", "[links]\nsource = 'fea'\n[pose]", "links.surface: missing"),
         ("[pose]", "[links]\nsurface = 'no.stl'\n[pose]", "surface: no such file"),
-        ("[pose]", "[checks]\nstiffness = true\n[pose]", "stiffness: this check"),
+        ("[pose]", "[checks]\nstiffness = true\n[pose]", "stiffness: found true"),
         ("[pose]", "[checks]\nmaps = 1\n[pose]", "checks.maps: found 1, expected true"),
         ("title", "scales = 3\ntitle", "scales: expected a list of factors"),
         ("title", "scales = ['a']\ntitle", "scales: found 'a' as number 1, expected"),

@@ -54,4 +54,4 @@ def test_free_motion_message_does_not_depend_on_the_size_of_the_load(load):
     with pytest.raises(FreeMotion) as told:
         reduced(turn_and_slide(), load * np.array([0, 0, 0, 0, 0, 2.0]))
     text = str(told.value)
-    assert "it moves slide tz; the platform along [0 0 0 0 0 1] [rad, m]" in text
+    assert "it moves slide tz; the platform moves along [0 0 0 0 0 1] [rad, m]" in text
