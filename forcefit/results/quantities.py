@@ -133,8 +133,8 @@ QUANTITIES: Mapping[str, Quantity] = {
         "condition number", meaning="of the map from drives to platform"
     ),
     # forced assembly, problems (21), (22) and (27)
-    "assemblable": flag("assembles by clearance alone, compliant joints rigid"),
-    "assemblable_free": flag("assembles by clearance alone, compliant joints free"),
+    "assemblable": flag("assembles, compliant joints rigid"),
+    "assemblable_free": flag("assembles, compliant joints free"),
     "margin": Quantity(
         "zone margin, compliant joints rigid", meaning="factor on all clearances at "
         "which it just assembles without force, compliant joints rigid",

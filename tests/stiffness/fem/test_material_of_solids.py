@@ -112,7 +112,7 @@ def test_unknown_solid_or_solid_without_material_is_refused_by_name(given, messa
 def test_solids_that_overlap_are_refused():
     surface = rod_in_tube(INNER, OUTER, LENGTH)
     solids = replace(surface.solids, overlaps=("solids a and b have 1 m^3 in common",))
-    with pytest.raises(BadInput, match="a and b have 1 m.3 in common, expected solids"):
+    with pytest.raises(BadInput, match="a and b have 1 m.3 in common; expected solids"):
         placed_materials(
             replace(surface, solids=solids),
             [Material(STEEL, 0.3), Material(STEEL, 0.3, solid="rod")],

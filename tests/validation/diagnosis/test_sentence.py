@@ -101,4 +101,4 @@ def test_verdict_sentence_states_the_supporting_findings(
 
 
 def test_text_states_the_number_of_rows_with_a_free_motion():
-    assert "free in 2 of 3 rows" in open_text(np.array([True, False, True]))
+    assert "undetermined in 2 of 3 rows" in open_text(np.array([True, False, True]))

@@ -136,7 +136,7 @@ def test_text_ends_with_residual_trends_and_the_next_measurement(shown):
         remarks=["odd"], open=["m0"],
     )  # fmt: skip
     assert "odd" in said
-    assert any("free in 1 of 4 rows" in line for line in said)
+    assert any("undetermined in 1 of 4 rows" in line for line in said)
     assert "residual varies with cov.bed: 42 %" in said
     assert said[-2:] == [
         "measure next: q.one=0.5; load fx=10, temperature 5",
