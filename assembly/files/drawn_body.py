@@ -161,7 +161,7 @@ def _end(table: Table, key: str, prefix: str, here: list[str]) -> str | None:
 def link_remarks(
     bodies: list[DrawnBody], joints: list[DrawnJoint], copies: list[Copy]
 ) -> tuple[str, ...]:
-    """The ends of links that no key says, of bodies with more than two joints."""
+    """Return a remark on links whose ends are assumed, for lack of `from` and `to`."""
     stated = {
         copied.prefix + table.content["name"]
         for copied in copies

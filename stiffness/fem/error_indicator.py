@@ -36,7 +36,8 @@ from stiffness.surface.true_surface import TrueSurface
 VOIGT = np.array([[0, 0], [1, 1], [2, 2], [1, 2], [0, 2], [0, 1]])
 _SAME_MODULUS = 1e-6  # relative difference
 _CHUNK = 1024  # number of faces per chunk
-# e_3 / s_3 at a singular edge, calibrated on the links of meshes/
+# ratio of the remaining error e_3 to the indicator s_3 at a singular edge,
+# calibrated on the example links in meshes/
 _SINGULAR_SHARE = 1.2
 # remaining error over s_3 as a function of s_3 / s_2, for rates from p^-0.1 to p^-40
 _RATES = np.geomspace(40.0, 0.1, 400)

@@ -29,7 +29,7 @@ from stiffness.mesh.regions import Region, material_edges
 from stiffness.mesh.solid import Solid, moved_onto_shapes
 
 ENDS = (0, 1)  # patches of base and tip; distributed tractions end at their outlines
-LAYER_SHARE = 0.25  # layer's thickness over the element's; 0.15 to 0.3 are as good
+LAYER_SHARE = 0.25  # layer thickness over element size; 0.15 to 0.3 are as accurate
 _PASSES = 100  # passes that split joining edges; 3 to 12 suffice for meshes/
 _REENTRANT = np.cos(np.radians(35.0))  # a flatter re-entrant edge is hardly singular
 # edges that are cut where a corner or an edge is singular; singular corners come first
@@ -185,7 +185,7 @@ def layered(
     count = len(solid.points)
     touched = np.zeros(count, dtype=bool)
     touched[graded_edges(solid, held, regions)] = True
-    # if a tetrahedron still touches more than an edge, its corners get no layer
+    # if a tetrahedron touches several edges, its corners get no graded layer
     while (several := touched[parts.corners].sum(axis=1) > 2).any():
         touched[parts.corners[several]] = False
     on = touched[parts.corners]

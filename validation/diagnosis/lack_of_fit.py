@@ -25,7 +25,7 @@ from validation.diagnosis.separability import orthonormal_basis
 SIGNIFICANT = 1e-4  # probability below which a residual is not noise
 UNLIKELY = 1e-3  # probability below which one of many tested residuals is unlikely
 OUTLIERS = 20  # at most one row in 20 may be an outlier
-_LEVELS = 30  # steps of a covariate's range; rows in one step are alike
+_LEVELS = 30  # bins over a covariate's range; rows of a bin count as replicates
 _OUTLYING = 5.5  # rms of an outlying row, in medians of all rows
 _MOST = 6  # largest number of trends that are reported
 

@@ -29,7 +29,7 @@ from validation.diagnosis.unknowns import STEP, Small, effects_in, with_effects_
 ERROR, COMPLIANCE, EFFECT, FUNCTION = (
     "geometric_error", "joint_compliance", "effect", "function",
 )  # fmt: skip
-_STAYS = 1e-3  # relative to a compliance: least remainder after a decrease
+_STAYS = 1e-3  # smallest compliance after a correction, over the declared one
 
 
 @dataclass(frozen=True)

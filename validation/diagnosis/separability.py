@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from validation.diagnosis.signatures import UNSEEN
 
 LIKE = 0.98  # cosine above which a design cannot distinguish
-SEEN = 3.0  # [sigma] length of a signature that exceeds the noise
+SEEN = 3.0  # [sigma] norm above which a signature is detectable
 ROUNDING = 1e-9  # relative size that is rounding: of a direction that others imitate
 _RANK = 1e-3  # relative size that is zero for signatures, because they are secants
 

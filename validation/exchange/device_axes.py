@@ -23,7 +23,7 @@ from validation.exchange.reading import LENGTHS
 _UNITS = {**LENGTHS, "ft": 0.3048}
 # relative to the scatter: another reading is accepted if less remains
 _FAR_BETTER = 0.25
-_SCALED = 0.02  # largest scatter of ratios of distances with one factor
+_SCALED = 0.02  # largest relative scatter of distance ratios with one unit factor
 # accepted error of the factor of two units, since the robot has errors too
 _UNIT = 0.05
 _PAIRED = 10  # number of following readings, to each of which the distance is taken

@@ -41,7 +41,7 @@ _BETTER = 1e-3  # increase of the criterion that counts as an improvement
 _AVERAGE = 20  # number of random plans that the plan is compared with
 _PACE = 60.0  # [s] time to measure a row
 _SWING = 2400.0  # [s] period in which the temperature of a machine rises and falls
-_FEWEST = 8  # least rows and configurations that held-out rows can judge
+_FEWEST = 8  # minimum number of rows and configurations for held-out rows
 
 
 @dataclass(frozen=True, eq=False)

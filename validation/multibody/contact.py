@@ -148,5 +148,5 @@ def _overlap(
     x = (squared - cone.size**2) / (2 * cone.size)
     w = width * cone.size
     root = math.hypot(x, w)
-    # x + root, without cancellation deep inside
+    # x + root, without cancellation for x << 0, inside the clearance
     return (x + root if x > 0 else w * w / (root - x)) / 2, root
