@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from forcefit.commands.answer import answer
 from forcefit.commands.deflection import deflection
 from forcefit.commands.frequencies import frequencies
 from forcefit.commands.help import Commands
@@ -39,7 +40,6 @@ from forcefit.inputs.writing import (
     PIXELS,
     check_writable,
     save_pixels,
-    write_json,
 )
 
 app = Commands(no_args_is_help=True)
@@ -79,7 +79,6 @@ def error(
     """Bound the largest pose error, problem (27)."""
     from assembly.linear.reference.pose_error import ASSUMPTIONS
     from assembly.model.largest import LARGEST_LENGTH
-    from assembly.model.statuses import OK
     from assembly.report.pose_errors import pose_error_of, pose_error_text
 
     for name in assumption or ():
@@ -106,11 +105,7 @@ def error(
             point=parse_point(at),
             direction=parse_direction(along), **options,
         )  # fmt: skip
-    write_json(results, json)
-    if json != "-":
-        print(pose_error_text(results))
-    if results["status"] != OK:
-        raise typer.Exit(1)
+    answer(results, pose_error_text(results), results["status"], json)
 
 
 @app.command()

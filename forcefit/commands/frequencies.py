@@ -4,6 +4,7 @@ from typing import Annotated
 
 import typer
 
+from forcefit.commands.answer import answer
 from forcefit.commands.options import (
     GravityOption,
     JointOption,
@@ -18,7 +19,6 @@ from forcefit.commands.options import (
     parse_state,
 )
 from forcefit.commands.progress import one_thread
-from forcefit.inputs.writing import write_json
 
 
 def frequencies(
@@ -44,7 +44,6 @@ def frequencies(
 
     Masses must be declared.
     """
-    from assembly.model.statuses import OK
     from assembly.report.vibration import vibration_of, vibration_text
 
     word = parse_state(state, ("nominal", "exact"))
@@ -56,8 +55,4 @@ def frequencies(
         results = vibration_of(
             applied.posture, count, applied.load, applied.gravity, word
         )
-    write_json(results, json)
-    if json != "-":
-        print(vibration_text(results))
-    if results["status"] != OK:
-        raise typer.Exit(1)
+    answer(results, vibration_text(results), results["status"], json)

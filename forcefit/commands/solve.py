@@ -4,6 +4,7 @@ from typing import Annotated, Any
 
 import typer
 
+from forcefit.commands.answer import answer
 from forcefit.commands.options import (
     GravityOption,
     JointOption,
@@ -20,7 +21,6 @@ from forcefit.commands.options import (
 )
 from forcefit.commands.progress import one_thread, progress_lines
 from forcefit.inputs.errors import BadInput, nearest
-from forcefit.inputs.writing import write_json
 
 _MARGINS = ("margin", "margin_free")
 
@@ -61,18 +61,7 @@ def solve(
         mismatch=mismatch, note=exact,
     )  # fmt: skip
     results, text = _exact_results(applied) if exact else _results(applied)
-    _answer(results, text, results["status"], json)
-
-
-def _answer(results: dict[str, Any], text: str, status: str, json: str | None) -> None:
-    """Write and print results; exit with status 1 where the status is not ok."""
-    from assembly.model.statuses import OK
-
-    write_json(results, json)
-    if json != "-":
-        print(text)
-    if status != OK:
-        raise typer.Exit(1)
+    answer(results, text, results["status"], json)
 
 
 def _results(applied: Any) -> tuple[dict[str, Any], str]:
@@ -124,6 +113,6 @@ def _solve_margins(
     posture = posture_of(robot, pose, joint, rest, mismatch, links=False)
     margins = zone_of(posture) | singular_status(posture)
     results = {"robot": robot, "zone": margins}
-    _answer(
+    answer(
         results, zone_text(results | {"pose": posture.pose()}), margins["status"], json
     )

@@ -1,0 +1,28 @@
+"""How a command ends: its results are written and printed; its exit status follows."""
+
+from typing import Any
+
+import typer
+
+from forcefit.inputs.writing import write_json
+
+
+def answer(results: dict[str, Any], text: str, status: str, json: str | None) -> None:
+    """Write and print results; exit with status 1 where the status is not ok.
+
+    Args:
+        results: plain values.
+        text: the same for people.
+        status: of the results.
+        json: target of the results, as of ``write_json``.
+
+    Raises:
+        typer.Exit: the status is not ok.
+    """
+    from assembly.model.statuses import OK
+
+    write_json(results, json)
+    if json != "-":
+        print(text)
+    if status != OK:
+        raise typer.Exit(1)
