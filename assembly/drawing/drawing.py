@@ -86,7 +86,7 @@ class DrawnBody:
 
     Attributes:
         name: of the body.
-        mass: [kg] beside its link's own.
+        mass: [kg] in addition to its link's.
         centre: (3,) [m] of that mass, base axes at home.
         inertia: (3, 3) [kg m^2] about the centre, base axes at home.
         axes: (3, 3) the base's axes turned with the copy of the leg, as columns.

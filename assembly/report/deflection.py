@@ -17,8 +17,8 @@ from assembly.platform_stiffness.deflection import (
 )
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.errors import plot_label
-from forcefit.results.display import rounded
-from forcefit.results.text import lines_of, listing, table_lines
+from forcefit.results.display import listing, rounded
+from forcefit.results.text import lines_of, table_lines
 from stiffness.screws import SCREW, WRENCH
 
 if TYPE_CHECKING:

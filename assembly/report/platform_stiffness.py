@@ -22,8 +22,8 @@ from assembly.platform_stiffness.platform_stiffness import State
 from assembly.report.beyond_linear import far_from_linear
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.errors import plot_label
-from forcefit.results.display import numbers, rounded
-from forcefit.results.text import lines_of, listing, table_lines, value_text
+from forcefit.results.display import listing, numbers, rounded
+from forcefit.results.text import lines_of, table_lines, value_text
 from stiffness.screws import SCREW, WRENCH
 
 if TYPE_CHECKING:

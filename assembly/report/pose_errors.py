@@ -20,7 +20,8 @@ from assembly.report.first_order import singular_status
 from assembly.report.results import proof_status
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.table import BadInput
-from forcefit.results.text import lines_of, listing, value_text
+from forcefit.results.display import listing
+from forcefit.results.text import lines_of, value_text
 
 
 def pose_error_of(

@@ -32,7 +32,8 @@ from assembly.report.beyond_linear import far_from_linear
 from assembly.report.first_order import first_order_status, linearisation_of
 from assembly.report.wrench_table import wrench_lines
 from assembly.solvers.conic import SolverFailed
-from forcefit.results.text import lines_of, listing, value_text
+from forcefit.results.display import listing
+from forcefit.results.text import lines_of, value_text
 
 # numbers of a certificate, relative ones and the gap in J
 _PROOF = (

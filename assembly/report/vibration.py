@@ -11,8 +11,8 @@ from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.statuses import FREE_MOTION, UNSTABLE
 from assembly.platform_stiffness.vibration import natural_modes
 from assembly.solvers.conic import SolverFailed
-from forcefit.results.display import numbers
-from forcefit.results.text import lines_of, listing
+from forcefit.results.display import listing, numbers
+from forcefit.results.text import lines_of
 
 _NOMINAL = (
     "these are the frequencies of the nominal robot, without load and gravity; "

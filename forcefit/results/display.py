@@ -31,10 +31,14 @@ def short_repr(self: Any) -> str:
     Returns:
         Lines of text.
     """
-    figures = _figures(self)
-    width = max(map(len, figures), default=0)
-    lines = [f"  {name:{width}}  {value}" for name, value in figures.items()]
-    return "\n".join([title(self), *lines])
+    return listing(title(self), _figures(self))
+
+
+def listing(title: str, lines: Mapping[str, str], notes: Sequence[str] = ()) -> str:
+    """Return a title and lines of words and values, aligned, then notes."""
+    width = max(map(len, lines), default=0)
+    rows = [f"  {words:{width}}  {value}" for words, value in lines.items()]
+    return "\n".join([title, *rows, *(f"note: {note}" for note in notes)])
 
 
 def html_table(self: Any) -> str:

@@ -109,13 +109,6 @@ def forced_lines(assembly: Any) -> dict[str, str]:
     return lines_of(values, "pose load energy platform_screw")
 
 
-def listing(title: str, lines: Mapping[str, str], notes: Sequence[str] = ()) -> str:
-    """Return a title and lines of words and values, aligned, then notes."""
-    width = max(map(len, lines), default=0)
-    rows = [f"  {words:{width}}  {value}" for words, value in lines.items()]
-    return "\n".join([title, *rows, *(f"note: {note}" for note in notes)])
-
-
 def table_lines(
     head: Sequence[str], rows: Mapping[str, Sequence[Any]], digits: int = 5
 ) -> list[str]:

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from forcefit.results.display import listing
 from forcefit.results.quantities import LABELS, QUANTITIES, number
 from forcefit.results.text import (
     in_unit,
     lines_of,
-    listing,
     readings_text,
     table_lines,
     value_text,
