@@ -55,4 +55,4 @@ def _range(part: str, order: list[str]) -> list[str]:
             f"--setup: found {quoted(part)}, expected rows 1 to {len(order)}"
         )
     hint = nearest(part, order)
-    raise BadInput(f"--setup: found {quoted(part)}, expected the label of a row{hint}")
+    raise BadInput(f"--setup: found {quoted(part)}, expected a row's label{hint}")

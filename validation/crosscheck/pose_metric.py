@@ -76,7 +76,7 @@ class PoseMetric:
 
     @cached_property
     def differences(self) -> dict[str, NDArray]:
-        """(k,) norms of the pose difference: ``rotation`` [rad], ``translation`` [m]."""
+        """(k,) norm of the pose difference: ``rotation`` [rad], ``translation`` [m]."""
         return {k: np.linalg.norm(v, axis=1) for k, v in self.components.items()}
 
     @cached_property

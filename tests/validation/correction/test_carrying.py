@@ -190,7 +190,7 @@ def test_set_up_rows_of_the_first_minutes_do_not_determine_a_drift(machine, run)
 
 
 @pytest.mark.parametrize(("words", "message"), [
-    (["--setup", "x1"], 'found "x1", which is no row'),
+    (["--setup", "x1"], 'found "x1", expected a row'),
     (["--setup", "1-99"], 'found "1-99", expected rows 1 to 6'),
     (["--setup", "0"], "found no set-up rows"),
     (["--setup", "6"], "nothing but set-up"),
