@@ -206,7 +206,7 @@ def resolution_text(found: Sequence[Resolution]) -> list[str]:
     if unproved:
         more = f" and {len(unproved) - _NAMED} more" if len(unproved) > _NAMED else ""
         lines.append(
-            f"unproved, a change by the full value is not detected:  {len(unproved)} "
+            f"unproved, a change by the full value is not detected: {len(unproved)} "
             f"of {len(found)} parameters: {', '.join(unproved[:_NAMED])}{more}"
         )
     return lines

@@ -219,7 +219,9 @@ def read_covariance(robot: Robot) -> SavedCovariance | None:
     except Exception:  # a damaged archive may raise any exception
         raise BadInput(f"{path}: found other content, {expected}") from None
     if C.shape != (len(values), len(values)) or not np.isfinite(C).all():
-        raise BadInput(f"{path}: found shape {C.shape}, expected {(len(values),) * 2}")
+        raise BadInput(
+            f"{path}: found shape {C.shape}, expected {len(values)} rows and columns"
+        )
     return SavedCovariance(numbers, C)
 
 

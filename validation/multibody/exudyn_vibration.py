@@ -1,8 +1,8 @@
 """Small vibrations of an Exudyn model about its equilibrium.
 
-Exudyn linearises the model and projects it onto the motions that its joints allow.
-Only bodies with a given mass have one, so the mass matrix is singular: degrees of
-freedom without inertia are condensed, instead of having an infinite frequency.
+Exudyn linearises the model and projects it onto the motions that its joints allow. Only
+bodies with a given mass have inertia, so the mass matrix is singular: degrees of
+freedom without inertia are condensed instead of having an infinite frequency.
 """
 
 import numpy as np
@@ -11,16 +11,17 @@ from numpy.typing import NDArray
 from validation.multibody.exudyn_model import Model
 from validation.multibody.exudyn_parts import Place
 
-_SIX = (np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1]))  # Exudyn's order
-_NOTHING = 1e-12  # relative to the largest: smaller inertias count as zero
+# Exudyn's order of the six entries of an inertia tensor
+_SIX = (np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1]))
+_NOTHING = 1e-12  # relative to the largest inertia: smaller ones count as zero
 
 
 def set_masses(model: Model, bodies: list[tuple[Place, float]]) -> None:
-    """Set point masses of the model's rigid bodies, in place of their first masses.
+    """Set point masses of the model's rigid bodies instead of their initial masses.
 
     Args:
-        model: solved.
-        bodies: place of each, and [kg].
+        model: model in equilibrium.
+        bodies: place of each mass, and the mass [kg].
     """
     for item in range(model.mbs.systemData.NumberOfObjects()):
         if model.mbs.GetObject(item)["objectType"] == "RigidBody":
@@ -28,7 +29,7 @@ def set_masses(model: Model, bodies: list[tuple[Place, float]]) -> None:
 
 
 def _set_mass(model: Model, body: int, points: list[tuple[Place, float]]) -> None:
-    """Set mass, centre and inertia about its reference point of one body."""
+    """Set mass, centre and inertia about the reference point of one body."""
     mass = sum(m for _, m in points)
     centres = np.array([p.local[:3, 3] for p, _ in points]).reshape(-1, 3)
     masses = np.array([m for _, m in points])
@@ -48,7 +49,7 @@ def natural_frequencies(model: Model) -> NDArray:
         model: model in its equilibrium.
 
     Returns:
-        One for each inertia.
+        One frequency for each inertia.
     """
     M, K, *_ = model.mbs.ComputeLinearizedSystem(projectIntoConstraintNullspace=True)
     M, K = (M + M.T) / 2, (K + K.T) / 2
