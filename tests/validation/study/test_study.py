@@ -251,7 +251,7 @@ def test_study_whose_map_has_no_reachable_point_does_not_pass(tmp_path):
     assert results.verdicts == {"reference": "passed"}
     assert results.unchecked == {"maps": "none of the grid's points has an answer"}
     assert not results.passed
-    assert "No point has an answer" in (tmp_path / "out" / "report.html").read_text()
+    assert "No point has a solution" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_study_whose_reference_has_no_answer_does_not_pass(tmp_path, monkeypatch):
