@@ -1,7 +1,8 @@
 """Mass and centre of mass of a body that differ from the declared ones.
 
-With declared mass m and centre c, and true M and C, ``mass`` is M - m and ``moment`` is
-M C - m c.  The weight is linear in both; the true centre is (m c + moment)/M.
+With the declared mass m and centre c, and the true M and C, ``mass`` is M - m and
+``moment`` is M C - m c.  The weight is linear in both; the true centre is (m c +
+moment)/M.
 """
 
 from dataclasses import replace
@@ -16,7 +17,7 @@ from assembly.measurement.conditions import Conditions
 from assembly.model.robot import BeamLink, Frame, Robot
 
 _MOMENT = ("moment.x", "moment.y", "moment.z")
-_LEAST = 1e-9  # [kg] smallest mass that has a centre
+_LEAST = 1e-9  # [kg] smallest mass for which a centre is defined
 
 
 def heavy_bodies(robot: Robot) -> tuple[str, ...]:

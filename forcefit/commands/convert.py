@@ -1,4 +1,4 @@
-"""The command ``forcefit convert``: robots of other programs, in and out."""
+"""The command ``forcefit convert``: robots from and to other programs."""
 
 from pathlib import Path
 from typing import Annotated

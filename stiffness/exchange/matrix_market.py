@@ -43,7 +43,7 @@ def matrix_market(path: Path, text: str) -> csr_array:
     words = tuple(head.lower().split()[1:])
     if len(words) != 4 or any(w not in k for w, k in zip(words, _MARKET, strict=True)):
         raise BadInput(
-            f"{path}: found  {describe(head)}, expected a "
+            f"{path}: found {describe(head)}, expected a "
             "matrix, coordinate or array, real or integer, general or symmetric"
         )
     numbers = _numbers(path, [line for line in lines if not line.startswith("%")])

@@ -45,5 +45,5 @@ def whole(path: Path | str, word: str) -> int:
         return int(word)
     except ValueError:
         raise BadInput(
-            f"{path}: found {describe(word.strip())}, expected an integer"
+            f"{path}: found {describe(word.strip())}, expected a whole number"
         ) from None
