@@ -80,7 +80,7 @@ def compare(
     figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compare K_E by finite elements with K_E of a beam, entry by entry.
+    """Compare K_E by finite elements with K_E of a beam.
 
     The beam of a SURFACE is straight with the given section, or follows a curve.  With
     --ratios the end effect is fitted to bars of several L / r, where r is twice the

@@ -57,12 +57,12 @@ def diagnose(
         Path | None, typer.Option(help="Also write the robot with the effects found.")
     ] = None,
 ) -> None:
-    """Find the effect that causes measured deviations and that the model lacks.
+    """Find effects that a model lacks, from measured deviations.
 
     The verdict is explained, learned, none_needed, ambiguous, outside_library or
-    Errors are computed on held-out rows, which are used neither to choose nor to fit a
-    model.  --save writes the robot if it predicts these rows better than the declared
-    one.
+    not_enough_rows.  The errors before and after are computed on held-out rows, which
+    are used neither to choose nor to fit a model.  --save writes the robot if it
+    predicts these rows better than the declared robot.
     """
     from validation.campaign.campaign_file import read_campaign
     from validation.diagnosis import results

@@ -66,7 +66,7 @@ def read(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """List the entries of a library, interpolate K_E between them, or export them."""
+    """List, interpolate or export the entries of a library."""
     if at and to:
         raise BadInput(
             "library read: found both --at and --to, expected only one of them"

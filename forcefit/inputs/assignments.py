@@ -40,8 +40,7 @@ def parse_assignments(
             )
         if abs(value) > largest:
             raise BadInput(
-                f"{option} {name[:60]}: found {value:g}, expected a number of "
-                "magnitude at "
+                f"{option} {name[:60]}: found {value:g}, expected a number of size at "
                 f"most {largest:g}"
             )
         values[name] = value

@@ -129,9 +129,9 @@ def places_of(
     """Yield kinds and parts of all candidates, for one variable after another.
 
     Yields:
-    Kind, and place with variable: single components and groups of three, all drives
-    together with their own coordinates, all bodies together along their axes.
-        together with their own coordinates, all bodies together along their axes.
+        The kind, and the places with the variable: single components, groups of three
+        components, all drives together with their own coordinates, and all bodies
+        together along their axes.
     """
     single: list[tuple[str, tuple[str, ...]]]
     single = [(f.name, (axis,)) for f in robot.frames for axis in AXES]

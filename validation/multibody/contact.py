@@ -124,8 +124,8 @@ def cone_forces(
         width: [-] width of the smoothing, relative to the size of the cone.
 
     Yields:
-    Rows of the screw, and the components [N m or N] of the force along these rows: the
-    gradient of the energy.
+        Rows of the screw, and the components [N m or N] of the force along these rows:
+        the gradient of the energy.
     """
     offsets = cone.offsets(screw)
     P, root = _overlap(cone, offsets, width)

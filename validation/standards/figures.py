@@ -206,7 +206,7 @@ def _distances(campaign: Campaign, sets: list[NDArray]) -> Iterator[DistanceFigu
     device.
 
     Yields:
-    Characteristics of each pair.
+        The characteristics of each pair.
     """
     T = campaign.transforms[:, campaign.robot.index(campaign.robot.platform)]
     nominal = T[:, :3, 3] + np.einsum("rij,rj->ri", T[:, :3, :3], campaign.targets)
