@@ -31,8 +31,7 @@ def _refuse_namesakes() -> None:
             raise ImportError(
                 f"forcefit: found {found}, expected forcefit's own package {name!r} in "
                 f"{_BESIDE}; remove the package of this name, or install forcefit in "
-                "an "
-                "environment of its own",
+                "an environment of its own",
                 name=name, path=found,
             )  # fmt: skip
 

@@ -102,7 +102,7 @@ def _forces(assembly: Assembly) -> list[dict[str, Any]]:
 
 
 def _error_body(body: ErrorBody, origin: NDArray) -> dict[str, Any]:
-    """Return the set of possible platform errors around its origin."""
+    """Return the set of possible platform errors as plain values, with its origin."""
     sizes = np.linalg.norm(body.points, axis=1)
     shown = shown_in("m", float(sizes.max(initial=0.0)))
     text = f"possible platform errors, up to {sizes.max() * shown.factor:.4g}"

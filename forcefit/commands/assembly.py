@@ -57,8 +57,7 @@ def error(
         list[str] | None,
         typer.Option(
             help="Assumption on the clearances: frozen | free | budget. Default: all "
-            "three; "
-            "under a load frozen and free."
+            "three; under a load frozen and free."
         ),
     ] = None,
     load: LoadOption = None,

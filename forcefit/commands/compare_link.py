@@ -49,8 +49,7 @@ def compare(
         str | None,
         typer.Option(
             help="Instead of a SURFACE: compare straight bars of the section with "
-            "these "
-            "slenderness ratios L / r, such as 5,10,20,40."
+            "these slenderness ratios L / r, such as 5,10,20,40."
         ),
     ] = None,
     radius: Radius = None,

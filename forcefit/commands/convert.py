@@ -26,8 +26,8 @@ def convert(
     loops: Annotated[
         Path | None,
         typer.Option(
-            help="Loops and drives of a URDF (YAML, closed_loop). Default: the YAML "
-            "file of the URDF's name, or robot.yaml, in its folder."
+            help="File with loops and drives of a URDF (YAML, closed_loop). Default: "
+            "a YAML file in the same folder, with the name of the URDF or robot.yaml."
         ),
     ] = None,
     overlay: Annotated[

@@ -44,8 +44,7 @@ def read(
         list[str] | None,
         typer.Option(
             help="Parameters at which K_E is interpolated between entries, with an "
-            "error; "
-            "in SI units, such as radius=0.02,length=0.4."
+            "error; in SI units, such as radius=0.02,length=0.4."
         ),
     ] = None,
     family: Annotated[

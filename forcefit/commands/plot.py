@@ -45,8 +45,7 @@ def plot(
         str | None,
         typer.Option(
             help="Kind of the figure: histogram | tornado | allocation. Default: by "
-            "the "
-            "file."
+            "the file."
         ),
     ] = None,
     quantities: Annotated[

@@ -257,8 +257,7 @@ def tolerances(
         str,
         typer.Option(
             help="Zone margin for the present errors: margin_free (compliant joints "
-            "free "
-            "about their own axis) | margin (rigid)."
+            "free about their own axis) | margin (rigid)."
         ),
     ] = "margin_free",
     clearance: ClearanceOption = "worst",

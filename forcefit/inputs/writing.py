@@ -118,8 +118,7 @@ def _check_there(path: Path, mode: int, kind: Kind | None) -> None:
     if not head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(kind.begins):
         raise BadInput(
             f"{path}: found a file that is not {kind.name}; expected such a file, or "
-            "no "
-            "file: it is not overwritten, write to another file"
+            "no file: it is not overwritten, write to another file"
         )
 
 

@@ -127,7 +127,8 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
         rows, columns, *nodes = (_whole(path, word) for word in words)
         if columns != 1 or len(nodes) != rows or len(set(nodes)) != rows:
             raise BadInput(
-                f"{path}: found {len(set(nodes))} nodes, expected {rows} in one column"
+                f"{path}: found {len(set(nodes))} different nodes, expected one column "
+                f"with {rows} nodes"
             )
         return nodes
     freedoms: dict[int, tuple[int, int]] = {}

@@ -84,8 +84,8 @@ def import_link(
     strange = [freedom for freedom in heavy.freedoms if freedom not in row]
     if strange or len(heavy.freedoms) < len(row) and not heavy.named:
         raise BadInput(
-            f"{mass}: found other degrees of freedom than in {path}, expected "
-            "the same nodes and directions"
+            f"{mass}: found nodes or directions that {path} does not have, or too "
+            "few; expected the same in both files"
         )
     # a file with named degrees of freedom omits those without mass
     moved = fields[[row[freedom] for freedom in heavy.freedoms]]

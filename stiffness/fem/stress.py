@@ -99,8 +99,7 @@ class StressInfluence:
         if self.source is not None and self.source.left_out.any():
             words += (
                 f"; {self.source.left_out.sum()} nodes are left out, where the mesh "
-                "does "
-                "not follow the part's surface"
+                "does not follow the part's surface"
             )
         return words
 

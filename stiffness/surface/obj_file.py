@@ -46,8 +46,8 @@ def read_obj(path: Path) -> tuple[NDArray, list[list[int]]]:
         wrong = [k for k in face if not 0 <= k < len(points)]
         if wrong:
             raise BadInput(
-                f"{path}:{number}: found a face of point {wrong[0] + 1}, expected 1 "
-                f"to {len(points)}"
+                f"{path}:{number}: found point {wrong[0] + 1} in a face, expected "
+                f"points 1 to {len(points)}"
             )
         if len(face) < 3:
             raise BadInput(f"{path}:{number}: found a face of {len(face)} points")

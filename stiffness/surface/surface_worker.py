@@ -116,7 +116,7 @@ def _check_points(path: Path, mesh: Any) -> None:
         wrong = used[(used < 0) | (used >= mesh.n_points)]
         if len(wrong):
             raise BadInput(
-                f"{path}: found a cell of point {wrong[0] + 1}, expected 1 to "
+                f"{path}: found point {wrong[0] + 1} in a cell, expected points 1 to "
                 f"{mesh.n_points}"
             )
 

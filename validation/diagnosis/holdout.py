@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 from validation.campaign.campaign import Campaign
 
 FEWEST = 8  # smallest number of blocks of rows for a test on held-out rows
-_SPLIT = 60  # number of configurations from which on rows are split once
+# number of configurations from which on a single part of the rows is held out
+_SPLIT = 60
 # share of the held-out blocks, of 60 blocks and of many blocks
 _SHARES = (1 / 4, 1 / 10)
 _ENOUGH = 60  # number of held-out blocks that is sufficient for any campaign
-_FOLDS = 5  # Hastie, Tibshirani, Friedman, Elements of Statistical Learning, 7.10
+# number of folds (Hastie, Tibshirani, Friedman, Elements of Statistical Learning, 7.10)
+_FOLDS = 5
 SPANS = "spans of time"
 
 

@@ -146,7 +146,7 @@ def _choices(
 def _groupings(
     places: tuple[str, ...], each: int
 ) -> Iterator[tuple[tuple[str, ...], ...]]:
-    """Yield groupings of frames: separate, all together, by kind, single frames."""
+    """Yield ways to divide frames into groups that have their unknowns in common."""
     if not places:
         return
     kinds: dict[str, list[str]] = {}

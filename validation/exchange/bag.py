@@ -93,7 +93,8 @@ def _reading(
         position[:] = np.nan  # the device saw no target
     elif not (np.abs(position) <= LARGEST).all():
         raise BadInput(
-            f"{path}: message {number}: found {position.tolist()}, expected a place [m]"
+            f"{path}: message {number}: found {position.tolist()}, "
+            "expected a position [m]"
         )
     time = header.stamp.sec + 1e-9 * header.stamp.nanosec
     rotation, where = None, f"{path}: message {number}"

@@ -7,7 +7,7 @@ from validation.campaign.campaign import LOAD, READING, Campaign
 
 
 def row_counts(kinds: NDArray) -> dict:
-    """Return the number of kinds, and the number of rows of each kind."""
+    """Return the number of kinds; the least, median and most rows of a kind."""
     _, rows = np.unique(kinds, return_counts=True)
     return {"count": len(rows), "rows_each": [rows.min(), np.median(rows), rows.max()]}
 

@@ -129,7 +129,7 @@ def test_mapping_of_six_freedoms_per_node_is_read(tmp_path):
 
 
 @pytest.mark.parametrize(("text", "message"), [
-    (node_vector([1, 1, 2]), "found 2 nodes, expected 3"),
+    (node_vector([1, 1, 2]), "found 2 different nodes, expected one column with 3"),
     (node_vector([1, 2, 3, 4, 5]), "expected those of a matrix with 12 rows"),
     ("1 1 UX\n2 1 UQ\n", "found the label 'UQ'"),
     ("1 1 UX\n3 1 UY\n", "expected rows numbered from 1"),
