@@ -163,7 +163,7 @@ def __dir__() -> list[str]:
 
 
 def _version() -> str:
-    """Return version of the installed package: last tag and number of commits since."""
+    """Return the version of the package: the last tag, and the commits after it."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:
