@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from forcefit.inputs.errors import BadInput
 
-# for the old words of a merged command its new words
+# old words of each merged command, and its new words
 COMMANDS: dict[str, tuple[str, ...]] = {
     "assembly exact": ("assembly", "solve", "--state", "exact"),
     "assembly zone": ("assembly", "solve", "--quantities", "margin"),
@@ -23,7 +23,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "validation iso": ("validation", "inspect", "--iso"),
 }
 _PICTURE: dict[str, tuple[str, ...]] = {"-o": ("--figure",), "--output": ("--figure",)}
-# for a command and an old option its new words; a value follows if the option takes one
+# old options of each command, and their new words; a value follows if the option has one
 OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "assembly error": {
         "--reading": ("--assumption",),
@@ -69,7 +69,7 @@ OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "stiffness beam": {"--axis": ("--along",)},
 }
 
-# for the old values of an option the new ones
+# old values of each option, and the new values
 VALUES = {"--compliant": {"free": "margin_free", "rigid": "margin"}}
 STAY = {("assembly error", "--reading"), ("stiffness beam", "--axis")}
 

@@ -29,7 +29,7 @@ from validation.crosscheck.pair import Pair
 
 SCALES = (1.0, 0.5, 0.25, 0.125)
 NOT_CHECKED = "not checked, nothing to compare"
-# least number of scales on which a check can fail; largest number of scales
+# smallest number of scales with which a check can fail, and largest number of scales
 _FEWEST, _MOST = 4, 6
 
 

@@ -69,7 +69,7 @@ class Element:
 
     @property
     def candidate(self) -> Candidate:
-        """Candidate of a function."""
+        """The candidate, if the element is a function."""
         assert isinstance(self.what, Candidate)
         return self.what
 

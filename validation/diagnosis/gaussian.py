@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr
 
-# degrees of freedom of the prior of tau^2; true sigma is then 1/2 to 3 times the stated
-# one
+# degrees of freedom of the prior of tau^2, which allows a true sigma of 1/2 to 3 times
+# the stated sigma
 FREEDOM = 20.0
 # [sigma] prior contributions to the readings over which the evidence is averaged
 SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)

@@ -16,7 +16,7 @@ from validation.campaign.campaign import Campaign
 FEWEST = 8  # smallest number of blocks of rows for a test on held-out rows
 # number of configurations from which on a single part of the rows is held out
 _SPLIT = 60
-# share of the held-out blocks, of 60 blocks and of many blocks
+# share of held-out blocks if there are 60 blocks, and if there are many blocks
 _SHARES = (1 / 4, 1 / 10)
 _ENOUGH = 60  # number of held-out blocks that is sufficient for any campaign
 # number of folds (Hastie, Tibshirani, Friedman, Elements of Statistical Learning, 7.10)

@@ -22,8 +22,8 @@ from assembly.measurement.conditions import Conditions
 from assembly.model.robot import Robot
 
 PER_SESSION = ("registration", "encoder_offset", "drift")
-# largest number of unknowns of one effect; with more frames, frames of one kind share
-# them
+# largest number of unknowns of one effect; if more are needed, frames of the same kind
+# have one unknown in common
 _MOST_UNKNOWNS = 24
 
 

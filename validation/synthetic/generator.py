@@ -246,8 +246,8 @@ def _shown_effect(
     declared: NDArray, redraw: Draw | None,
 ) -> tuple[Hidden, NDArray, NDArray]:  # fmt: skip
     """Return the scaled effect; draw again while it is hardly visible."""
-    # for example, a force whose line meets a drive's axis does not load the drive's
-    # spring
+    # an effect may be invisible in a draw: for example, a force whose line meets the
+    # axis of a drive does not load the spring of this drive
     for _ in range(_DRAWS - 1):
         try:
             return _scaled_effect(machine, effect, multiple, sigma, declared)
