@@ -23,7 +23,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "validation iso": ("validation", "inspect", "--iso"),
 }
 _PICTURE: dict[str, tuple[str, ...]] = {"-o": ("--figure",), "--output": ("--figure",)}
-# old options of each command, and their new words; a value follows if the option has one
+# old options of each command, and new words; a value follows if the option has one
 OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "assembly error": {
         "--reading": ("--assumption",),
