@@ -1,0 +1,40 @@
+"""Capability indices against worked numbers and exact coverage."""
+
+import numpy as np
+import pytest
+
+from assembly.statistics.capability import (
+    capability,
+    cp_interval,
+    cpk_interval,
+    cpk_interval_one_sided,
+    share_outside,
+)
+
+
+@pytest.mark.parametrize(
+    ("cpk", "ppm", "tol"),
+    [(1.0, 2700, 0.5), (4 / 3, 63.3, 0.05), (1.33, 66.1, 0.05), (2.0, 0.00197, 5e-6)],
+)
+def test_share_outside_of_a_centred_process_is_the_known_ppm(cpk, ppm, tol):
+    assert share_outside(cpk, cpk) * 1e6 == pytest.approx(ppm, abs=tol)
+
+
+def test_intervals_of_fifty_values_at_1_33_are_the_worked_ones():
+    assert cpk_interval(1.33, 50) == pytest.approx((1.051, 1.609), abs=5e-4)
+    assert cpk_interval_one_sided(1.33, 50) == pytest.approx((1.051, 1.607), abs=5e-4)
+    assert cp_interval(1.33, 50) == pytest.approx((1.067, 1.592), abs=5e-4)
+
+
+def test_intervals_cover_the_true_index_as_often_as_stated():
+    """2000 samples of 30: a share of 0.95 has a standard error of 0.5 %."""
+    rng = np.random.default_rng(1)
+    found = [capability(x, -4.0, 4.0) for x in rng.normal(size=(2000, 30))]
+    assert np.mean([c.cp[1] <= 4 / 3 <= c.cp[2] for c in found]) > 0.93
+    one = [capability(x, -np.inf, 4.0) for x in rng.normal(size=(300, 30))]
+    assert np.mean([c.cpk[1] <= 4 / 3 <= c.cpk[2] for c in one]) > 0.91
+
+
+def test_capability_without_spread_is_refused():
+    with pytest.raises(ValueError, match="do not vary"):
+        capability([1.0, 1.0], 0.0, 2.0)
