@@ -72,8 +72,9 @@ class Callout:
             :data:`ORIENTATIONS`.
         hole: size of a hole whose position holds at maximum material, such as
             ``"12 H7"``; empty if it holds at every size.
-        direction: (3,) unit vector in which the zones are, in the frame's axes; None
-            for all directions.
+        direction: (3,) unit vector in which the zones are, at right angles to the
+            axis, in the frame's axes; None for all directions.  Of a face: that of its
+            first size.
         length: [m] distance from datum A and its tolerance to each side, or None.
         general: general tolerance, such as ``"ISO 2768-mK"``, or empty.
         distribution: see :meth:`assembly.callouts.zone.Zone.draw`.
@@ -105,6 +106,9 @@ class Callout:
     @property
     def axes(self) -> NDArray:
         """(3, 3) axes of the feature as columns, in the frame's: z = axis."""
+        if self.shape == "plane" and self.direction is not None:
+            x, z = np.array(self.direction), np.array(self.axis)
+            return np.column_stack([x, np.cross(z, x), z])
         return axes_along(self.axis)
 
 

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from forcefit.inputs.table import BadInput, quoted
 
@@ -110,6 +109,8 @@ class Fit:
         Returns:
             (k,) [m].
         """
+        from scipy.special import ndtri
+
         sizes = []
         for column, limits in zip(uniform.T, (self.hole, self.shaft), strict=True):
             middle, half = np.mean(limits), (limits.upper - limits.lower) / 2

@@ -18,9 +18,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.special import gammainc, gammaincinv, ndtr
-
 from assembly.callouts.largest_product import largest_product
 
 DISTRIBUTIONS = ("uniform", "normal", "truncated")
@@ -50,10 +47,7 @@ class Zone:
         cutting: list[int] = []
         for i, bound in enumerate(self.bounds):
             rows = np.vstack([self.bounds[j] for j in kept] + [bound])
-            # scaled to unit rows, so that rad and m weigh alike
-            scale = np.abs(rows).max(axis=0)
-            rows = rows / np.where(scale > 0, scale, 1.0)
-            sizes = np.linalg.svd(rows, compute_uv=False)
+            sizes = np.linalg.svd(rows / _scale(rows), compute_uv=False)
             independent = len(rows) <= 6 and sizes[-1] > _RANK * sizes[0]
             (kept if independent else cutting).append(i)
         return kept, cutting
@@ -67,8 +61,7 @@ class Zone:
     def columns(self) -> NDArray:
         """(6, m) [rad, m] the screw of the coordinates u."""
         rows = np.vstack([self.bounds[i] for i in self._split[0]])
-        scale = np.abs(rows).max(axis=0)
-        scale = np.where(scale > 0, scale, 1.0)
+        scale = _scale(rows)
         return np.asarray(np.linalg.pinv(rows / scale) / scale[:, None])
 
     @cached_property
@@ -184,6 +177,9 @@ class Zone:
             [-] in radii of the balls; exact for independent bounds, with others the
             quantile of fixed draws (1 % accurate).
         """
+        from scipy.optimize import brentq
+        from scipy.special import gammainc, ndtr
+
         outside = 2 * ndtr(-3 * cp)
         halves = np.array(self.dimensions) / 2
 
@@ -232,6 +228,12 @@ def intersection(zones: Sequence[Zone]) -> Zone:
     return Zone(bounds, zones[0].bonus)
 
 
+def _scale(rows: NDArray) -> NDArray:
+    """(6,) [1/rad, 1/m] the largest entries, so that rad and m weigh alike."""
+    sizes = [np.abs(rows[:, part]).max() for part in (slice(0, 3), slice(3, 6))]
+    return np.repeat([size if size > 0 else 1.0 for size in sizes], 3)
+
+
 def _sample(words: int, attempt: int = 0) -> NDArray:
     """Fixed uniform numbers, the same at each call."""
     return np.random.default_rng([words, attempt]).random((_SAMPLE, words))
@@ -239,6 +241,8 @@ def _sample(words: int, attempt: int = 0) -> NDArray:
 
 def _in_ball(uniform: NDArray, distribution: str, s: float) -> NDArray:
     """(k, d) points of a unit ball of dimension d from (k, d) uniform numbers."""
+    from scipy.special import gammainc, gammaincinv
+
     d = uniform.shape[1]
     v = abs(2 * uniform[:, 0] - 1) if d == 1 else uniform[:, 0]
     if distribution == "uniform":
@@ -263,5 +267,7 @@ def _variance(d: int, distribution: str, s: float) -> float:
         return 1.0 / (d + 2)
     if distribution == "normal":
         return s**2
+    from scipy.special import gammainc
+
     limit = 0.5 / s**2
     return float(s**2 * gammainc(d / 2 + 1, limit) / gammainc(d / 2, limit))

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.callouts.callout import Callout
 from assembly.model.robot import BeamLink, Clearance, Link, MeshLink
 
 # freedoms of each type: rows of the screw [RX RY RZ TX TY TZ] in the joint's axes; of a
@@ -106,6 +107,21 @@ class DrawnBody:
 
 
 @dataclass(frozen=True, eq=False)
+class DrawnCallout:
+    """The callouts of a joint's feature on one of its two bodies.
+
+    Attributes:
+        body: name of the body, or ``"base"``.
+        callout: with names of joints in place of frames.
+        direction: (3,) in which the zones are, base axes at home; None for all.
+    """
+
+    body: str
+    callout: Callout
+    direction: Direction = None
+
+
+@dataclass(frozen=True, eq=False)
 class Drawing:
     """A robot of bodies and joints.
 
@@ -117,6 +133,7 @@ class Drawing:
         joints: likewise.
         description: one line.
         remarks: defaults of its file that are easily overlooked.
+        callouts: tolerances of features.
     """
 
     name: str
@@ -126,6 +143,7 @@ class Drawing:
     joints: tuple[DrawnJoint, ...]
     description: str = ""
     remarks: tuple[str, ...] = ()
+    callouts: tuple[DrawnCallout, ...] = ()
 
 
 def unit(vector: NDArray) -> NDArray:

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.drawing.frames import robot_of_drawing
+from assembly.files.callout_file import callout_table, read_frame_callouts
 from assembly.files.drawing_file import is_drawing, read_drawing
 from assembly.files.effect_file import effect_tables, with_effects
 from assembly.files.joint_file import read_clearance, read_joint_stiffness
 from assembly.files.link_file import link_table, read_link
+from assembly.kinematics.callout_maps import place_callouts
 from assembly.kinematics.posture import home_posture
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.link_span import with_spans
@@ -81,7 +83,9 @@ def robot_of(root: Table, name: str, close: Closing | None = None) -> Robot:
     robot = declared_robot(root, name)
     try:
         robot = robot if close is None else close(robot)
-        return with_spans(robot, home_posture(robot).coordinates)
+        home = home_posture(robot)
+        place_callouts(home)  # whether they fit the geometry
+        return with_spans(robot, home.coordinates)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
 
@@ -135,6 +139,7 @@ def _framed(root: Table, name: str, description: str) -> Robot:
     """Return the robot of a file of frames and closures."""
     platform = root.text("platform", expected="the name of a frame")
     tables = root.tables("frame"), root.tables("closure")
+    root.tables("tolerance")  # read when all frames are known
     root.finish()
     if not 0 < len(tables[0]) <= MOST_FRAMES:
         fault = f"found {len(tables[0])}" if tables[0] else "missing"
@@ -142,11 +147,13 @@ def _framed(root: Table, name: str, description: str) -> Robot:
     frames = tuple(_frame(table) for table in tables[0])
     names = [frame.name for frame in frames]
     closures = tuple(_closure(table, names) for table in tables[1])
+    callouts = read_frame_callouts(root, names)
     _check_known(root, "platform", platform, names)
     try:
         robot = Robot(
-            name, platform, frames, closures, description, remarks=_remarks(tables[0])
-        )
+            name, platform, frames, closures, description,
+            remarks=_remarks(tables[0]), callouts=callouts,
+        )  # fmt: skip
         _check_meeting_frames(robot)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
@@ -371,12 +378,18 @@ def write_robot(robot: Robot, path: Path | str) -> None:
     check_writable(path, ROBOT)
     table = robot_table(robot, Path(path).parent)
     frames, closures = table.pop("frame"), table.pop("closure", [])
+    callouts = table.pop("tolerance", [])
     effects, diagnosis = table.pop("effect", []), table.pop("diagnosis", {})
     lines = [ROBOT_MARK, *(f"{k} = {_toml(v)}" for k, v in table.items())]
     if diagnosis:
         lines += ["", "[diagnosis]"]
         lines += [f"{k} = {_toml(v)}" for k, v in diagnosis.items()]
-    kinds = {"frame": frames, "closure": closures, "effect": effects}
+    kinds = {
+        "frame": frames,
+        "closure": closures,
+        "tolerance": callouts,
+        "effect": effects,
+    }
     for kind, tables in kinds.items():
         for inner in tables:
             pairs = (f"{k} = {_toml(v)}" for k, v in inner.items())
@@ -410,6 +423,8 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
     table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
     if robot.closures:
         table["closure"] = [{"frames": list(pair)} for pair in robot.closures]
+    if robot.callouts:
+        table["tolerance"] = [callout_table(callout) for callout in robot.callouts]
     if robot.has_effects:
         table["effect"] = effect_tables(robot)
     return table

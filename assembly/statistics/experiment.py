@@ -11,8 +11,9 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.assembled import without_rounding
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.zone import MARGINS
-from assembly.model.error_distributions import ErrorSources, draw_generator
+from assembly.model.error_distributions import draw_generator
 from assembly.model.link_stress import peak_stresses, stressed_links
+from assembly.statistics.callout_sources import Sources
 from assembly.statistics.clearance_positions import (
     CLEARANCE_MODELS,
     CLEARANCE_STREAM,
@@ -57,7 +58,7 @@ class Experiment:
     """
 
     posture: Posture
-    sources: ErrorSources
+    sources: Sources
     seed: int = 1
     clearance: str = "worst"
     margins: bool = True

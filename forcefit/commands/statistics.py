@@ -59,7 +59,13 @@ ContactLengthOption = Annotated[
 
 def statistics(
     robot: RobotArgument,
-    errors: Annotated[Path, typer.Option(help="Distributions of the errors (TOML).")],
+    errors: Annotated[
+        Path | None,
+        typer.Option(
+            help="Distributions of the errors (TOML), in addition to the "
+            "[[tolerance]] of the robot file."
+        ),
+    ] = None,
     pose: PoseOption = None,
     joint: JointOption = None,
     load: LoadOption = None,
@@ -133,6 +139,7 @@ def statistics(
     from assembly.model.error_distributions import read_sources
     from assembly.report.first_order import posture_status
     from assembly.report.results import status_line
+    from assembly.statistics.callout_sources import sources_of
     from assembly.statistics.experiment import Experiment, precision_for
     from assembly.statistics.importance_table import ImportanceOptions
     from assembly.statistics.monte_carlo import run_draws
@@ -160,7 +167,12 @@ def statistics(
         robot, pose, joint, rest, mismatch, own_errors=not closing, note=False
     )
     fixed = posture.robot.errors if closing else None
-    sources = read_sources(errors, posture.robot, fixed)
+    if errors is None:
+        sources = sources_of(posture.robot, None, fixed)
+    elif posture.robot.callouts:
+        sources = sources_of(posture.robot, read_sources(errors, posture.robot), fixed)
+    else:
+        sources = read_sources(errors, posture.robot, fixed)
     wrench, g = parse_load(load), parse_gravity(gravity)
     note_closing(posture.robot, rest, mismatch)
     note_massless(posture.robot, g)

@@ -213,3 +213,13 @@ def test_zone_at_maximum_material_grows_with_the_hole():
     mean_square = (34e-6**3 - 25e-6**3) / (3 * 9e-6) / 2
     assert np.mean(ends**2) == pytest.approx(mean_square, rel=0.01)
     assert zone.covariance()[3, 3] == pytest.approx(screws[:, 3].var(), rel=0.01)
+
+
+def test_shift_along_a_direction_has_no_part_across_it():
+    along = np.array([0.5, np.sqrt(0.75), 0.0])
+    zone = shift_along(1e-4, along)
+    across = np.concatenate([np.zeros(3), [-along[1], along[0], 0]])
+    assert zone.support(np.concatenate([np.zeros(3), along])) == pytest.approx(1e-4)
+    assert zone.support(across) == pytest.approx(0, abs=1e-18)
+    both = axis_position_along(WIDTH, LENGTH, along[:2])
+    assert both.support(across) == pytest.approx(0, abs=1e-18)

@@ -1,0 +1,99 @@
+"""Statistics of callouts: a serial arm and a four-bar by hand."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from assembly.files.robot_file import read_robot
+from assembly.kinematics.posture import home_posture
+from assembly.model.error_distributions import tolerance_sources
+from assembly.statistics.callout_sources import sources_of
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.importance import linear_importance, source_groups
+from assembly.statistics.monte_carlo import run_draws
+from forcefit.inputs.table import BadInput
+from tests.drawn_four_bar_for_tests import COEFFICIENTS, LEVER, four_bar_file
+
+
+@pytest.fixture(scope="module")
+def four_bar(tmp_path_factory):
+    path = tmp_path_factory.mktemp("four_bar") / "four_bar.toml"
+    path.write_text(four_bar_file())
+    return read_robot(path)
+
+
+@pytest.fixture(scope="module")
+def experiment(four_bar):
+    return Experiment(
+        home_posture(four_bar), sources_of(four_bar), clearance="least", margins=False
+    )
+
+
+def test_coupler_turns_as_much_as_by_hand(experiment):
+    """Deviation of the angle: 20 um / sqrt 3 times the root of the sum of squares."""
+    data = run_draws(experiment, 20_000)
+    root = np.sqrt(sum(c**2 for c in COEFFICIENTS.values()))
+    expected = root * 20e-6 / np.sqrt(3) / LEVER
+    turned = data["platform_screw"].values[:, 2]
+    assert turned.std() == pytest.approx(expected, rel=0.01)
+
+
+def test_importance_by_callout_is_the_share_by_hand(experiment):
+    sources = experiment.sources
+    slopes = experiment.energies.screws[2, -6 * len(sources.robot.frames) :]
+    shares = linear_importance(
+        sources.of_numbers(slopes.reshape(1, -1, 6)), sources,
+        groups := source_groups(sources, "source"),
+    )[0]  # fmt: skip
+    total = sum(c**2 for c in COEFFICIENTS.values())
+    for (name, _), share in zip(groups, shares, strict=True):
+        body = name.rpartition(" ")[2]
+        assert name.startswith("length of ")
+        assert share == pytest.approx(COEFFICIENTS[body] ** 2 / total, abs=1e-3)
+
+
+def test_draw_is_the_same_in_any_division(four_bar):
+    sources = sources_of(four_bar)
+    whole = sources.draw(0, 100, 5)
+    assert np.array_equal(sources.draw(37, 20, 5), whole[37:57])
+    assert not np.array_equal(sources.draw(0, 100, 6), whole)
+
+
+def test_independent_errors_are_added_to_callouts(four_bar):
+    independent = tolerance_sources(four_bar, np.eye(6)[3] * 1e-5, ("C",))
+    sources = sources_of(four_bar, independent)
+    assert len(sources) == len(sources_of(four_bar)) + 1
+    values = sources.draw(0, 50_000, 1)
+    errors = sources.errors(values)[:, four_bar.index("C")]
+    alone = sources_of(four_bar)
+    of_callouts = alone.errors(alone.draw(0, 50_000, 1))[:, four_bar.index("C")]
+    added = errors[:, 3].var() - of_callouts[:, 3].var()
+    assert added == pytest.approx(1e-10 / 3, rel=0.05)
+    assert [n for n, _ in source_groups(sources, "source")][0] == "C.TX"
+
+
+def test_robot_without_tolerances_needs_a_file_of_errors(four_bar):
+    from dataclasses import replace
+
+    with pytest.raises(BadInput, match=r"found no \[\[tolerance\]\]"):
+        sources_of(replace(four_bar, callouts=()))
+
+
+def test_command_reports_the_importance_by_callout(tmp_path):
+    from forcefit.commands.app import app
+
+    path, answer = tmp_path / "four_bar.toml", tmp_path / "answer.json"
+    path.write_text(four_bar_file())
+    words = ["assembly", "statistics", str(path), "--draws", "200", "--importance",
+             "128", "--clearance", "least", "--json", str(answer), "-o",
+             str(tmp_path / "draws.nc")]  # fmt: skip
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, result.output
+    assert "length of C on rocker" in result.output
+    groups = json.loads(answer.read_text())["importance"]["platform"]
+    assert set(groups) == {
+        "length of B on crank", "length of C on coupler", "length of C on rocker",
+        "length of D on base",
+    }  # fmt: skip
