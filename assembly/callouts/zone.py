@@ -18,6 +18,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+
 from assembly.callouts.largest_product import largest_product
 
 DISTRIBUTIONS = ("uniform", "normal", "truncated")
@@ -86,6 +87,12 @@ class Zone:
         ends = np.cumsum(self.dimensions)
         return np.split(u, ends[:-1], axis=-1)
 
+    @cached_property
+    def bounds_on_u(self) -> tuple[NDArray, ...]:
+        """(k, m) each: |bound @ u| <= 1 for all of them is the zone at its largest."""
+        rows = np.split(np.eye(sum(self.dimensions)), np.cumsum(self.dimensions)[:-1])
+        return (*(row / (1.0 + self.bonus) for row in rows), *self.cuts)
+
     def support(self, direction: NDArray) -> float:
         """Return the largest ``direction @ d`` over the screws of the zone.
 
@@ -96,27 +103,22 @@ class Zone:
             The largest value: closed form of independent bounds; with others a
             certified upper bound, about 3e-8 relative above the largest value.
         """
-        w = np.asarray(direction, dtype=float) @ self.columns
-        grown = 1.0 + self.bonus
-        if not self.cuts:
-            return grown * sum(float(np.linalg.norm(x)) for x in self._balls(w))
-        rows = [np.eye(len(w))[part] / grown for part in self._balls(np.arange(len(w)))]
-        return largest_product(w, [*rows, *self.cuts])[1]
+        return self.farthest_u(np.asarray(direction, dtype=float) @ self.columns)[1]
 
     def farthest(self, direction: NDArray) -> NDArray:
         """Return (6,) [rad, m] the screw of the zone farthest in a direction (6,)."""
         w = np.asarray(direction, dtype=float) @ self.columns
-        grown = 1.0 + self.bonus
+        return np.asarray(self.columns @ self.farthest_u(w)[0])
+
+    def farthest_u(self, w: NDArray) -> tuple[NDArray, float]:
+        """Return coordinates u (m,) of the largest w @ u, and an upper bound of it."""
         if self.cuts:
-            parts = self._balls(np.arange(len(w)))
-            rows = [np.eye(len(w))[part] / grown for part in parts]
-            return np.asarray(self.columns @ largest_product(w, [*rows, *self.cuts])[0])
-        sizes = [np.linalg.norm(x) for x in self._balls(w)]
-        u = [
-            grown * x / size if size else x * 0.0
-            for x, size in zip(self._balls(w), sizes, strict=True)
-        ]
-        return np.asarray(self.columns @ np.concatenate(u))
+            return largest_product(w, self.bounds_on_u)
+        grown, u = 1.0 + self.bonus, []
+        for part in self._balls(w):
+            size = float(np.linalg.norm(part))
+            u.append(grown * part / size if size else part * 0.0)
+        return np.concatenate(u), float(w @ np.concatenate(u))
 
     def draw(
         self, numbers: Numbers, distribution: str = "uniform", cp: float = 1.0

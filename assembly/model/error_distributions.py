@@ -145,7 +145,7 @@ class ErrorSources:
 
     def of_numbers(self, slopes: NDArray) -> NDArray:
         """Return slopes (..., n, 6) with the errors as slopes (..., m)."""
-        return slopes[..., self.frame, self.component]
+        return np.asarray(slopes[..., self.frame, self.component])
 
     @property
     def units(self) -> list[str]:
