@@ -1,15 +1,24 @@
-"""Capability of a normal quantity within two limits: Cp, Cpk, share outside.
+"""Capability: Cp, Cpk and parts per million outside, with their intervals.
+
+Normal data within two limits, and draws of any distribution below one limit.
 
 Sources:
     Rodriguez (1992), Recent developments in process capability analysis, J. Quality
     Technology 24 (approximate interval of Cpk).
 """
 
+import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import chi2, nct, norm
+
+from assembly.statistics.estimates import quantile
+
+_TAIL = 0.99865  # share below three standard deviations of a normal distribution
 
 
 @dataclass(frozen=True)
@@ -95,3 +104,69 @@ def cpk_interval_one_sided(
         return float(brentq(excess, root * low, root * high))
 
     return solve((1 + level) / 2) / root, solve((1 - level) / 2) / root
+
+
+def quantile_cpk(
+    values: ArrayLike, limit: float, level: float = 0.95
+) -> tuple[float, float, float]:
+    """Return Cpk of draws of any distribution below an upper limit.
+
+    Cpk is (limit - median) / (99.865 % quantile - median), which is the usual index of
+    a normal distribution.
+
+    Args:
+        values: (k,) draws; inf where there is no answer.
+        limit: upper limit.
+        level: confidence of the interval, which holds for any distribution: order
+            statistics of both quantiles, at half the error each.
+
+    Returns:
+        Value, lower, upper; 0 below a quantile that so few draws do not bound.
+    """
+    each = (1 + level) / 2
+    middle, tail = (quantile(values, share, each) for share in (0.5, _TAIL))
+
+    def index(m: float, q: float) -> float:
+        if not np.isfinite(m) or m == -np.inf:
+            return float("nan")
+        return (limit - m) / (q - m) if q > m else float("inf")
+
+    ends = itertools.product(("lower", "upper"), repeat=2)
+    corners = [index(middle[a], tail[b]) for a, b in ends]
+    return index(middle["value"], tail["value"]), min(corners), max(corners)
+
+
+def draws_capability(
+    values: ArrayLike, exceeds: Mapping[str, Any], level: float = 0.95
+) -> dict[str, Any]:
+    """Return Cpk and parts per million of draws above a limit.
+
+    Args:
+        values: (k,) draws; NaN where there is no answer, which exceeds the limit.
+        exceeds: ``limit``, ``unit``, and the ``probability`` above it with ``lower``
+            and ``upper``.
+        level: level of confidence.
+
+    Returns:
+        ``limit``, ``unit``, and ``cpk`` and ``ppm`` with value, lower, upper.
+    """
+    values = np.where(np.isnan(values), np.inf, values)
+    words, limit = ("value", "lower", "upper"), exceeds["limit"]
+    ppm = [1e6 * exceeds[k] for k in ("probability", "lower", "upper")]
+    cpk = quantile_cpk(values, limit, level)
+    return {
+        "limit": limit, "unit": exceeds["unit"],
+        "cpk": dict(zip(words, cpk, strict=True)),
+        "ppm": dict(zip(words, ppm, strict=True)),
+    }  # fmt: skip
+
+
+def capability_text(results: Mapping[str, Any]) -> str:
+    """Return capabilities of draws by quantity as text, a line each."""
+    return "\n".join(
+        f"{key} up to {one['limit']:.4g} {one['unit']}: Cpk {one['cpk']['value']:.3g} "
+        f"({one['cpk']['lower']:.3g} to {one['cpk']['upper']:.3g}) by quantiles, "
+        f"{one['ppm']['value']:.4g} ppm above ({one['ppm']['lower']:.4g} to "
+        f"{one['ppm']['upper']:.4g})"
+        for key, one in results.items()
+    )

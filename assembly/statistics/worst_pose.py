@@ -25,17 +25,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.callouts.largest_product import largest_product
-from assembly.callouts.zone import Zone
-from assembly.model.error_distributions import KINDS, ErrorSources
 from assembly.solvers.outer_cuts import farthest
-from assembly.statistics.callout_sources import CalloutSources, Sources
+from assembly.statistics.callout_sources import Sources
+from assembly.statistics.error_sets import ErrorSets, error_sets, zones_of_errors
 from assembly.statistics.linear_response import LinearResponse
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.responses import respond
 from forcefit.inputs.table import BadInput
 
 _TOLERANCE = 3e-4  # relative to the sum of the supports along x, y and z
-_ROUNDING = 1e-9  # a row relative to the largest: smaller ones are rounding
 _STARTS = 24  # random corners from which the equilibrium climbs
 _CLIMBS = 12  # most steps from corner to corner
 
@@ -73,28 +71,6 @@ class WorstPose:
     rigid: float = float("nan")
 
 
-@dataclass(frozen=True, eq=False)
-class _Sets:
-    """Zones of all errors and clearances in one vector z, with linear rows.
-
-    Attributes:
-        names: of the zones.
-        zones: one for each, in unit coordinates.
-        columns: of z for each zone.
-        screws: (6, total) [rad, m] platform screw.
-        rigid_rows: (p, total) rows that must be zero: of rigid parts.
-        spring_rows: (r, total) rows that load springs.
-    """
-
-    names: tuple[str, ...]
-    zones: tuple[Zone, ...]
-    columns: tuple[NDArray, ...]
-    screws: NDArray
-    rigid_rows: NDArray
-    spring_rows: NDArray
-    clearances: int
-
-
 def worst_pose(
     prepared: LinearResponse, sources: Sources, quantity: str, seed: int = 1
 ) -> WorstPose:
@@ -115,7 +91,7 @@ def worst_pose(
     """
     if prepared.loads is not None:
         raise BadInput("worst case: found a load, expected none: it is not linear then")
-    sets, half = _sets(prepared, sources), 3 * POSE_ERRORS.index(quantity)
+    sets, half = error_sets(prepared, sources), 3 * POSE_ERRORS.index(quantity)
     held, sprung = len(sets.rigid_rows) > 0, len(sets.spring_rows) > 0
     if sprung and sets.clearances:
         reading = "equilibrium"
@@ -146,85 +122,8 @@ def worst_pose(
     )
 
 
-def _sets(prepared: LinearResponse, sources: Sources) -> _Sets:
-    """The zones of errors and clearances, and their effect."""
-    own = _zones_of_errors(sources)
-    names, zones, units = map(list, zip(*own, strict=True))
-    n, nu = len(prepared.posture.robot.frames), int(prepared.starts[-1])
-    maps = np.eye(6 * n)[:, :0]
-    if len(sources):
-        maps = _maps(sources).reshape(6 * n, -1) * np.concatenate(units)
-    cones = prepared.joints.cones
-    for first, last in zip(prepared.starts[:-1], prepared.starts[1:], strict=True):
-        names.append(_cone_name(prepared, cones[:, first]))
-        zones.append(Zone((np.eye(6)[: last - first],)))
-    sizes = [sum(zone.dimensions) for zone in zones]
-    both = np.hstack([maps, cones])
-    to_platform = np.hstack([prepared.screws[:, nu:] @ maps, prepared.screws[:, :nu]])
-    return _Sets(
-        tuple(names), tuple(zones),
-        tuple(np.split(np.arange(sum(sizes)), np.cumsum(sizes)[:-1])),
-        to_platform, _real_rows(prepared.infeasible, both),
-        _real_rows(prepared.misfit, both), nu,
-    )  # fmt: skip
-
-
-def _real_rows(rows: NDArray, columns: NDArray) -> NDArray:
-    """The product, independent rows only, orthonormal; none where all is rounding."""
-    product = rows @ columns
-    scale = np.abs(rows).max(initial=0.0) * np.linalg.norm(columns)
-    _, sizes, vt = np.linalg.svd(product, full_matrices=False)
-    return np.asarray(vt[: len(sizes)][sizes > _ROUNDING * max(scale, 1e-300)])
-
-
-def _maps(sources: Sources) -> NDArray:
-    """(n, 6, m) errors of a unit of each number."""
-    if isinstance(sources, CalloutSources):
-        return sources.maps
-    return np.moveaxis(sources.errors(np.eye(len(sources))), 0, -1)
-
-
-def _zones_of_errors(sources: Sources) -> list[tuple[str, Zone, NDArray]]:
-    """Name, zone and unit of the coordinates of every error."""
-    independent = sources
-    found: list[tuple[str, Zone, NDArray]] = []
-    placed = ()
-    if isinstance(sources, CalloutSources):
-        independent, placed = sources.independent, sources.placed
-        if sources.fixed is not None and sources.fixed.any():
-            raise BadInput("worst case: found closures that do not hold, expected none")
-    if independent is not None:
-        for label, width in zip(
-            independent.labels, _half_widths(independent), strict=True
-        ):
-            found.append((label, Zone((np.eye(6)[:1],)), np.array([width])))
-    found += [(p.name, p.zone, np.ones(sum(p.zone.dimensions))) for p in placed]
-    return found
-
-
-def _half_widths(sources: ErrorSources) -> NDArray:
-    """(m,) [rad or m] half widths of independent errors."""
-    uniform = sources.kind == KINDS.index("uniform")
-    bounded = uniform | (sources.kind == KINDS.index("truncated"))
-    centred = (sources.centre == 0) & sources.signed
-    if not (bounded & centred).all():
-        name = sources.labels[int(np.argmin(bounded & centred))]
-        raise BadInput(
-            f"worst case: found {name}, which is unbounded or not symmetric about "
-            "zero; expected a uniform or truncated error of both signs"
-        )
-    return np.asarray(sources.scale * np.where(uniform, 1.0, sources.limit))
-
-
-def _cone_name(prepared: LinearResponse, column: NDArray) -> str:
-    """Name of a clearance: the frame's, and its components."""
-    row = int(np.flatnonzero(column)[0])
-    kind = ("tilt", "tilt", "spin", "radial", "radial", "axial")[row % 6]
-    return f"{kind} clearance of {prepared.posture.robot.frames[row // 6].name}"
-
-
 def _farthest(
-    sets: _Sets, rows: NDArray, half: int
+    sets: ErrorSets, rows: NDArray, half: int
 ) -> tuple[tuple[float, float], NDArray]:
     """Bracket the largest half screw over the zones where rows @ z = 0."""
     support = _support(sets, rows, half)
@@ -244,7 +143,7 @@ def _farthest(
 
 
 def _support(
-    sets: _Sets, rows: NDArray, half: int
+    sets: ErrorSets, rows: NDArray, half: int
 ) -> Callable[[NDArray], tuple[float, NDArray, NDArray]]:
     """The support function of the platform's screws, with the screw that attains it."""
     P = sets.screws[half : half + 3]
@@ -277,7 +176,7 @@ def _climb(
 ) -> tuple[float, NDArray]:
     """The largest equilibrium found from corners, and its direction (3,)."""
     half = 3 * POSE_ERRORS.index(quantity)
-    own = _zones_of_errors(sources)
+    own = zones_of_errors(sources)
     sizes = [sum(zone.dimensions) for _, zone, _ in own]
     parts = np.split(np.arange(sum(sizes)), np.cumsum(sizes)[:-1])
     scale = np.concatenate([unit for _, _, unit in own])

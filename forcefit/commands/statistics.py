@@ -117,6 +117,20 @@ def statistics(
             "contact (clearances pressed or free) | exact (internal forces too)."
         ),
     ] = None,
+    capability: Annotated[
+        bool,
+        typer.Option(
+            "--capability", help="Also Cpk and parts per million of every --limit."
+        ),
+    ] = False,
+    worst_case: Annotated[
+        bool,
+        typer.Option(
+            "--worst-case",
+            help="Also the largest pose errors over all errors within tolerance and "
+            "all clearances.",
+        ),
+    ] = False,
     confidence: Annotated[
         float, typer.Option(help="Confidence of all intervals.")
     ] = 0.95,
@@ -158,6 +172,8 @@ def statistics(
     if yield_strength is not None and not 0 < yield_strength < float("inf"):
         raise BadInput(f"--yield-strength: found {yield_strength}, expected > 0")
     limits = dict(map(parse_limit, limit or ()))
+    if capability and not limits:
+        raise BadInput("--capability: found no --limit, expected one or more")
     if output is not None:
         check_dataset(output, "draws")
     if figure is not None:
@@ -189,6 +205,11 @@ def statistics(
         contact_length=contact_length,
     )  # fmt: skip
     experiment.check_limits([*limits, *(["stress"] if yield_strength else [])])
+    worst = None
+    if worst_case:
+        from assembly.statistics.worst_pose_report import worst_results
+
+        worst = worst_results(experiment.energies, sources, seed)
     options = None
     if importance is not None:
         options = ImportanceOptions(importance, by, confidence)
@@ -205,8 +226,10 @@ def statistics(
     summary = {
         "robot": posture.robot.name, "pose": posture.pose(), "seed": seed,
         "load": wrench, "gravity": g,
-        **summarise(data, limits, yield_strength, confidence),
+        **summarise(data, limits, yield_strength, confidence, capability),
     }  # fmt: skip
+    if worst is not None:
+        summary["worst_case"] = worst
     write_json(summary, json)
     if report is not None:
         from assembly.statistics.report import draws_page

@@ -88,12 +88,21 @@ def test_command_reports_the_importance_by_callout(tmp_path):
     path.write_text(four_bar_file())
     words = ["assembly", "statistics", str(path), "--draws", "200", "--importance",
              "128", "--clearance", "least", "--json", str(answer), "-o",
-             str(tmp_path / "draws.nc")]  # fmt: skip
+             str(tmp_path / "draws.nc"), "--limit", "translation=2e-5", "--capability",
+             "--worst-case", "--report", str(tmp_path / "page.html")]  # fmt: skip
     result = CliRunner().invoke(app, words)
     assert result.exit_code == 0, result.output
     assert "length of C on rocker" in result.output
-    groups = json.loads(answer.read_text())["importance"]["platform"]
+    results = json.loads(answer.read_text())
+    groups = results["importance"]["platform"]
     assert set(groups) == {
         "length of B on crank", "length of C on coupler", "length of C on rocker",
         "length of D on base",
     }  # fmt: skip
+    turned = results["worst_case"]["rotation"]
+    assert turned["attained"] == pytest.approx(0.1903e-3, abs=5e-8)
+    assert turned["reading"] == "linear"
+    assert sum(turned["shares"].values()) == pytest.approx(0.1903e-3, abs=5e-8)
+    above = results["exceeds"]["translation"]["probability"]
+    assert results["capability"]["translation"]["ppm"]["value"] == above * 1e6
+    assert "certified bound" in (tmp_path / "page.html").read_text()

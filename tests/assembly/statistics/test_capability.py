@@ -8,8 +8,10 @@ from assembly.statistics.capability import (
     cp_interval,
     cpk_interval,
     cpk_interval_one_sided,
+    quantile_cpk,
     share_outside,
 )
+from assembly.statistics.estimates import proportion
 
 
 @pytest.mark.parametrize(
@@ -38,3 +40,32 @@ def test_intervals_cover_the_true_index_as_often_as_stated():
 def test_capability_without_spread_is_refused():
     with pytest.raises(ValueError, match="do not vary"):
         capability([1.0, 1.0], 0.0, 2.0)
+
+
+def test_parts_per_million_have_the_worked_intervals():
+    """270 of 1e5: 2388 to 3041 ppm; none of 1e6: at most 3.7 ppm, one-sided 3.0."""
+    share = proportion(270, 100_000)
+    assert share["lower"] * 1e6 == pytest.approx(2388, abs=1)
+    assert share["upper"] * 1e6 == pytest.approx(3041, abs=1)
+    assert proportion(0, 10**6)["upper"] * 1e6 == pytest.approx(3.7, abs=0.05)
+    assert proportion(0, 10**6, 0.9)["upper"] * 1e6 == pytest.approx(3.0, abs=0.01)
+
+
+def test_cpk_by_quantiles_is_the_index_of_a_normal_distribution():
+    values = np.random.default_rng(1).normal(size=200_000)
+    value, lower, upper = quantile_cpk(values, 4.0)
+    assert value == pytest.approx(4 / 3, rel=0.02)
+    assert lower < 4 / 3 < upper
+
+
+def test_cpk_by_quantiles_of_a_disc_is_that_of_its_radius():
+    """Rayleigh: median s sqrt(2 ln 2), 99.865 % quantile s sqrt(-2 ln 0.00135)."""
+    x = np.random.default_rng(2).normal(size=(400_000, 2))
+    middle, tail = np.sqrt(2 * np.log(2)), np.sqrt(-2 * np.log(0.00135))
+    value, lower, upper = quantile_cpk(np.linalg.norm(x, axis=1), 4.0)
+    assert value == pytest.approx((4 - middle) / (tail - middle), rel=0.01)
+    assert lower < value < upper
+
+
+def test_cpk_of_few_draws_has_no_lower_bound_above_zero():
+    assert quantile_cpk(np.arange(100.0), 200.0)[1] == 0.0
