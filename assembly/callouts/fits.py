@@ -95,6 +95,11 @@ class Fit:
         least, most = self.diametral
         return max(0.0, least / 2), max(0.0, most / 2)
 
+    @property
+    def mean_radial(self) -> float:
+        """[m] radial clearance of parts of mean sizes, 0 if they interfere."""
+        return max(0.0, sum(self.diametral) / 4)
+
     def draw(
         self, uniform: NDArray, distribution: str = "uniform", cp: float = 1.0
     ) -> NDArray:

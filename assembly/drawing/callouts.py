@@ -41,6 +41,15 @@ def frame_callouts(
     return tuple(_of_frames(drawn, passed, poses) for drawn in drawing.callouts)
 
 
+def frame_fits(steps: Sequence[Step]) -> dict[str, str]:
+    """Return the fits of the joints of a tree, by frame."""
+    return {
+        part.name: part.numbers.fit
+        for step in steps if isinstance(step.edge.item, DrawnJoint)
+        for part in parts_of(step.edge.item, step.reverse) if part.numbers.fit
+    }  # fmt: skip
+
+
 def _of_frames(
     drawn: DrawnCallout, passed: Mapping[str, Step],
     poses: Mapping[str, tuple[NDArray, NDArray]],

@@ -37,12 +37,14 @@ class JointNumbers:
             along free motions; or None.
         error: (6,) [rad, m] delta l.
         tolerance: (6,) [rad, m] standard deviations of it, or None.
+        fit: ISO 286 fit whose mean radial clearance is in ``clearance``, or empty.
     """
 
     clearance: Clearance | None = None
     stiffness: NDArray | None = None
     error: NDArray = field(default_factory=lambda: np.zeros(6))
     tolerance: NDArray | None = None
+    fit: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.drawing.drawing import FREE_ROWS, DrawnJoint, JointNumbers, perpendicular
-from assembly.files.joint_file import read_clearance, read_joint_stiffness
+from assembly.files.joint_file import read_clearance, read_fit, read_joint_stiffness
 from assembly.files.written_units import SCREW, without_units
 from assembly.model.largest import LARGEST, LARGEST_LENGTH
 from assembly.model.robot import Clearance
@@ -129,6 +129,7 @@ def _one(table: Table, kind: str, actuated: bool) -> JointNumbers:
         stiffness=_stiffness(table, kind, actuated),
         error=error,
         tolerance=_tolerance(table),
+        fit=read_fit(table),
     )
 
 

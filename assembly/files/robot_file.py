@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.callouts.fits import parse_fit
 from assembly.drawing.frames import robot_of_drawing
 from assembly.files.callout_file import callout_table, read_frame_callouts
 from assembly.files.drawing_file import is_drawing, read_drawing
 from assembly.files.effect_file import effect_tables, with_effects
-from assembly.files.joint_file import read_clearance, read_joint_stiffness
+from assembly.files.joint_file import read_clearance, read_fit, read_joint_stiffness
 from assembly.files.link_file import link_table, read_link
 from assembly.kinematics.callout_maps import place_callouts
 from assembly.kinematics.posture import home_posture
@@ -116,8 +117,9 @@ def declared_robot(root: Table, name: str) -> Robot:
     effects = root.tables("effect")
     robot = (_drawn if is_drawing(root) else _framed)(root, name, description)
     robot = replace(
-        robot, learned_range=ranges, reference_point=point, diagnosis=diagnosis
-    )
+        robot, learned_range=ranges, reference_point=point, diagnosis=diagnosis,
+        remarks=(*robot.remarks, *_fit_remarks(robot)),
+    )  # fmt: skip
     return with_effects(robot, effects)
 
 
@@ -153,6 +155,7 @@ def _framed(root: Table, name: str, description: str) -> Robot:
         robot = Robot(
             name, platform, frames, closures, description,
             remarks=_remarks(tables[0]), callouts=callouts,
+            fits={t.content["name"]: fit for t in tables[0] if (fit := read_fit(t))},
         )  # fmt: skip
         _check_meeting_frames(robot)
     except BadInput as error:
@@ -224,6 +227,18 @@ def _remarks(tables: list[Table]) -> tuple[str, ...]:
     if not without_alpha:
         return ()
     return (f"dh without alpha, taken as 0: {', '.join(without_alpha)}",)
+
+
+def _fit_remarks(robot: Robot) -> tuple[str, ...]:
+    """Return a remark on the fits, of which one clearance is used."""
+    texts = []
+    for name, text in robot.fits.items():
+        fit = parse_fit(text)
+        mean, (least, most) = 1e6 * fit.mean_radial, (1e6 * r for r in fit.radial)
+        texts.append(
+            f"{quoted(name)} {text}, {mean:.4g} um of {least:.4g} to {most:.4g}"
+        )
+    return (f"mean radial clearance of fits: {'; '.join(texts)}",) if texts else ()
 
 
 def _frame(table: Table) -> Frame:
@@ -421,6 +436,10 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
         if path and folder is not None:
             table["diagnosis"]["covariance"] = path_from(folder.resolve(), path)
     table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
+    for frame in table["frame"]:
+        if frame["name"] in robot.fits:
+            del frame["clearance"]["radial"]
+            frame["clearance"]["fit"] = robot.fits[frame["name"]]
     if robot.closures:
         table["closure"] = [{"frames": list(pair)} for pair in robot.closures]
     if robot.callouts:

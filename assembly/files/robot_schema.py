@@ -77,6 +77,7 @@ _FRAME = record(
     clearance_=record(
         radial_=number("radial clearance", "m"), axial_=number("axial clearance", "m"),
         tilt_=number("tilt clearance", "rad"), spin_=number("clearance about z", "rad"),
+        fit_=text('fit of ISO 286 in place of radial, such as "12 H7/g6"'),
     ),
     joint_stiffness_=Either((
         number("diagonal stiffness", "N m/rad .. N/m", "screw"), _STIFFNESS,

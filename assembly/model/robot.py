@@ -65,6 +65,8 @@ class Robot:
             hold-out error, digest of the campaign, path of the covariance.
         remarks: defaults of its file that are easily overlooked.
         callouts: tolerances of features, as the drawing states them.
+        fits: ISO 286 fits such as ``"12 H7/g6"`` by frame; ``radial`` of its clearance
+            is the mean.
     """
 
     name: str
@@ -82,6 +84,7 @@ class Robot:
     diagnosis: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
     callouts: tuple[Callout, ...] = ()
+    fits: Mapping[str, str] = field(default_factory=dict)
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 

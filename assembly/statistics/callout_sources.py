@@ -1,4 +1,4 @@
-"""Random errors of the callouts of a robot, alone or with independent errors.
+"""Random errors of the callouts and fits of a robot, with independent errors.
 
 A callout is drawn as a whole: shift and tilt of a bore in a position zone depend on
 each other.  The numbers of a draw depend on its number and the seed only, as those of
@@ -6,41 +6,66 @@ each other.  The numbers of a draw depend on its number and the seed only, as th
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.callouts.fits import Fit, parse_fit
 from assembly.callouts.zone import DISTRIBUTIONS
 from assembly.kinematics.callout_maps import PlacedCallout, place_callouts
 from assembly.kinematics.posture import home_posture
 from assembly.model.error_distributions import ErrorSources
-from assembly.model.robot import Robot
+from assembly.model.robot import Clearance, Robot
 from assembly.statistics.ranking import group_of, kind_of
 from forcefit.inputs.table import BadInput
 
+_SAMPLE = 1 << 14  # draws of a fit for its variance
 _WORDS = 4  # random numbers of one step of Philox
 
 
 @dataclass(frozen=True, eq=False)
-class CalloutSources:
-    """Errors by callouts, and independent ones; m numbers of each draw.
+class JointFit:
+    """A fit of a joint.
 
-    The numbers are the coordinates of the callouts' zones, in radii of their balls
-    [-], after the independent errors [rad or m].
+    Attributes:
+        row: of the frame.
+        frame: its name.
+        fit: the fit.
+    """
+
+    row: int
+    frame: str
+    fit: Fit
+
+    @property
+    def name(self) -> str:
+        """Name in tables: ``"fit 12 H7/g6 of elbow"``."""
+        return f"fit {self.fit.text} of {self.frame}"
+
+
+@dataclass(frozen=True, eq=False)
+class CalloutSources:
+    """Errors by callouts, independent errors and fits; m numbers of each draw.
+
+    The numbers are the independent errors [rad or m], then the coordinates of the
+    callouts' zones in radii of their balls [-], then the radial clearances of the fits
+    less their means [m].
 
     Attributes:
         robot: of the callouts.
         placed: its callouts.
         independent: errors that are added, or None.
         fixed: (n, 6) [rad, m] errors that every draw has; zero if None.
+        fits: of its joints.
     """
 
     robot: Robot
     placed: tuple[PlacedCallout, ...]
     independent: ErrorSources | None = None
     fixed: NDArray | None = None
+    fits: tuple[JointFit, ...] = ()
 
     @property
     def _independent_count(self) -> int:
@@ -67,9 +92,8 @@ class CalloutSources:
         return maps
 
     def __len__(self) -> int:
-        return self._independent_count + sum(
-            sum(placed.zone.dimensions) for placed in self.placed
-        )
+        of_zones = sum(sum(placed.zone.dimensions) for placed in self.placed)
+        return self._independent_count + of_zones + len(self.fits)
 
     @cached_property
     def labels(self) -> tuple[str, ...]:
@@ -82,6 +106,7 @@ class CalloutSources:
                 for placed in self.placed
                 for i in range(sum(placed.zone.dimensions))
             ),
+            *(fit.name for fit in self.fits),
         )
 
     def groups_by(self, by: str) -> list[str]:
@@ -100,11 +125,15 @@ class CalloutSources:
             callout = placed.callout
             name = kind_of(callout.name) if by == "kind" else callout.name
             own += [f"{callout.words} of {name}"] * sum(placed.zone.dimensions)
+        for fit in self.fits:
+            short = kind_of(fit.frame) if by == "kind" else fit.frame
+            own.append(f"fit {fit.fit.text} of {short}")
         return own
 
     def draw(self, first: int, count: int, seed: int, stream: int = 0) -> NDArray:
         """Return the (count, m) numbers of draws; see ErrorSources.uniforms."""
         words = [self._independent_count, *(p.zone.words for p in self.placed)]
+        words += [2] * len(self.fits)
         ends = np.cumsum(words)
 
         @cache
@@ -123,7 +152,29 @@ class CalloutSources:
                     of_callout, placed.callout.distribution, placed.callout.cp
                 )
             )
+        for i, one in enumerate(self.fits, 1 + len(self.placed)):
+            radial = one.fit.draw(uniforms(0)[i])
+            parts.append(radial[:, None] - one.fit.mean_radial)
         return np.hstack(parts)
+
+    def with_clearances(self, values: NDArray) -> Robot:
+        """Return the robot with the clearances of one draw's numbers (m,)."""
+        more = values[len(self) - len(self.fits) :]
+        pairs = zip(self.fits, more, strict=True)
+        return self._with_radial([f.fit.mean_radial + float(v) for f, v in pairs])
+
+    def with_largest_clearances(self) -> Robot:
+        """Return the robot with the largest clearance of every fit."""
+        return self._with_radial([one.fit.radial[1] for one in self.fits])
+
+    def _with_radial(self, radial: list[float]) -> Robot:
+        """The robot with radial clearances [m] of the fits."""
+        frames = list(self.robot.frames)
+        for one, bound in zip(self.fits, radial, strict=True):
+            frame = frames[one.row]
+            clearance = replace(frame.clearance or Clearance(), radial=max(0.0, bound))
+            frames[one.row] = replace(frame, clearance=clearance)
+        return replace(self.robot, frames=tuple(frames))
 
     def errors(self, values: NDArray) -> NDArray:
         """Return (..., n, 6) [rad, m] delta l of every frame for numbers (..., m)."""
@@ -141,6 +192,8 @@ class CalloutSources:
         for p in self.placed:
             C = p.zone.variance_of_u(p.callout.distribution, p.callout.cp)
             own.append(np.diag(C))
+        fixed = np.random.default_rng(1).random((_SAMPLE, 2))
+        own += [np.array([one.fit.draw(fixed).var()]) for one in self.fits]
         return np.concatenate(own)
 
     @property
@@ -156,6 +209,7 @@ class CalloutSources:
         for p in self.placed:
             law = [DISTRIBUTIONS.index(p.callout.distribution), p.callout.cp]
             own += [*p.zone.bounds, np.array([p.zone.bonus, *law]), p.errors]
+        own += [np.array([*f.fit.hole, *f.fit.shaft, f.row]) for f in self.fits]
         return own + ([] if self.fixed is None else [self.fixed])
 
 
@@ -197,12 +251,16 @@ def sources_of(
     Raises:
         BadInput: there are neither.
     """
-    if robot.callouts:
+    fits = tuple(
+        JointFit(robot.index(name), name, parse_fit(fit))
+        for name, fit in robot.fits.items()
+    )
+    if robot.callouts or fits:
         placed = place_callouts(home_posture(robot))
-        return CalloutSources(robot, placed, independent, fixed)
+        return CalloutSources(robot, placed, independent, fixed, fits)
     if independent is None:
         raise BadInput(
-            f"{robot.name}: found no [[tolerance]] in the robot file and no --errors, "
-            "expected one of them"
+            f"{robot.name}: found no [[tolerance]] and no fit in the robot file and no "
+            "--errors, expected one of them"
         )
     return independent

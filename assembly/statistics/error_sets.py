@@ -52,11 +52,13 @@ def error_sets(prepared: LinearResponse, sources: Sources) -> ErrorSets:
         BadInput: an independent error is unbounded or not symmetric about zero.
     """
     own = zones_of_errors(sources)
-    names, zones, units = map(list, zip(*own, strict=True))
+    names, zones = [name for name, _, _ in own], [zone for _, zone, _ in own]
     n, nu = len(prepared.posture.robot.frames), int(prepared.starts[-1])
     maps = np.eye(6 * n)[:, :0]
     if len(sources):
-        maps = _maps(sources).reshape(6 * n, -1) * np.concatenate(units)
+        maps = _maps(sources).reshape(6 * n, -1) * np.concatenate([
+            unit for _, _, unit in own
+        ])
     cones = prepared.joints.cones
     for first, last in zip(prepared.starts[:-1], prepared.starts[1:], strict=True):
         names.append(_cone_name(prepared, cones[:, first]))

@@ -1,7 +1,7 @@
 """A Monte Carlo experiment: distributions at a posture, quantities of each draw."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,7 +13,7 @@ from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.zone import MARGINS
 from assembly.model.error_distributions import draw_generator
 from assembly.model.link_stress import peak_stresses, stressed_links
-from assembly.statistics.callout_sources import Sources
+from assembly.statistics.callout_sources import CalloutSources, Sources
 from assembly.statistics.clearance_positions import (
     CLEARANCE_MODELS,
     CLEARANCE_STREAM,
@@ -174,6 +174,20 @@ class Experiment:
             With the worst clearance model, rotation and translation are upper bounds of
             the largest, and the platform's screw is that of the solution of (22).
         """
+        if not isinstance(self.sources, CalloutSources) or not self.sources.fits:
+            return self._evaluate_alike(values, draws)
+        rows = np.zeros(len(values), dtype=self.record_type)
+        for i, own in enumerate(values):
+            # every draw has clearances of its own
+            posture = replace(self.posture, robot=self.sources.with_clearances(own))
+            one = replace(self, posture=posture)
+            rows[i] = one._evaluate_alike(own[None], [int(draws[i])])[0]
+        return rows
+
+    def _evaluate_alike(
+        self, values: NDArray, draws: Sequence[int] | NDArray
+    ) -> NDArray:
+        """Return the records of draws that have the clearances of the posture."""
         errors = self.sources.errors(values)
         solved = self.energies.solve(errors)
         rows = np.zeros(len(values), dtype=self.record_type)

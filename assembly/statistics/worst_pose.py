@@ -19,16 +19,16 @@ Sources:
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.callouts.largest_product import largest_product
 from assembly.solvers.outer_cuts import farthest
-from assembly.statistics.callout_sources import Sources
+from assembly.statistics.callout_sources import CalloutSources, Sources
 from assembly.statistics.error_sets import ErrorSets, error_sets, zones_of_errors
-from assembly.statistics.linear_response import LinearResponse
+from assembly.statistics.linear_response import LinearResponse, linear_response
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.responses import respond
 from forcefit.inputs.table import BadInput
@@ -78,7 +78,8 @@ def worst_pose(
 
     Args:
         prepared: a posture without loads.
-        sources: callouts, and independent errors that are bounded and symmetric.
+        sources: callouts, independent errors that are bounded and symmetric, and
+            fits, each at its largest clearance.
         quantity: ``"rotation"`` or ``"translation"``.
         seed: of the corners from which the equilibrium climbs.
 
@@ -91,6 +92,10 @@ def worst_pose(
     """
     if prepared.loads is not None:
         raise BadInput("worst case: found a load, expected none: it is not linear then")
+    if isinstance(sources, CalloutSources) and sources.fits:
+        robot = sources.with_largest_clearances()
+        prepared = linear_response(replace(prepared.posture, robot=robot))
+        sources = replace(sources, fits=())
     sets, half = error_sets(prepared, sources), 3 * POSE_ERRORS.index(quantity)
     held, sprung = len(sets.rigid_rows) > 0, len(sets.spring_rows) > 0
     if sprung and sets.clearances:

@@ -183,12 +183,10 @@ def statistics(
         robot, pose, joint, rest, mismatch, own_errors=not closing, note=False
     )
     fixed = posture.robot.errors if closing else None
-    if errors is None:
-        sources = sources_of(posture.robot, None, fixed)
-    elif posture.robot.callouts:
-        sources = sources_of(posture.robot, read_sources(errors, posture.robot), fixed)
-    else:
-        sources = read_sources(errors, posture.robot, fixed)
+    independent = None
+    if errors is not None:
+        independent = read_sources(errors, posture.robot, fixed)
+    sources = sources_of(posture.robot, independent, fixed)
     wrench, g = parse_load(load), parse_gravity(gravity)
     note_closing(posture.robot, rest, mismatch)
     note_massless(posture.robot, g)

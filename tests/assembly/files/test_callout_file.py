@@ -200,3 +200,38 @@ def test_mistake_in_a_file_of_frames_is_reported_in_one_line(
 ):
     with pytest.raises(BadInput, match=re.escape(message)):
         read(tmp_path, FRAMES.replace(old, new, 1))
+
+
+FIT = FRAMES.replace('name = "b"', 'name = "b"\nclearance = { fit = "12 H7/g6" }')
+
+
+def test_fit_is_kept_when_a_robot_is_written(tmp_path):
+    robot = read(tmp_path, FIT)
+    write_robot(robot, tmp_path / "again.toml")
+    again = read_robot(tmp_path / "again.toml")
+    assert dict(again.fits) == {"b": "12 H7/g6"}
+    assert again.frame("b").clearance == robot.frame("b").clearance
+
+
+def test_fit_of_a_drawn_joint_is_that_of_its_frame(tmp_path, without_circle):
+    joint = 'name = "foot"\ntype = "revolute"'
+    text = without_circle.replace(joint, joint + '\nclearance = { fit = "12 H7/g6" }')
+    robot = read(tmp_path, text)
+    assert dict(robot.fits) == dict.fromkeys(("leg1.foot", "leg2.foot"), "12 H7/g6")
+
+
+@pytest.mark.parametrize(
+    ("clearance", "message"),
+    [
+        (
+            '{ fit = "25 H7/p6" }',
+            'clearance.fit: found "25 H7/p6", an interference fit',
+        ),
+        ('{ fit = "12 H7/z6" }', 'clearance.fit: found "z6", expected one of the let'),
+        ('{ fit = "12 H7/g6", radial = 1e-5 }', 'radial: found it together with "fit"'),
+        ("{ fit = 12 }", "clearance.fit: found 12, expected a fit such as"),
+    ],
+)
+def test_mistake_in_a_fit_is_reported_in_one_line(tmp_path, clearance, message):
+    with pytest.raises(BadInput, match=re.escape(message)):
+        read(tmp_path, FIT.replace('{ fit = "12 H7/g6" }', clearance))
