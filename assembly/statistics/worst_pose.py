@@ -107,7 +107,9 @@ def worst_pose(
     if reading == "equilibrium":
         rows = np.vstack([sets.rigid_rows, sets.spring_rows])
         (rigid, _), inner = _farthest(sets, rows, half)
-        low, direction = _climb(prepared, sources, quantity, seed)
+        toward = inner[half : half + 3] / max(rigid, 1e-300)
+        errors = _support(sets, rows, half)(toward)[2][: -sets.clearances]
+        low, direction = _climb(prepared, sources, quantity, seed, errors)
         if rigid > low:
             low, direction = rigid, inner[half : half + 3]
     else:
@@ -177,9 +179,9 @@ def _support(
 
 
 def _climb(
-    prepared: LinearResponse, sources: Sources, quantity: str, seed: int
+    prepared: LinearResponse, sources: Sources, quantity: str, seed: int, start: NDArray
 ) -> tuple[float, NDArray]:
-    """The largest equilibrium found from corners, and its direction (3,)."""
+    """The largest equilibrium found from corners and a start, and its direction (3,)."""
     half = 3 * POSE_ERRORS.index(quantity)
     own = zones_of_errors(sources)
     sizes = [sum(zone.dimensions) for _, zone, _ in own]
@@ -200,6 +202,7 @@ def _climb(
     n = len(prepared.posture.robot.frames)
     first = sources.of_numbers(starts.reshape(-1, n, 6))
     values = corners(np.vstack([first, rng.normal(size=first.shape) / scale]))
+    values = np.vstack([values, start * scale])
     best, best_values = -np.inf, values[0]
     for _ in range(_CLIMBS):
         sizes_found, slopes = respond(prepared, sources, values, quantity)
