@@ -181,7 +181,7 @@ def _support(
 def _climb(
     prepared: LinearResponse, sources: Sources, quantity: str, seed: int, start: NDArray
 ) -> tuple[float, NDArray]:
-    """The largest equilibrium found from corners and a start, and its direction (3,)."""
+    """The largest equilibrium found by climbing, and its direction (3,)."""
     half = 3 * POSE_ERRORS.index(quantity)
     own = zones_of_errors(sources)
     sizes = [sum(zone.dimensions) for _, zone, _ in own]
