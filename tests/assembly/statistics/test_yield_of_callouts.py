@@ -1,4 +1,4 @@
-"""Yields of callouts against draws in finite geometry, which share no code with them."""
+"""Yields of callouts against draws in finite geometry, by code of its own."""
 
 from dataclasses import replace
 
