@@ -175,19 +175,25 @@ class Experiment:
             the largest, and the platform's screw is that of the solution of (22).
         """
         if not isinstance(self.sources, CalloutSources) or not self.sources.fits:
-            return self._evaluate_alike(values, draws)
-        rows = np.zeros(len(values), dtype=self.record_type)
-        for i, own in enumerate(values):
-            # every draw has clearances of its own
-            posture = replace(self.posture, robot=self.sources.with_clearances(own))
-            one = replace(self, posture=posture)
-            rows[i] = one._evaluate_alike(own[None], [int(draws[i])])[0]
+            parts = [self._without_stress(values, draws)]
+        else:
+            parts = []
+            for own, draw in zip(values, np.asarray(draws).tolist(), strict=True):
+                # every draw has clearances of its own
+                robot = self.sources.with_clearances(own)
+                one = replace(self, posture=replace(self.posture, robot=robot))
+                parts.append(one._without_stress(own[None], [draw]))
+        rows, wrenches, at_tips = (
+            np.concatenate(arrays) for arrays in zip(*parts, strict=True)
+        )
+        if self.links:
+            rows["stress"] = peak_stresses(self.posture.robot, wrenches, at_tips)
         return rows
 
-    def _evaluate_alike(
+    def _without_stress(
         self, values: NDArray, draws: Sequence[int] | NDArray
-    ) -> NDArray:
-        """Return the records of draws that have the clearances of the posture."""
+    ) -> tuple[NDArray, NDArray, NDArray]:
+        """Return records with the posture's clearances, wrenches, and their weights."""
         errors = self.sources.errors(values)
         solved = self.energies.solve(errors)
         rows = np.zeros(len(values), dtype=self.record_type)
@@ -217,15 +223,13 @@ class Experiment:
             through = wrenches[..., part] - at_tips[..., part]
             sizes = np.sqrt((through**2).sum(axis=-1))
             rows[name] = sizes.max(axis=1)
-        if self.links:
-            rows["stress"] = peak_stresses(self.posture.robot, wrenches, at_tips)
         for name, zone in self.zones.items():
             rows[name] = zone.solve(errors).margin
         if self.stiffness:
             rows["stiffness"], rows["free_motion"] = draw_stiffnesses(
                 self.posture, errors, self.stiffness, self.load, self.gravity
             )
-        return rows
+        return rows, wrenches, np.broadcast_to(at_tips, wrenches.shape)
 
 
 def precision_for(
