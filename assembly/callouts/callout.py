@@ -104,6 +104,13 @@ class Callout:
         return " and ".join(found)
 
     @property
+    def first_width(self) -> float:
+        """[m] width of the first zone, or the tolerance of the length to each side."""
+        if self.widths:
+            return next(iter(self.widths.values()))
+        return self.length[1] if self.length else 1.0
+
+    @property
     def axes(self) -> NDArray:
         """(3, 3) axes of the feature as columns, in the frame's: z = axis."""
         if self.shape == "plane" and self.direction is not None:

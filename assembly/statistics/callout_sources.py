@@ -73,7 +73,7 @@ class CalloutSources:
         return 0 if self.independent is None else len(self.independent)
 
     @cached_property
-    def _columns(self) -> list[NDArray]:
+    def columns(self) -> list[NDArray]:
         """Columns of the numbers of each callout."""
         widths = [sum(placed.zone.dimensions) for placed in self.placed]
         ends = self._independent_count + np.cumsum(widths)
@@ -87,7 +87,7 @@ class CalloutSources:
         if self.independent is not None:
             columns = np.arange(len(self.independent))
             maps[self.independent.frame, self.independent.component, columns] = 1.0
-        for columns, placed in zip(self._columns, self.placed, strict=True):
+        for columns, placed in zip(self.columns, self.placed, strict=True):
             maps[:, :, columns] = placed.errors
         return maps
 

@@ -190,6 +190,7 @@ _CLASS = record(
     scaled_alike=number("with one factor on all tolerances", ""),
     cost=number("cost"), loosest_allowed=number("largest allowed", ""),
     at_loosest=flag("at the largest allowed"),
+    width_=flag("whether it is the full width of a zone, not to each side"),
 )  # fmt: skip
 _VERIFICATION = record(
     "draws verdict confidence", look=count("interim test"),
