@@ -2,6 +2,7 @@
 
 import re
 
+from forcefit.inputs.number_arrays import as_number
 from forcefit.inputs.table import BadInput, describe
 
 _UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
@@ -26,9 +27,9 @@ def parse_width(value: object) -> tuple[float, bool]:
     """
     expected = 'expected a width > 0 such as "0.05 mm"'
     width, at_most = -1.0, False
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        width = float(value)
-    elif isinstance(value, str) and (match := _WIDTH.fullmatch(value)):
+    if not isinstance(value, str):
+        width = as_number(value)
+    elif match := _WIDTH.fullmatch(value):
         width, at_most = _value(match[1], match[2]) * _UNITS[match[3]], bool(match[4])
     if not 0 < width < 1.0:
         raise BadInput(f"found {describe(value)}, {expected}")

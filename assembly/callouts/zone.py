@@ -12,6 +12,7 @@ Sources:
     sets).
 """
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.callouts.largest_product import largest_product
+from assembly.callouts.unit_balls import VOLUMES, ball_variance, in_balls
 
 DISTRIBUTIONS = ("uniform", "normal", "truncated")
 _SAMPLE = 1 << 17  # draws for the covariance of a zone that is cut
@@ -160,12 +162,35 @@ class Zone:
         u = self._in_balls(uniform, distribution, s) * grown[:, None]
         if distribution == "normal":
             return u, np.ones(len(u), dtype=bool)
+        if distribution == "uniform" and self.cuts and not self.bonus:
+            dimensions, to_u = self._tightest
+            u = in_balls(uniform, dimensions) @ to_u.T
         return u, self.inside(u, grown)
 
     def _in_balls(self, uniform: NDArray, distribution: str, s: float) -> NDArray:
         """(k, m) coordinates in the unit balls, without the cuts."""
-        parts = self._balls(uniform[:, : sum(self.dimensions)])
-        return np.hstack([_in_ball(part, distribution, s) for part in parts])
+        return in_balls(uniform, self.dimensions, distribution, s)
+
+    @cached_property
+    def _tightest(self) -> tuple[tuple[int, ...], NDArray]:
+        """Of all sets of independent bounds that with the least volume, for drawing.
+
+        Dimensions of its balls, and the matrix from coordinates in them to u.
+        """
+        bounds = [bound @ self.columns for bound in self.bounds]
+        m, best = sum(self.dimensions), np.inf
+        found = self.dimensions, np.eye(m)
+        for count in range(1, len(bounds) + 1):
+            for chosen in itertools.combinations(bounds, count):
+                rows = np.vstack(chosen)
+                if len(rows) != m or np.linalg.cond(rows) > 1 / _RANK:
+                    continue
+                dimensions = tuple(len(bound) for bound in chosen)
+                volume = np.prod([VOLUMES[d] for d in dimensions])
+                volume /= abs(np.linalg.det(rows))
+                if volume < best * (1 - 1e-9):
+                    best, found = volume, (dimensions, np.linalg.inv(rows))
+        return found
 
     def deviation(self, cp: float = 1.0) -> float:
         """Return the standard deviation of each u of a normal distribution.
@@ -219,7 +244,7 @@ class Zone:
             )
             return np.asarray(np.cov(u.T, bias=True)).reshape(u.shape[1], -1)
         s = 0.0 if distribution == "uniform" else self.deviation(cp)
-        each = [np.full(d, _variance(d, distribution, s)) for d in self.dimensions]
+        each = [np.full(d, ball_variance(d, distribution, s)) for d in self.dimensions]
         b = self.bonus
         return np.diag(np.concatenate(each)) * (1 + b + b**2 / 3)
 
@@ -239,37 +264,3 @@ def _scale(rows: NDArray) -> NDArray:
 def _sample(words: int, attempt: int = 0) -> NDArray:
     """Fixed uniform numbers, the same at each call."""
     return np.random.default_rng([words, attempt]).random((_SAMPLE, words))
-
-
-def _in_ball(uniform: NDArray, distribution: str, s: float) -> NDArray:
-    """(k, d) points of a unit ball of dimension d from (k, d) uniform numbers."""
-    from scipy.special import gammainc, gammaincinv
-
-    d = uniform.shape[1]
-    v = abs(2 * uniform[:, 0] - 1) if d == 1 else uniform[:, 0]
-    if distribution == "uniform":
-        radius = v ** (1 / d)
-    else:
-        share = gammainc(d / 2, 0.5 / s**2) if distribution == "truncated" else 1.0
-        radius = s * np.sqrt(2 * gammaincinv(d / 2, np.minimum(v, 1 - 2**-53) * share))
-    if d == 1:
-        return np.asarray(np.copysign(radius, uniform[:, 0] - 0.5))[:, None]
-    angle = 2 * np.pi * uniform[:, 1]
-    across, along = radius, None
-    if d == 3:
-        height = 2 * uniform[:, 2] - 1
-        across, along = radius * np.sqrt(1 - height**2), radius * height
-    plane = [across * np.cos(angle), across * np.sin(angle)]
-    return np.column_stack(plane if along is None else [*plane, along])
-
-
-def _variance(d: int, distribution: str, s: float) -> float:
-    """Variance of each coordinate in a unit ball of dimension d."""
-    if distribution == "uniform":
-        return 1.0 / (d + 2)
-    if distribution == "normal":
-        return s**2
-    from scipy.special import gammainc
-
-    limit = 0.5 / s**2
-    return float(s**2 * gammainc(d / 2 + 1, limit) / gammainc(d / 2, limit))

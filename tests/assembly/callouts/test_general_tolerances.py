@@ -66,3 +66,8 @@ def test_length_without_a_tolerance_is_refused(value):
 def test_general_tolerance_of_another_standard_is_refused():
     with pytest.raises(BadInput, match="ISO 2768-mK"):
         parse_general("DIN 7168-m")
+
+
+def test_huge_whole_number_is_no_width():
+    with pytest.raises(BadInput, match="expected a width > 0"):
+        parse_width(10**400)

@@ -223,3 +223,12 @@ def test_shift_along_a_direction_has_no_part_across_it():
     assert zone.support(across) == pytest.approx(0, abs=1e-18)
     both = axis_position_along(WIDTH, LENGTH, along[:2])
     assert both.support(across) == pytest.approx(0, abs=1e-18)
+
+
+def test_draws_of_a_wide_zone_within_a_narrow_one_are_those_of_the_narrow_one():
+    """Position 20 mm within position 0.05 mm on the same bore: the tighter holds."""
+    narrow = axis_position(WIDTH, LENGTH)
+    zone = intersection([axis_position(20e-3, LENGTH), narrow])
+    screws = drawn(zone, count=20_000)
+    C = narrow.covariance()
+    assert screws.var(axis=0)[[0, 3]] == pytest.approx(np.diag(C)[[0, 3]], rel=0.03)
