@@ -13,6 +13,7 @@ from assembly.model.error_distributions import tolerance_sources
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.statistics.callout_sources import sources_of
 from assembly.statistics.linear_response import linear_response
+from assembly.statistics.responses import respond
 from assembly.statistics.worst_pose import worst_pose
 from forcefit.inputs.table import BadInput
 from tests.drawn_four_bar_for_tests import four_bar_file
@@ -171,6 +172,19 @@ def test_four_springs_have_three_different_readings():
     assert found.rigid * 1e6 == pytest.approx(233.3, abs=0.5)
     assert found.attained * 1e6 == pytest.approx(240, abs=0.5)
     assert found.bound * 1e6 == pytest.approx(280, abs=0.5)
+
+
+def test_equilibrium_is_not_below_its_corners_and_inner_points():
+    """All 16 corners and 500 inner points; each pose error is known to 1e-9 rad."""
+    robot, sources = on_springs((-0.3, -0.1, 0.1, 0.3), 20e-6)
+    prepared = linear_response(home_posture(robot))
+    found = worst_pose(prepared, sources, "rotation")
+    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=4)))
+    inner = np.random.default_rng(1).uniform(-1, 1, (500, 4))
+    sizes, _ = respond(
+        prepared, sources, 50e-6 * np.vstack([corners, inner]), "rotation"
+    )
+    assert sizes.max() <= found.attained + 1e-9
 
 
 def test_springs_without_clearance_are_a_linear_response():
