@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.model.frame import ONE_OF_BALL, SLIDING_BALL
 from assembly.model.largest import LARGEST, LARGEST_LENGTH
 from assembly.model.robot import LOCKED, Clearance
 from forcefit.inputs.number_arrays import find_fault, number_array
@@ -10,35 +11,59 @@ from forcefit.inputs.table import Table
 
 # [rad, m] smaller values are refused, because their square is 0
 _LEAST_CLEARANCE = 1e-30
-_CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad"}
+_CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad", "ball": "m"}
 
 
-def read_clearance(table: Table) -> Clearance | None:
+def read_clearance(table: Table, slides: bool) -> Clearance | None:
     """Return the ``clearance`` table, None if absent.
 
     Args:
         table: table of a ``[[frame]]``.
+        slides: whether its joint is passive and prismatic.
 
     Returns:
         The given bounds.
 
     Raises:
-        BadInput: an unknown key, a value that is not a finite number >= 0, or one so
-            small that its square is 0.
+        BadInput: an unknown key, or a bound that :func:`read_bounds` refuses.
     """
     if not table.has("clearance"):
         return None
     inner = table.table("clearance")
+    bounds = read_bounds(inner, slides)
+    inner.finish()
+    return bounds
+
+
+def read_bounds(table: Table, slides: bool) -> Clearance:
+    """Return the bounds of a ``clearance`` table, which may have other keys too.
+
+    Args:
+        table: the table.
+        slides: whether its joint is passive and prismatic.
+
+    Returns:
+        The given bounds.
+
+    Raises:
+        BadInput: a value is not a finite number >= 0, or so small that its square is 0;
+            or ``ball`` is given with another bound of the same motion.
+    """
     bounds = {
-        key: inner.number(key, unit, least=0.0, largest=LARGEST_LENGTH)
+        key: table.number(key, unit, least=0.0, largest=LARGEST_LENGTH)
         for key, unit in _CLEARANCE.items()
-        if inner.has(key)
+        if table.has(key)
     }
     for key, bound in bounds.items():
         if 0.0 < bound < _LEAST_CLEARANCE:
             expected = f"expected 0 or at least {_LEAST_CLEARANCE:g}"
-            raise inner.bad(key, f"found {bound:g}, {expected}")
-    inner.finish()
+            raise table.bad(key, f"found {bound:g}, {expected}")
+    if "ball" in bounds:
+        if slides:
+            raise table.bad("ball", SLIDING_BALL)
+        for key in ("radial", "axial"):
+            if key in bounds:
+                raise table.bad(key, ONE_OF_BALL)
     return Clearance(**bounds)
 
 

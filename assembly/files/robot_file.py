@@ -244,7 +244,7 @@ def _frame(table: Table) -> Frame:
         limits=_limits(table),
         geometric_error=_numbers(table, "geometric_error", 6, "rad, m"),
         tolerance=_tolerance(table),
-        clearance=read_clearance(table),
+        clearance=read_clearance(table, own == 5),
         joint_stiffness=read_joint_stiffness(table, own),
         link=read_link(table),
         mass=table.number("mass", "kg", 0.0, least=0.0, largest=1e40),

@@ -23,6 +23,8 @@ LOCKED = (
     "found inf along the own motion of a passive joint, which would lock it; expected "
     '0 (free, as a bearing), a number > 0 (a spring), or joint = "fixed"'
 )
+SLIDING_BALL = "found one on a passive prismatic joint, which slides; expected radial"
+ONE_OF_BALL = 'found together with "ball", expected one of them'
 
 
 @dataclass(frozen=True)
@@ -37,12 +39,20 @@ class Clearance:
         axial: [m] bound of abs(TZ), eq. (3).
         tilt: [rad] radius of the disc for (RX, RY), eq. (4).
         spin: [rad] bound of abs(RZ), eq. (5).
+        ball: [m] radius of the ball for (TX, TY, TZ), in place of ``radial`` and
+            ``axial``: a ball in its socket.
     """
 
     radial: float | None = None
     axial: float | None = None
     tilt: float | None = None
     spin: float | None = None
+    ball: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.ball is not None and (self.radial, self.axial) != (None, None):
+            key = "axial" if self.radial is None else "radial"
+            raise BadInput(f"clearance.{key}: {ONE_OF_BALL}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +104,9 @@ class Frame:
             if value is not None:
                 value = locked(value, shape, f"frame '{self.name}': {name}")
                 object.__setattr__(self, name, value)
+        ball = self.clearance is not None and self.clearance.ball is not None
+        if ball and self.passive and self.joint == "prismatic":
+            raise BadInput(f"frame {quoted(self.name)}.clearance.ball: {SLIDING_BALL}")
         own = self.own_stiffness
         if self.passive and own is not None and np.isinf(own):
             raise BadInput(f"frame {quoted(self.name)}.joint_stiffness: {LOCKED}")
