@@ -207,13 +207,14 @@ def every_joint(rng):
     yield {}
     yield {"joint": "revolute", "actuated": True, "limits": (-1.5, 2.0)}
     yield {"joint": "prismatic", "clearance": Clearance(1e-30, None, 0.0, 1.0)}
+    yield {"joint": "revolute", "clearance": Clearance(spin=0.2, ball=1 / 7)}
     yield {"joint": "revolute", "joint_stiffness": bearing}
     yield {"joint": "prismatic", "joint_stiffness": slide}
     yield {"joint": "prismatic", "actuated": True, "joint_stiffness": locked}
     yield {"joint": "revolute", "joint_stiffness": K, "clearance": Clearance(1 / 3)}
 
 
-@pytest.mark.parametrize("seed", range(7))
+@pytest.mark.parametrize("seed", range(8))
 def test_every_kind_of_link_and_joint_is_equal_after_writing_and_reading(
     seed, tmp_path
 ):
