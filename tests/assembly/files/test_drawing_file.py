@@ -506,21 +506,22 @@ REFUSED = {
         'leg "leg".body "rod".to: found "lower", expected a joint of this body'),
     "a bore without its gap": (
         "axis2 = [0, 1, 0]", 'axis2 = [0, 1, 0]\nclearance = { length = "30 mm" }',
-        'leg "leg".joint "upper", first bearing.clearance.radial: missing; expected a '),
+        'leg "leg".joint "upper", first bearing.clearance.radial: missing; '),
     "a bore without length": (
         "axis2 = [0, 1, 0]",
         "axis2 = [0, 1, 0]\nclearance = { radial = 1e-5, length = 0 }",
-        'leg "leg".joint "upper", first bearing.clearance.length: found 0, expected a '),
+        'leg "leg".joint "upper", first bearing.clearance.length: found 0, '),
     "tilt of a bore": (
-        "drive_stiffness = 2e7", "clearance = { radial = 1e-5, length = 0.1, tilt = 1 }",
-        'leg "leg".joint "slide".clearance.tilt: found together with "length", which b'),
+        "drive_stiffness = 2e7",
+        "clearance = { radial = 1e-5, length = 0.1, tilt = 1 }",
+        'leg "leg".joint "slide".clearance.tilt: found together with "length", '),
     "unknown key of a clearance": (
         "drive_stiffness = 2e7", "clearance = { radial = 1e-5, lenght = 0.1 }",
-        'leg "leg".joint "slide".clearance: unknown key "lenght"; did you mean "length"'),
+        'leg "leg".joint "slide".clearance: unknown key "lenght"; did you '),
     "length of a ball": (
         'name = "upper"\ntype = "universal"',
         'name = "upper"\ntype = "spherical"\nclearance = { length = 0.1 }',
-        'leg "leg".joint "upper".clearance.length: found the length of a bore on a sph'),
+        'leg "leg".joint "upper".clearance.length: found the length of a bore on a s'),
     "copies": (
         "count = 3", "count = 0",
         'leg "leg".repeat.count: found 0, expected a whole number >= 1'),
