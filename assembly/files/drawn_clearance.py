@@ -1,14 +1,15 @@
 """Clearance of a joint of a robot file of ``format = 2``: bounds, or contacts."""
 
-from assembly.drawing.contacts import Contact, bore
+from assembly.drawing.contacts import Contact, bore, guide, largest_roll, pad
 from assembly.drawing.drawing import FREE_ROWS
 from assembly.files.joint_file import read_bounds
 from assembly.files.written_units import without_units
 from assembly.model.clearance import BOUNDS, CONES
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Clearance
-from forcefit.inputs.table import Table
+from forcefit.inputs.table import Table, quoted
 
+_LEAST_LENGTH = 1e-9  # [m] a shorter contact would allow tilts of many turns
 _ANGLES = ("tilt", "spin")
 _Clearance = tuple[Clearance | None, tuple[Contact, ...]]
 
@@ -34,9 +35,13 @@ def read_drawn_clearance(table: Table, kind: str, slides: bool) -> _Clearance:
     for key in (*BOUNDS, "length"):
         without_units(inner, key, "angle" if key in _ANGLES else "length")
     bounds = read_bounds(inner, slides)
+    contacts = [key for key in _CONTACTS if inner.has(key)]
+    if len(contacts) > 1:
+        fault = f"found together with {quoted(contacts[0])}"
+        raise inner.bad(contacts[1], f"{fault}, expected one of them")
     found: _Clearance = bounds, ()
-    if inner.has("length"):
-        found = _in_bore(inner, kind, bounds)
+    for key in contacts:
+        found = _CONTACTS[key](inner, kind, bounds)
     inner.finish()
     _refuse_free(inner, found[0], kind)
     return found
@@ -47,13 +52,70 @@ def _in_bore(table: Table, kind: str, bounds: Clearance) -> _Clearance:
     if not {0, 1, 3, 4}.isdisjoint(FREE_ROWS[kind]):
         fault = f"found the length of a bore on a {kind} joint"
         raise table.bad("length", f"{fault}, which has no bore; expected none")
-    length = table.number("length", "m", above=0.0, largest=LARGEST_LENGTH)
+    length = _length(table, "length")
     radial = table.number("radial", "m", least=0.0, largest=LARGEST_LENGTH)
     if bounds.tilt is not None:
         fault = 'found together with "length"'
         raise table.bad("tilt", f"{fault}, which bounds the tilt; expected one of them")
     kept = Clearance(axial=bounds.axial, spin=bounds.spin)
     return (None if kept == Clearance() else kept), bore(radial, length)
+
+
+def _in_guide(table: Table, kind: str, bounds: Clearance) -> _Clearance:
+    """The largest roll as a bound, and the contacts of a guide with it."""
+    _refuse_with(table, "guide", kind, "prismatic", ("radial", "tilt", "spin", "ball"))
+    inner = _sizes(table, "guide", ("gap", "length", "width", "height"))
+    gap = inner.content.get("gap")
+    if isinstance(gap, list):
+        x, y = inner.array("gap", (2,), "m", largest=LARGEST_LENGTH).tolist()
+        if min(x, y) < 0:
+            raise inner.bad("gap", f"found {min(x, y):g}, expected 2 numbers >= 0 [m]")
+    else:
+        x = y = inner.number("gap", "m", least=0.0, largest=LARGEST_LENGTH)
+    length, width, height = (_length(inner, k) for k in ("length", "width", "height"))
+    inner.finish()
+    roll = largest_roll((x, y), width, height)
+    return Clearance(axial=bounds.axial, spin=roll), guide((x, y), length)
+
+
+def _on_pad(table: Table, kind: str, bounds: Clearance) -> _Clearance:
+    """No bounds, and the contacts of a pad."""
+    _refuse_with(table, "pad", kind, "planar", ("axial", "tilt", "ball"))
+    inner = _sizes(table, "pad", ("gap", "length", "width"))
+    gap = inner.number("gap", "m", least=0.0, largest=LARGEST_LENGTH)
+    length, width = (_length(inner, key) for key in ("length", "width"))
+    inner.finish()
+    return (None if bounds == Clearance() else bounds), pad(gap, length, width)
+
+
+_CONTACTS = {"length": _in_bore, "guide": _in_guide, "pad": _on_pad}
+
+
+def _refuse_with(
+    table: Table, key: str, kind: str, of_kind: str, others: tuple[str, ...]
+) -> None:
+    """Reject contacts of another type of joint, or with bounds of the same motions."""
+    if kind != of_kind:
+        fault = f"found one on a {kind} joint, expected none"
+        raise table.bad(key, f"{fault}; only a {of_kind} joint has a {key}")
+    for other in others:
+        if table.has(other):
+            fault = f"found together with {quoted(key)}, which bounds that motion"
+            raise table.bad(other, f"{fault}; expected one of them")
+
+
+def _sizes(table: Table, key: str, keys: tuple[str, ...]) -> Table:
+    """A table of lengths, their units removed."""
+    given = table.table(key)
+    inner = Table(dict(given.content), given.file, given.place)
+    for name in keys:
+        without_units(inner, name, "length")
+    return inner
+
+
+def _length(table: Table, key: str) -> float:
+    """A length of a contact."""
+    return table.number(key, "m", above=_LEAST_LENGTH, largest=LARGEST_LENGTH)
 
 
 def _refuse_free(table: Table, bounds: Clearance | None, kind: str) -> None:

@@ -104,7 +104,19 @@ _OF_FRAMES = record(
     frame=Listed(_FRAME),
     closure_=Listed(record(frames=text("two frames that meet", "frame"))),
 )  # fmt: skip
-_CONTACTS = record("", _CLEARANCE, length_=number("length of the bore", "m"))
+_GAP = number("gap from the middle to one side", "m")
+_CONTACTS = record(
+    "", _CLEARANCE, length_=number("length of the bore", "m"),
+    guide_=record(
+        gap=Either((_GAP, number("gaps along x and y", "m", "axis"))),
+        length=number("length along the axis", "m"),
+        width=number("width along x", "m"), height=number("height along y", "m"),
+    ),
+    pad_=record(
+        gap=_GAP, length=number("length along x", "m"),
+        width=number("width along y", "m"),
+    ),
+)  # fmt: skip
 # of a universal joint one for each of its two bearings
 _OF_JOINT = record(**{
     f"{key}_": Either((one, Listed(one)))

@@ -522,6 +522,26 @@ REFUSED = {
         'name = "upper"\ntype = "universal"',
         'name = "upper"\ntype = "spherical"\nclearance = { length = 0.1 }',
         'leg "leg".joint "upper".clearance.length: found the length of a bore on a s'),
+    "a guide of a cross": (
+        "axis2 = [0, 1, 0]", "axis2 = [0, 1, 0]\nclearance = { guide = { gap = 1 } }",
+        'first bearing.clearance.guide: found one on a revolute joint, expected none'),
+    "a guide with tilt": (
+        "drive_stiffness = 2e7", "clearance = { tilt = 1e-4, guide = { gap = 1e-5 } }",
+        'leg "leg".joint "slide".clearance.tilt: found together with "guide", which '),
+    "a guide without height": (
+        "drive_stiffness = 2e7",
+        "clearance = { guide = { gap = 1e-5, length = 1, width = 1 } }",
+        'leg "leg".joint "slide".clearance.guide.height: missing; expected a finite '),
+    "a guide of negative gap": (
+        "drive_stiffness = 2e7",
+        "clearance = { guide = { gap = [1, -1], length = 1, width = 1, height = 1 } }",
+        'leg "leg".joint "slide".clearance.guide.gap: found -1, expected 2 numbers >='),
+    "a guide and a bore": (
+        "drive_stiffness = 2e7", "clearance = { length = 0.1, guide = { gap = 1e-5 } }",
+        '.clearance.guide: found together with "length", expected one of them'),
+    "a pad on a slide": (
+        "drive_stiffness = 2e7", "clearance = { pad = { gap = 1e-5 } }",
+        'leg "leg".joint "slide".clearance.pad: found one on a prismatic joint, exp'),
     "copies": (
         "count = 3", "count = 0",
         'leg "leg".repeat.count: found 0, expected a whole number >= 1'),
