@@ -19,6 +19,8 @@ from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reference.pose_error import reachable_screws
 from assembly.statistics.clearance_positions import position_clearances
 from assembly.statistics.linear_response import linear_response
+from validation.assumptions.bushes import solve_bushes
+from validation.crosscheck.crosscheck import crosscheck
 from validation.crosscheck.pair import scaled
 
 C, L = 10e-6, 40e-3  # [m]
@@ -324,6 +326,23 @@ def test_the_energy_of_a_forced_bore_equals_that_of_its_ends_in_cvxpy(seed, held
     problem.solve(solver=cp.CLARABEL, tol_gap_rel=1e-11, tol_feas=1e-11)
     found = solve_assembly(held_shaft(error, BORE + ', axial = "5 um"'))
     assert found.energy == pytest.approx(problem.value * 1e-6, rel=1e-6)
+
+
+def test_a_bore_has_the_energy_of_a_pin_in_two_bushes(held_shaft, rng):
+    """Bushes at +-20 mm: radial 10 um, tilt 10 um / 20 mm, as one pair of discs."""
+    for _ in range(4):
+        error = rng.normal(size=6) * [1e-3, 1e-3, 1e-3, 2e-5, 2e-5, 2e-5]
+        bushes = solve_bushes(held_shaft(error, 'radial = "10 um", tilt = "0.5 mrad"'))
+        found = solve_assembly(held_shaft(error, BORE))
+        assert found.energy == pytest.approx(bushes.energy, rel=1e-7)
+
+
+@pytest.mark.exudyn
+def test_crosscheck_of_a_bore_passes(held_shaft):
+    """The simulation moves the two frames of the bore by finite rotations."""
+    error = [4e-3, -7e-3, 2e-3, 9e-5, -6e-5, 7e-5]
+    check = crosscheck(held_shaft(error, BORE), (1.0, 0.5, 0.25), clearances=True)
+    assert check.passed, check.checks
 
 
 @pytest.mark.parametrize("clearance", [BORE, 'ball = "10 um"'])
