@@ -15,7 +15,7 @@ frames    contacts            small screws that the contacts allow, in the joint
 
 - Bore: a small rotation about one end moves the shaft at the other end only.  So the
   two rotations of at most c / L, about one end each, move the two ends independently
-  in discs of radius c.
+  in discs of radius c.  Likewise in two bearings, of any heights and gaps.
 - Guide: likewise about x and y alone, and RZ between its largest values independently
   of the others.  Exact without RZ; the volume is 3 to 5 times that of the guide.
 - Pad: turns about the four lines that join the middles of neighbouring sides.  Exact
@@ -46,19 +46,26 @@ class Contact:
     clearance: Clearance
 
 
-def bore(radial: float, length: float) -> tuple[Contact, ...]:
-    """Return the contacts of a shaft in a bore about z, its middle at the origin.
+def bearings(
+    first: tuple[float, float], second: tuple[float, float], name: str = "bearing"
+) -> tuple[Contact, ...]:
+    """Return the contacts of a shaft along z in two bearings, or at a bore's two ends.
 
     Args:
-        radial: [m] gap c between shaft and bore, half the diametral clearance.
-        length: [m] L of the bore, > 0.
+        first: [m] height z and radial gap, half the diametral clearance.
+        second: likewise, above the first.
+        name: with which the names of the contacts begin.
 
     Returns:
         Two, whose sum is exactly the set of small screws of the shaft.
     """
-    tilt = Clearance(tilt=radial / length)
-    ends = (("bore_start", -length / 2), ("bore_end", length / 2))
-    return tuple(Contact(name, _along_z(z), tilt) for name, z in ends)
+    (z1, c1), (z2, c2) = first, second
+    # a turn about one place moves the shaft at the other place only
+    turns = ((f"{name}_start", z1, c2), (f"{name}_end", z2, c1))
+    return tuple(
+        Contact(suffix, _along_z(z), Clearance(tilt=gap / (z2 - z1)))
+        for suffix, z, gap in turns
+    )
 
 
 def guide(gaps: tuple[float, float], length: float) -> tuple[Contact, ...]:

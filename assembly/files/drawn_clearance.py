@@ -1,13 +1,13 @@
 """Clearance of a joint of a robot file of ``format = 2``: bounds, or contacts."""
 
-from assembly.drawing.contacts import Contact, bore, guide, largest_roll, pad
+from assembly.drawing.contacts import Contact, bearings, guide, largest_roll, pad
 from assembly.drawing.drawing import FREE_ROWS
 from assembly.files.joint_file import read_bounds
 from assembly.files.written_units import without_units
 from assembly.model.clearance import BOUNDS, CONES
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Clearance
-from forcefit.inputs.table import Table, quoted
+from forcefit.inputs.table import Table, describe, quoted
 
 _LEAST_LENGTH = 1e-9  # [m] a shorter contact would allow tilts of many turns
 _ANGLES = ("tilt", "spin")
@@ -49,21 +49,57 @@ def read_drawn_clearance(table: Table, kind: str, slides: bool) -> _Clearance:
 
 def _in_bore(table: Table, kind: str, bounds: Clearance) -> _Clearance:
     """The bounds without ``radial``, and the contacts of a bore with it."""
-    if not {0, 1, 3, 4}.isdisjoint(FREE_ROWS[kind]):
-        fault = f"found the length of a bore on a {kind} joint"
-        raise table.bad("length", f"{fault}, which has no bore; expected none")
-    length = _length(table, "length")
-    radial = table.number("radial", "m", least=0.0, largest=LARGEST_LENGTH)
-    if bounds.tilt is not None:
-        fault = 'found together with "length"'
-        raise table.bad("tilt", f"{fault}, which bounds the tilt; expected one of them")
+    _refuse_with(table, "length", ("tilt", "ball"))
+    _refuse_without_shaft(table, "length", kind)
+    half = _length(table, "length") / 2
+    gap = table.number("radial", "m", least=0.0, largest=LARGEST_LENGTH)
+    return _of_shaft(bounds), bearings((-half, gap), (half, gap), "bore")
+
+
+def _in_bearings(table: Table, kind: str, bounds: Clearance) -> _Clearance:
+    """The bounds, and the contacts of a shaft in two bearings."""
+    _refuse_with(table, "bearings", ("radial", "tilt", "ball"))
+    _refuse_without_shaft(table, "bearings", kind)
+    value = table.get("bearings")
+    pair = isinstance(value, list) and len(value) == 2
+    if not pair or not all(isinstance(one, dict) for one in value):
+        fault = f"found {describe(value)}, expected two tables"
+        raise table.bad("bearings", f"{fault} {{ z, radial }}")
+    first, second = sorted(_bearing(table, k, one) for k, one in enumerate(value, 1))
+    if second[0] - first[0] <= _LEAST_LENGTH:
+        fault = f"found both at z = {first[0]:g} m"
+        raise table.bad("bearings", f"{fault}, expected a distance between them")
+    return _of_shaft(bounds), bearings(first, second)
+
+
+def _bearing(table: Table, number: int, content: dict) -> tuple[float, float]:
+    """Height and radial gap [m] of one bearing."""
+    inner = Table(dict(content), table.file, f"{table.place}.bearings[{number}]")
+    for key in ("z", "radial"):
+        without_units(inner, key, "length")
+    z = inner.number("z", "m", largest=LARGEST_LENGTH)
+    gap = inner.number("radial", "m", least=0.0, largest=LARGEST_LENGTH)
+    inner.finish()
+    return z, gap
+
+
+def _of_shaft(bounds: Clearance) -> Clearance | None:
+    """The bounds that bearings leave to the joint, None if there are none."""
     kept = Clearance(axial=bounds.axial, spin=bounds.spin)
-    return (None if kept == Clearance() else kept), bore(radial, length)
+    return None if kept == Clearance() else kept
+
+
+def _refuse_without_shaft(table: Table, key: str, kind: str) -> None:
+    """Reject a bore or bearings of a joint that tilts or moves across its axis."""
+    if not {0, 1, 3, 4}.isdisjoint(FREE_ROWS[kind]):
+        fault = f"found the clearance of a shaft on a {kind} joint"
+        raise table.bad(key, f"{fault}, which has no shaft; expected none")
 
 
 def _in_guide(table: Table, kind: str, bounds: Clearance) -> _Clearance:
     """The largest roll as a bound, and the contacts of a guide with it."""
-    _refuse_with(table, "guide", kind, "prismatic", ("radial", "tilt", "spin", "ball"))
+    _refuse_type(table, "guide", kind, "prismatic")
+    _refuse_with(table, "guide", ("radial", "tilt", "spin", "ball"))
     inner = _sizes(table, "guide", ("gap", "length", "width", "height"))
     gap = inner.content.get("gap")
     if isinstance(gap, list):
@@ -80,7 +116,8 @@ def _in_guide(table: Table, kind: str, bounds: Clearance) -> _Clearance:
 
 def _on_pad(table: Table, kind: str, bounds: Clearance) -> _Clearance:
     """No bounds, and the contacts of a pad."""
-    _refuse_with(table, "pad", kind, "planar", ("axial", "tilt", "ball"))
+    _refuse_type(table, "pad", kind, "planar")
+    _refuse_with(table, "pad", ("axial", "tilt", "ball"))
     inner = _sizes(table, "pad", ("gap", "length", "width"))
     gap = inner.number("gap", "m", least=0.0, largest=LARGEST_LENGTH)
     length, width = (_length(inner, key) for key in ("length", "width"))
@@ -88,16 +125,20 @@ def _on_pad(table: Table, kind: str, bounds: Clearance) -> _Clearance:
     return (None if bounds == Clearance() else bounds), pad(gap, length, width)
 
 
-_CONTACTS = {"length": _in_bore, "guide": _in_guide, "pad": _on_pad}
+_CONTACTS = {
+    "length": _in_bore, "bearings": _in_bearings, "guide": _in_guide, "pad": _on_pad,
+}  # fmt: skip
 
 
-def _refuse_with(
-    table: Table, key: str, kind: str, of_kind: str, others: tuple[str, ...]
-) -> None:
-    """Reject contacts of another type of joint, or with bounds of the same motions."""
+def _refuse_type(table: Table, key: str, kind: str, of_kind: str) -> None:
+    """Reject contacts of another type of joint."""
     if kind != of_kind:
         fault = f"found one on a {kind} joint, expected none"
         raise table.bad(key, f"{fault}; only a {of_kind} joint has a {key}")
+
+
+def _refuse_with(table: Table, key: str, others: tuple[str, ...]) -> None:
+    """Reject contacts together with bounds of the same motions."""
     for other in others:
         if table.has(other):
             fault = f"found together with {quoted(key)}, which bounds that motion"

@@ -107,6 +107,7 @@ _OF_FRAMES = record(
 _GAP = number("gap from the middle to one side", "m")
 _CONTACTS = record(
     "", _CLEARANCE, length_=number("length of the bore", "m"),
+    bearings_=Listed(record(z=number("height", "m"), radial=_GAP)),
     guide_=record(
         gap=Either((_GAP, number("gaps along x and y", "m", "axis"))),
         length=number("length along the axis", "m"),

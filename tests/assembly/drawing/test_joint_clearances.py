@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from assembly.exact.exact import solve_exact
-from assembly.files.robot_file import read_robot
+from assembly.files.robot_file import read_robot, write_robot
 from assembly.kinematics.mobility import mobility
 from assembly.kinematics.posture import home_posture
 from assembly.linear.closure import linearise
@@ -127,6 +127,21 @@ def test_the_reach_of_a_bore_is_that_of_finite_shafts(one_joint):
         off = middle + height * unit - [0, 0, height]
         found = reach(one_joint("revolute", BORE, [0, 0, height]))
         assert np.linalg.norm(off, axis=2).max() == pytest.approx(found[1], rel=2e-4)
+
+
+BEARINGS = (
+    'bearings = [{ z = "-20 mm", radial = "10 um" }, { z = "60 mm", radial = "5 um" }]'
+)
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+def test_two_bearings_bound_the_axis_at_their_places(reverse, one_joint):
+    """e(h) is linear between e(-20 mm) <= 10 um and e(60 mm) <= 5 um."""
+    for h, expected in ((-0.02, 10e-6), (0.06, 5e-6), (0.14, 20e-6), (-0.1, 25e-6)):
+        posture = one_joint("cylindrical", BEARINGS, [0, 0, h], reverse=reverse)
+        for direction in ([1, 0], [0.6, 0.8]):
+            found = heights(posture, [[0, 0, 0, *direction, 0]])[0]
+            assert found == pytest.approx(expected, rel=1e-7)
 
 
 def test_axial_and_spin_of_a_bore_stay_bounds_of_their_own(one_joint):
@@ -258,11 +273,20 @@ def test_a_pad_contains_its_octahedron_and_1_5_times_its_volume(one_joint, rng):
 @pytest.mark.parametrize(("kind", "clearance"), [
     ("revolute", BORE), ("cylindrical", BORE), ("universal", BORE),
     ("spherical", 'ball = "10 um"'), ("prismatic", GUIDE), ("planar", PAD),
+    ("revolute", BEARINGS),
 ])  # fmt: skip
-def test_contacts_change_no_count_of_mobility(kind, clearance, one_joint):
+def test_contacts_change_no_count_of_mobility(kind, clearance, one_joint, tmp_path):
+    """And they are the same in the frames that are written."""
     keys = "axis = [0, 0, 1]\naxis2 = [0, 1, 0]"
     bare, own = (mobility(one_joint(kind, text, keys=keys)) for text in ("", clearance))
     assert vars(bare) == vars(own)
+    posture = one_joint(kind, clearance, [0, 0, 0.1], keys)
+    write_robot(posture.robot, tmp_path / "frames.toml")
+    again = read_robot(tmp_path / "frames.toml")
+    frames = zip(again.frames, posture.robot.frames, strict=True)
+    assert all(a.clearance == b.clearance for a, b in frames)
+    change = home_posture(again).transforms - posture.transforms
+    assert np.abs(change).max() == 0.0
 
 
 @pytest.fixture
@@ -343,6 +367,16 @@ def test_crosscheck_of_a_bore_passes(held_shaft):
     error = [4e-3, -7e-3, 2e-3, 9e-5, -6e-5, 7e-5]
     check = crosscheck(held_shaft(error, BORE), (1.0, 0.5, 0.25), clearances=True)
     assert check.passed, check.checks
+
+
+@pytest.mark.parametrize("clearance", [BORE, 'ball = "10 um"'])
+def test_both_exact_methods_agree_with_contacts(clearance, held_shaft):
+    posture = held_shaft([4e-3, -7e-3, 2e-3, 90e-6, -60e-6, 70e-6], clearance)
+    one, other = (solve_exact(posture, method=m) for m in ("compiled", "reference"))
+    assert one.energy == pytest.approx(other.energy, rel=1e-9)
+    np.testing.assert_allclose(
+        one.clearance_screws, other.clearance_screws, rtol=1e-6, atol=1e-9
+    )
 
 
 @pytest.mark.parametrize("clearance", [BORE, 'ball = "10 um"'])

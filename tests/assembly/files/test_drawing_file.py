@@ -521,7 +521,7 @@ REFUSED = {
     "length of a ball": (
         'name = "upper"\ntype = "universal"',
         'name = "upper"\ntype = "spherical"\nclearance = { length = 0.1 }',
-        'leg "leg".joint "upper".clearance.length: found the length of a bore on a s'),
+        'leg "leg".joint "upper".clearance.length: found the clearance of a sh'),
     "a guide of a cross": (
         "axis2 = [0, 1, 0]", "axis2 = [0, 1, 0]\nclearance = { guide = { gap = 1 } }",
         'first bearing.clearance.guide: found one on a revolute joint, expected none'),
@@ -539,6 +539,20 @@ REFUSED = {
     "a guide and a bore": (
         "drive_stiffness = 2e7", "clearance = { length = 0.1, guide = { gap = 1e-5 } }",
         '.clearance.guide: found together with "length", expected one of them'),
+    "three bearings": (
+        "drive_stiffness = 2e7", "clearance = { bearings = [1, 2, 3] }",
+        'leg "leg".joint "slide".clearance.bearings: found [1, 2, 3], expected two t'),
+    "bearings at one place": (
+        "drive_stiffness = 2e7",
+        "clearance = { bearings = [{ z = 0, radial = 1 }, { z = 0, radial = 1 }] }",
+        'leg "leg".joint "slide".clearance.bearings: found both at z = 0 m, expected '),
+    "a bearing without gap": (
+        "drive_stiffness = 2e7",
+        "clearance = { bearings = [{ z = 0, radial = 1 }, { z = 1 }] }",
+        'leg "leg".joint "slide".clearance.bearings[2].radial: missing; expected a '),
+    "radial beside bearings": (
+        "drive_stiffness = 2e7", "clearance = { radial = 1, bearings = [] }",
+        'leg "leg".joint "slide".clearance.radial: found together with "bearings", '),
     "a pad on a slide": (
         "drive_stiffness = 2e7", "clearance = { pad = { gap = 1e-5 } }",
         'leg "leg".joint "slide".clearance.pad: found one on a prismatic joint, exp'),
