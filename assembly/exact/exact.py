@@ -61,10 +61,12 @@ from assembly.linear.closure import VirtualJoints, virtual_joints
 from assembly.linear.energy import solve_assembly
 from assembly.linear.rounding import differs_from_zero
 from assembly.model.clearance import (
+    clearance_components,
     clearance_bounds,
     clearance_excess,
     has_bounded_motion,
 )
+from assembly.model.links import own_screw
 from assembly.solvers.cones import into_cones
 from assembly.solvers.method import Method, check_method
 from forcefit.results.display import Figures, html_table, short_repr
@@ -234,8 +236,8 @@ class ExactAssembly:
     def clearance_screws(self) -> NDArray:
         """(n, 6) [rad, m] clearances, with motions of passive joints."""
         screws = self.placement.screws[CLEARANCE, self.cut.last]
-        axes = [frame.own_axis for frame in self.posture.robot.frames]
-        screws[np.arange(len(axes)), axes] += self.placement.own[self.cut.last]
+        units = [own_screw(frame) for frame in self.posture.robot.frames]
+        screws += self.placement.own[self.cut.last, None] * np.array(units)
         return screws
 
     @cached_property
@@ -293,8 +295,9 @@ class ExactAssembly:
 
     def clearance_excess(self) -> float:
         """Return the largest excess [-] of a clearance over its cone, relative."""
-        bounds = clearance_bounds(self.posture.robot)
-        return float(clearance_excess(self.clearance_screws, bounds))
+        robot = self.posture.robot
+        bounded = clearance_components(robot, self.clearance_screws)
+        return float(clearance_excess(bounded, clearance_bounds(robot)))
 
 
 def solve_exact(

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from assembly.kinematics.pieces import cut_beams
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.row_state import Rows, RowState
-from assembly.measurement.without_clearance import (
-    flexibility,
-)
+from assembly.measurement.without_clearance import flexibility
+from assembly.model.links import own_screw
+from assembly.model.robot import Robot
 
 _MOST_ITERATIONS = 60  # largest number of iterations; 5 to 12 are usual
 _CONVERGED = 1e-12  # [rad, reference lengths] largest change of a screw at the end
@@ -57,21 +57,23 @@ def solve_rows(
     )
     distinct, posture_of_row = conditions.postures.distinct
     flexible = flexibility(distinct)
-    own_axes = [
-        6 * i + f.own_axis for i, f in enumerate(conditions.robot.frames) if f.passive
-    ]
-    moved = np.flatnonzero(flexible.free.any(axis=1))
-    if not np.isin(moved, own_axes).all():
-        return (
-            screws,
-            converged,
-        )  # a fixed joint with a free motion
+    if not _of_passive_joints(flexible.free, conditions.robot):
+        return screws, converged
     for begin in range(0, len(conditions), _BATCH):
         rows = slice(begin, begin + _BATCH)
         some = conditions.take(np.arange(len(conditions))[rows])
         batch = Rows(some, flexible, posture_of_row[rows], linear_deflections[rows])
         screws[rows], converged[rows] = _solve(batch)
     return screws, converged
+
+
+def _of_passive_joints(free: NDArray, robot: Robot) -> bool:
+    """Return whether all free motions (6n, q) are those of passive joints."""
+    own = np.zeros((len(free), len(robot.frames)))
+    for i, frame in enumerate(robot.frames):
+        if frame.passive:
+            own[6 * i : 6 * i + 6, i] = own_screw(frame)
+    return bool((free[:, :, None] == own[:, None, :]).all(axis=0).any(axis=1).all())
 
 
 def _solve(rows: Rows) -> tuple[NDArray, NDArray]:

@@ -102,18 +102,18 @@ REFUSED = {
     "a joint of another kind": (
         'joint = "revolute"\nactuated', 'joint = "revolut"\nactuated',
         'frame "crank".joint: found \'revolut\', expected "fixed" | "revolute" | '
-        '"prismatic"; did you mean "revolute"?'),
+        '"prismatic" | "helical"; did you mean "revolute"?'),
     "a number for true": (
         "actuated = true", "actuated = 1",
         'frame "crank".actuated: found 1, expected true or false'),
     "a position of a fixed joint": (
         'joint = "revolute"\nactuated = true', "",
         'frame "crank".position: found position on a fixed joint; expected joint = '
-        '"revolute" | "prismatic", or no position'),
+        '"revolute" | "prismatic" | "helical", or no position'),
     "an actuated fixed joint": (
         'joint = "revolute"\nactuated = true\nposition = 1.0', "actuated = true",
         'frame "crank".actuated: found actuated on a fixed joint; expected joint = '
-        '"revolute" | "prismatic", or no actuated'),
+        '"revolute" | "prismatic" | "helical", or no actuated'),
     "a negative mass": (
         "mass = 1.2", "mass = -1.2",
         'frame "coupler".mass: found -1.2, expected a finite number >= 0 [kg]'),
