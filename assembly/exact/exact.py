@@ -61,8 +61,8 @@ from assembly.linear.closure import VirtualJoints, virtual_joints
 from assembly.linear.energy import solve_assembly
 from assembly.linear.rounding import differs_from_zero
 from assembly.model.clearance import (
-    clearance_components,
     clearance_bounds,
+    clearance_components,
     clearance_excess,
     has_bounded_motion,
 )

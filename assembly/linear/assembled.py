@@ -36,8 +36,8 @@ from assembly.linear.reference.reduction import reduce_problem
 from assembly.linear.rounding import ROUNDING, closure_rounding, differs_from_zero
 from assembly.linear.solution import Solution
 from assembly.model.clearance import (
-    clearance_components,
     clearance_bounds,
+    clearance_components,
     clearance_excess,
 )
 from assembly.model.point_results import N, plain

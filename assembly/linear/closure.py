@@ -189,7 +189,7 @@ def _cones(bounds: NDArray, scales: NDArray) -> tuple[NDArray, NDArray, NDArray]
 
 
 def _free(bounds: NDArray, robot: Robot) -> NDArray:
-    """Return the unit columns of the motions without bound, [0 0 1 0 0 h] of a thread."""
+    """Return the unit columns of motions without bound; of a thread [0 0 1 0 0 h]."""
     rows = [6 * i + r for i, cone in np.argwhere(np.isinf(bounds)) for r in CONES[cone]]
     columns = np.zeros((6 * len(bounds), len(rows)))
     columns[rows, np.arange(len(rows))] = 1.0

@@ -16,8 +16,8 @@ from assembly.measurement.conditions import Conditions
 from assembly.measurement.without_clearance import flexibility
 from assembly.model.clearance import (
     CONES,
-    clearance_components,
     clearance_bounds,
+    clearance_components,
     component_bounds,
     scales_with_margin,
 )

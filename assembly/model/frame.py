@@ -102,8 +102,8 @@ class Frame:
         if (self.joint == "helical") != (self.pitch != 0.0):
             raise BadInput(
                 f"frame {quoted(self.name)}.pitch: found {self.pitch:g} on a "
-                f"{self.joint} joint; expected a pitch other than 0 of a helical joint, "
-                "and 0 of other joints"
+                f"{self.joint} joint; expected 0 except on a helical joint, "
+                "where it is not 0"
             )
         if self.pitch and self.clearance and self.clearance.spin is not None:
             place = f"frame {quoted(self.name)}.clearance.spin"

@@ -18,7 +18,8 @@ def with_spans(robot: Robot, home: NDArray) -> Robot:
     """Return the robot with every link's length known and checked.
 
     A beam connects the two origins at home.  After a prismatic or helical joint that is
-    not at zero there, this differs from the frame's translation, and the length is stored.
+    not at zero there, this differs from the frame's translation, and the length is
+    stored.
 
     Args:
         robot: robot as read.

@@ -34,8 +34,8 @@ from assembly.linear.closure import VirtualJoints, virtual_joints
 from assembly.linear.reference.energy import least_energy
 from assembly.linear.reference.reduction import complement
 from assembly.model.clearance import (
-    clearance_components,
     clearance_bounds,
+    clearance_components,
     component_bounds,
     scales_with_margin,
 )

@@ -13,8 +13,8 @@ from assembly.linear.closure import (
 )
 from assembly.linear.reference.reduction import Reduction, reduce_problem
 from assembly.model.clearance import (
-    clearance_components,
     clearance_bounds,
+    clearance_components,
     clearance_excess,
     scales_with_margin,
 )

@@ -1,23 +1,36 @@
-"""Screws and nuts: a turn that is a shift as well."""
+"""Helical joints: a screw and its nut."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from assembly.exact.exact import solve_exact
 from assembly.exchange.convert import convert
 from assembly.exchange.robot_files import load_robot
 from assembly.files.robot_file import read_robot, write_robot
 from assembly.kinematics.mobility import mobility
-from assembly.kinematics.posture import home_posture, place_robot
+from assembly.kinematics.posture import home_posture, place_robot, together
+from assembly.kinematics.verdict import limits_passed
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.reference.as_printed import energy_as_printed, margin_as_printed
+from assembly.linear.zone import zone_margin
+from assembly.measurement.conditions import as_declared
+from assembly.measurement.exact_rows import solve_rows
+from assembly.measurement.predict import assemble_row
+from assembly.model.robot import Clearance, Frame, Robot
+from assembly.platform_stiffness.deflection import deflection_curve
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.platform_stiffness.vibration import natural_modes
+from assembly.statistics.linear_response import linear_response
+from assembly.sweeps.sweep import sweep_poses
 from forcefit.inputs.table import BadInput
 
 CASES = Path(__file__).parents[4] / "shared" / "cases" / "robots_drawn"
+METHODS = ["compiled", "reference"]
 LIFT = """
 format = 2
 name = "screw_lift"
@@ -51,7 +64,7 @@ between = ["base", "table"]
 at = [0.2, 0, 0.2]
 axis = [0, 0, 1]
 """
-LEAD = 0.005 / (2 * np.pi)  # [m/rad]
+LEAD = 0.005 / (2 * np.pi)  # [m/rad] of the lift
 
 
 @pytest.fixture
@@ -63,38 +76,63 @@ def read(tmp_path):
     return robot
 
 
-def test_a_screw_lift_has_one_freedom(read):
-    """The table cannot turn: the column is beside the screw, three times too many."""
+def test_screw_lift_has_one_freedom_and_three_redundant_constraints(read):
+    """Of the column and the screw, each alone holds two tilts and one rotation."""
     found = mobility(home_posture(read()))
     assert (found.freedoms, found.platform_freedoms) == (1, 1)
     assert (found.freedoms_drives_locked, found.redundant_constraints) == (0, 3)
 
 
-def test_a_nut_kept_from_turning_moves_by_the_pitch_in_a_turn(read):
-    """Down where a right-hand screw turns as its axis points, up where a left-hand."""
+def test_turn_of_the_screw_moves_the_table_by_the_pitch(read):
+    """Down if a right-hand screw turns about +z, up if a left-hand one does."""
     for text, step in ((LIFT, -0.005), (LIFT.replace('"5 mm"', '"-5 mm"'), 0.005)):
         pose = place_robot(read(text), joints={"bearing": 2 * np.pi}).pose()
         expected = [0.3, 0, 0.4 + step, 0, 0, 0]
         assert list(pose.values()) == pytest.approx(expected, abs=1e-14)
 
 
-def test_a_pose_of_the_table_is_reached_by_the_screw(read):
-    at = place_robot(read(), pose={"tz": 0.41})
+def test_height_of_the_table_needs_eighty_turns_of_the_screw(read):
+    at = place_robot(read(), pose={"tz": 0.8})
     angle = at.coordinates[at.robot.index("bearing")]
-    assert angle == pytest.approx(-0.01 / LEAD, rel=1e-12)
+    assert angle == pytest.approx(-80 * 2 * np.pi, rel=1e-12)
 
 
-@pytest.mark.parametrize("method", ["compiled", "reference"])
-def test_the_compliance_of_a_screw_is_its_drives_times_its_lead_squared(method, read):
+def test_pose_of_a_chain_is_the_product_of_matrix_exponentials(rng):
+    """exp of each joint's twist [w; p x w + h w], read at the base origin, at home."""
+    frames, twists, parent = [], [], "base"
+    for k, pitch in enumerate([0.3, -0.2, 0.0, 0.7]):
+        kind = "helical" if pitch else "revolute"
+        frames.append(Frame(f"j{k}", parent, rng.normal(size=3), rng.normal(size=3),
+                            joint=kind, pitch=pitch, actuated=True))  # fmt: skip
+        parent = f"j{k}"
+    robot = Robot("chain", "tip", (*frames, Frame("tip", parent, [0.1, 0.2, 0.3])))
+    home, q = home_posture(robot), rng.uniform(-3, 3, 4)
+    for frame, T in zip(frames, home.transforms, strict=False):
+        w, p = T[:3, 2], T[:3, 3]
+        v = np.cross(p, w) + frame.pitch / (2 * np.pi) * w
+        W = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+        twists.append(np.block([[W, v[:, None]], [np.zeros((1, 4))]]))
+    expected = np.linalg.multi_dot([
+        expm(t * a) for t, a in zip(twists, q, strict=True)
+    ])
+    found = place_robot(
+        robot, joints={f.name: a for f, a in zip(frames, q, strict=True)}
+    )
+    assert np.abs(found.platform - expected @ home.platform).max() < 1e-13
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_compliance_of_the_table_is_lead_squared_over_drive_stiffness(method, read):
     C = platform_stiffness(home_posture(read()), method=method).compliance
     expected = np.zeros((6, 6))
     expected[5, 5] = LEAD**2 / 200
+    assert expected[5, 5] == pytest.approx(3.16629e-9, rel=1e-6)
     assert np.abs(C - expected).max() < 1e-12 * expected[5, 5]
 
 
-@pytest.mark.parametrize("method", ["compiled", "reference"])
-def test_a_screw_gives_way_under_a_load_with_a_proved_energy(method, read):
-    """F^2 lead^2 / 2 k, and with finite motions the same: the table moves straight."""
+@pytest.mark.parametrize("method", METHODS)
+def test_energy_under_a_load_is_that_of_the_drive_spring(method, read):
+    """F^2 lead^2 / 2 k, with finite motions too: the table moves straight."""
     at, load = home_posture(read()), [0, 0, 0, 0, 0, 1000.0]
     found = solve_assembly(at, load, method=method)
     energy = 1e6 * LEAD**2 / 400
@@ -104,17 +142,87 @@ def test_a_screw_gives_way_under_a_load_with_a_proved_energy(method, read):
     assert solve_exact(at, load).energy == pytest.approx(energy, rel=1e-9)
 
 
-def test_the_weight_of_a_table_turns_its_screw(read):
-    """Of 8 kg, at rest: the drive carries m g times the lead."""
+def test_weight_of_the_table_turns_the_drive_by_its_moment(read):
+    """The drive carries m g times the lead."""
     found = solve_assembly(home_posture(read()), gravity=[0, 0, -9.81])
     turn = found.joint_screws[found.posture.robot.index("bearing"), 2]
     assert turn == pytest.approx(8 * 9.81 * LEAD / 200, rel=1e-12)
 
 
-def test_the_frequency_of_a_table_is_that_of_its_mass_on_the_screw(read):
+def test_frequency_of_the_table_is_that_of_its_mass_on_the_screw(read):
     found = natural_modes(home_posture(read()))
     expected = np.sqrt(200 / LEAD**2 / 8) / (2 * np.pi)
     assert found.frequencies == pytest.approx([expected], rel=1e-9)
+
+
+@pytest.mark.parametrize("state", ["contact", "exact"])
+def test_deflection_of_the_table_grows_by_the_compliance_of_the_screw(state, read):
+    at, loads = home_posture(read()), np.arange(0.0, -501.0, -250.0)
+    curve = deflection_curve(at, 5, loads, state=state)
+    np.testing.assert_allclose(curve.deflection, loads * LEAD**2 / 200, rtol=1e-9)
+    np.testing.assert_allclose(curve.stiffness, 200 / LEAD**2, rtol=1e-6)
+
+
+def test_rotation_error_of_the_screw_lowers_the_table_by_its_lead(read):
+    """Exact, however large the rotation is: all axes are parallel."""
+    robot, errors = read(), np.zeros((6, 6))
+    errors[robot.index("bearing"), 2] = 0.3
+    at = home_posture(robot.with_errors(errors))
+    expected = [0, 0, 0, 0, 0, -0.3 * LEAD]
+    for found in (solve_assembly(at), solve_exact(at)):
+        np.testing.assert_allclose(found.platform_screw, expected, rtol=0, atol=1e-12)
+    drawn = linear_response(home_posture(robot)).solve(np.stack([errors, -errors]))
+    np.testing.assert_allclose(drawn.platform_screw[:, 5], [-0.3 * LEAD, 0.3 * LEAD])
+
+
+def test_sweep_of_heights_has_the_error_of_the_pitch_everywhere(read):
+    robot, errors = read(), np.zeros((6, 6))
+    errors[robot.index("bearing"), 2] = 1e-3
+    data = sweep_poses(robot.with_errors(errors), {"tz": np.array([0.3, 0.4, 0.5])})
+    assert set(data["status"].values.tolist()) == {"ok"}
+    np.testing.assert_allclose(data["platform_screw"].values[:, 5], -1e-3 * LEAD)
+
+
+DIFFERENTIAL = """
+format = 2
+platform = "table"
+platform_at = [0.1, 0, 0.1]
+[[body]]
+name = "screw"
+[[body]]
+name = "table"
+[[joint]]
+name = "coarse"
+type = "helical"
+pitch = "5 mm"
+between = ["base", "screw"]
+at = [0, 0, 0]
+axis = [0, 0, 1]
+actuated = true
+drive_stiffness = 50
+[[joint]]
+name = "fine"
+type = "helical"
+pitch = "4 mm"
+between = ["table", "screw"]
+at = [0, 0, 0.1]
+axis = [0, 0, 1]
+[[joint]]
+name = "guide"
+type = "prismatic"
+between = ["base", "table"]
+at = [0.1, 0, 0]
+axis = [0, 0, 1]
+"""
+
+
+def test_differential_screw_moves_by_the_difference_of_its_pitches(read):
+    """A turn of the screw moves it by 5 mm, and the table back by 4 mm on the screw."""
+    robot = read(DIFFERENTIAL)
+    pose = place_robot(robot, joints={"coarse": 2 * np.pi}).pose()
+    assert pose["tz"] == pytest.approx(0.101, abs=1e-14)
+    C = platform_stiffness(home_posture(robot)).compliance
+    assert C[5, 5] == pytest.approx((0.001 / (2 * np.pi)) ** 2 / 50, rel=1e-9)
 
 
 NUT = """
@@ -143,42 +251,141 @@ axis = [0, 0, 1]
 @pytest.mark.parametrize(("guide", "row", "most"), [
     ("revolute", 2, 25e-6 / 0.004 * 2 * np.pi), ("prismatic", 5, 25e-6),
 ])  # fmt: skip
-def test_backlash_is_along_the_thread(guide, row, most, read):
-    """Tr 16 x 4 of 50 um from flank to flank: 25 um, or 39.3 mrad if only turned."""
+def test_nut_clearance_is_axial_or_a_rotation_by_the_thread(guide, row, most, read):
+    """Tr 16 x 4, 50 um from flank to flank: 25 um, or 39.3 mrad with TZ held."""
     robot = read(NUT.replace('"revolute"', f'"{guide}"'))
     bound = bound_pose_error(solve_assembly(home_posture(robot)))
     error = bound.rotation_error if row == 2 else bound.translation_error
+    assert most == pytest.approx([39.27e-3, 25e-6][row == 5], rel=1e-4)
     assert np.ravel(error) == pytest.approx([most, most], rel=1e-3)
 
 
-def test_a_driven_screw_is_elastic_along_its_thread(read):
-    """K in its freedom: C = s s^T / k of the unit screw s = (0 0 1 0 0 lead)."""
+def test_driven_nut_is_elastic_along_its_thread(read):
+    """C = s s^T / k of the unit screw s = [0 0 1 0 0 h]."""
     text = NUT[: NUT.index("clearance")] + "actuated = true\ndrive_stiffness = 50\n"
     C = platform_stiffness(home_posture(read(text))).compliance
     s = np.array([0, 0, 1, 0, 0, 0.004 / (2 * np.pi)])
     assert np.abs(C - np.outer(s, s) / 50).max() < 1e-14
 
 
+def held_nut(turned, shifted, k=None):
+    """A nut of 25 um axial clearance on a seat with an error along the thread."""
+    K = None if k is None else np.diag([np.inf, np.inf, 0, np.inf, np.inf, k])
+    thread = Frame(
+        "thread", joint="helical", pitch=0.004, joint_stiffness=K,
+        clearance=Clearance(axial=25e-6),
+    )  # fmt: skip
+    seat = Frame("seat", geometric_error=[0, 0, turned, 0, 0, shifted])
+    frames = (thread, Frame("nut", "thread"), seat)
+    return home_posture(Robot("held", "nut", frames, (("nut", "seat"),)))
+
+
+@pytest.mark.parametrize(("turned", "shifted"), [(0.05, 1e-5), (-0.1, 2e-5), (0, 3e-5)])
+def test_margin_of_a_nut_is_its_offset_from_the_thread(turned, shifted):
+    """|TZ - h RZ| / b, the rotation alone being free."""
+    at = held_nut(turned, shifted)
+    expected = abs(shifted - 0.004 / (2 * np.pi) * turned) / 25e-6
+    for method in METHODS:
+        assert zone_margin(at, method=method).margin == pytest.approx(
+            expected, rel=1e-8
+        )
+    assert margin_as_printed(at) == pytest.approx(expected, rel=1e-6)
+
+
+def test_energy_of_a_forced_nut_is_that_of_its_offset_beyond_the_clearance():
+    """k (|TZ - h RZ| - b)^2 / 2, finite motions too: all of them share one axis."""
+    at = held_nut(-0.1, 2e-5, 1e7)
+    over = 2e-5 + 0.1 * 0.004 / (2 * np.pi) - 25e-6
+    for method in METHODS:
+        found = solve_assembly(at, method=method)
+        assert found.energy == pytest.approx(1e7 * over**2 / 2, rel=1e-9)
+        assert found.clearance_excess() < 1e-9
+    assert energy_as_printed(at)[0] == pytest.approx(1e7 * over**2 / 2, rel=1e-6)
+    exact = solve_exact(at)
+    assert exact.energy == pytest.approx(1e7 * over**2 / 2, rel=1e-8)
+    assert exact.clearance_excess() < 1e-9
+
+
+SPRUNG = LIFT.replace("pitch =", (
+    "clearance = { radial = 1e-5, axial = 2e-5, tilt = 1e-4 }\n"
+    "joint_stiffness = [2e4, 2e4, 0, 1e8, 1e8, 5e7]\npitch ="
+))  # fmt: skip
+
+
 @pytest.mark.parametrize("seed", [1, 2])
-def test_compiled_and_reference_agree_on_a_screw_with_errors(seed, read):
-    """A loop with springs, clearance and errors, under a load."""
-    text = LIFT.replace("pitch =", (
-        "clearance = { radial = 1e-5, axial = 2e-5, tilt = 1e-4 }\n"
-        "joint_stiffness = [2e4, 2e4, 0, 1e8, 1e8, 5e7]\npitch ="
-    ))  # fmt: skip
-    robot = read(text)
-    rng = np.random.default_rng(seed)
+def test_compiled_reference_and_printed_energies_of_a_loaded_lift_agree(seed, read):
+    """Three solvers; the printed one has the thread as a constraint of its own."""
+    robot, rng = read(SPRUNG), np.random.default_rng(seed)
     robot = robot.with_errors(rng.normal(size=(len(robot.frames), 6)) * 1e-4)
     at, load = home_posture(robot), rng.normal(size=6) * 100
-    found, expected = (
-        solve_assembly(at, load, method=method) for method in ("compiled", "reference")
-    )
+    found, expected = (solve_assembly(at, load, method=method) for method in METHODS)
     assert found.method == "compiled"
     assert found.energy == pytest.approx(expected.energy, rel=1e-9)
+    energy, screw = energy_as_printed(at, load)
+    assert energy == pytest.approx(expected.energy, rel=1e-5)
+    np.testing.assert_allclose(screw, found.platform_screw, rtol=0, atol=1e-9)
     assert expected.energy > 1e-3
 
 
-def test_a_screw_is_written_and_read_again(read, tmp_path):
+def test_exact_solution_differs_by_the_square_of_the_errors(read):
+    """Ratio of the differences at full and half size: 4, to 5 %."""
+    robot, rng = read(SPRUNG.replace("clearance =", "# ")), np.random.default_rng(3)
+    E, load = rng.normal(size=(len(robot.frames), 6)) * 1e-3, rng.normal(size=6) * 200
+    gap = []
+    for scale in (0.025, 0.0125):
+        at = home_posture(robot.with_errors(scale * E))
+        exact, linear = solve_exact(at, scale * load), solve_assembly(at, scale * load)
+        gap.append(np.abs(exact.platform_screw - linear.platform_screw).max())
+    assert gap[0] / gap[1] == pytest.approx(4.0, rel=0.05)
+    assert gap[0] > 1e-8  # 1e-5 m and rad of errors, 5 N and N m of load
+
+
+def test_exact_rows_of_a_measured_lift_equal_single_exact_solutions(read):
+    """A chord iteration, and Newton's method of the other engine."""
+    robot, rng = read(SPRUNG.replace("clearance =", "# ")), np.random.default_rng(4)
+    robot = robot.with_errors(rng.normal(size=(len(robot.frames), 6)) * 1e-4)
+    postures = [place_robot(robot, pose={"tz": z}) for z in (0.39, 0.42)]
+    here = as_declared(
+        together(postures), rng.normal(size=(2, 6)) * 50,
+        mismatch=[p.mismatch for p in postures], point=np.zeros(3),
+        gravity=[0, 0, -9.81],
+    )  # fmt: skip
+    here = replace(here, exact=True)
+    screws, found = solve_rows(here, np.zeros((2, 0)))
+    assert found.all()
+    for row in range(2):
+        alone = assemble_row(here, row).platform_screw
+        np.testing.assert_allclose(screws[row], alone, rtol=0, atol=2e-11)
+
+
+def test_whole_turns_of_a_passive_nut_count_against_its_limits(read):
+    """After a turn a helical joint is elsewhere; a revolute joint is not."""
+    robot = read(LIFT.replace("pitch =", "limits = [-6.0, 6.0]\npitch ="))
+    at = place_robot(robot, joints={"bearing": -7.0})
+    assert limits_passed(robot, at.coordinates) == "nut at 7 rad, limits -6 to 6"
+
+
+def test_beam_beyond_a_turned_thread_is_longer_by_the_travel(write_file):
+    """From the thread's origin, 0.1 m before it, to its tip 0.24 m aside: 0.26 m."""
+    path = write_file("""
+        platform = "tip"
+        [[frame]]
+        name = "thread"
+        parent = "base"
+        joint = "helical"
+        pitch = 0.2
+        actuated = true
+        position = 3.141592653589793
+        [[frame]]
+        name = "tip"
+        parent = "thread"
+        translation = [0.24, 0, 0]
+        link = { beam = { radius = 0.01 }, young = 2e11, poisson = 0.3 }
+    """)
+    assert read_robot(path).frame("tip").link.length == pytest.approx(0.26, rel=1e-14)
+
+
+def test_screw_is_written_and_read_unchanged(read, tmp_path):
     robot = read()
     write_robot(robot, tmp_path / "frames.toml")
     again = read_robot(tmp_path / "frames.toml")
@@ -187,20 +394,36 @@ def test_a_screw_is_written_and_read_again(read, tmp_path):
 
 
 @pytest.mark.parametrize("ending", ["xml", "urdf"])
-def test_other_programs_files_hold_no_screws(ending, read, tmp_path):
+def test_files_of_other_programs_refuse_a_screw(ending, read, tmp_path):
     read()
     with pytest.raises(BadInput, match=r'helical joints \("nut"\), which only robot'):
         convert(tmp_path / "lift.toml", tmp_path / f"lift.{ending}")
     assert not (tmp_path / f"lift.{ending}").exists()
 
 
-def test_the_motion_of_a_nut_has_no_bound(read):
+def test_rotation_bound_of_a_nut_is_refused(read):
     text = LIFT.replace("pitch =", "clearance = { spin = 1e-3 }\npitch =")
     with pytest.raises(BadInput, match="spin: found one on a helical joint, exp"):
         read(text)
 
 
-def test_the_example_file_loads():
+@pytest.mark.exudyn
+def test_simulation_of_a_screw_is_refused_in_one_line(read, run, tmp_path):
+    read()
+    code, out, err = run("validation", "crosscheck", tmp_path / "lift.toml")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert 'frame "nut": found a helical joint, expected revolute, prismatic' in err
+
+
+def test_study_with_a_cross_check_of_a_screw_is_refused_at_once(read, run, tmp_path):
+    read()
+    (tmp_path / "study.toml").write_text('robot = "lift.toml"')
+    code, _, err = run("study", tmp_path / "study.toml")
+    assert (code, err.count("\n")) == (2, 1)
+    assert 'found helical joints ("nut"), which are not simulated; set crossch' in err
+
+
+def test_example_file_of_the_format_loads():
     path = CASES / "screw.toml"
     if not path.exists():
         pytest.skip(f"{path} is not here")

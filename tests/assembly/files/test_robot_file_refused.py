@@ -103,6 +103,15 @@ REFUSED = {
         'joint = "revolute"\nactuated', 'joint = "revolut"\nactuated',
         'frame "crank".joint: found \'revolut\', expected "fixed" | "revolute" | '
         '"prismatic" | "helical"; did you mean "revolute"?'),
+    "a helical joint without pitch": (
+        'joint = "revolute"\nactuated', 'joint = "helical"\nactuated',
+        'frame "crank".pitch: missing; expected a finite number [m per turn]'),
+    "a pitch of 0": (
+        'joint = "revolute"\nactuated', 'joint = "helical"\npitch = 0\nactuated',
+        'frame "crank".pitch: found 0, expected at least 1e-09 m, or at most minus'),
+    "a pitch of another joint": (
+        'joint = "revolute"\nactuated', 'joint = "revolute"\npitch = 0.01\nactuated',
+        'frame "crank".pitch: found one on a revolute joint, expected none, or a hel'),
     "a number for true": (
         "actuated = true", "actuated = 1",
         'frame "crank".actuated: found 1, expected true or false'),
