@@ -422,7 +422,8 @@ def _search(
 def _first_guess(model: FiniteRobot, linear: Assembly) -> NDArray:
     """Return (N,) linear solution as first guess, clearances projected on the cones."""
     motions = np.hstack([model.joints.cones, model.joints.free])
-    moved = motions.T @ linear.clearance_screws.ravel() / np.sum(motions**2, axis=0)
+    screws = clearance_components(linear.posture.robot, linear.clearance_screws)
+    moved = motions.T @ screws.ravel() / np.sum(motions**2, axis=0)
     x = np.concatenate([linear.elastic, moved])
     turned = np.linalg.norm(place(model, x).screws[..., :3], axis=-1)
     x *= LONGEST_STEP / turned.max(initial=LONGEST_STEP)

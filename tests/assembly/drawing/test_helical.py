@@ -21,11 +21,14 @@ from assembly.linear.zone import zone_margin
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.exact_rows import solve_rows
 from assembly.measurement.predict import assemble_row
+from assembly.model.error_distributions import tolerance_sources
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.platform_stiffness.deflection import deflection_curve
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.platform_stiffness.vibration import natural_modes
+from assembly.statistics.experiment import Experiment
 from assembly.statistics.linear_response import linear_response
+from assembly.statistics.monte_carlo import run_draws
 from assembly.sweeps.sweep import sweep_poses
 from forcefit.inputs.table import BadInput
 
@@ -258,6 +261,16 @@ def test_nut_clearance_is_axial_or_a_rotation_by_the_thread(guide, row, most, re
     error = bound.rotation_error if row == 2 else bound.translation_error
     assert most == pytest.approx([39.27e-3, 25e-6][row == 5], rel=1e-4)
     assert np.ravel(error) == pytest.approx([most, most], rel=1e-3)
+
+
+def test_uniform_positions_of_a_nut_fill_its_axial_clearance(read):
+    """(0, b) uniform: mean of |TZ| b / 2, with 400 draws to 3 sigma, b / 23."""
+    at = home_posture(read(NUT.replace('"revolute"', '"prismatic"')))
+    sources = tolerance_sources(at.robot, [0, 0, 0, 0, 0, 1e-12])
+    data = run_draws(Experiment(at, sources, clearance="uniform"), 400)
+    sizes = data["translation"].values / 25e-6
+    assert sizes.max() == pytest.approx(1.0, abs=0.02)
+    assert sizes.mean() == pytest.approx(0.5, abs=1 / 23)
 
 
 def test_driven_nut_is_elastic_along_its_thread(read):
