@@ -1,28 +1,22 @@
 """Helical joints: a screw and its nut."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 
 from assembly.exact.exact import solve_exact
-from assembly.exchange.convert import convert
-from assembly.exchange.robot_files import load_robot
-from assembly.files.robot_file import read_robot, write_robot
+from assembly.files.robot_file import read_robot
 from assembly.kinematics.mobility import mobility
 from assembly.kinematics.posture import home_posture, place_robot, together
 from assembly.kinematics.verdict import limits_passed
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.as_printed import energy_as_printed, margin_as_printed
-from assembly.linear.zone import zone_margin
+from assembly.linear.reference.as_printed import energy_as_printed
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.exact_rows import solve_rows
 from assembly.measurement.predict import assemble_row
 from assembly.model.error_distributions import tolerance_sources
-from assembly.model.robot import Clearance, Frame, Robot
 from assembly.platform_stiffness.deflection import deflection_curve
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.platform_stiffness.vibration import natural_modes
@@ -30,43 +24,9 @@ from assembly.statistics.experiment import Experiment
 from assembly.statistics.linear_response import linear_response
 from assembly.statistics.monte_carlo import run_draws
 from assembly.sweeps.sweep import sweep_poses
-from forcefit.inputs.table import BadInput
+from tests.screws_for_tests import DIFFERENTIAL, LIFT, NUT
 
-CASES = Path(__file__).parents[4] / "shared" / "cases" / "robots_drawn"
 METHODS = ["compiled", "reference"]
-LIFT = """
-format = 2
-name = "screw_lift"
-platform = "table"
-platform_at = [0.3, 0, 0.4]
-[[body]]
-name = "screw"
-[[body]]
-name = "table"
-mass = 8
-centre = [0.2, 0, 0.4]
-[[joint]]
-name = "bearing"
-type = "revolute"
-between = ["base", "screw"]
-at = [0, 0, 0]
-axis = [0, 0, 1]
-actuated = true
-drive_stiffness = 200
-[[joint]]
-name = "nut"
-type = "helical"
-pitch = "5 mm"
-between = ["screw", "table"]
-at = [0, 0, 0.4]
-axis = [0, 0, 1]
-[[joint]]
-name = "column"
-type = "cylindrical"
-between = ["base", "table"]
-at = [0.2, 0, 0.2]
-axis = [0, 0, 1]
-"""
 LEAD = 0.005 / (2 * np.pi)  # [m/rad] of the lift
 
 
@@ -80,7 +40,7 @@ def read(tmp_path):
 
 
 def test_screw_lift_has_one_freedom_and_three_redundant_constraints(read):
-    """Of the column and the screw, each alone holds two tilts and one rotation."""
+    """Column and screw both hold two tilts, and the distance between their axes."""
     found = mobility(home_posture(read()))
     assert (found.freedoms, found.platform_freedoms) == (1, 1)
     assert (found.freedoms_drives_locked, found.redundant_constraints) == (0, 3)
@@ -98,30 +58,6 @@ def test_height_of_the_table_needs_eighty_turns_of_the_screw(read):
     at = place_robot(read(), pose={"tz": 0.8})
     angle = at.coordinates[at.robot.index("bearing")]
     assert angle == pytest.approx(-80 * 2 * np.pi, rel=1e-12)
-
-
-def test_pose_of_a_chain_is_the_product_of_matrix_exponentials(rng):
-    """exp of each joint's twist [w; p x w + h w], read at the base origin, at home."""
-    frames, twists, parent = [], [], "base"
-    for k, pitch in enumerate([0.3, -0.2, 0.0, 0.7]):
-        kind = "helical" if pitch else "revolute"
-        frames.append(Frame(f"j{k}", parent, rng.normal(size=3), rng.normal(size=3),
-                            joint=kind, pitch=pitch, actuated=True))  # fmt: skip
-        parent = f"j{k}"
-    robot = Robot("chain", "tip", (*frames, Frame("tip", parent, [0.1, 0.2, 0.3])))
-    home, q = home_posture(robot), rng.uniform(-3, 3, 4)
-    for frame, T in zip(frames, home.transforms, strict=False):
-        w, p = T[:3, 2], T[:3, 3]
-        v = np.cross(p, w) + frame.pitch / (2 * np.pi) * w
-        W = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-        twists.append(np.block([[W, v[:, None]], [np.zeros((1, 4))]]))
-    expected = np.linalg.multi_dot([
-        expm(t * a) for t, a in zip(twists, q, strict=True)
-    ])
-    found = place_robot(
-        robot, joints={f.name: a for f, a in zip(frames, q, strict=True)}
-    )
-    assert np.abs(found.platform - expected @ home.platform).max() < 1e-13
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -186,39 +122,6 @@ def test_sweep_of_heights_has_the_error_of_the_pitch_everywhere(read):
     np.testing.assert_allclose(data["platform_screw"].values[:, 5], -1e-3 * LEAD)
 
 
-DIFFERENTIAL = """
-format = 2
-platform = "table"
-platform_at = [0.1, 0, 0.1]
-[[body]]
-name = "screw"
-[[body]]
-name = "table"
-[[joint]]
-name = "coarse"
-type = "helical"
-pitch = "5 mm"
-between = ["base", "screw"]
-at = [0, 0, 0]
-axis = [0, 0, 1]
-actuated = true
-drive_stiffness = 50
-[[joint]]
-name = "fine"
-type = "helical"
-pitch = "4 mm"
-between = ["table", "screw"]
-at = [0, 0, 0.1]
-axis = [0, 0, 1]
-[[joint]]
-name = "guide"
-type = "prismatic"
-between = ["base", "table"]
-at = [0.1, 0, 0]
-axis = [0, 0, 1]
-"""
-
-
 def test_differential_screw_moves_by_the_difference_of_its_pitches(read):
     """A turn of the screw moves it by 5 mm, and the table back by 4 mm on the screw."""
     robot = read(DIFFERENTIAL)
@@ -226,29 +129,6 @@ def test_differential_screw_moves_by_the_difference_of_its_pitches(read):
     assert pose["tz"] == pytest.approx(0.101, abs=1e-14)
     C = platform_stiffness(home_posture(robot)).compliance
     assert C[5, 5] == pytest.approx((0.001 / (2 * np.pi)) ** 2 / 50, rel=1e-9)
-
-
-NUT = """
-format = 2
-platform = "nut"
-platform_at = [0, 0, 0]
-[[body]]
-name = "nut"
-[[joint]]
-name = "thread"
-type = "helical"
-pitch = "4 mm"
-between = ["base", "nut"]
-at = [0, 0, 0]
-axis = [0, 0, 1]
-clearance = { axial = "25 um" }
-[[joint]]
-name = "guide"
-type = "revolute"
-between = ["base", "nut"]
-at = [0, 0, 0]
-axis = [0, 0, 1]
-"""
 
 
 @pytest.mark.parametrize(("guide", "row", "most"), [
@@ -281,44 +161,6 @@ def test_driven_nut_is_elastic_along_its_thread(read):
     assert np.abs(C - np.outer(s, s) / 50).max() < 1e-14
 
 
-def held_nut(turned, shifted, k=None):
-    """A nut of 25 um axial clearance on a seat with an error along the thread."""
-    K = None if k is None else np.diag([np.inf, np.inf, 0, np.inf, np.inf, k])
-    thread = Frame(
-        "thread", joint="helical", pitch=0.004, joint_stiffness=K,
-        clearance=Clearance(axial=25e-6),
-    )  # fmt: skip
-    seat = Frame("seat", geometric_error=[0, 0, turned, 0, 0, shifted])
-    frames = (thread, Frame("nut", "thread"), seat)
-    return home_posture(Robot("held", "nut", frames, (("nut", "seat"),)))
-
-
-@pytest.mark.parametrize(("turned", "shifted"), [(0.05, 1e-5), (-0.1, 2e-5), (0, 3e-5)])
-def test_margin_of_a_nut_is_its_offset_from_the_thread(turned, shifted):
-    """|TZ - h RZ| / b, the rotation alone being free."""
-    at = held_nut(turned, shifted)
-    expected = abs(shifted - 0.004 / (2 * np.pi) * turned) / 25e-6
-    for method in METHODS:
-        assert zone_margin(at, method=method).margin == pytest.approx(
-            expected, rel=1e-8
-        )
-    assert margin_as_printed(at) == pytest.approx(expected, rel=1e-6)
-
-
-def test_energy_of_a_forced_nut_is_that_of_its_offset_beyond_the_clearance():
-    """k (|TZ - h RZ| - b)^2 / 2, finite motions too: all of them share one axis."""
-    at = held_nut(-0.1, 2e-5, 1e7)
-    over = 2e-5 + 0.1 * 0.004 / (2 * np.pi) - 25e-6
-    for method in METHODS:
-        found = solve_assembly(at, method=method)
-        assert found.energy == pytest.approx(1e7 * over**2 / 2, rel=1e-9)
-        assert found.clearance_excess() < 1e-9
-    assert energy_as_printed(at)[0] == pytest.approx(1e7 * over**2 / 2, rel=1e-6)
-    exact = solve_exact(at)
-    assert exact.energy == pytest.approx(1e7 * over**2 / 2, rel=1e-8)
-    assert exact.clearance_excess() < 1e-9
-
-
 SPRUNG = LIFT.replace("pitch =", (
     "clearance = { radial = 1e-5, axial = 2e-5, tilt = 1e-4 }\n"
     "joint_stiffness = [2e4, 2e4, 0, 1e8, 1e8, 5e7]\npitch ="
@@ -338,19 +180,6 @@ def test_compiled_reference_and_printed_energies_of_a_loaded_lift_agree(seed, re
     assert energy == pytest.approx(expected.energy, rel=1e-5)
     np.testing.assert_allclose(screw, found.platform_screw, rtol=0, atol=1e-9)
     assert expected.energy > 1e-3
-
-
-def test_exact_solution_differs_by_the_square_of_the_errors(read):
-    """Ratio of the differences at full and half size: 4, to 5 %."""
-    robot, rng = read(SPRUNG.replace("clearance =", "# ")), np.random.default_rng(3)
-    E, load = rng.normal(size=(len(robot.frames), 6)) * 1e-3, rng.normal(size=6) * 200
-    gap = []
-    for scale in (0.025, 0.0125):
-        at = home_posture(robot.with_errors(scale * E))
-        exact, linear = solve_exact(at, scale * load), solve_assembly(at, scale * load)
-        gap.append(np.abs(exact.platform_screw - linear.platform_screw).max())
-    assert gap[0] / gap[1] == pytest.approx(4.0, rel=0.05)
-    assert gap[0] > 1e-8  # 1e-5 m and rad of errors, 5 N and N m of load
 
 
 def test_exact_rows_of_a_measured_lift_equal_single_exact_solutions(read):
@@ -376,68 +205,3 @@ def test_whole_turns_of_a_passive_nut_count_against_its_limits(read):
     robot = read(LIFT.replace("pitch =", "limits = [-6.0, 6.0]\npitch ="))
     at = place_robot(robot, joints={"bearing": -7.0})
     assert limits_passed(robot, at.coordinates) == "nut at 7 rad, limits -6 to 6"
-
-
-def test_beam_beyond_a_turned_thread_is_longer_by_the_travel(write_file):
-    """From the thread's origin, 0.1 m before it, to its tip 0.24 m aside: 0.26 m."""
-    path = write_file("""
-        platform = "tip"
-        [[frame]]
-        name = "thread"
-        parent = "base"
-        joint = "helical"
-        pitch = 0.2
-        actuated = true
-        position = 3.141592653589793
-        [[frame]]
-        name = "tip"
-        parent = "thread"
-        translation = [0.24, 0, 0]
-        link = { beam = { radius = 0.01 }, young = 2e11, poisson = 0.3 }
-    """)
-    assert read_robot(path).frame("tip").link.length == pytest.approx(0.26, rel=1e-14)
-
-
-def test_screw_is_written_and_read_unchanged(read, tmp_path):
-    robot = read()
-    write_robot(robot, tmp_path / "frames.toml")
-    again = read_robot(tmp_path / "frames.toml")
-    assert again.frame("nut").pitch == robot.frame("nut").pitch == 0.005
-    assert convert(tmp_path / "lift.toml", tmp_path / "c.toml").difference < 1e-12
-
-
-@pytest.mark.parametrize("ending", ["xml", "urdf"])
-def test_files_of_other_programs_refuse_a_screw(ending, read, tmp_path):
-    read()
-    with pytest.raises(BadInput, match=r'helical joints \("nut"\), which only robot'):
-        convert(tmp_path / "lift.toml", tmp_path / f"lift.{ending}")
-    assert not (tmp_path / f"lift.{ending}").exists()
-
-
-def test_rotation_bound_of_a_nut_is_refused(read):
-    text = LIFT.replace("pitch =", "clearance = { spin = 1e-3 }\npitch =")
-    with pytest.raises(BadInput, match="spin: found one on a helical joint, exp"):
-        read(text)
-
-
-@pytest.mark.exudyn
-def test_simulation_of_a_screw_is_refused_in_one_line(read, run, tmp_path):
-    read()
-    code, out, err = run("validation", "crosscheck", tmp_path / "lift.toml")
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert 'frame "nut": found a helical joint, expected revolute, prismatic' in err
-
-
-def test_study_with_a_cross_check_of_a_screw_is_refused_at_once(read, run, tmp_path):
-    read()
-    (tmp_path / "study.toml").write_text('robot = "lift.toml"')
-    code, _, err = run("study", tmp_path / "study.toml")
-    assert (code, err.count("\n")) == (2, 1)
-    assert 'found helical joints ("nut"), which are not simulated; set crossch' in err
-
-
-def test_example_file_of_the_format_loads():
-    path = CASES / "screw.toml"
-    if not path.exists():
-        pytest.skip(f"{path} is not here")
-    assert home_posture(load_robot(path)).mismatch < 1e-14
