@@ -66,7 +66,7 @@ from assembly.model.clearance import (
     clearance_excess,
     has_bounded_motion,
 )
-from assembly.model.links import own_screw
+from assembly.model.links import own_screws
 from assembly.solvers.cones import into_cones
 from assembly.solvers.method import Method, check_method
 from forcefit.results.display import Figures, html_table, short_repr
@@ -236,9 +236,8 @@ class ExactAssembly:
     def clearance_screws(self) -> NDArray:
         """(n, 6) [rad, m] clearances, with motions of passive joints."""
         screws = self.placement.screws[CLEARANCE, self.cut.last]
-        units = [own_screw(frame) for frame in self.posture.robot.frames]
-        screws += self.placement.own[self.cut.last, None] * np.array(units)
-        return screws
+        own = self.placement.own[self.cut.last, None]
+        return screws + own * own_screws(self.posture.robot)
 
     @cached_property
     def closure_wrenches(self) -> NDArray:

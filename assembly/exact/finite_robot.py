@@ -20,7 +20,7 @@ from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
 from assembly.kinematics.se3 import exponential, inverse
 from assembly.linear.closure import VirtualJoints
-from assembly.model.links import own_screw
+from assembly.model.links import own_screws
 from assembly.model.robot import Robot
 from stiffness.screws import rotation_matrix, transform
 
@@ -180,8 +180,7 @@ class FiniteRobot:
 
 def along_own(robot: Robot, coordinates: NDArray) -> NDArray:
     """Return the (..., n, 4, 4) motions about or along each joint's z by (..., n)."""
-    units = np.array([own_screw(frame) for frame in robot.frames])
-    return exponential(coordinates[..., None] * units)
+    return exponential(coordinates[..., None] * own_screws(robot))
 
 
 def nominally_carried(posture: Posture) -> NDArray:

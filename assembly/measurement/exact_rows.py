@@ -24,7 +24,7 @@ from assembly.kinematics.pieces import cut_beams
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.row_state import Rows, RowState
 from assembly.measurement.without_clearance import flexibility
-from assembly.model.links import own_screw
+from assembly.model.links import own_screws
 from assembly.model.robot import Robot
 
 _MOST_ITERATIONS = 60  # largest number of iterations; 5 to 12 are usual
@@ -69,11 +69,13 @@ def solve_rows(
 
 def _of_passive_joints(free: NDArray, robot: Robot) -> bool:
     """Return whether all free motions (6n, q) are those of passive joints."""
-    own = np.zeros((len(free), len(robot.frames)))
-    for i, frame in enumerate(robot.frames):
-        if frame.passive:
-            own[6 * i : 6 * i + 6, i] = own_screw(frame)
-    return bool((free[:, :, None] == own[:, None, :]).all(axis=0).any(axis=1).all())
+    passive = np.array([frame.passive for frame in robot.frames])
+    own = own_screws(robot) * passive[:, None]
+    for column in free.T.reshape(-1, len(robot.frames), 6):
+        row = np.abs(column).max(axis=1).argmax()
+        if not np.array_equal(column[row], own[row]):
+            return False
+    return True
 
 
 def _solve(rows: Rows) -> tuple[NDArray, NDArray]:

@@ -57,8 +57,6 @@ class Frame:
         rotation: (3,) [rad] rotation vector of the axes, seen from there too.
         joint: ``"fixed"``, ``"revolute"`` or ``"prismatic"``, about or along own z, or
             ``"helical"``, both together; its coordinate is the angle.
-        pitch: [m] translation of a helical joint in a turn, positive for a right-hand
-            thread; 0 of other joints.
         actuated: whether the joint is locked at a command; otherwise its motion is
             free.
         position: [rad or m] joint coordinate in the home pose.
@@ -72,6 +70,8 @@ class Frame:
         link: elasticity of the body, None if rigid.
         mass: [kg] of the body in addition to its link's own.
         centre_of_mass: (3,) [m] of that mass, in the frame's axes.
+        pitch: [m] translation of a helical joint in a turn, positive for a right-hand
+            thread; 0 of other joints.
     """
 
     name: str
@@ -79,7 +79,6 @@ class Frame:
     translation: NDArray = field(default_factory=lambda: np.zeros(3))
     rotation: NDArray = field(default_factory=lambda: np.zeros(3))
     joint: str = "fixed"
-    pitch: float = 0.0
     actuated: bool = False
     position: float = 0.0
     limits: tuple[float, float] | None = None
@@ -90,6 +89,7 @@ class Frame:
     link: Link | None = None
     mass: float = 0.0
     centre_of_mass: NDArray = field(default_factory=lambda: np.zeros(3))
+    pitch: float = 0.0
 
     __repr__, _repr_html_ = short_repr, html_table
 

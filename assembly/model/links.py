@@ -123,6 +123,15 @@ def own_screw(frame: Frame) -> NDArray:
     return motion_map(frame)[:, frame.own_axis]
 
 
+def own_screws(robot: Robot) -> NDArray:
+    """Return the (n, 6) unit screws of all joints' own motions."""
+    frames = robot.frames
+    screws = np.zeros((len(frames), 6))
+    screws[np.arange(len(frames)), [frame.own_axis for frame in frames]] = 1.0
+    screws[:, 5] += [frame.lead for frame in frames]
+    return screws
+
+
 def motion_map(frame: Frame) -> NDArray:
     """Return the (6, 6) map of a joint's components to its screw in the frame's axes.
 

@@ -15,7 +15,7 @@ from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reference.as_printed import energy_as_printed
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.exact_rows import solve_rows
-from assembly.measurement.predict import assemble_row
+from assembly.measurement.predict import assemble_row, predict
 from assembly.model.error_distributions import tolerance_sources
 from assembly.platform_stiffness.deflection import deflection_curve
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
@@ -182,11 +182,13 @@ def test_compiled_reference_and_printed_energies_of_a_loaded_lift_agree(seed, re
     assert expected.energy > 1e-3
 
 
-def test_exact_rows_of_a_measured_lift_equal_single_exact_solutions(read):
+@pytest.mark.parametrize("pitch", ["5 mm", "9 mm"])
+def test_exact_rows_of_a_measured_lift_equal_single_exact_solutions(pitch, read):
     """A chord iteration, and Newton's method of the other engine."""
-    robot, rng = read(SPRUNG.replace("clearance =", "# ")), np.random.default_rng(4)
+    text = SPRUNG.replace("clearance =", "# ").replace("5 mm", pitch)
+    robot, rng = read(text), np.random.default_rng(4)
     robot = robot.with_errors(rng.normal(size=(len(robot.frames), 6)) * 1e-4)
-    postures = [place_robot(robot, pose={"tz": z}) for z in (0.39, 0.42)]
+    postures = [place_robot(robot, pose={"tz": z}) for z in (0.4, 0.42)]
     here = as_declared(
         together(postures), rng.normal(size=(2, 6)) * 50,
         mismatch=[p.mismatch for p in postures], point=np.zeros(3),
@@ -198,6 +200,17 @@ def test_exact_rows_of_a_measured_lift_equal_single_exact_solutions(read):
     for row in range(2):
         alone = assemble_row(here, row).platform_screw
         np.testing.assert_allclose(screws[row], alone, rtol=0, atol=2e-11)
+
+
+def test_readings_of_lifts_that_differ_in_pitch_are_those_of_their_own(read):
+    """At the same frames, an error of 1 mrad moves the tables by their own lead."""
+    for pitch in (0.005, 0.009):
+        robot = read(LIFT.replace('"5 mm"', str(pitch)))
+        errors = np.zeros((6, 6))
+        errors[robot.index("bearing"), 2] = 1e-3
+        at = home_posture(robot.with_errors(errors))
+        found = predict(as_declared(at, np.zeros(6))).deviation[0]
+        assert found[5] == pytest.approx(-1e-3 * pitch / (2 * np.pi), rel=1e-9)
 
 
 def test_whole_turns_of_a_passive_nut_count_against_its_limits(read):
