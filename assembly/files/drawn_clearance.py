@@ -14,13 +14,12 @@ _ANGLES = ("tilt", "spin")
 _Clearance = tuple[Clearance | None, tuple[Contact, ...]]
 
 
-def read_drawn_clearance(table: Table, kind: str, slides: bool) -> _Clearance:
+def read_drawn_clearance(table: Table, kind: str) -> _Clearance:
     """The ``clearance`` table of a joint or of a bearing.
 
     Args:
         table: of the joint.
         kind: its type; that of a universal joint's bearing is ``"revolute"``.
-        slides: whether it is passive and prismatic.
 
     Returns:
         The bounds of its own frame, None if there are none; and its contacts.
@@ -34,7 +33,7 @@ def read_drawn_clearance(table: Table, kind: str, slides: bool) -> _Clearance:
     inner = Table(dict(given.content), given.file, given.place)
     for key in (*BOUNDS, "length"):
         without_units(inner, key, "angle" if key in _ANGLES else "length")
-    bounds = read_bounds(inner, slides)
+    bounds = read_bounds(inner, kind)
     contacts = [key for key in _CONTACTS if inner.has(key)]
     if len(contacts) > 1:
         fault = f"found together with {quoted(contacts[0])}"

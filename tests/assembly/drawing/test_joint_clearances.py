@@ -25,6 +25,8 @@ from validation.crosscheck.pair import scaled
 
 C, L = 10e-6, 40e-3  # [m]
 BORE = 'radial = "10 um", length = "40 mm"'
+GUIDE = "guide = { gap = 1e-5, length = 0.08, width = 0.04, height = 0.03 }"
+PAD = "pad = { gap = 1e-5, length = 0.06, width = 0.04 }"
 
 
 @pytest.fixture
@@ -160,6 +162,31 @@ def test_a_round_guide_slides_and_its_key_bounds_its_roll(one_joint):
     assert mobility(posture).freedoms == 1
 
 
+@pytest.mark.parametrize("driven", [False, True])
+def test_a_nut_has_the_bore_of_its_length_and_a_backlash_along_its_thread(
+    driven, one_joint
+):
+    """Tr 16 x 4, 50 um from flank to flank: |TZ - h RZ| <= 25 um, h = 4 mm / 2 pi."""
+    keys = 'axis = [0, 0, 1]\npitch = "4 mm"'
+    keys += "\nactuated = true" if driven else ""
+    text = BORE + ', axial = "25 um"'
+    posture = one_joint("helical", text, [0, 0, 0.1], keys)
+    along_thread = [0, 0, -4e-3 / (2 * np.pi), 0, 0, 1]
+    found = heights(posture, [along_thread, [0, 0, 0, 0.6, 0.8, 0]])
+    np.testing.assert_allclose(found, [25e-6, 50e-6], rtol=1e-7)
+    assert mobility(posture).drives == driven
+
+
+def test_only_the_own_frame_of_a_driven_joint_is_its_drive(one_joint):
+    keys = "axis = [0, 0, 1]\nactuated = true\nposition = 0.1\nlimits = [0, 1]"
+    for text in (BORE, GUIDE):
+        posture = one_joint("prismatic", text, keys=keys)
+        assert mobility(posture).drives == 1
+        assert [f.name for f in posture.robot.frames if f.actuated] == ["j"]
+        assert [f.name for f in posture.robot.frames if f.limits] == ["j"]
+        assert mobility(posture).freedoms == 1
+
+
 @pytest.mark.parametrize("axis2", [[0, 1, 0], [1, 1, 0]])
 def test_a_cross_adds_the_clearances_of_its_two_bearings(axis2, one_joint):
     """c = a = 10 um, L = 30 mm: 20 um along each axis, 4 c / L = 1.33 mrad about n."""
@@ -196,10 +223,6 @@ def test_a_ball_joint_reaches_its_gap_and_turns_freely(one_joint, rng):
     found = heights(posture, [[0, 0, 0, *d] for d in directions])
     np.testing.assert_allclose(found, C * np.linalg.norm(directions, axis=1), rtol=1e-7)
     assert mobility(posture).freedoms == 3
-
-
-GUIDE = "guide = { gap = 1e-5, length = 0.08, width = 0.04, height = 0.03 }"
-PAD = "pad = { gap = 1e-5, length = 0.06, width = 0.04 }"
 
 
 def test_a_guide_reaches_its_largest_motions_one_by_one(one_joint):

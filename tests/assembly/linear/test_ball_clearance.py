@@ -21,11 +21,11 @@ C = 10e-6  # [m]
 
 
 def with_balls(robot):
-    """The robot, each radial clearance made a ball, except of sliding joints."""
+    """The robot, each radial clearance made a ball, except of slides."""
 
     def changed(frame):
         given = frame.clearance
-        if given is None or (frame.passive and frame.joint == "prismatic"):
+        if given is None or frame.joint == "prismatic":
             return frame
         ball = Clearance(tilt=given.tilt, spin=given.spin, ball=given.radial)
         return replace(frame, clearance=ball)
@@ -173,5 +173,5 @@ def test_clearances_of_a_ball_are_named_so():
 def test_a_ball_takes_the_place_of_other_bounds(key):
     with pytest.raises(BadInput, match=f'clearance.{key}: found together with "ball"'):
         Clearance(ball=C, **{key: C})
-    with pytest.raises(BadInput, match=r"clearance\.ball: found one on a passive pris"):
+    with pytest.raises(BadInput, match=r"clearance\.ball: found one on a joint that"):
         Frame("slide", joint="prismatic", clearance=Clearance(ball=C))
