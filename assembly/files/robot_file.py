@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from assembly.drawing.frames import robot_of_drawing
 from assembly.files.drawing_file import is_drawing, read_drawing
 from assembly.files.effect_file import effect_tables, with_effects
+from assembly.files.inertia_file import read_inertia
 from assembly.files.joint_file import read_clearance, read_joint_stiffness
 from assembly.files.link_file import link_table, read_link
 from assembly.kinematics.posture import home_posture
+from assembly.model.inertia import six_moments
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.link_span import with_spans
 from assembly.model.robot import (
@@ -249,6 +251,7 @@ def _frame(table: Table) -> Frame:
         link=read_link(table),
         mass=table.number("mass", "kg", 0.0, least=0.0, largest=1e40),
         centre_of_mass=_numbers(table, "centre_of_mass", 3, "m"),
+        inertia=read_inertia(table),
     )
     if not isinstance(frame.link, MeshLink) and "up" in table.content:
         raise table.bad(
@@ -451,6 +454,8 @@ def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
         table["mass"] = frame.mass
     if np.any(frame.centre_of_mass):
         table["centre_of_mass"] = frame.centre_of_mass.tolist()
+    if np.any(frame.inertia):
+        table["inertia"] = six_moments(frame.inertia)
     return table
 
 

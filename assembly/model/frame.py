@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.model.inertia import inertia_fault
 from assembly.model.link_kinds import BeamLink, Link
 from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import html_table, short_repr
@@ -68,6 +69,8 @@ class Frame:
         link: elasticity of the body, None if rigid.
         mass: [kg] of the body in addition to its link's own.
         centre_of_mass: (3,) [m] of that mass, in the frame's axes.
+        inertia: (3, 3) [kg m^2] of that mass about its centre, in the frame's axes;
+            symmetric, its principal moments those of a body.
     """
 
     name: str
@@ -85,6 +88,7 @@ class Frame:
     link: Link | None = None
     mass: float = 0.0
     centre_of_mass: NDArray = field(default_factory=lambda: np.zeros(3))
+    inertia: NDArray = field(default_factory=lambda: np.zeros((3, 3)))
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -97,6 +101,13 @@ class Frame:
         own = self.own_stiffness
         if self.passive and own is not None and np.isinf(own):
             raise BadInput(f"frame {quoted(self.name)}.joint_stiffness: {LOCKED}")
+        if self.inertia.any():
+            fault = inertia_fault(self.inertia)
+            if fault:
+                raise BadInput(f"frame {quoted(self.name)}.inertia: {fault}")
+            # files have the upper triangle
+            J = locked((self.inertia + self.inertia.T) / 2, (3, 3), "inertia")
+            object.__setattr__(self, "inertia", J)
 
     @property
     def passive(self) -> bool:
@@ -146,6 +157,7 @@ _SHAPES = {
     "tolerance": (6,),
     "joint_stiffness": (6, 6),
     "centre_of_mass": (3,),
+    "inertia": (3, 3),
 }
 
 

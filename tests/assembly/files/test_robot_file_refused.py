@@ -117,6 +117,18 @@ REFUSED = {
     "a negative mass": (
         "mass = 1.2", "mass = -1.2",
         'frame "coupler".mass: found -1.2, expected a finite number >= 0 [kg]'),
+    "moments of inertia of no body": (
+        "mass = 1.2", "mass = 1.2\ninertia = [1, 1, 2.1, 0, 0, 0]",
+        'frame "coupler".inertia: found principal moments 1, 1, 2.1; expected none '
+        "negative, and none larger than the sum of the other two"),
+    "a negative principal moment": (
+        "mass = 1.2", "mass = 1.2\ninertia = [1, 1, 1, 2, 0, 0]",
+        'frame "coupler".inertia: found principal moments -1, 1, 3; expected none '
+        "negative, and none larger than the sum of the other two"),
+    "moments of inertia as a matrix": (
+        "mass = 1.2", "mass = 1.2\ninertia = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]",
+        'frame "coupler".inertia: found [[1, 0, 0], [0, 1, 0], [0, 0, 1]] of length '
+        "3, expected 6 finite numbers [kg m^2]"),
     "an infinite length": (
         "translation = [0.3, 0.0, 0.0]", "translation = [0.3, -inf, 0.0]",
         'frame "wrist".translation: found -inf as number 2, expected 3 finite numbers '
