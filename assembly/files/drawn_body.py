@@ -108,9 +108,8 @@ def with_ends(
     matrix, mass, centre, J = curve_link(link, start, back @ end)
     centre, R = (copied.T @ [*centre, 1.0])[:3], copied.T[:3, :3]
     if mass:
-        total, middle, whole = joined_bodies(
-            (body.mass, mass), (body.centre, centre), (body.inertia, R @ J @ R.T)
-        )
+        own = body.mass, body.centre, body.inertia
+        total, middle, whole = joined_bodies([own, (mass, centre, R @ J @ R.T)])
         body = replace(body, mass=total, centre=middle, inertia=whole)
     return replace(body, link=matrix)
 

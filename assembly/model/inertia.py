@@ -5,6 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+# mass [kg], centre (3,) [m] and moments of inertia (3, 3) [kg m^2] about that centre
+MassProperties = tuple[float, NDArray, NDArray]
+
 _ROUNDING = 1e-6  # [-] of the largest moment: files have few digits
 _SIX = (np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2]))
 
@@ -48,25 +51,20 @@ def point_inertia(mass: float, arm: NDArray) -> NDArray:
     return np.asarray(mass * (arm @ arm * np.eye(3) - np.outer(arm, arm)))
 
 
-def joined_bodies(
-    masses: Sequence[float], centres: Sequence[NDArray], inertias: Sequence[NDArray]
-) -> tuple[float, NDArray, NDArray]:
+def joined_bodies(parts: Sequence[MassProperties]) -> MassProperties:
     """Return mass, centre and moments of inertia of bodies that form one rigid body.
 
     Args:
-        masses: [kg] of each.
-        centres: (3,) [m] of each, in common axes.
-        inertias: (3, 3) [kg m^2] of each about its own centre.
+        parts: mass properties of each body, in common axes.
 
     Returns:
-        [kg], (3,) [m], and (3, 3) [kg m^2] about that centre, by the parallel axis
-        theorem; the centre is the origin without a mass.
+        Theirs together, by the parallel axis theorem; the centre is the origin without
+        a mass.
     """
-    total = float(sum(masses))
-    centre = np.zeros(3)
+    masses, centres = [mass for mass, _, _ in parts], [at for _, at, _ in parts]
+    total, centre, J = float(sum(masses)), np.zeros(3), np.zeros((3, 3))
     if total:
         centre = np.asarray(np.average(centres, axis=0, weights=masses))
-    J = np.zeros((3, 3))
-    for mass, at, own in zip(masses, centres, inertias, strict=True):
+    for mass, at, own in parts:
         J += own + point_inertia(mass, at - centre)
     return total, centre, J

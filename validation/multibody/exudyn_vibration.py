@@ -4,7 +4,8 @@ Exudyn linearises the model by forward differences and projects it onto the moti
 its joints allow.  Differences of two sizes cancel the error of first order: without
 this a stiff robot's frequencies are wrong by 1e-6 to 1e-2.
 Only bodies with a given mass or moments of inertia have one, so the mass matrix is
-singular: degrees of freedom without inertia are condensed, instead of having an infinite frequency.
+singular: degrees of freedom without inertia are condensed, instead of having an
+infinite frequency.
 """
 
 import numpy as np

@@ -21,18 +21,17 @@ def test_a_box_cut_in_three_has_the_moments_of_the_whole_box(turn):
     cuts = np.array([0.0, 0.1, 0.25, 0.6])
     lengths = np.diff(cuts)
     middles = (cuts[1:] + cuts[:-1]) / 2 - 0.3
-    mass, centre, J = joined_bodies(
-        10 * lengths,
-        [at + R @ [x, 0, 0] for x in middles],
-        [R @ box(10 * x, [x, 0.2, 0.05]) @ R.T for x in lengths],
-    )
+    mass, centre, J = joined_bodies([
+        (10 * x, at + R @ [middle, 0, 0], R @ box(10 * x, [x, 0.2, 0.05]) @ R.T)
+        for x, middle in zip(lengths, middles, strict=True)
+    ])
     assert mass == pytest.approx(6.0, rel=1e-15)
     np.testing.assert_allclose(centre, at, rtol=1e-14)
     np.testing.assert_allclose(J, R @ box(6, [0.6, 0.2, 0.05]) @ R.T, atol=1e-15)
 
 
 def test_bodies_without_mass_keep_their_moments():
-    mass, centre, J = joined_bodies([0.0], [np.ones(3)], [np.eye(3)])
+    mass, centre, J = joined_bodies([(0.0, np.ones(3), np.eye(3))])
     assert mass == 0.0
     np.testing.assert_array_equal(centre, np.zeros(3))
     np.testing.assert_array_equal(J, np.eye(3))
