@@ -80,6 +80,7 @@ _FRAME = record(
     joint_stiffness_=Either((
         number("diagonal stiffness", "N m/rad .. N/m", "screw"), _STIFFNESS,
     )),
+    drive_force_=number("force of a drive on a passive joint", "N m or N"),
     link_=_LINK, up_=_DIRECTION, mass_=number("mass", "kg"),
     centre_of_mass_=number("centre of mass", "m", "axis"), inertia_=_INERTIA,
 )  # fmt: skip

@@ -7,15 +7,15 @@ carries the children.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.model.inertia import inertia_fault
+from assembly.model.inertia import inertia_fault, six_moments
 from assembly.model.link_kinds import BeamLink, Link
 from forcefit.inputs.table import BadInput, quoted
-from forcefit.results.display import html_table, short_repr
+from forcefit.results.display import Figures, brief, html_table, short_repr
 from stiffness.screws import rotation_matrix
 
 JOINTS = ("fixed", "revolute", "prismatic")
@@ -23,6 +23,11 @@ BASE = "base"
 LOCKED = (
     "found inf along the own motion of a passive joint, which would lock it; expected "
     '0 (free, as a bearing), a number > 0 (a spring), or joint = "fixed"'
+)
+
+FORCE_CONTROL = (
+    'expected a joint = "revolute" | "prismatic" that is not actuated: a drive that '
+    "applies a force holds no coordinate"
 )
 
 
@@ -66,6 +71,8 @@ class Frame:
         clearance: clearance of the joint; None if it has none.
         joint_stiffness: (6, 6) K_B with ``inf`` on the diagonal where rigid, or None;
             0 along a passive joint's own motion (its row and column) leaves it free.
+        drive_force: [N m or N] with which a drive pushes a passive joint along its
+            motion, independent of its coordinate; positive where the coordinate grows.
         link: elasticity of the body, None if rigid.
         mass: [kg] of the body in addition to its link's own.
         centre_of_mass: (3,) [m] of that mass, in the frame's axes.
@@ -85,6 +92,7 @@ class Frame:
     tolerance: NDArray | None = None
     clearance: Clearance | None = None
     joint_stiffness: NDArray | None = None
+    drive_force: float = 0.0
     link: Link | None = None
     mass: float = 0.0
     centre_of_mass: NDArray = field(default_factory=lambda: np.zeros(3))
@@ -101,6 +109,12 @@ class Frame:
         own = self.own_stiffness
         if self.passive and own is not None and np.isinf(own):
             raise BadInput(f"frame {quoted(self.name)}.joint_stiffness: {LOCKED}")
+        if self.drive_force and not self.passive:
+            kind = "actuated" if self.actuated else "fixed"
+            raise BadInput(
+                f"frame {quoted(self.name)}.drive_force: found {self.drive_force:g} on "
+                f"a {kind} joint; {FORCE_CONTROL}"
+            )
         if self.inertia.any():
             fault = inertia_fault(self.inertia)
             if fault:
@@ -108,6 +122,16 @@ class Frame:
             # files have the upper triangle
             J = locked((self.inertia + self.inertia.T) / 2, (3, 3), "inertia")
             object.__setattr__(self, "inertia", J)
+
+    def _figures(self) -> Figures:
+        """Return the fields in short; the rarest only where they are not zero."""
+        shown = {f.name: brief(getattr(self, f.name)) for f in fields(self)[1:]}
+        if not self.drive_force:
+            del shown["drive_force"]
+        del shown["inertia"]
+        if self.inertia.any():
+            shown["inertia"] = brief(np.array(six_moments(self.inertia)))
+        return shown
 
     @property
     def passive(self) -> bool:

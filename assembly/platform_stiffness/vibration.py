@@ -102,7 +102,10 @@ def natural_modes(
     if state not in {"nominal", "exact"}:
         raise ValueError(f"natural_modes: no state {state!r}")
     if state == "nominal":
-        frames = (replace(f, clearance=None) for f in posture.robot.frames)
+        # forces of drives are loads
+        frames = (
+            replace(f, clearance=None, drive_force=0.0) for f in posture.robot.frames
+        )
         tight = replace(posture.robot, frames=tuple(frames))
         posture = replace(posture, robot=tight.with_errors(0 * tight.errors))
         load = gravity = None

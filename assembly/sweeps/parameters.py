@@ -34,7 +34,8 @@ _UNITS = {
     "radius": "m", "inner_radius": "m", "width": "m", "height": "m", "length": "m",
     "area": "m^2", "I_y": "m^4", "I_z": "m^4", "J": "m^4", "shear_y": "1",
     "shear_z": "1", "young": "Pa", "poisson": "1", "density": "kg/m^3", "mass": "kg",
-    "centre_of_mass": "m", "inertia": "kg m^2", "position": "rad or m",
+    "centre_of_mass": "m", "inertia": "kg m^2", "drive_force": "N m or N",
+    "position": "rad or m",
 }  # fmt: skip
 
 Setter = Callable[[float], None]

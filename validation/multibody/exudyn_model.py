@@ -245,6 +245,17 @@ class Model:
         self.mbs.AddLoad(torque)
         self.add_force(place, wrench[3:])
 
+    def add_following_load(self, place: Place, wrench: NDArray) -> None:
+        """Add a wrench at a place, in its axes, which turns with its body."""
+        marker = self.add_marker(place)
+        for load, vector in (
+            (self.item.LoadTorqueVector, wrench[:3]),
+            (self.item.LoadForceVector, wrench[3:]),
+        ):
+            self.mbs.AddLoad(
+                load(markerNumber=marker, bodyFixed=True, loadVector=vector.tolist())
+            )
+
     def add_force(self, place: Place, force: NDArray) -> None:
         """Add a force (3,) [N] at a place, in base axes, of constant direction."""
         load = self.item.LoadForceVector(

@@ -183,7 +183,7 @@ def simulate_assembly(
 
     Args:
         posture: the robot and its joint coordinates; actuated joints are locked there.
-        scale: factor on the robot's geometric errors.
+        scale: factor on the robot's geometric errors and on the forces of its drives.
         model: options for links and joints.
         load: (6,) [N m, N] on the platform at its origin, base axes, of constant
             direction.

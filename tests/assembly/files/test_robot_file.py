@@ -208,7 +208,7 @@ def every_joint(rng):
     yield {"joint": "revolute", "actuated": True, "limits": (-1.5, 2.0)}
     yield {"joint": "prismatic", "clearance": Clearance(1e-30, None, 0.0, 1.0)}
     yield {"joint": "revolute", "joint_stiffness": bearing}
-    yield {"joint": "prismatic", "joint_stiffness": slide}
+    yield {"joint": "prismatic", "joint_stiffness": slide, "drive_force": -1 / 3}
     yield {"joint": "prismatic", "actuated": True, "joint_stiffness": locked}
     yield {"joint": "revolute", "joint_stiffness": K, "clearance": Clearance(1 / 3)}
 
