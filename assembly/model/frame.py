@@ -18,16 +18,17 @@ from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import Figures, brief, html_table, short_repr
 from stiffness.screws import rotation_matrix
 
-JOINTS = ("fixed", "revolute", "prismatic")
+JOINTS = ("fixed", "revolute", "prismatic", "helical")
 BASE = "base"
 LOCKED = (
     "found inf along the own motion of a passive joint, which would lock it; expected "
     '0 (free, as a bearing), a number > 0 (a spring), or joint = "fixed"'
 )
+NO_SPIN = "expected none: its motion along the thread has no clearance bound"
 
 FORCE_CONTROL = (
-    'expected a joint = "revolute" | "prismatic" that is not actuated: a drive that '
-    "applies a force holds no coordinate"
+    'expected a joint = "revolute" | "prismatic" | "helical" that is not actuated: a '
+    "drive that applies a force holds no coordinate"
 )
 
 
@@ -60,7 +61,8 @@ class Frame:
         parent: name of the parent frame, or ``"base"``.
         translation: (3,) [m] origin seen from the parent's frame after its joint.
         rotation: (3,) [rad] rotation vector of the axes, seen from there too.
-        joint: ``"fixed"``, ``"revolute"`` or ``"prismatic"``, about or along own z.
+        joint: ``"fixed"``, ``"revolute"`` or ``"prismatic"``, about or along own z, or
+            ``"helical"``, both together; its coordinate is the angle.
         actuated: whether the joint is locked at a command; otherwise its motion is
             free.
         position: [rad or m] joint coordinate in the home pose.
@@ -78,6 +80,8 @@ class Frame:
         centre_of_mass: (3,) [m] of that mass, in the frame's axes.
         inertia: (3, 3) [kg m^2] of that mass about its centre, in the frame's axes;
             symmetric, its principal moments those of a body.
+        pitch: [m] translation of a helical joint in a turn, positive for a right-hand
+            thread; 0 of other joints.
     """
 
     name: str
@@ -97,6 +101,7 @@ class Frame:
     mass: float = 0.0
     centre_of_mass: NDArray = field(default_factory=lambda: np.zeros(3))
     inertia: NDArray = field(default_factory=lambda: np.zeros((3, 3)))
+    pitch: float = 0.0
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -106,6 +111,15 @@ class Frame:
             if value is not None:
                 value = locked(value, shape, f"frame '{self.name}': {name}")
                 object.__setattr__(self, name, value)
+        if (self.joint == "helical") != (self.pitch != 0.0):
+            raise BadInput(
+                f"frame {quoted(self.name)}.pitch: found {self.pitch:g} on a "
+                f"{self.joint} joint; expected 0 except on a helical joint, "
+                "where it is not 0"
+            )
+        if self.pitch and self.clearance and self.clearance.spin is not None:
+            place = f"frame {quoted(self.name)}.clearance.spin"
+            raise BadInput(f"{place}: found one on a helical joint, {NO_SPIN}")
         own = self.own_stiffness
         if self.passive and own is not None and np.isinf(own):
             raise BadInput(f"frame {quoted(self.name)}.joint_stiffness: {LOCKED}")
@@ -126,8 +140,9 @@ class Frame:
     def _figures(self) -> Figures:
         """Return the fields in short; the rarest only where they are not zero."""
         shown = {f.name: brief(getattr(self, f.name)) for f in fields(self)[1:]}
-        if not self.drive_force:
-            del shown["drive_force"]
+        for name in ("drive_force", "pitch"):
+            if not getattr(self, name):
+                del shown[name]
         del shown["inertia"]
         if self.inertia.any():
             shown["inertia"] = brief(np.array(six_moments(self.inertia)))
@@ -153,8 +168,22 @@ class Frame:
         return np.diag(K)
 
     @property
+    def lead(self) -> float:
+        """[m/rad] translation of a helical joint per angle, 0 of others."""
+        return self.pitch / (2 * math.pi)
+
+    @property
+    def turns(self) -> bool:
+        """Whether the coordinate is an angle: of a revolute or helical joint."""
+        return self.joint in {"revolute", "helical"}
+
+    @property
     def own_axis(self) -> int:
-        """Index of the joint's own component of a screw: RZ, or TZ if prismatic."""
+        """Index of the joint's own component of a screw: RZ, or TZ if prismatic.
+
+        RZ of a helical joint is its whole motion, the translation included
+        (:func:`assembly.model.links.motion_map`).
+        """
         return 5 if self.joint == "prismatic" else 2
 
     @property

@@ -207,3 +207,19 @@ def test_unknown_and_coupled_drives_are_refused():
         with_drive_forces(robot, {"rocker": 1.0})
     with pytest.raises(BadInput, match=r'"a"\.drive_force: found 3 on a fixed joint'):
         Frame("a", drive_force=3.0)
+
+
+@pytest.mark.parametrize("solve", [solve_assembly, solve_exact])
+def test_torque_of_a_screw_drive_presses_by_the_torque_over_the_lead(solve):
+    """2 pi M x = F P per turn: a nut that cannot turn presses a spring with M / h."""
+    pitch, k, M = 0.005, 2e6, 3.0
+    screw = Frame("screw", joint="helical", pitch=pitch, actuated=True)
+    nut = Frame("nut", "screw", joint="revolute")
+    rail = Frame("rail", joint="prismatic", joint_stiffness=_along(k))
+    frames = screw, nut, Frame("end", "nut"), rail, Frame("table", "rail")
+    robot = Robot("press", "table", frames, (("end", "table"),))
+    posture = home_posture(with_drive_forces(robot, {"screw": M}))
+    assembly = solve(posture)
+    force = M / (pitch / (2 * np.pi))
+    assert assembly.platform_screw[5] == pytest.approx(force / k, rel=1e-9)
+    assert assembly.energy == pytest.approx(force**2 / k / 2, rel=1e-9)
