@@ -8,18 +8,12 @@ the first natural frequency and its acceleration does not jump.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.nominal import Target
-from assembly.kinematics.posture import (
-    Posture,
-    place_many,
-    place_many_joints,
-    together,
-)
+from assembly.kinematics.posture import together
 from assembly.kinematics.verdict import verdicts
 from assembly.linear.energy import Assembly, solve_assembly
 from assembly.linear.pose_error import bound_pose_error
@@ -31,18 +25,20 @@ from assembly.path.beam_inertia import beam_stress
 from assembly.path.idle_motions import with_idle_accelerations
 from assembly.path.inertial_loads import InertialLoads, inertial_loads
 from assembly.path.motion import Motion, NotFollowed, follow_path
-from assembly.path.path_file import PathTable
+from assembly.path.placing import check_path_robot, first_frequency, placed
 from assembly.path.trajectory import Trajectory
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.platform_stiffness.vibration import check_masses, natural_modes
-from assembly.solvers.conic import SolverFailed
 from assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput, nearest
 from forcefit.results.display import Figures, html_table, largest, short_repr
 
 ASSUMPTIONS = ("none", "frozen", "free")  # of the bounds of problem (27) under load
 _BLOCK = 2000  # points solved together
-_FREQUENCIES = 5  # postures at which the first natural frequency is computed
+# results that exist wherever the path does
+_GEOMETRIC = {
+    "coordinates", "rates", "second_rates", "platform", "platform_velocity",
+    "platform_acceleration", "compliance",
+}  # fmt: skip
 Progress = Callable[[int, int], None]
 
 
@@ -57,14 +53,17 @@ class PathErrors:
         frequency: [Hz] least first natural frequency along the path; NaN if unknown.
         free: largest number of joint motions that neither path nor closures prescribe;
             they are left at rest.
-        arrays: by the names of a NetCDF file, k rows each: ``coordinates``,
-            ``platform`` (k, 4, 4), ``platform_velocity`` and ``platform_acceleration``
-            (k, 6) of the platform's origin, ``platform_screw`` (k, 6) pose error of
-            geometric errors and all loads, ``inertial_screw`` (k, 6) its change by the
-            accelerations, ``energy`` (k,), ``wrench`` (k, n, 6) through bodies at their
-            tips, ``drive_force`` (k, drives), ``stress`` (k, links), ``compliance``
-            (k, 6, 6); and with an assumption ``rotation_error`` and
-            ``translation_error`` (k, 2).  NaN where the status is not ok.
+        arrays: results by name, k rows each; NaN where the status is not ok.
+
+            - ``coordinates``, ``rates``, ``second_rates`` (k, n) of all joints
+            - ``platform`` (k, 4, 4), ``platform_velocity``, ``platform_acceleration``
+              (k, 6) of its origin
+            - ``platform_screw`` (k, 6) pose error by geometric errors and all loads
+            - ``inertial_screw`` (k, 6) its change by the accelerations
+            - ``energy`` (k,), ``wrench`` (k, n, 6) through bodies at their tips,
+              ``drive_force`` (k, drives), ``stress`` (k, links)
+            - ``compliance`` (k, 6, 6) nominal, of the platform
+            - with an assumption ``rotation_error``, ``translation_error`` (k, 2)
         status: (k,) ``"ok"``, or why a point has no result.
         reason: (k,) message where the status is not ok.
     """
@@ -112,7 +111,7 @@ def path_errors(
     *,
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
-    assumption: Literal["none", "frozen", "free"] = "none",
+    assumption: str = "none",
     progress: Progress = lambda done, most: None,
 ) -> PathErrors:
     """Return the errors of a robot along a path, its inertia included.
@@ -154,64 +153,6 @@ def path_errors(
     )
 
 
-def check_path_robot(robot: Robot) -> None:
-    """Reject a robot without masses, or with effects, which a path leaves out.
-
-    Args:
-        robot: any robot.
-
-    Raises:
-        BadInput: as said.
-    """
-    if robot.has_effects:
-        raise BadInput(
-            f"{robot.name}: found effects of the machine, which are not computed along "
-            "a path; expected a robot without effects"
-        )
-    check_masses(robot)
-
-
-def check_rows(robot: Robot, table: PathTable, where: str = "path") -> None:
-    """Reject a path with a row that the robot cannot reach.
-
-    Args:
-        robot: any robot.
-        table: rows of the path.
-        where: its file, for messages.
-
-    Raises:
-        BadInput: names the row.
-    """
-    _, reasons = _placed(robot, table.names, table.values)
-    for row, reason in enumerate(reasons):
-        if reason:
-            raise BadInput(f"{where}: {table.row_name(row)}: {reason}")
-
-
-def first_frequency(robot: Robot, trajectory: Trajectory) -> float:
-    """Return the least natural frequency at postures along a path, drives held.
-
-    Args:
-        robot: any robot.
-        trajectory: the path.
-
-    Returns:
-        [Hz], of the nominal robot; NaN where nothing vibrates.
-    """
-    count = len(trajectory.times)
-    rows = np.unique(np.linspace(0, count - 1, _FREQUENCIES).astype(int))
-    postures, _ = _placed(robot, trajectory.names, trajectory.values[rows])
-    found = []
-    for posture in postures:
-        try:
-            modes = natural_modes(posture, 6) if posture is not None else None
-        except (BadInput, SolverFailed):
-            continue
-        if modes is not None:
-            found += [f for f in modes.frequencies.tolist() if f > 0.0]
-    return min(found, default=float("nan"))
-
-
 @dataclass(frozen=True, eq=False)
 class _Asked:
     """Arguments of :func:`path_errors`, the same for all blocks."""
@@ -221,14 +162,6 @@ class _Asked:
     load: ArrayLike | None
     gravity: ArrayLike | None
     assumption: str
-
-
-def _placed(
-    robot: Robot, names: tuple[str, ...], values: NDArray
-) -> tuple[list[Posture | None], list[str]]:
-    """Return the postures of rows, and the reason where there is none."""
-    place = place_many_joints if of_joints(names) else place_many
-    return place(robot, goals_of(names, robot, values))
 
 
 def _solve(asked: _Asked, rows: slice) -> dict[str, NDArray]:
@@ -246,6 +179,8 @@ def _solve(asked: _Asked, rows: slice) -> dict[str, NDArray]:
     wrenches = assembly.wrenches - loads.at_tips
     out = {
         "coordinates": motion.postures.coordinates,
+        "rates": motion.rates,
+        "second_rates": motion.second_rates,
         "platform": T,
         "platform_velocity": _at_origin(motion.twists[:, platform], T),
         "platform_acceleration": np.hstack([
@@ -265,7 +200,7 @@ def _solve(asked: _Asked, rows: slice) -> dict[str, NDArray]:
         out["rotation_error"] = bounds.rotation_error
         out["translation_error"] = bounds.translation_error
     status, reason = _statuses(assembly, verdict)
-    for name in out.keys() - {"coordinates", "platform", "compliance"}:
+    for name in out.keys() - _GEOMETRIC:
         out[name] = np.array(out[name], dtype=float)
         out[name][status != OK] = np.nan
     free = np.full(len(status), motion.free)
@@ -276,7 +211,7 @@ def _moved(asked: _Asked, rows: slice) -> tuple[Motion, list[tuple[str, str]]]:
     """Return the motion of a block of points, and the verdict on each posture."""
     robot, path = asked.robot, asked.trajectory
     values = path.values[rows]
-    postures, reasons = _placed(robot, path.names, values)
+    postures, reasons = placed(robot, path.names, values)
     for i, reason in enumerate(reasons):
         if reason:
             raise BadInput(f"path at {path.times[rows][i]:.6g} s: {reason}")

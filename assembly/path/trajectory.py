@@ -9,7 +9,6 @@ vectors or joint coordinates, component by component.
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,9 +50,7 @@ class Trajectory:
         return float(self.times[-1] - self.times[0])
 
 
-def timed(
-    table: PathTable, points: int, ends: Literal["rest", "moving"] = "rest"
-) -> Trajectory:
+def timed(table: PathTable, points: int, ends: str = "rest") -> Trajectory:
     """Return the trajectory through rows at given times.
 
     Args:

@@ -65,9 +65,7 @@ def simulated(stiffness, steps):
         node = mbs.AddNode(item.NodeRigidBody2D(referenceCoordinates=[*centre, angle]))
         inertia = mass * length**2 / 12
         number = mbs.AddObject(
-            item.ObjectRigidBody2D(
-                mass=mass, inertia=inertia, nodeNumber=node
-            )
+            item.ObjectRigidBody2D(mass=mass, inertia=inertia, nodeNumber=node)
         )
         return node, number
 
