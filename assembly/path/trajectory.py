@@ -17,7 +17,7 @@ from assembly.path.path_file import PathTable
 from assembly.path.profiles import JUMPING, PROFILES
 from forcefit.inputs.table import BadInput, nearest
 
-MOST_POINTS = 100_000  # more than any figure shows; some minutes
+MOST_POINTS = 50_000  # half a minute and 500 MB
 _FINE = 4001  # instants at which peaks of speed and acceleration are searched
 _ROWS_MOVING = 6  # least number of rows that a quintic spline needs without end values
 
