@@ -98,7 +98,8 @@ def follow_path(
 
     Args:
         postures: k postures on the path.
-        names: c prescribed components, ``tx`` .. or ``q.<frame>``, of one kind.
+        names: c prescribed components, ``tx`` .. or ``q.<frame>``, of one kind; drives
+            that are not named among joints stay at rest.
         path: (k, c) components [m or rad] and their first and second derivatives.
 
     Returns:
@@ -109,6 +110,8 @@ def follow_path(
             prescribed velocity or acceleration.
     """
     robot = postures.robot
+    if names[0] not in POSE:
+        names, path = _with_all_drives(robot, names, path)
     values, first, second = path
     moves, scale = mobile(robot), _units(robot)
     S = motion_screws(robot, postures.transforms)
@@ -137,6 +140,17 @@ def follow_path(
     second_rates = joints(second - own, -of_closures)
     accelerations = carries @ (S * second_rates[..., None]) + drift
     return Motion(postures, rates, second_rates, twists, accelerations, free, E)
+
+
+def _with_all_drives(
+    robot: Robot, names: tuple[str, ...], path: tuple[NDArray, NDArray, NDArray]
+) -> tuple[tuple[str, ...], tuple[NDArray, NDArray, NDArray]]:
+    """Return a path of joints with the drives that it does not name, at rest."""
+    drives = [f"q.{f.name}" for f in robot.frames if f.actuated]
+    still = [name for name in drives if name not in names]
+    zero = np.zeros((len(path[0]), len(still)))
+    values, first, second = (np.hstack([part, zero]) for part in path)
+    return (*names, *still), (values, first, second)
 
 
 def _units(robot: Robot) -> NDArray:

@@ -17,7 +17,7 @@ from assembly.path.path_file import PathTable
 from assembly.path.profiles import JUMPING, PROFILES
 from forcefit.inputs.table import BadInput, nearest
 
-MOST_POINTS = 50_000  # half a minute and 500 MB
+MOST_POINTS = 20_000  # ten seconds and 600 MB for a hexapod
 _FINE = 4001  # instants at which peaks of speed and acceleration are searched
 _ROWS_MOVING = 6  # least number of rows that a quintic spline needs without end values
 

@@ -101,6 +101,19 @@ def test_arm_given_by_joints_moves_as_its_closed_form():
     )  # fmt: skip
 
 
+def test_drives_that_a_path_of_joints_does_not_name_stay_at_rest():
+    robot = load_robot("arm6")
+    path = tuple(np.array([[x, y]]) for x, y in ((0.2, 0.3), (1.0, -2), (3.0, 4)))
+    names = ("q.joint2", "q.joint4")
+    motion = follow_path(placed(robot, names, path[0]), names, path)
+    expected = np.zeros((2, len(robot.frames)))
+    for name, rate, second in (("joint2", 1.0, 3.0), ("joint4", -2.0, 4.0)):
+        expected[:, robot.index(name)] = rate, second
+    found = [motion.rates[0], motion.second_rates[0]]
+    np.testing.assert_allclose(found, expected, atol=1e-13)
+    assert motion.free == 0
+
+
 def test_rotations_beyond_half_a_turn_keep_their_rate():
     """A turntable whose rotation vector is counted on to 4 rad turns at 2 rad/s."""
     robot = Robot("table", "top", (hinge("drive"), Frame("top", "drive", [0.1, 0, 0])))
