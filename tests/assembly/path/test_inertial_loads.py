@@ -6,11 +6,13 @@ import pytest
 from assembly.kinematics.posture import home_posture
 from assembly.linear.energy import solve_assembly
 from assembly.model.robot import Frame, Robot
+from assembly.path.inertial_loads import inertial_loads
 from assembly.path.path_errors import path_errors
 from tests.assembly.path.moving_robots_for_tests import (
     GRAVITY,
     hinge,
     instants,
+    moving_drives,
     rod,
     spinning_beam,
 )
@@ -131,6 +133,30 @@ def test_beam_in_pieces_deflects_as_the_whole_beam(theory):
     size = np.abs(screws[0]).max()
     for screw in screws[1:]:
         np.testing.assert_allclose(screw, screws[0], atol=1e-9 * size)
+
+
+def test_section_at_a_beams_start_carries_what_the_hub_bears():
+    """Equilibrium of the whole beam: its load and a tool beside its tip."""
+    robot, path = spinning_beam(80.0, 3000.0, radius=0.03, axis=(0.3, -0.5, 1))
+    tool = Frame(
+        "tool",
+        "piece0",
+        [0.1, 0.05, -0.07],
+        mass=1.2,
+        inertia=np.diag([1e-3, 2e-3, 2e-3]),
+    )
+    robot = Robot("beam", "tool", (*robot.frames, tool))
+    motion = moving_drives(robot, path.names, (path.values, path.first, path.second))
+    load = inertial_loads(motion, GRAVITY).beams[1]
+    hub, tip = path_errors(robot, path, gravity=GRAVITY).arrays["wrench"][0, :2]
+    T = motion.postures.transforms[0]
+    to_section = T[1, :3, :3] @ load.data.axes
+    R = load.data.axes
+    sections = load.on_sections(np.r_[tip[:3] @ R, tip[3:] @ R][None], count=3)[0]
+    in_base = T[0, :3, :3]
+    at_start = np.r_[to_section.T @ in_base @ hub[:3], to_section.T @ in_base @ hub[3:]]
+    np.testing.assert_allclose(sections[0], at_start, atol=1e-10 * np.abs(hub).max())
+    np.testing.assert_allclose(sections[2, :3], tip[:3] @ R, atol=1e-12)
 
 
 def test_load_at_rest_is_the_weight_of_the_static_solution():

@@ -99,6 +99,10 @@ def test_profile_along_many_rows_turns_without_a_jump():
     np.testing.assert_allclose(path.values, straight.values, atol=1e-14)
     bend = PathTable(("tx", "ty"), np.array([[0, 0], [0.1, 0], [0.1, 0.1]], float))
     turned = profiled(bend, 2001, "quintic", 1.0, duration=1.0)
+    for part, rate in (("values", "first"), ("first", "second")):
+        slope = np.gradient(getattr(turned, part), turned.times, axis=0)[1:-1]
+        size = np.abs(slope).max()
+        np.testing.assert_allclose(slope, getattr(turned, rate)[1:-1], atol=2e-3 * size)
     steps = np.abs(np.diff(turned.second, axis=0)).max()
     assert steps < 0.02 * np.abs(turned.second).max()
 
