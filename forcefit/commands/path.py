@@ -91,7 +91,7 @@ def path(
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compute the errors of a robot by its own inertia along a path.
+    """Compute the errors by inertia along a path.
 
     Masses must be declared.  Vibration is left out.
     """
