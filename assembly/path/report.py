@@ -82,7 +82,7 @@ def path_page(
         Page(
             title=f"{summary['robot']}: errors along a path",
             verdict=_verdict(summary),
-            good=None if summary["status"] == OK and not summary["remarks"] else False,
+            good=None if summary["status"] == OK else False,
             tiles=_tiles(summary),
             about=f"{summary['points']} instants, {summary['solved']} solved; law of "
             f"the motion: {summary['law']}.",
