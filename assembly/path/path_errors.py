@@ -102,7 +102,15 @@ class PathErrors:
     @property
     def drives(self) -> tuple[str, ...]:
         """Names of the actuated joints, of the columns of ``drive_force``."""
-        return tuple(f.name for f in self.robot.frames if f.actuated)
+        return tuple(self.drive_units)
+
+    @property
+    def drive_units(self) -> dict[str, str]:
+        """Unit of each drive's force: N of a prismatic joint, N m of others."""
+        return {
+            f.name: "N" if f.joint == "prismatic" else "N m"
+            for f in self.robot.frames if f.actuated
+        }  # fmt: skip
 
 
 def path_errors(

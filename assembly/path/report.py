@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from assembly.model.statuses import OK
 from assembly.path.path_errors import PathErrors
-from assembly.path.summary import LARGEST, LEAST_PERIODS, sizes
+from assembly.path.summary import LARGEST, LAWS, LEAST_PERIODS, sizes
 from forcefit.inputs.errors import plot_label
 from forcefit.page.charts import BLUE, GREY, RED, Axis, chart, grid
 from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
@@ -85,7 +85,7 @@ def path_page(
             good=None if summary["status"] == OK else False,
             tiles=_tiles(summary),
             about=f"{summary['points']} instants, {summary['solved']} solved; law of "
-            f"the motion: {summary['law']}.",
+            f"the motion: {LAWS.get(summary['law'], summary['law'])}.",
             body=[
                 section("Largest values", _largest(summary)) if peaks else "",
                 section("Over time", *_charts(errors)) if peaks else "",
@@ -138,7 +138,7 @@ def _largest(summary: Mapping[str, Any]) -> str:
     rows += [
         [
             f"drive {name}",
-            Value(peak["value"], "N m or N"),
+            Value(peak["value"], peak["unit"]),
             Value(peak["time"], "s"),
             "",
         ]

@@ -15,6 +15,7 @@ from forcefit.results.units import FACTORS
 
 LEAST_PERIODS = 10.0  # below, vibration adds 15 % and more (quintic, undamped)
 _STARTS = 1e-6  # of the largest acceleration: more at an end is a jump from rest
+LAWS = {"times": "spline through given times"}
 # largest values by key: words, SI unit, shown unit
 LARGEST = {
     "inertial_translation": ("deflection by acceleration", "m", "um"),
@@ -92,8 +93,8 @@ def path_summary(errors: PathErrors) -> dict[str, Any]:
     }  # fmt: skip
     forces = errors.arrays["drive_force"]
     summary["drives"] = {
-        name: _peak(np.abs(forces[:, k]), times)
-        for k, name in enumerate(errors.drives)
+        name: _peak(np.abs(forces[:, k]), times) | {"unit": unit}
+        for k, (name, unit) in enumerate(errors.drive_units.items())
     }  # fmt: skip
     return summary
 
@@ -102,11 +103,12 @@ def _peak(
     values: NDArray, times: NDArray, owners: list[str] | None = None
 ) -> dict[str, Any]:
     """Return the largest value of (k,) or (k, owners) values, its time and owner."""
-    over_time = values if values.ndim == 1 else np.nanmax(values, axis=1)
+    known = np.where(np.isfinite(values), values, -1.0)  # sizes are never negative
+    over_time = known if known.ndim == 1 else known.max(axis=1)
     row = largest_row(over_time)
     peak: dict[str, Any] = {"value": float(over_time[row]), "time": float(times[row])}
     if owners is not None:
-        peak["frame"] = owners[largest_row(values[row])]
+        peak["frame"] = owners[largest_row(known[row])]
     return peak
 
 
@@ -153,7 +155,7 @@ def path_text(summary: dict[str, Any]) -> str:
     periods = summary["periods"]
     beside = f", {periods:.3g} periods of {summary['first_frequency']:.4g} Hz"
     lines |= {
-        "law": summary["law"],
+        "law": LAWS.get(summary["law"], summary["law"]),
         "path time": in_unit(summary["duration"], "s")
         + (beside if np.isfinite(periods) else ""),
         "points": f"{summary['points']}, {summary['solved']} solved",
@@ -172,5 +174,5 @@ def _table(summary: dict[str, Any]) -> list[str]:
         value = FACTORS.get(unit, 1.0) * peak["value"]
         rows[f"{words} [{unit}]"] = (value, peak["time"], peak.get("frame", ""))
     for name, peak in summary["drives"].items():
-        rows[f"drive {name} [N m or N]"] = (peak["value"], peak["time"], "")
+        rows[f"drive {name} [{peak['unit']}]"] = (peak["value"], peak["time"], "")
     return table_lines(("largest", "value", "at [s]", "body"), rows)

@@ -234,7 +234,7 @@ _SWEEP = Record(
     closed=False,
 )  # fmt: skip
 _PEAK = record(
-    "time", value=number("largest value", ""), frame_=text("frame of the body")
+    "time unit?", value=number("largest value", ""), frame_=text("frame of the body")
 )  # fmt: skip
 _PATH = record(
     "robot status reason? remarks first_frequency periods", output_=text("file"),

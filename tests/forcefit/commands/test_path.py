@@ -60,7 +60,7 @@ def test_text_of_a_path_names_its_largest_values(run, slide):
     assert "law        trapezoid" in out
     assert "path time  1.5 s" in out
     assert "deflection by acceleration [um]" in out
-    assert "drive rail" in out
+    assert "drive rail [N]" in out
     assert "note: the acceleration jumps" in out
 
 
@@ -90,6 +90,33 @@ def test_path_writes_data_figure_and_page(run, tmp_path):
     assert "errors along a path" in page
     assert "Quasi-static" in page
     assert files["png"].read_bytes().startswith(b"\x89PNG")
+
+
+def test_path_beyond_a_limit_keeps_the_results_before_it(run, slide):
+    """The rail may go to 50 mm: half of a path of 100 mm, up to the highest speed."""
+    file = slide / "slide.toml"
+    text = file.read_text().replace(
+        "actuated = true", "actuated = true\nlimits = [0, 0.05]"
+    )
+    file.write_text(text)
+    status, out, _ = run(
+        "assembly", "path", file, "--path", slide / "way.csv", "--profile", "quintic",
+        "--duration", 0.5, "--json", slide / "new.json", "-o", slide / "new.nc",
+        "--report", slide / "new.html",
+    )  # fmt: skip
+    answer = json.loads((slide / "new.json").read_text())
+    assert status == 1
+    assert answer["status"] == "beyond_limits"
+    assert answer["reason"].startswith("at 0.2525 s: rail at 0.05")
+    assert "beyond_limits" in out
+    assert (answer["points"], answer["solved"]) == (201, 101)
+    largest = answer["largest"]
+    assert largest["speed"]["value"] == pytest.approx(1.875 * 0.1 / 0.5)
+    force = 3.0 * PEAK * 0.1 / 0.5**2
+    assert answer["drives"]["rail"]["value"] == pytest.approx(force, rel=1e-3)
+    data = open_dataset(slide / "new.nc")
+    assert np.isnan(data["drive_force"].values[101:]).all()
+    assert np.isfinite(data["drive_force"].values[:101]).all()
 
 
 def test_interval_spaces_the_rows_of_a_table_without_times(run, slide):
