@@ -30,6 +30,7 @@ from forcefit.commands.options import (
     parse_point,
     posture_of,
 )
+from forcefit.commands.path import path
 from forcefit.commands.platform_stiffness import stiffness
 from forcefit.commands.plot import plot
 from forcefit.commands.progress import one_thread
@@ -192,6 +193,6 @@ def show(
 
 
 for command in (
-    stiffness, deflection, frequencies, statistics, tolerances, sweep, plot
+    stiffness, deflection, frequencies, path, statistics, tolerances, sweep, plot
 ):  # fmt: skip
     app.command()(command)
