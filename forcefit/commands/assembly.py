@@ -14,6 +14,7 @@ from forcefit.commands.help import Commands
 from forcefit.commands.options import (
     AlongOption,
     AtOption,
+    DriveForceOption,
     GravityOption,
     JointOption,
     JsonOption,
@@ -29,6 +30,7 @@ from forcefit.commands.options import (
     parse_point,
     posture_of,
 )
+from forcefit.commands.path import path
 from forcefit.commands.platform_stiffness import stiffness
 from forcefit.commands.plot import plot
 from forcefit.commands.progress import one_thread
@@ -61,6 +63,7 @@ def error(
         ),
     ] = None,
     load: LoadOption = None,
+    drive_force: DriveForceOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
     energy_budget: Annotated[
@@ -96,8 +99,9 @@ def error(
             expected = f"a finite number > 0, at most {LARGEST_LENGTH:g}"
             raise BadInput(f"{option}: found {value}, expected {expected}")
     applied = declared_under(
-        robot, pose, joint, load, gravity, under, rest=rest, mismatch=mismatch
-    )
+        robot, pose, joint, load, gravity, under, rest=rest, mismatch=mismatch,
+        drive_force=drive_force,
+    )  # fmt: skip
     with one_thread():
         results = pose_error_of(
             applied.posture, assumption or None,
@@ -123,6 +127,7 @@ def show(
     rest: RestOption = None,
     mismatch: MismatchOption = None,
     load: LoadOption = None,
+    drive_force: DriveForceOption = None,
     exaggeration: Annotated[
         float | None, typer.Option(help="Factor on displacements.")
     ] = None,
@@ -162,14 +167,14 @@ def show(
     if exaggeration is not None:
         checked("--exaggeration", exaggeration, "1", above=0)
     wrench = parse_load(load)
-    loaded = wrench is not None and any(wrench)
+    loaded = bool(drive_force) or (wrench is not None and any(wrench))
     if loaded and error_body is not None and assumption == "budget":
         raise BadInput(
-            "--assumption: found budget together with --load, but the budget bound "
+            "--assumption: found budget together with a load, but the budget bound "
             "is defined for a robot without load; expected frozen or free"
         )
     assumption = assumption or ("frozen" if loaded else "budget")
-    posture = posture_of(robot, pose, joint, rest, mismatch)
+    posture = posture_of(robot, pose, joint, rest, mismatch, drive_force=drive_force)
     for line in remark_lines(posture.robot.remarks):
         print(line)
     try:
@@ -188,6 +193,6 @@ def show(
 
 
 for command in (
-    stiffness, deflection, frequencies, statistics, tolerances, sweep, plot
+    stiffness, deflection, frequencies, path, statistics, tolerances, sweep, plot
 ):  # fmt: skip
     app.command()(command)
