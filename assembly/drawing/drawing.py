@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.drawing.contacts import Contact
 from assembly.model.robot import BeamLink, Clearance, Link, MeshLink
 
 # freedoms of each type: rows of the screw [RX RY RZ TX TY TZ] in the joint's axes; of a
@@ -37,12 +38,14 @@ class JointNumbers:
             along free motions; or None.
         error: (6,) [rad, m] delta l.
         tolerance: (6,) [rad, m] standard deviations of it, or None.
+        contacts: further clearance, by the sizes of the contacts.
     """
 
     clearance: Clearance | None = None
     stiffness: NDArray | None = None
     error: NDArray = field(default_factory=lambda: np.zeros(6))
     tolerance: NDArray | None = None
+    contacts: tuple[Contact, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -132,10 +132,9 @@ def _frames_of(plan: _Plan, step: Step) -> list[PlacedFrame]:
     if isinstance(item, DrawnJoint):
         for part in parts_of(item, step.reverse):
             numbers = part.numbers
+            motion = _motion(item, part.position) if part.kind != "fixed" else {}
             frame = Frame(
-                part.name, carrier, joint=part.kind, pitch=item.pitch,
-                actuated=item.actuated,
-                position=part.position, limits=item.limits,
+                part.name, carrier, joint=part.kind, **motion,
                 clearance=numbers.clearance, joint_stiffness=numbers.stiffness,
                 geometric_error=numbers.error, tolerance=numbers.tolerance,
             )  # fmt: skip
@@ -152,6 +151,14 @@ def _frames_of(plan: _Plan, step: Step) -> list[PlacedFrame]:
     if not step.closes and step.end in plan.own and plan.own[step.end] != carrier:
         placed.append(_body_frame(plan, step.end, carrier))
     return placed
+
+
+def _motion(joint: DrawnJoint, position: float) -> dict:
+    """The keys of a frame for the motion of a joint."""
+    return {
+        "pitch": joint.pitch, "actuated": joint.actuated, "position": position,
+        "limits": joint.limits,
+    }  # fmt: skip
 
 
 def _mass(body: DrawnBody, pose: NDArray) -> dict:

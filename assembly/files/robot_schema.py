@@ -59,6 +59,11 @@ _LINK = record(
     pieces_=number("springs in series of a beam"),
     parts_=text("solids of other materials", "part"),
 )  # fmt: skip
+_CLEARANCE = record(
+    radial_=number("radial clearance", "m"), axial_=number("axial clearance", "m"),
+    tilt_=number("tilt clearance", "rad"), spin_=number("clearance about z", "rad"),
+    ball_=number("clearance of a ball in its socket", "m"),
+)  # fmt: skip
 _FRAME = record(
     name=text("name"), parent=text('name of a frame, or "base"'),
     translation_=number("translation from the parent", "m", "axis"),
@@ -74,10 +79,7 @@ _FRAME = record(
     limits_=number("least and largest coordinate", "rad or m", "bound"),
     geometric_error_="geometric_error",
     tolerance_=number("standard deviations of the geometric error", "rad, m", "screw"),
-    clearance_=record(
-        radial_=number("radial clearance", "m"), axial_=number("axial clearance", "m"),
-        tilt_=number("tilt clearance", "rad"), spin_=number("clearance about z", "rad"),
-    ),
+    clearance_=_CLEARANCE,
     joint_stiffness_=Either((
         number("diagonal stiffness", "N m/rad .. N/m", "screw"), _STIFFNESS,
     )),
@@ -105,10 +107,28 @@ _OF_FRAMES = record(
     frame=Listed(_FRAME),
     closure_=Listed(record(frames=text("two frames that meet", "frame"))),
 )  # fmt: skip
+_GAP = number("gap from the middle to one side", "m")
+_CONTACTS = record(
+    "", _CLEARANCE, length_=number("length of the bore", "m"),
+    bearings_=Listed(record(z=number("height", "m"), radial=_GAP)),
+    guide_=record(
+        gap=Either((_GAP, number("gaps along x and y", "m", "axis"))),
+        length=number("length along the axis", "m"),
+        width=number("width along x", "m"), height=number("height along y", "m"),
+    ),
+    pad_=record(
+        gap=_GAP, length=number("length along x", "m"),
+        width=number("width along y", "m"),
+    ),
+)  # fmt: skip
 # of a universal joint one for each of its two bearings
 _OF_JOINT = record(**{
-    f"{key}_": Either((_FRAME.content[key], Listed(_FRAME.content[key])))
-    for key in ("clearance", "joint_stiffness", "geometric_error", "tolerance")
+    f"{key}_": Either((one, Listed(one)))
+    for key, one in (
+        ("clearance", _CONTACTS),
+        *((k, _FRAME.content[k]) for k in ("joint_stiffness", "geometric_error",
+                                           "tolerance")),
+    )
 })  # fmt: skip
 _PIECE = record(
     end_=_POINT, center_=_POINT,

@@ -56,10 +56,10 @@ def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArra
         size = np.linalg.norm(parts, axis=2)
         rests = size > _UNLOADED * size.max(initial=0.0)
         unit = parts / np.where(rests, size, 1.0)[:, :, None]
-        clearance_screws[:, :, list(rows)] = (
-            unit * (rests * bounds[:, cone])[:, :, None]
-        )
-        undetermined |= np.any(~rests & (bounds[:, cone] > 0.0), axis=1)
+        # a joint with a ball has neither radial nor axial clearance, and conversely
+        bound = np.where(np.isnan(bounds[:, cone]), 0.0, bounds[:, cone])
+        clearance_screws[:, :, list(rows)] += unit * (rests * bound)[:, :, None]
+        undetermined |= np.any(~rests & (bound > 0.0), axis=1)
     return replace(tight, errors=conditions.errors + clearance_screws), undetermined
 
 

@@ -24,6 +24,8 @@ LOCKED = (
     "found inf along the own motion of a passive joint, which would lock it; expected "
     '0 (free, as a bearing), a number > 0 (a spring), or joint = "fixed"'
 )
+SLIDING_BALL = "found one on a joint that slides, expected radial"
+ONE_OF_BALL = 'found together with "ball", expected one of them'
 NO_SPIN = "expected none: its motion along the thread has no clearance bound"
 
 FORCE_CONTROL = (
@@ -44,12 +46,20 @@ class Clearance:
         axial: [m] bound of abs(TZ), eq. (3).
         tilt: [rad] radius of the disc for (RX, RY), eq. (4).
         spin: [rad] bound of abs(RZ), eq. (5).
+        ball: [m] radius of the ball for (TX, TY, TZ), in place of ``radial`` and
+            ``axial``: a ball in its socket.
     """
 
     radial: float | None = None
     axial: float | None = None
     tilt: float | None = None
     spin: float | None = None
+    ball: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.ball is not None and (self.radial, self.axial) != (None, None):
+            key = "axial" if self.radial is None else "radial"
+            raise BadInput(f"clearance.{key}: {ONE_OF_BALL}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +130,9 @@ class Frame:
         if self.pitch and self.clearance and self.clearance.spin is not None:
             place = f"frame {quoted(self.name)}.clearance.spin"
             raise BadInput(f"{place}: found one on a helical joint, {NO_SPIN}")
+        ball = self.clearance is not None and self.clearance.ball is not None
+        if ball and self.joint in {"prismatic", "helical"}:
+            raise BadInput(f"frame {quoted(self.name)}.clearance.ball: {SLIDING_BALL}")
         own = self.own_stiffness
         if self.passive and own is not None and np.isinf(own):
             raise BadInput(f"frame {quoted(self.name)}.joint_stiffness: {LOCKED}")

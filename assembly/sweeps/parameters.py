@@ -30,7 +30,7 @@ _PLACED: dict[str, Any] = {"translation": [0.0] * 3, "rotation": [0.0] * 3}
 _DH_UNITS = {"theta": "rad", "d": "m", "a": "m", "alpha": "rad"}
 _UNITS = {
     "translation": "m", "rotation": "rad", "radial": "m", "axial": "m",
-    "tilt": "rad", "spin": "rad",
+    "tilt": "rad", "spin": "rad", "ball": "m",
     "radius": "m", "inner_radius": "m", "width": "m", "height": "m", "length": "m",
     "area": "m^2", "I_y": "m^4", "I_z": "m^4", "J": "m^4", "shear_y": "1",
     "shear_z": "1", "young": "Pa", "poisson": "1", "density": "kg/m^3", "mass": "kg",
