@@ -74,7 +74,7 @@ def _plain_basis(rows: NDArray) -> NDArray:
     P = np.linalg.pinv(rows, rcond=_ZERO) @ rows if rank else np.zeros((3, 3))
     basis: list[NDArray] = []
     for _ in range(rank):
-        # the base's axis nearest to what is left of the space
+        # the base's axis nearest to the remaining space
         k = int(np.argmax(np.round(np.diag(P), 9)))
         d = P[k] / np.linalg.norm(P[k])
         d = np.where(np.abs(d) < 1e-12, 0.0, d)

@@ -158,3 +158,28 @@ def test_rounded_closures_are_reported(tmp_path):
 def test_missing_output_folder_is_refused_before_anything_is_written(tmp_path):
     with pytest.raises(BadInput, match="no folder"):
         convert("arm6", tmp_path / "absent" / "arm.toml", version=2)
+
+
+@pytest.mark.parametrize(("old", "new", "message"), [
+    ('between = ["tube", "rod"]', 'between = ["tube", "rood"]',
+     'joint "slide".between: found "rood", expected a body or "base"'),
+    ("axis2 = [0, 1, 0]", "axis2 = [-90, 0, -32]",
+     'joint "upper".axis2: found it parallel to "axis"'),
+    ("[[leg]]", '[[body]]\nname = "lost"\n\n[[leg]]', 'body "lost": found no joint'),
+])  # fmt: skip
+@pytest.mark.parametrize("words", [
+    ("assembly", "solve", "bad.toml", "--json", "x.json"),
+    ("assembly", "show", "bad.toml", "--json", "x.json"),
+    ("convert", "bad.toml", "-o", "x.toml", "--format", "2"),
+])  # fmt: skip
+def test_mistake_in_a_drawing_writes_nothing(
+    run, tmp_path, monkeypatch, old, new, message, words
+):
+    monkeypatch.chdir(tmp_path)
+    text = (DRAWN / "three_upu.toml").read_text()
+    assert old in text
+    Path("bad.toml").write_text(text.replace(old, new, 1))
+    status, out, err = run(*words)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.toml"]
