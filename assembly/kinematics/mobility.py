@@ -16,13 +16,16 @@ from assembly.kinematics.nominal import mobile, motion_screws, size_of
 from assembly.kinematics.posture import Posture
 from assembly.kinematics.ranks import MISMATCH_FACTOR, rank_of
 
-# [rad, lengths] of the platform for unit joint rates: less is none, the null space of
-# closures known to the tolerance above
+# relative size of singular values that count as zero: those of files rounded at 6
+# digits, and of singular postures, which closures to 1e-10 determine to its root
+ZERO = 1e-5
+# [rad, lengths] least motion of the platform for unit joint rates
 _PLATFORM_RANK = 1e-6
+_ERROR = 10.0  # error of free motions, over the ratio of singular values
 _NOISE = 1e-14  # relative rounding of singular values
 _DISTANCE = 0.05  # [rad or lengths] distance of nearby postures
 _NEIGHBOURS = 2  # number of nearby postures
-_CLOSED = 1e-8  # [rad, m] largest closure error of a nearby posture
+_CLOSED = 1e-6  # [rad, m] largest closure error of a nearby posture
 _BACK = 0.1  # share of the distance: a posture nearer than this has returned
 
 
@@ -80,7 +83,7 @@ class NearMobility:
     there: Mobility | None
 
 
-def mobility(posture: Posture, tolerance: float = 1e-8) -> Mobility:
+def mobility(posture: Posture, tolerance: float = ZERO) -> Mobility:
     """Return the mobility and redundant constraints at a posture.
 
     Args:
@@ -101,8 +104,7 @@ def mobility(posture: Posture, tolerance: float = 1e-8) -> Mobility:
     passive = moves & ~driven
     tolerance = _tolerance(posture, tolerance)
     free = _motions(A[:, moves], P[:, moves], tolerance)
-    least = tolerance * free.largest
-    locked = _motions(A[:, passive], P[:, passive], 0.0, least)
+    locked = _motions(A[:, passive], P[:, passive], 0.0, tolerance * free.largest)
     freedoms, held = len(free.joints), len(locked.joints)
     drives, rank = int(driven.sum()), int(moves.sum()) - freedoms
     return Mobility(
@@ -117,11 +119,11 @@ def mobility(posture: Posture, tolerance: float = 1e-8) -> Mobility:
         smallest_singular_value=float(free.values[rank - 1]) if rank else 0.0,
         local_freedoms=freedoms - free.independent,
         actuation_redundancy=drives - freedoms + held,
-        singular_value_gap=min(free.gap(least), locked.gap(least)),
+        singular_value_gap=min(free.gap, locked.gap),
     )
 
 
-def platform_screws(posture: Posture) -> NDArray:
+def platform_screws(posture: Posture) -> tuple[NDArray, float]:
     """Return independent motions of the platform, drives free.
 
     Args:
@@ -129,14 +131,16 @@ def platform_screws(posture: Posture) -> NDArray:
 
     Returns:
         (k, 6) [rad, m] k ``platform_freedoms``, read at the platform's origin in base
-        axes; orthonormal where lengths are divided by the robot's size.
+        axes; orthonormal where lengths are divided by the robot's size.  And [rad,
+        lengths] their error.
     """
     A, P = _rates(posture)
     moves = mobile(posture.robot)
     found = _motions(A[:, moves], P[:, moves], _tolerance(posture))
     U = np.linalg.svd(found.platform, full_matrices=False)[0]
     size = size_of(posture.robot)
-    return U[:, : found.independent].T * ([1.0] * 3 + [size] * 3)
+    screws = U[:, : found.independent].T * ([1.0] * 3 + [size] * 3)
+    return screws, found.error
 
 
 def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
@@ -173,7 +177,7 @@ def _certainly_least(posture: Posture, here: Mobility) -> bool:
     return here.overconstraint == 0 and here.freedoms_drives_locked == 0
 
 
-def _tolerance(posture: Posture, least: float = 1e-8) -> float:
+def _tolerance(posture: Posture, least: float = ZERO) -> float:
     """Relative size of singular values that count as zero, rounded files included."""
     return max(least, MISMATCH_FACTOR * float(posture.mismatch))
 
@@ -218,15 +222,22 @@ class _Motions:
     def independent(self) -> int:
         """Number of independent motions of the platform."""
         moved = np.linalg.svd(self.platform, compute_uv=False)
-        return int(np.sum(moved > _PLATFORM_RANK))
+        return int(np.sum(moved > self.error))
 
-    def gap(self, least: float) -> float:
-        """Least singular value above a size, over the largest below it or rounding."""
-        kept = self.values[self.values > least]
-        dropped = self.values[self.values <= least]
-        if not len(kept):
+    @property
+    def error(self) -> float:
+        """[rad, lengths] motions of the platform that count as none."""
+        return max(_PLATFORM_RANK, _ERROR / self.gap)
+
+    @property
+    def gap(self) -> float:
+        """Least singular value that counts, over the largest other or rounding."""
+        rank = self.joints.shape[1] - len(self.joints)
+        if not rank:
             return np.inf
-        return float(kept[-1] / max(_NOISE * kept[0], *dropped[:1], 1e-300))
+        dropped = self.values[rank : rank + 1]
+        noise = _NOISE * float(self.values[0])
+        return float(self.values[rank - 1] / max(noise, *dropped, 1e-300))
 
 
 def _motions(A: NDArray, P: NDArray, tolerance: float, least: float = 0.0) -> _Motions:

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-_ZERO = 1e-6  # [rad, lengths] smaller parts of unit screws count as zero
+# of files rounded at 6 digits: parallel rods turn a platform by ten times that error
+_TURN = 1e-4  # [rad] turn of a motion by one length that counts as a translation
+_PITCH = 1e-5  # [lengths] shift for 1 rad that counts as a turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +34,9 @@ class PureMotion:
     pitch: float | None = None
 
 
-def pure_motions(screws: NDArray, at: NDArray, size: float) -> list[PureMotion]:
+def pure_motions(
+    screws: NDArray, at: NDArray, size: float, error: float = 0.0
+) -> list[PureMotion]:
     """Return independent motions that span a space of screws.
 
     Translations come first.  The others are turns if all their axes can meet in one
@@ -42,36 +46,36 @@ def pure_motions(screws: NDArray, at: NDArray, size: float) -> list[PureMotion]:
         screws: (k, 6) [rad, m] independent, read at a point, base axes.
         at: (3,) [m] that point.
         size: [m] reference length by which translations are compared with rotations.
+        error: [rad, lengths] of the screws, which parts must exceed.
 
     Returns:
         k of them, in base axes.
     """
     w, v = screws[:, :3], screws[:, 3:] / size
+    zero, exact = max(_TURN, error), max(_PITCH, error)
     U, values, Wt = np.linalg.svd(w, full_matrices=True)
-    turning = int((values > _ZERO).sum())
+    turning = int((values > zero).sum())
     free = U[:, turning:].T @ v
-    slides = [PureMotion("translation", d) for d in _plain_basis(free)]
+    slides = [PureMotion("translation", d) for d in _plain_basis(free, zero)]
     if not turning:
         return slides
-    axes = _plain_basis(Wt[:turning])
+    axes = _plain_basis(Wt[:turning], zero)
     # velocities of c for these rotations; translations are free to be added
-    across = _complement(free)
-    rates = axes @ np.linalg.pinv(w, rcond=_ZERO) @ v @ across.T @ across
-    point, anywhere = _common_point(axes, rates, across)
+    across = _complement(free, zero)
+    rates = axes @ np.linalg.pinv(w, rcond=zero) @ v @ across.T @ across
+    point, anywhere = _common_point(axes, rates, across, exact)
     if point is None:
-        return slides + _principal_screws(axes, rates, at, size)
+        return slides + _principal_screws(axes, rates, at, size, exact)
     centre = None if anywhere else at + size * point
     return slides + [PureMotion("turn", axis, centre) for axis in axes]
 
 
-def _plain_basis(rows: NDArray) -> NDArray:
+def _plain_basis(rows: NDArray, zero: float) -> NDArray:
     """Unit vectors that span the rows, along the base's axes where they can be."""
-    rank = (
-        int((np.linalg.svd(rows, compute_uv=False) > _ZERO).sum()) if len(rows) else 0
-    )
+    rank = int((np.linalg.svd(rows, compute_uv=False) > zero).sum()) if len(rows) else 0
     if rank == 3:
         return np.eye(3)
-    P = np.linalg.pinv(rows, rcond=_ZERO) @ rows if rank else np.zeros((3, 3))
+    P = np.linalg.pinv(rows, rcond=zero) @ rows if rank else np.zeros((3, 3))
     basis: list[NDArray] = []
     for _ in range(rank):
         # the base's axis nearest to the remaining space
@@ -84,16 +88,16 @@ def _plain_basis(rows: NDArray) -> NDArray:
     return np.array(order).reshape(-1, 3)
 
 
-def _complement(rows: NDArray) -> NDArray:
+def _complement(rows: NDArray, zero: float) -> NDArray:
     """(3 - rank, 3) orthonormal rows at right angles to all rows."""
     if not len(rows):
         return np.eye(3)
     _, values, Vt = np.linalg.svd(rows)
-    return np.asarray(Vt[int((values > _ZERO).sum()) :])
+    return np.asarray(Vt[int((values > zero).sum()) :])
 
 
 def _common_point(
-    axes: NDArray, rates: NDArray, across: NDArray
+    axes: NDArray, rates: NDArray, across: NDArray, zero: float
 ) -> tuple[NDArray | None, bool]:
     """The point through which all axes can pass, nearest to the origin.
 
@@ -101,6 +105,7 @@ def _common_point(
         axes: (r, 3) unit vectors.
         rates: (r, 3) velocities at the origin, without free translations.
         across: (m, 3) directions in which translations are not free.
+        zero: [lengths] largest difference of velocities that counts as none.
 
     Returns:
         (3,) the point, None if there is none; and whether any point will do.
@@ -108,10 +113,10 @@ def _common_point(
     # p x axis must equal the rate, but for free translations
     rows = np.vstack([across @ -_cross(axis) for axis in axes])
     goal = np.concatenate([across @ rate for rate in rates])
-    point = np.linalg.lstsq(rows, goal, rcond=_ZERO)[0]
-    if np.abs(rows @ point - goal).max(initial=0.0) > _ZERO:
+    point = np.linalg.lstsq(rows, goal, rcond=zero)[0]
+    if np.abs(rows @ point - goal).max(initial=0.0) > zero:
         return None, False
-    return point, not np.abs(rows).max(initial=0.0) > _ZERO
+    return point, not np.abs(rows).max(initial=0.0) > zero
 
 
 def _cross(a: NDArray) -> NDArray:
@@ -120,7 +125,7 @@ def _cross(a: NDArray) -> NDArray:
 
 
 def _principal_screws(
-    axes: NDArray, rates: NDArray, at: NDArray, size: float
+    axes: NDArray, rates: NDArray, at: NDArray, size: float, zero: float
 ) -> list[PureMotion]:
     """Principal screws: stationary pitches w.v / w.w among all combinations."""
     Q = axes @ rates.T
@@ -129,7 +134,7 @@ def _principal_screws(
     for pitch, m in zip(pitches, mix.T, strict=True):
         w, v = m @ axes, m @ rates
         point = at + size * np.cross(w, v) / (w @ w)
-        kind = "screw" if abs(pitch) > _ZERO else "turn"
+        kind = "screw" if abs(pitch) > zero else "turn"
         w = w / np.linalg.norm(w)
         w = w if w[np.argmax(np.round(np.abs(w), 9))] > 0 else -w
         turn = float(2 * np.pi * pitch * size) if kind == "screw" else None

@@ -81,8 +81,9 @@ def mobility_of(posture: Posture) -> dict[str, Any]:
 
 def _motions(posture: Posture) -> list[dict[str, Any]]:
     """Return the platform's motions as plain values; absent keys have no meaning."""
+    screws, error = platform_screws(posture)
     motions = pure_motions(
-        platform_screws(posture), posture.platform[:3, 3], size_of(posture.robot)
+        screws, posture.platform[:3, 3], size_of(posture.robot), error
     )
     return [
         {k: v for k, v in vars(motion).items() if v is not None} for motion in motions

@@ -6,11 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from assembly.drawing.drawing import DrawnJoint, perpendicular, unit
 from assembly.kinematics.mobility import mobility
 from assembly.kinematics.posture import Posture, home_posture, place_robot
 from assembly.kinematics.pure_motions import pure_motions
 from assembly.report.mobility import mobility_lines, mobility_of
 from assembly.robots import load_robot
+from tests.assembly.drawing import test_mobility_of_mechanisms as mechanisms
 from tests.assembly.drawing.test_mobility_of_mechanisms import (
     MECHANISMS,
     X,
@@ -181,27 +183,46 @@ def test_pure_motions_of_screw_systems_equal_hand_results(name, size):
         assert motion.pitch == (None if pitch is None else pytest.approx(pitch))
 
 
-def test_counts_of_a_rounded_file_are_certain(tmp_path):
-    """Bennett's linkage of numbers rounded at 7 digits closes to 1e-7 only."""
-    robot = MECHANISMS["bennett"][0]()
-    frames = [
-        f'[[frame]]\nname = "{f.name}"\nparent = "{f.parent}"\njoint = "{f.joint}"\n'
-        f"translation = {np.round(f.translation, 7).tolist()}\n"
-        f"rotation = {np.round(f.rotation, 7).tolist()}\n"
-        + "actuated = true\n"
-        * f.actuated
-        for f in robot.frames
-    ]
-    a, b = robot.closures[0]
-    path = tmp_path / "rounded.toml"
-    path.write_text(
-        f'platform = "{robot.platform}"\n{"".join(frames)}'
-        f'[[closure]]\nframes = ["{a}", "{b}"]\n'
-    )
-    home = home_posture(load_robot(path))
-    assert home.mismatch > 1e-9
-    found = mobility(home)
-    assert (found.freedoms, found.overconstraint) == (1, 3)
+def rounded(digits):
+    """A maker of joints whose points and axes have so many digits."""
+
+    def make(name, kind, first, second, at, axis, across, axis2, driven):
+        axis, axis2 = (unit(np.round(v, digits)) for v in (axis, axis2))
+        across = perpendicular(axis, axis2)
+        at = np.round(at, digits)
+        return DrawnJoint(name, kind, first, second, at, axis, across, axis2, driven)
+
+    return make
+
+
+@pytest.mark.parametrize("name", [*WORDS, "bennett"])
+def test_counts_of_files_rounded_at_6_digits_are_those_of_exact_ones(name, monkeypatch):
+    """Of Bennett's linkage they would be 0 if all its singular values counted."""
+    make, expected = MECHANISMS[name]
+    monkeypatch.setattr(mechanisms, "DrawnJoint", rounded(6))
+    found = mobility_of(home_posture(make()))
+    names = ("freedoms", "platform_freedoms", "freedoms_drives_locked",
+             "platform_freedoms_drives_locked", "redundant_constraints")  # fmt: skip
+    assert tuple(found[key] for key in names) == expected
+    assert found["counts_certain"]
+    assert found["words"] == WORDS.get(name, found["words"])
+    assert found["finite_freedoms"] == found["freedoms"] - 2 * (name == "snu")
+
+
+def test_counts_without_a_gap_are_reported_as_not_certain():
+    """Axes tilted by 1e-4 and 2e-5 rad: the equations they add are of those sizes."""
+    robot = mechanism(
+        "one", [0.1, 0.2, 0],
+        joint("revolute", "base", "one", [0, 0, 0], driven=True),
+        joint("revolute", "one", "two", [0.1, 0.3, 0]),
+        joint("revolute", "two", "three", [0.4, 0.6, 0], [1e-4, 0, 1]),
+        joint("revolute", "three", "four", [0.7, 0.5, 0], [0, 2e-5, 1]),
+        joint("revolute", "base", "four", [0.8, 0, 0]),
+    )  # fmt: skip
+    found = mobility_of(home_posture(robot))
+    assert 1 < found["singular_value_gap"] < 100
+    assert not found["counts_certain"]
+    assert "differ only by" in mobility_lines(found)["counts not certain"]
 
 
 def test_show_writes_mobility_and_axes_without_a_picture(run):
