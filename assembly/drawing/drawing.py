@@ -17,6 +17,7 @@ FREE_ROWS: dict[str, tuple[int, ...]] = {
     "fixed": (),
     "revolute": (2,),
     "prismatic": (5,),
+    "helical": (2,),
     "cylindrical": (2, 5),
     "universal": (2, 2),
     "spherical": (0, 1, 2),
@@ -63,6 +64,7 @@ class DrawnJoint:
         actuated: whether a drive holds it.
         position: [rad or m] coordinate at home.
         limits: [rad or m] least and largest coordinate, or None.
+        pitch: [m] of a helical joint in a turn, 0 of others.
         numbers: one for the joint; for a universal joint one for each bearing.
     """
 
@@ -77,6 +79,7 @@ class DrawnJoint:
     actuated: bool = False
     position: float = 0.0
     limits: tuple[float, float] | None = None
+    pitch: float = 0.0
     numbers: tuple[JointNumbers, ...] = (JointNumbers(),)
 
 

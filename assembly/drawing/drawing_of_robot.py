@@ -36,7 +36,7 @@ _SAME = 1e-12  # [lengths, rad] error below which points and axes are the same
 _HELD = {
     "name", "parent", "translation", "rotation", "joint", "actuated", "position",
     "limits", "geometric_error", "tolerance", "clearance", "joint_stiffness", "link",
-    "mass", "centre_of_mass",
+    "mass", "centre_of_mass", "pitch",
 }  # fmt: skip
 
 

@@ -139,7 +139,8 @@ def _frames_of(plan: _Plan, step: Step) -> list[PlacedFrame]:
         for part in parts_of(item, step.reverse):
             numbers = part.numbers
             frame = Frame(
-                part.name, carrier, joint=part.kind, actuated=item.actuated,
+                part.name, carrier, joint=part.kind, pitch=item.pitch,
+                actuated=item.actuated,
                 position=part.position, limits=item.limits,
                 clearance=numbers.clearance, joint_stiffness=numbers.stiffness,
                 geometric_error=numbers.error, tolerance=numbers.tolerance,

@@ -22,6 +22,8 @@ from assembly.model.robot import Clearance, Frame, Robot
 _SAME = 1e-12  # [lengths, sine] error below which points and directions are the same
 _PARALLEL = 1e-2  # sine of the angle below which a universal joint is not made
 _TURNS = ("revolute", "revolute")
+# ends of the names that frames of a drawn joint have (``parts.py``)
+_PARTS = {"first", "second", "third", "turn", "slide", "slide_x", "slide_y"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +111,8 @@ def _single(posture: Posture, i: int) -> DrawnJoint:
     frame, T = posture.robot.frames[i], posture.transforms[i]
     return DrawnJoint(
         frame.name, frame.joint, "", "", T[:3, 3], T[:3, 2], T[:3, 0], T[:3, 0],
-        frame.actuated, float(posture.coordinates[i]), frame.limits, (_numbers(frame),),
+        frame.actuated, float(posture.coordinates[i]), frame.limits, frame.pitch,
+        (_numbers(frame),),
     )  # fmt: skip
 
 
@@ -243,6 +246,9 @@ def _empty(own: JointNumbers) -> bool:
 def _common_name(robot: Robot, rows: list[int]) -> str:
     """What the names of several frames have in common, or the first of them."""
     names = [robot.frames[i].name for i in rows]
+    stems = {name.rpartition(".")[0] for name in names}
+    if {name.rpartition(".")[2] for name in names} <= _PARTS and len(stems) == 1:
+        return stems.pop()
     others = {f.name for f in robot.frames if connects(f)}
     common = "".join(_while_equal(names)).rstrip("._-")
     taken = not common or common in others

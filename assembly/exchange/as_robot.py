@@ -245,6 +245,7 @@ def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
             Joint(
                 name, frame.joint, on[frame.parent], child, T,
                 position=float(q), actuated=frame.actuated, limits=frame.limits,
+                lead=frame.lead,
             )
         )  # fmt: skip
         on[frame.name] = child

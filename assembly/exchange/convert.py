@@ -220,6 +220,12 @@ def _written(
 
 def _built_in(conversion: Conversion) -> tuple[Conversion, RobotAndMechanism]:
     """Return the rigid mechanism of a robot, its calibration included, loops closed."""
+    threads = [quoted(f.name) for f in conversion.robot.frames if f.pitch]
+    if threads:
+        raise BadInput(
+            f"{conversion.robot.name}: found helical joints ({', '.join(threads)}), "
+            "which only robot files (.toml) hold; nothing is written"
+        )
     posture = home_posture(conversion.robot)
     robot = with_calibration(posture)
     home = posture.coordinates

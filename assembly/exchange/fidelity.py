@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from assembly.exchange.as_robot import RobotAndMechanism
 from assembly.exchange.mechanism import body_poses
 from assembly.exchange.tree import place_frames
+from assembly.kinematics.nominal import KINDS
 from assembly.kinematics.posture import home_posture
-from assembly.model.robot import BASE, JOINTS, Robot
+from assembly.model.robot import BASE, Robot
 from forcefit.inputs.errors import BadInput
 
 FAITHFUL = 1e-12  # [rad, lengths] largest difference of a body's pose
@@ -38,11 +39,12 @@ def largest_difference(placed: RobotAndMechanism) -> float:
     if lost:
         raise BadInput(f"{robot.name}: joint {lost[0]} was lost in conversion")
     random, worst = np.random.default_rng(0), 0.0
-    kinds = np.array([JOINTS.index(f.joint) for f in robot.frames])
+    kinds = np.array([KINDS[f.joint] for f in robot.frames])
+    leads = np.array([f.lead for f in robot.frames])
     for _ in range(_POSTURES):
         shift = random.uniform(-1, 1, len(robot.frames))
         q = np.where(kinds > 0, robot.positions + shift, 0.0)
-        _, after = place_frames(robot.parents, kinds, robot.fixed_transforms, q)
+        _, after = place_frames(robot.parents, kinds, robot.fixed_transforms, q, leads)
         frames = dict(zip((f.name for f in robot.frames), after, strict=True))
         given = [q[rows[j.name]] if j.name in rows else 0.0 for j in mechanism.joints]
         poses = body_poses(mechanism, np.array(given))
@@ -107,5 +109,6 @@ def _passes(
 
 def _placed(robot: Robot, q: NDArray) -> NDArray:
     """Return (n, 4, 4) frames before their joints' motions."""
-    kinds = np.array([JOINTS.index(f.joint) for f in robot.frames])
-    return place_frames(robot.parents, kinds, robot.fixed_transforms, q)[0]
+    kinds = np.array([KINDS[f.joint] for f in robot.frames])
+    leads = np.array([f.lead for f in robot.frames])
+    return place_frames(robot.parents, kinds, robot.fixed_transforms, q, leads)[0]

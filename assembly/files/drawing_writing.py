@@ -68,6 +68,8 @@ def _joint_table(joint: DrawnJoint) -> dict[str, Any]:
     table: dict[str, Any] = {"name": joint.name, "type": joint.kind}
     table |= {"between": [joint.first, joint.second], "at": _point(joint.at)}
     table |= {"axis": _point(joint.axis), "axis2": _point(joint.axis2)}
+    if joint.pitch:
+        table["pitch"] = joint.pitch
     if joint.actuated:
         table["actuated"] = True
     if abs(joint.position) > _AT_ZERO:
@@ -75,11 +77,26 @@ def _joint_table(joint: DrawnJoint) -> dict[str, Any]:
     if joint.limits is not None:
         table["limits"] = list(joint.limits)
     numbers = [_numbers_table(each) for each in joint.numbers]
+    drive = _drive_stiffness(joint)
+    if drive is not None:
+        numbers[0].pop("joint_stiffness")
+        table["drive_stiffness"] = drive
     if len(numbers) == 1:
         return table | numbers[0]
     for key in dict.fromkeys(key for each in numbers for key in each):
         table[key] = [each.get(key, _none(key)) for each in numbers]
     return table
+
+
+def _drive_stiffness(joint: DrawnJoint) -> float | None:
+    """Return the stiffness of a drive if it is the only spring of its joint."""
+    K = joint.numbers[0].stiffness
+    if K is None or not joint.actuated:
+        return None
+    row = 5 if joint.kind == "prismatic" else 2
+    rigid = np.isinf(np.diag(K))
+    alone = rigid.sum() == 5 and not rigid[row]
+    return float(K[row, row]) if alone else None
 
 
 def _none(key: str) -> Any:

@@ -4,20 +4,48 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.largest import LARGEST, LARGEST_LENGTH
-from assembly.model.robot import LOCKED, Clearance
+from assembly.model.robot import LOCKED, NO_SPIN, Clearance
 from forcefit.inputs.number_arrays import find_fault, number_array
 from forcefit.inputs.table import Table
 
 # [rad, m] smaller values are refused, because their square is 0
 _LEAST_CLEARANCE = 1e-30
+_LEAST_PITCH = 1e-9  # [m] smaller pitches are refused
+_LARGEST_PITCH = 1.0  # [m] larger pitches are refused
 _CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad"}
 
 
-def read_clearance(table: Table) -> Clearance | None:
+def read_pitch(table: Table, joint: str) -> float:
+    """Return the ``pitch`` of a helical joint, 0 of other joints.
+
+    Args:
+        table: table of a frame or a drawn joint.
+        joint: type of the joint.
+
+    Returns:
+        [m] translation in a turn of 360 degrees, positive for a right-hand thread.
+
+    Raises:
+        BadInput: the pitch is missing, 0 or above 1 m, or the joint is not helical.
+    """
+    if joint != "helical":
+        if table.has("pitch"):
+            expected = "expected none, or a helical joint"
+            raise table.bad("pitch", f"found one on a {joint} joint, {expected}")
+        return 0.0
+    pitch = table.number("pitch", "m per turn", largest=_LARGEST_PITCH)
+    if abs(pitch) < _LEAST_PITCH:
+        expected = f"expected at least {_LEAST_PITCH:g} m, or at most minus that"
+        raise table.bad("pitch", f"found {pitch:g}, {expected}")
+    return pitch
+
+
+def read_clearance(table: Table, joint: str) -> Clearance | None:
     """Return the ``clearance`` table, None if absent.
 
     Args:
         table: table of a ``[[frame]]``.
+        joint: type of the joint.
 
     Returns:
         The given bounds.
@@ -34,6 +62,8 @@ def read_clearance(table: Table) -> Clearance | None:
         for key, unit in _CLEARANCE.items()
         if inner.has(key)
     }
+    if joint == "helical" and "spin" in bounds:
+        raise inner.bad("spin", f"found one on a helical joint, {NO_SPIN}")
     for key, bound in bounds.items():
         if 0.0 < bound < _LEAST_CLEARANCE:
             expected = f"expected 0 or at least {_LEAST_CLEARANCE:g}"

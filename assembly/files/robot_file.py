@@ -12,7 +12,11 @@ from numpy.typing import NDArray
 from assembly.drawing.frames import robot_of_drawing
 from assembly.files.drawing_file import is_drawing, read_drawing
 from assembly.files.effect_file import effect_tables, with_effects
-from assembly.files.joint_file import read_clearance, read_joint_stiffness
+from assembly.files.joint_file import (
+    read_clearance,
+    read_joint_stiffness,
+    read_pitch,
+)
 from assembly.files.link_file import link_table, read_link
 from assembly.files.toml_text import file_text
 from assembly.kinematics.posture import home_posture
@@ -229,7 +233,7 @@ def _frame(table: Table) -> Frame:
     if joint == "fixed" and (actuated or given):
         key = "actuated" if actuated else given[0]
         message = f'found {key} on a fixed joint; expected joint = "revolute" | '
-        raise table.bad(key, message + f'"prismatic", or no {key}')
+        raise table.bad(key, message + f'"prismatic" | "helical", or no {key}')
     translation, rotation = _placement(table)
     passive = joint != "fixed" and not actuated
     own = (5 if joint == "prismatic" else 2) if passive else None
@@ -239,12 +243,13 @@ def _frame(table: Table) -> Frame:
         translation=translation,
         rotation=rotation,
         joint=joint,
+        pitch=read_pitch(table, joint),
         actuated=actuated,
         position=table.number("position", "rad or m", 0.0, largest=LARGEST_LENGTH),
         limits=_limits(table),
         geometric_error=_numbers(table, "geometric_error", 6, "rad, m"),
         tolerance=_tolerance(table),
-        clearance=read_clearance(table),
+        clearance=read_clearance(table, joint),
         joint_stiffness=read_joint_stiffness(table, own),
         link=read_link(table),
         mass=table.number("mass", "kg", 0.0, least=0.0, largest=1e40),
@@ -436,6 +441,8 @@ def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
     table["rotation"] = frame.rotation.tolist()
     if frame.joint != "fixed":
         table |= {"joint": frame.joint, "position": frame.position}
+        if frame.pitch:
+            table["pitch"] = frame.pitch
         if frame.actuated:
             table["actuated"] = True
         if frame.limits is not None:

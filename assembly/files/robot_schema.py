@@ -68,6 +68,7 @@ _FRAME = record(
         alpha_=number("Denavit-Hartenberg alpha", "rad"),
     ),
     joint_=Words((*JOINTS,)), actuated_=flag("actuated"),
+    pitch_=number("translation of a helical joint in a turn", "m"),
     position_=number("coordinate at home", "rad or m"),
     limits_=number("least and largest coordinate", "rad or m", "bound"),
     geometric_error_="geometric_error",
@@ -125,6 +126,7 @@ _BODY = record(
 _JOINT = record(
     "", _OF_JOINT, name=text("name"), type=Words((*FREE_ROWS,)),
     between=text("two bodies", "body"), at=_POINT, axis_=_DIRECTION, axis2_=_DIRECTION,
+    pitch_=number("translation of a helical joint in a turn", "m"),
     actuated_=flag("actuated"), position_=number("coordinate at home", "rad or m"),
     limits_=number("least and largest coordinate", "rad or m", "bound"),
     drive_stiffness_=number("stiffness of the drive", "N m/rad or N/m"),

@@ -35,7 +35,11 @@ from assembly.linear.load import (
 from assembly.linear.reference.reduction import reduce_problem
 from assembly.linear.rounding import ROUNDING, closure_rounding, differs_from_zero
 from assembly.linear.solution import Solution
-from assembly.model.clearance import clearance_bounds, clearance_excess
+from assembly.model.clearance import (
+    clearance_bounds,
+    clearance_components,
+    clearance_excess,
+)
 from assembly.model.point_results import N, plain
 from assembly.model.statuses import OK
 from assembly.solvers.cones import cone_sizes, cone_sums
@@ -271,7 +275,8 @@ class Assembly(Solution[N]):
         if not own_axes_free and "_excess" in vars(self):
             return self._excess
         bounds = clearance_bounds(self.posture.robot, own_axes_free)
-        return plain(clearance_excess(self.clearance_screws, bounds))
+        bounded = clearance_components(self.posture.robot, self.clearance_screws)
+        return plain(clearance_excess(bounded, bounds))
 
     @cached_property
     def _excess(self) -> N:

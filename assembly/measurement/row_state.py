@@ -34,6 +34,7 @@ from assembly.measurement.without_clearance import (
     at_postures,
     pseudo_inverse,
 )
+from assembly.model.links import own_screw
 from stiffness.screws import rotation_matrix, rotation_vector, transform
 
 _LINEAR_BELOW = 1e-9  # [rad or m] below it the law of a contact is linear
@@ -86,7 +87,7 @@ class Rows:
         ))
         for k, law in enumerate(self.conditions.laws):
             i = self.conditions.robot.index(law.frame)
-            columns[6 * i + self.conditions.robot.frames[i].own_axis, k] = 1.0
+            columns[6 * i : 6 * i + 6, k] = own_screw(self.conditions.robot.frames[i])
         return columns
 
     @cached_property
@@ -204,7 +205,8 @@ class RowState:
     def passive_motion(self) -> NDArray:
         """(R, n) [rad or m] motions of passive joints from their coordinates."""
         moved = self.motions @ self.rows.flexible.free.T
-        return moved.reshape(*self.screws.shape[1:]).sum(axis=-1)
+        own = [f.own_axis for f in self.rows.conditions.robot.frames]
+        return moved.reshape(*self.screws.shape[1:])[..., np.arange(len(own)), own]
 
     @cached_property
     def poses(self) -> tuple[NDArray, NDArray, NDArray, NDArray]:

@@ -17,6 +17,7 @@ from assembly.measurement.without_clearance import flexibility
 from assembly.model.clearance import (
     CONES,
     clearance_bounds,
+    clearance_components,
     component_bounds,
     scales_with_margin,
 )
@@ -103,9 +104,8 @@ def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
     """
     bounds = _component_bounds(robot)
     finite = np.isfinite(bounds) & (bounds > 0)
-    return np.divide(
-        clearance_screws, bounds, out=np.zeros_like(clearance_screws), where=finite
-    )
+    bounded = clearance_components(robot, clearance_screws)
+    return np.divide(bounded, bounds, out=np.zeros_like(bounded), where=finite)
 
 
 def without_joint_clearances(robot: Robot) -> Robot:

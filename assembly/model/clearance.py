@@ -73,6 +73,27 @@ def has_bounded_motion(robot: Robot) -> bool:
     return bool(np.isfinite(clearance_bounds(robot)[own]).any())
 
 
+def clearance_components(robot: Robot, screws: NDArray) -> NDArray:
+    """Return the components of clearance screws that bounds limit.
+
+    Component TZ of a helical joint is the translation relative to its thread,
+    TZ - h RZ; other components are those of the screw.
+
+    Args:
+        robot: of n frames.
+        screws: (..., n, 6) [rad, m] clearances and motions of passive joints.
+
+    Returns:
+        (..., n, 6) [rad, m]; the same object without helical joints.
+    """
+    leads = np.array([frame.lead for frame in robot.frames])
+    if not leads.any():
+        return screws
+    components = screws.copy()
+    components[..., 5] -= leads * screws[..., 2]
+    return components
+
+
 def clearance_excess(screws: NDArray, bounds: NDArray) -> NDArray:
     """Return the largest excess of a clearance screw over its cone, eqs (2)-(5).
 

@@ -17,12 +17,13 @@ from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import html_table, short_repr
 from stiffness.screws import rotation_matrix
 
-JOINTS = ("fixed", "revolute", "prismatic")
+JOINTS = ("fixed", "revolute", "prismatic", "helical")
 BASE = "base"
 LOCKED = (
     "found inf along the own motion of a passive joint, which would lock it; expected "
     '0 (free, as a bearing), a number > 0 (a spring), or joint = "fixed"'
 )
+NO_SPIN = "expected none: its motion along the thread has no clearance bound"
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,8 @@ class Frame:
         parent: name of the parent frame, or ``"base"``.
         translation: (3,) [m] origin seen from the parent's frame after its joint.
         rotation: (3,) [rad] rotation vector of the axes, seen from there too.
-        joint: ``"fixed"``, ``"revolute"`` or ``"prismatic"``, about or along own z.
+        joint: ``"fixed"``, ``"revolute"`` or ``"prismatic"``, about or along own z, or
+            ``"helical"``, both together; its coordinate is the angle.
         actuated: whether the joint is locked at a command; otherwise its motion is
             free.
         position: [rad or m] joint coordinate in the home pose.
@@ -68,6 +70,8 @@ class Frame:
         link: elasticity of the body, None if rigid.
         mass: [kg] of the body in addition to its link's own.
         centre_of_mass: (3,) [m] of that mass, in the frame's axes.
+        pitch: [m] translation of a helical joint in a turn, positive for a right-hand
+            thread; 0 of other joints.
     """
 
     name: str
@@ -85,6 +89,7 @@ class Frame:
     link: Link | None = None
     mass: float = 0.0
     centre_of_mass: NDArray = field(default_factory=lambda: np.zeros(3))
+    pitch: float = 0.0
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -94,6 +99,15 @@ class Frame:
             if value is not None:
                 value = locked(value, shape, f"frame '{self.name}': {name}")
                 object.__setattr__(self, name, value)
+        if (self.joint == "helical") != (self.pitch != 0.0):
+            raise BadInput(
+                f"frame {quoted(self.name)}.pitch: found {self.pitch:g} on a "
+                f"{self.joint} joint; expected 0 except on a helical joint, "
+                "where it is not 0"
+            )
+        if self.pitch and self.clearance and self.clearance.spin is not None:
+            place = f"frame {quoted(self.name)}.clearance.spin"
+            raise BadInput(f"{place}: found one on a helical joint, {NO_SPIN}")
         own = self.own_stiffness
         if self.passive and own is not None and np.isinf(own):
             raise BadInput(f"frame {quoted(self.name)}.joint_stiffness: {LOCKED}")
@@ -118,8 +132,22 @@ class Frame:
         return np.diag(K)
 
     @property
+    def lead(self) -> float:
+        """[m/rad] translation of a helical joint per angle, 0 of others."""
+        return self.pitch / (2 * math.pi)
+
+    @property
+    def turns(self) -> bool:
+        """Whether the coordinate is an angle: of a revolute or helical joint."""
+        return self.joint in {"revolute", "helical"}
+
+    @property
     def own_axis(self) -> int:
-        """Index of the joint's own component of a screw: RZ, or TZ if prismatic."""
+        """Index of the joint's own component of a screw: RZ, or TZ if prismatic.
+
+        RZ of a helical joint is its whole motion, the translation included
+        (:func:`assembly.model.links.motion_map`).
+        """
         return 5 if self.joint == "prismatic" else 2
 
     @property

@@ -95,6 +95,10 @@ def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
     scales = _scales(root)
     service = read_service(root, robot)
     checks, named = _checks(root, bool(meshes), bool(grid), bool(scales))
+    threads = [quoted(frame.name) for frame in robot.frames if frame.pitch]
+    if threads and "crosscheck" in checks:
+        fault = f"found helical joints ({', '.join(threads)}), which are not simulated"
+        raise root.bad("checks", f"{fault}; set crosscheck = false under [checks]")
     wanted = tuple(c for c in checks if c in named | asked_by_key)
     wanted += ("service",) if service is not None else ()
     asked = root.text("output", f"{path.stem}_study")

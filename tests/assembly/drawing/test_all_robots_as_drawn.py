@@ -104,6 +104,21 @@ def test_drawn_robots_are_equal_after_conversion_to_frames_and_back(name, tmp_pa
     compare(*(home_posture(load_robot(path)) for path in files))
 
 
+def test_screw_converted_to_bodies_and_joints_keeps_its_pitch_and_names(tmp_path):
+    """A turn of the drive lowers the table by the pitch of 5 mm."""
+    source = LITERATURE.with_name("robots_drawn") / "screw.toml"
+    if not source.exists():
+        pytest.skip(f"{source} is not here")
+    convert(source, tmp_path / "frames.toml")
+    convert(tmp_path / "frames.toml", tmp_path / "drawn.toml", version=2)
+    text = (tmp_path / "drawn.toml").read_text()
+    assert 'name = "column"\ntype = "cylindrical"' in text
+    assert "drive_stiffness = 200.0" in text
+    robot = load_robot(tmp_path / "drawn.toml")
+    turned = place_robot(robot, joints={"bearing": 2 * np.pi})
+    assert turned.pose()["tz"] == pytest.approx(0.4 - 0.005, abs=1e-12)
+
+
 def test_what_bodies_and_joints_cannot_hold_is_reported(run, tmp_path):
     """Axes of the platform that are not the base's, as of a flange."""
     status, out, err = run(
@@ -165,6 +180,7 @@ def test_missing_output_folder_is_refused_before_anything_is_written(tmp_path):
      'joint "slide".between: found "rood", expected a body or "base"'),
     ("axis2 = [0, 1, 0]", "axis2 = [-90, 0, -32]",
      'joint "upper".axis2: found it parallel to "axis"'),
+    ('type = "prismatic"', 'type = "helical"\npitch = 0', 'pitch: found 0'),
     ("[[leg]]", '[[body]]\nname = "lost"\n\n[[leg]]', 'body "lost": found no joint'),
 ])  # fmt: skip
 @pytest.mark.parametrize("words", [

@@ -442,9 +442,15 @@ REFUSED = {
     "unknown type": (
         'type = "prismatic"', 'type = "prismatc"',
         'leg "leg".joint "slide".type: found \'prismatc\', expected "fixed" | "revol'),
-    "helical": (
+    "missing pitch": (
         'type = "prismatic"', 'type = "helical"',
-        'leg "leg".joint "slide".type: found "helical", which is not supported yet'),
+        'leg "leg".joint "slide".pitch: missing; expected a finite number [m per '),
+    "no pitch": (
+        'type = "prismatic"', 'type = "helical"\npitch = 0',
+        'leg "leg".joint "slide".pitch: found 0, expected at least 1e-09'),
+    "pitch of another joint": (
+        'type = "prismatic"', 'type = "prismatic"\npitch = "5 mm"',
+        'leg "leg".joint "slide".pitch: found one on a prismatic joint, expected none'),
     "unknown key": (
         "drive_stiffness", "drive_stifness",
         'leg "leg".joint "slide": unknown key "drive_stifness"; did you mean '),

@@ -266,6 +266,20 @@ def test_documentation_bearing_deflects_by_its_data_sheet_stiffness(write_file):
         solve_assembly(home_posture(robot), [0, 0, 1.0, 0, 0, 0])
 
 
+def test_documentation_nut_moves_along_its_thread_by_clearance_and_flanks(write_file):
+    """Under F along z and the moment -h F that the thread carries: b + F / k."""
+    text = (Path(__file__).parents[3] / "docs" / "robot_files.md").read_text("utf-8")
+    example = text.split("```toml\n")[3].split("```")[0]
+    tip = 'platform = "tip"\n[[frame]]\nname = "tip"\nparent = "nut"\n'
+    robot = read_robot(write_file(tip + example.replace('"screw"', '"base"')))
+    h = 0.004 / (2 * np.pi)
+    moved = solve_assembly(home_posture(robot), [0, 0, -100 * h, 0, 0, 100.0])
+    along = moved.platform_screw[5] - h * moved.platform_screw[2]
+    assert along == pytest.approx(25e-6 + 100 / 1e8, rel=1e-9)
+    with pytest.raises(FreeMotion):
+        solve_assembly(home_posture(robot), [0, 0, 0, 0, 0, 100.0])
+
+
 def test_missing_dh_alpha_is_reported(write_file, run, monkeypatch):
     """Reported by solve, in text and JSON, and by show; not if alpha is given."""
     text = """

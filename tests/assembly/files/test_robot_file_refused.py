@@ -102,18 +102,27 @@ REFUSED = {
     "a joint of another kind": (
         'joint = "revolute"\nactuated', 'joint = "revolut"\nactuated',
         'frame "crank".joint: found \'revolut\', expected "fixed" | "revolute" | '
-        '"prismatic"; did you mean "revolute"?'),
+        '"prismatic" | "helical"; did you mean "revolute"?'),
+    "a helical joint without pitch": (
+        'joint = "revolute"\nactuated', 'joint = "helical"\nactuated',
+        'frame "crank".pitch: missing; expected a finite number [m per turn]'),
+    "a pitch of 0": (
+        'joint = "revolute"\nactuated', 'joint = "helical"\npitch = 0\nactuated',
+        'frame "crank".pitch: found 0, expected at least 1e-09 m, or at most minus'),
+    "a pitch of another joint": (
+        'joint = "revolute"\nactuated', 'joint = "revolute"\npitch = 0.01\nactuated',
+        'frame "crank".pitch: found one on a revolute joint, expected none, or a hel'),
     "a number for true": (
         "actuated = true", "actuated = 1",
         'frame "crank".actuated: found 1, expected true or false'),
     "a position of a fixed joint": (
         'joint = "revolute"\nactuated = true', "",
         'frame "crank".position: found position on a fixed joint; expected joint = '
-        '"revolute" | "prismatic", or no position'),
+        '"revolute" | "prismatic" | "helical", or no position'),
     "an actuated fixed joint": (
         'joint = "revolute"\nactuated = true\nposition = 1.0', "actuated = true",
         'frame "crank".actuated: found actuated on a fixed joint; expected joint = '
-        '"revolute" | "prismatic", or no actuated'),
+        '"revolute" | "prismatic" | "helical", or no actuated'),
     "a negative mass": (
         "mass = 1.2", "mass = -1.2",
         'frame "coupler".mass: found -1.2, expected a finite number >= 0 [kg]'),
