@@ -178,13 +178,13 @@ def _add_bodies(sheet: _Sheet) -> None:
     """Name the bodies: the platform, then the frames at whose joints they end."""
     robot, rigid = sheet.posture.robot, sheet.rigid
     numbers = {rigid.after[robot.index(robot.platform)]: robot.platform}
-    for which in (rigid.before, rigid.after):
-        for k, frame in zip(which, robot.frames, strict=True):
-            heavy = frame.mass or frame.link is not None
-            if which is rigid.before and heavy:
-                numbers.setdefault(k, frame.name)
-        for k, frame in zip(which, robot.frames, strict=True):
-            numbers.setdefault(k, frame.name)
+    first = [i for i, frame in enumerate(robot.frames) if _holds(frame)]
+    every = range(len(robot.frames))
+    for which, rows in (
+        (rigid.before, first), (rigid.before, every), (rigid.after, every)
+    ):  # fmt: skip
+        for i in rows:
+            numbers.setdefault(which[i], robot.frames[i].name)
     numbers.pop(0, None)
     named = {
         robot.frames[row].name: found.joint.name
@@ -291,7 +291,7 @@ def _only_joint(sheet: _Sheet, body: int, i: int) -> DrawnJoint | None:
     if (
         body == 0
         or body in sheet.same
-        or rigid.after[robot.index(robot.platform)] == (body)
+        or body == rigid.after[robot.index(robot.platform)]
     ):
         return None
     others = [k for k, f in enumerate(robot.frames) if k != i and (

@@ -210,7 +210,8 @@ def exact_of(
         ``"unstable"`` where the potential decreases along a motion.
     """
     results: dict[str, Any] = {
-        "robot": posture.robot.name, "status": "ok", "pose": posture.pose()
+        "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
+        "mobility": mobility_of(posture),
     }  # fmt: skip
     try:
         assembly = solve_exact(posture, load, gravity=gravity, progress=progress)
@@ -243,7 +244,9 @@ def exact_text(results: dict[str, Any]) -> str:
     """Return an exact solution as text."""
     return listing(
         results["robot"],
-        lines_of(results, "pose status reason energy platform_screw")
+        lines_of(results, "pose")
+        | mobility_lines(results["mobility"])
+        | lines_of(results, "status reason energy platform_screw")
         | _linearisation_lines(results)
         | lines_of(results.get("certificate", {}), _PROOF),
         results.get("remarks", ()),

@@ -65,7 +65,7 @@ SOLUTION = record(
     worst_error_=record("assumption rotation translation"),
 )  # fmt: skip
 _EXACT = record(
-    "remarks?", _POSTURE,
+    "remarks?", _POSTURE, mobility=MOBILITY,
     energy_="energy", potential_="potential", platform_screw_="platform_screw",
     frames_=_SOLVED.content["frames"], closures_=_SOLVED.content["closures"],
     certificate_=record(
