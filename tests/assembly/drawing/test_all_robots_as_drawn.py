@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from assembly.exchange.convert import convert
+from assembly.exchange.robot_files import load_robot
 from assembly.files.robot_file import read_robot
 from assembly.kinematics.mobility import mobility
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.linear.zone import zone_margin
+from assembly.model.frame import between_origins
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.robots import BUILT_IN, load_robot
+from assembly.robots import BUILT_IN
 from forcefit.inputs.errors import BadInput
 
 SAME = 1e-12
@@ -199,3 +201,27 @@ def test_mistake_in_a_drawing_writes_nothing(
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert message in err
     assert [path.name for path in tmp_path.iterdir()] == ["bad.toml"]
+
+
+def test_directions_of_a_mesh_are_kept(tmp_path):
+    """From base to tip, and of its height, in the axes of the base at home."""
+    mesh = Path(__file__).parents[3] / "meshes" / "distal_plain.stl"
+    (tmp_path / "mesh.toml").write_text(
+        ALONE.replace('name = "tip"\nparent = "arm"\n', 'name = "elbow"\n'
+                      'parent = "arm"\nrotation = [0.4, -0.2, 0.9]\n'
+                      'joint = "revolute"\n'
+                      f'link = {{ mesh = {{ surface = "{mesh}", base = "z=0", tip = '
+                      '"z=0.452", up = [1, 0, 0] }, young = 6e10, poisson = 0.3 }\n'
+                      "up = [0.3, 0.2, 1.0]\n")
+        .replace('parent = "base"\n', 'parent = "base"\nrotation = [0.3, 0.2, 0.1]\n')
+        + '[[frame]]\nname = "tip"\nparent = "elbow"\ntranslation = [0.2, 0, 0]\n'
+    )  # fmt: skip
+    convert(tmp_path / "mesh.toml", tmp_path / "drawn.toml", version=2)
+    found = []
+    for name in ("mesh", "drawn"):
+        robot = load_robot(tmp_path / f"{name}.toml", links=False)
+        (i,) = (i for i, f in enumerate(robot.frames) if f.link is not None)
+        link, R = robot.frames[i].link, home_posture(robot).transforms[i][:3, :3]
+        axis = between_origins(robot.frames[i]) if link.axis is None else link.axis
+        found.append([R @ axis / np.linalg.norm(axis), R @ link.frame_up])
+    np.testing.assert_allclose(found[1], found[0], atol=1e-12)
