@@ -135,7 +135,7 @@ def _several(posture: Posture, rows: list[int]) -> tuple[DrawnJoint, list[int]] 
     if kinds == _TURNS and abs(across[0]) < np.cos(_PARALLEL):
         found = _universal(axes, own)
     elif kinds == (*_TURNS, "revolute") and right:
-        bounds = ("radial", "axial", "ball")
+        bounds: Sequence[str] = ("radial", "axial", "ball")
         back = _isotropic(own[-1]) and all(map(_empty, own[:-1]))
         ball = (axes[::-1], own[::-1]) if back else (axes, own)
         found = _with_one_contact("spherical", *ball, bounds)
