@@ -15,12 +15,13 @@ from assembly.drawing.drawing import (
     DrawnJoint,
     JointNumbers,
 )
-from assembly.drawing.joint_types import FoundJoint, found_joints
+from assembly.drawing.joint_types import FoundJoint, found_joints, has_mass
 from assembly.drawing.links import beam_start, drawn_link
 from assembly.drawing.parts import joint_axes, parts_of
 from assembly.drawing.rigid_bodies import RigidBodies, rigid_bodies
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture, home_posture
+from assembly.model.inertia import joined_bodies
 from assembly.model.robot import (
     BASE,
     Frame,
@@ -36,7 +37,7 @@ _SAME = 1e-12  # [lengths, rad] error below which points and axes are the same
 _HELD = {
     "name", "parent", "translation", "rotation", "joint", "actuated", "position",
     "limits", "geometric_error", "tolerance", "clearance", "joint_stiffness", "link",
-    "mass", "centre_of_mass", "pitch",
+    "mass", "centre_of_mass", "inertia", "pitch",
 }  # fmt: skip
 
 
@@ -79,7 +80,7 @@ def drawing_of_robot(robot: Robot) -> DrawnRobot:
     for i, frame in enumerate(robot.frames):
         if frame.link is not None:
             _add_link(sheet, i)
-        if frame.mass and rigid.before[i] != 0:
+        if has_mass(frame) and rigid.before[i] != 0:
             _add_mass(sheet, i)
     sheet.joints.extend((found.joint, *found.bodies) for found in sheet.found)
     joints = [
@@ -159,7 +160,7 @@ def _left_out(sheet: _Sheet) -> list[str]:
         lost.append(f"coordinates at home of {names}: they are 0 in the new file")
     grounded = [
         quoted(frame.name) for i, frame in enumerate(robot.frames)
-        if frame.mass and sheet.rigid.before[i] == 0
+        if has_mass(frame) and sheet.rigid.before[i] == 0
     ]  # fmt: skip
     if grounded:
         lost.append(f"masses that are fixed to the base: {', '.join(grounded)}")
@@ -203,20 +204,20 @@ def _add_bodies(sheet: _Sheet) -> None:
 
 def _holds(frame: Frame) -> bool:
     """Whether a frame's body has a mass or a link."""
-    return bool(frame.mass) or frame.link is not None
+    return has_mass(frame) or frame.link is not None
 
 
 def _add_mass(sheet: _Sheet, i: int) -> None:
-    """Give a mass to its body; a second one is a body of its own."""
+    """Add the mass and moments of inertia of a frame to its body."""
     frame, T = sheet.posture.robot.frames[i], sheet.posture.transforms[i]
-    centre = T[:3, :3] @ frame.centre_of_mass + T[:3, 3]
-    k = sheet.rigid.before[i]
+    R, k = T[:3, :3], sheet.rigid.before[i]
     body = sheet.bodies[k]
-    if body.mass:
-        k = _new_body(sheet, f"{frame.name}.mass")
-        _fix(sheet, f"{frame.name}.mass", sheet.rigid.before[i], k, _at(centre))
-        body = sheet.bodies[k]
-    sheet.bodies[k] = replace(body, mass=frame.mass, centre=centre)
+    J = R @ frame.inertia @ R.T
+    own = frame.mass, R @ frame.centre_of_mass + T[:3, 3], (J + J.T) / 2
+    if has_mass(body):
+        own = joined_bodies([(body.mass, body.centre, body.inertia), own])
+    mass, centre, inertia = own
+    sheet.bodies[k] = replace(body, mass=mass, centre=centre, inertia=inertia)
 
 
 def _new_body(sheet: _Sheet, name: str) -> int:
@@ -296,7 +297,7 @@ def _only_joint(sheet: _Sheet, body: int, i: int) -> DrawnJoint | None:
         return None
     others = [k for k, f in enumerate(robot.frames) if k != i and (
         (f.link is not None and body in (rigid.starts[k], rigid.before[k]))
-        or (f.mass and rigid.before[k] == body)
+        or (has_mass(f) and rigid.before[k] == body)
     )]  # fmt: skip
     joints = [found.joint for found in sheet.found if body in found.bodies]
     return joints[0] if len(joints) == 1 and not others else None

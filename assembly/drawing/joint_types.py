@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.drawing.drawing import DrawnJoint, JointNumbers, perpendicular
+from assembly.drawing.drawing import DrawnBody, DrawnJoint, JointNumbers, perpendicular
 from assembly.drawing.rigid_bodies import RigidBodies, connects
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
@@ -88,7 +88,7 @@ def _following(posture: Posture, bodies: RigidBodies) -> dict[int, int]:
     robot, size = posture.robot, size_of(posture.robot)
     held = Counter(bodies.before[robot.index(robot.platform)] for _ in range(2))
     for i, frame in enumerate(robot.frames):
-        held.update({bodies.before[i]} if frame.mass else ())
+        held.update({bodies.before[i]} if has_mass(frame) else ())
         if frame.link is not None:
             held.update((bodies.starts[i], bodies.before[i]))
         if connects(frame):
@@ -104,6 +104,11 @@ def _following(posture: Posture, bodies: RigidBodies) -> dict[int, int]:
         and held[bodies.after[i]] == 2
         and np.abs(at[i] - at[j]).max() <= _SAME * size
     }
+
+
+def has_mass(body: Frame | DrawnBody) -> bool:
+    """Return whether a body has a mass or moments of inertia."""
+    return bool(body.mass or body.inertia.any())
 
 
 def _single(posture: Posture, i: int) -> DrawnJoint:

@@ -14,6 +14,7 @@ from assembly.files.effect_file import effect_tables
 from assembly.files.link_file import link_table
 from assembly.files.robot_file import root_table
 from assembly.files.toml_text import file_text
+from assembly.model.inertia import six_moments
 from assembly.model.robot import Robot
 
 _ROUNDING = 1e-15  # relative: smaller parts of points and directions are written as 0
@@ -50,7 +51,11 @@ def _body_table(body: DrawnBody, folder: Path) -> dict[str, Any]:
     """Return the keys of a body."""
     table: dict[str, Any] = {"name": body.name}
     if body.mass:
-        table |= {"mass": body.mass, "centre": _point(body.centre)}
+        table["mass"] = body.mass
+    if body.mass or body.inertia.any():
+        table["centre"] = _point(body.centre)
+    if body.inertia.any():
+        table["inertia"] = six_moments(body.inertia)
     if body.link is not None and body.ends is not None:
         link = link_table(body.link, folder)
         beam = link["link"].get("beam", {})

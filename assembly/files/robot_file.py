@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from assembly.drawing.frames import robot_of_drawing
 from assembly.files.drawing_file import is_drawing, read_drawing
 from assembly.files.effect_file import effect_tables, with_effects
+from assembly.files.inertia_file import read_inertia
 from assembly.files.joint_file import (
     read_clearance,
     read_joint_stiffness,
@@ -20,7 +21,9 @@ from assembly.files.joint_file import (
 from assembly.files.link_file import link_table, read_link
 from assembly.files.toml_text import file_text
 from assembly.kinematics.posture import home_posture
-from assembly.model.largest import LARGEST_LENGTH
+from assembly.model.frame import FORCE_CONTROL
+from assembly.model.inertia import six_moments
+from assembly.model.largest import LARGEST, LARGEST_LENGTH
 from assembly.model.link_span import with_spans
 from assembly.model.robot import (
     BASE,
@@ -251,9 +254,11 @@ def _frame(table: Table) -> Frame:
         tolerance=_tolerance(table),
         clearance=read_clearance(table, joint),
         joint_stiffness=read_joint_stiffness(table, own),
+        drive_force=_drive_force(table, passive),
         link=read_link(table),
         mass=table.number("mass", "kg", 0.0, least=0.0, largest=1e40),
         centre_of_mass=_numbers(table, "centre_of_mass", 3, "m"),
+        inertia=read_inertia(table),
     )
     if not isinstance(frame.link, MeshLink) and "up" in table.content:
         raise table.bad(
@@ -269,6 +274,14 @@ def _numbers(table: Table, key: str, count: int, unit: str) -> NDArray:
     """Return the lengths or angles, zero where absent."""
     zero = np.zeros(count)
     return table.array(key, (count,), unit, zero, largest=LARGEST_LENGTH)
+
+
+def _drive_force(table: Table, passive: bool) -> float:
+    """Return the force of a drive on a passive joint, 0 if not given."""
+    if table.has("drive_force") and not passive:
+        fault = f"found one on a joint that is not passive; {FORCE_CONTROL}"
+        raise table.bad("drive_force", fault)
+    return table.number("drive_force", "N m or N", 0.0, largest=LARGEST)
 
 
 def _limits(table: Table) -> tuple[float, float] | None:
@@ -458,10 +471,14 @@ def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
         K = frame.joint_stiffness
         diagonal = np.array_equal(K, np.diag(np.diag(K)))
         table["joint_stiffness"] = (np.diag(K) if diagonal else K).tolist()
+    if frame.drive_force:
+        table["drive_force"] = frame.drive_force
     if frame.link is not None:
         table |= link_table(frame.link, folder)
     if frame.mass:
         table["mass"] = frame.mass
     if np.any(frame.centre_of_mass):
         table["centre_of_mass"] = frame.centre_of_mass.tolist()
+    if np.any(frame.inertia):
+        table["inertia"] = six_moments(frame.inertia)
     return table

@@ -21,6 +21,7 @@ from stiffness.surface.surface import UNITS
 
 _DIRECTION = number("direction", "1", "axis")
 _POINT = number("point", "m", "axis")
+_INERTIA = number("Ixx, Iyy, Izz, Ixy, Ixz, Iyz at the centre", "kg m^2", "moment")
 _INTERFACE = Either((
     text('interface, such as "z=0.452"'),
     record(
@@ -80,8 +81,9 @@ _FRAME = record(
     joint_stiffness_=Either((
         number("diagonal stiffness", "N m/rad .. N/m", "screw"), _STIFFNESS,
     )),
+    drive_force_=number("force of a drive on a passive joint", "N m or N"),
     link_=_LINK, up_=_DIRECTION, mass_=number("mass", "kg"),
-    centre_of_mass_=number("centre of mass", "m", "axis"),
+    centre_of_mass_=number("centre of mass", "m", "axis"), inertia_=_INERTIA,
 )  # fmt: skip
 _NUMBERS = Each(number("parameter", ""))
 _EFFECT = record(
@@ -116,7 +118,7 @@ _PIECE = record(
 _BODY = record(
     name=text("name"), mass_=number("mass in addition to the link's", "kg"),
     centre_=_POINT,
-    inertia_=number("Ixx, Iyy, Izz, Ixy, Ixz, Iyz at the centre", "kg m^2", "moment"),
+    inertia_=_INERTIA,
     link_=record(
         "", _LINK, curve_=Listed(_PIECE), theory_=Words(("timoshenko", "euler"))
     ),

@@ -39,7 +39,8 @@ def ball_joints(robot: Robot) -> tuple[tuple[int, int, int], ...]:
         tilted = rotation_matrix(frame.rotation)[2, 2]
         return (
             frame.parent in bare and _turns(robot, i) and not frame.mass
-            and frame.link is None and bool(np.abs(frame.translation).max() <= least)
+            and not frame.inertia.any() and frame.link is None
+            and bool(np.abs(frame.translation).max() <= least)
             and abs(tilted) <= _SAME
         )  # fmt: skip
 

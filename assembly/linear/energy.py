@@ -23,7 +23,7 @@ from assembly.linear.closure import (
     virtual_joints,
 )
 from assembly.linear.lanes import assemble_side_by_side
-from assembly.linear.load import FrameLoads, no_loads
+from assembly.linear.load import FrameLoads, driven, no_loads
 from assembly.linear.reference.energy import CannotAssemble, least_energy
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.robot_structure import Structure, structure_of
@@ -121,7 +121,8 @@ def solve_assembly(
     if not isinstance(posture, Posture):
         posture = together(posture)
     loads = no_loads(posture.robot.errors.size)
-    if load is not None or bodies is not None or gravity is not None:
+    given = load is not None or bodies is not None or gravity is not None
+    if given or driven(posture.robot):
         loads = all_loads(posture, load, bodies, gravity)
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     if posture.transforms.ndim == 3 and errors is None and loads.body.ndim == 1:

@@ -17,7 +17,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exact.dead_load import DeadLoads, dead_loads_of_rows, resultants
+from assembly.exact.dead_load import (
+    DeadLoads,
+    dead_loads_of_rows,
+    drive_wrenches,
+    resultants,
+)
 from assembly.exact.finite_robot import along_own
 from assembly.kinematics.closure_rates import closure_signs
 from assembly.kinematics.nominal import size_of
@@ -278,6 +283,9 @@ class RowState:
         if loads.beyond_platform:
             carried = self.poses[3] @ self.rows.commanded
             total += resultants(posture, loads, self.poses[1], carried)[:2]
+        if loads.drives.any():
+            carried = self.poses[3] @ self.rows.commanded
+            total[1] += drive_wrenches(posture, loads, carried)
         return total
 
     def wrenches(self, total: NDArray, poses: NDArray, frames: NDArray) -> NDArray:

@@ -7,14 +7,15 @@ carries the children.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.model.inertia import inertia_fault, six_moments
 from assembly.model.link_kinds import BeamLink, Link
 from forcefit.inputs.table import BadInput, quoted
-from forcefit.results.display import html_table, short_repr
+from forcefit.results.display import Figures, brief, html_table, short_repr
 from stiffness.screws import rotation_matrix
 
 JOINTS = ("fixed", "revolute", "prismatic", "helical")
@@ -24,6 +25,11 @@ LOCKED = (
     '0 (free, as a bearing), a number > 0 (a spring), or joint = "fixed"'
 )
 NO_SPIN = "expected none: its motion along the thread has no clearance bound"
+
+FORCE_CONTROL = (
+    'expected a joint = "revolute" | "prismatic" | "helical" that is not actuated: a '
+    "drive that applies a force holds no coordinate"
+)
 
 
 @dataclass(frozen=True)
@@ -67,9 +73,13 @@ class Frame:
         clearance: clearance of the joint; None if it has none.
         joint_stiffness: (6, 6) K_B with ``inf`` on the diagonal where rigid, or None;
             0 along a passive joint's own motion (its row and column) leaves it free.
+        drive_force: [N m or N] with which a drive pushes a passive joint along its
+            motion, independent of its coordinate; positive where the coordinate grows.
         link: elasticity of the body, None if rigid.
         mass: [kg] of the body in addition to its link's own.
         centre_of_mass: (3,) [m] of that mass, in the frame's axes.
+        inertia: (3, 3) [kg m^2] of that mass about its centre, in the frame's axes;
+            symmetric, its principal moments those of a body.
         pitch: [m] translation of a helical joint in a turn, positive for a right-hand
             thread; 0 of other joints.
     """
@@ -86,9 +96,11 @@ class Frame:
     tolerance: NDArray | None = None
     clearance: Clearance | None = None
     joint_stiffness: NDArray | None = None
+    drive_force: float = 0.0
     link: Link | None = None
     mass: float = 0.0
     centre_of_mass: NDArray = field(default_factory=lambda: np.zeros(3))
+    inertia: NDArray = field(default_factory=lambda: np.zeros((3, 3)))
     pitch: float = 0.0
 
     __repr__, _repr_html_ = short_repr, html_table
@@ -111,6 +123,30 @@ class Frame:
         own = self.own_stiffness
         if self.passive and own is not None and np.isinf(own):
             raise BadInput(f"frame {quoted(self.name)}.joint_stiffness: {LOCKED}")
+        if self.drive_force and not self.passive:
+            kind = "actuated" if self.actuated else "fixed"
+            raise BadInput(
+                f"frame {quoted(self.name)}.drive_force: found {self.drive_force:g} on "
+                f"a {kind} joint; {FORCE_CONTROL}"
+            )
+        if self.inertia.any():
+            fault = inertia_fault(self.inertia)
+            if fault:
+                raise BadInput(f"frame {quoted(self.name)}.inertia: {fault}")
+            # files have the upper triangle
+            J = locked((self.inertia + self.inertia.T) / 2, (3, 3), "inertia")
+            object.__setattr__(self, "inertia", J)
+
+    def _figures(self) -> Figures:
+        """Return the fields in short; the rarest only where they are not zero."""
+        shown = {f.name: brief(getattr(self, f.name)) for f in fields(self)[1:]}
+        for name in ("drive_force", "pitch"):
+            if not getattr(self, name):
+                del shown[name]
+        del shown["inertia"]
+        if self.inertia.any():
+            shown["inertia"] = brief(np.array(six_moments(self.inertia)))
+        return shown
 
     @property
     def passive(self) -> bool:
@@ -174,6 +210,7 @@ _SHAPES = {
     "tolerance": (6,),
     "joint_stiffness": (6, 6),
     "centre_of_mass": (3,),
+    "inertia": (3, 3),
 }
 
 

@@ -24,6 +24,7 @@ from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import VirtualJoints
 from assembly.linear.energy import Assembly, solve_assembly
+from assembly.linear.load import driven
 from assembly.linear.nearest_pose import nearest_pose
 from assembly.platform_stiffness.active_set import contacts
 from assembly.platform_stiffness.exact_tangent import exact_tangent
@@ -253,7 +254,8 @@ def _settled(
     If clearances leave it open, the one nearest to nominal.
     """
     equilibrium = point.equilibrium
-    idle = not rest.any() and gravity is None and abs(point.load) <= _NO_LOAD * largest
+    others = rest.any() or gravity is not None or driven(equilibrium.posture.robot)
+    idle = not others and abs(point.load) <= _NO_LOAD * largest
     if idle and isinstance(equilibrium, Assembly):
         nearest, open_ = nearest_pose(equilibrium, np.zeros(3), method)
         return nearest.platform_screw, open_

@@ -228,8 +228,8 @@ def exact_of(
         "energy": assembly.linear.energy,
         "platform_screw": assembly.linear.platform_screw,
     }
-    loaded = assembly.load.any() or gravity is not None
-    if loaded and not exact_tangent(assembly).stable:
+    loaded = assembly.load.any() or assembly.loads.drives.any()
+    if (loaded or gravity is not None) and not exact_tangent(assembly).stable:
         results |= {"status": UNSTABLE, "reason": _UNSTABLE}
     return results | {
         **_screws_and_wrenches(assembly),

@@ -11,6 +11,7 @@ from forcefit.commands.help import Commands
 from forcefit.commands.options import (
     AlongOption,
     AtOption,
+    DriveForceOption,
     GravityOption,
     JointOption,
     JsonOption,
@@ -52,6 +53,7 @@ def error(
         ),
     ] = None,
     load: LoadOption = None,
+    drive_force: DriveForceOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
     energy_budget: Annotated[
@@ -87,8 +89,9 @@ def error(
             expected = f"a finite number > 0, at most {LARGEST_LENGTH:g}"
             raise BadInput(f"{option}: found {value}, expected {expected}")
     applied = declared_under(
-        robot, pose, joint, load, gravity, under, rest=rest, mismatch=mismatch
-    )
+        robot, pose, joint, load, gravity, under, rest=rest, mismatch=mismatch,
+        drive_force=drive_force,
+    )  # fmt: skip
     with one_thread():
         results = pose_error_of(
             applied.posture, assumption or None,

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from forcefit.commands.options import (
+    DriveForceOption,
     JointOption,
     JsonOption,
     LoadOption,
@@ -38,6 +39,7 @@ def show(
     rest: RestOption = None,
     mismatch: MismatchOption = None,
     load: LoadOption = None,
+    drive_force: DriveForceOption = None,
     exaggeration: Annotated[
         float | None, typer.Option(help="Factor on displacements.")
     ] = None,
@@ -83,14 +85,14 @@ def show(
     if exaggeration is not None:
         checked("--exaggeration", exaggeration, "1", above=0)
     wrench = parse_load(load)
-    loaded = wrench is not None and any(wrench)
+    loaded = bool(drive_force) or (wrench is not None and any(wrench))
     if loaded and error_body is not None and assumption == "budget":
         raise BadInput(
-            "--assumption: found budget together with --load, but the budget bound "
+            "--assumption: found budget together with a load, but the budget bound "
             "is defined for a robot without load; expected frozen or free"
         )
     assumption = assumption or ("frozen" if loaded else "budget")
-    posture = posture_of(robot, pose, joint, rest, mismatch)
+    posture = posture_of(robot, pose, joint, rest, mismatch, drive_force=drive_force)
     results = shown_of(posture)
     if drawn:
         need("pyvista")

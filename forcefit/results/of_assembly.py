@@ -154,7 +154,10 @@ _OF_DRAWS = record(
 _LIMITED = record("", INTERVAL, clearance_=_CLEARANCE_MODEL)
 _STIFFNESS_OF_DRAWS = record(
     "state", means=text("meaning of the state"),
-    axes=Each(record("unit draws", free=INTERVAL, mean_=_MEAN, quantiles_=_QUANTILES)),
+    axes=Each(record(
+        "unit draws", free_=INTERVAL, rigid_=INTERVAL, mean_=_MEAN,
+        quantiles_=_QUANTILES,
+    )),
     free_motions=Listed(record("screw draws")),
 )  # fmt: skip
 _IMPORTANCE = record(

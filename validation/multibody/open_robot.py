@@ -201,6 +201,11 @@ def _add_frame(
     if frame.passive and not frame.compliant and frame.name not in tree.contacts:
         tree.idle[frame.name] = model.add_idle(place, frame.own_axis)
         place = tree.idle[frame.name].far
+    if case.scale * frame.drive_force:
+        force = np.zeros(6)
+        force[frame.own_axis] = case.scale * frame.drive_force
+        model.add_following_load(place, force)
+        model.add_following_load(tree.bodies[frame.name], -force)
     tree.before[frame.name] = place
     return place
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from assembly.exchange.robot_files import load_robot
 from assembly.kinematics.closing import closing_of
 from assembly.kinematics.posture import POSE
+from assembly.linear.load import driven
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_named
 from assembly.model.robot import BeamLink, MeshLink, Robot
@@ -157,7 +158,14 @@ def _closed(root: Table, name: Path | str) -> Robot:
     mismatch = root.choice("mismatch", ("spring",)) if root.has("mismatch") else None
     own_errors = not root.has("errors")
     try:
-        return load_robot(name, closing_of(rest, mismatch, own_errors=own_errors))
+        robot = load_robot(name, closing_of(rest, mismatch, own_errors=own_errors))
+        if driven(robot):
+            raise root.bad(
+                "robot",
+                "found a robot with drive_force; expected one without, because a study "
+                "bounds errors of a robot without load (assembly solve computes it)",
+            )
+        return robot
     except BadInput as error:
         for key, option in (("rest", "--rest: "), ("mismatch", "--mismatch spring: ")):
             _, found, reason = str(error).partition(option)

@@ -14,6 +14,7 @@ from assembly.linear.energy import solve_assembly
 from assembly.linear.zone import zone_margin
 from assembly.model.frame import between_origins
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from assembly.platform_stiffness.vibration import natural_modes
 from assembly.robots import BUILT_IN
 from forcefit.inputs.errors import BadInput
 
@@ -201,6 +202,29 @@ def test_mistake_in_a_drawing_writes_nothing(
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert message in err
     assert [path.name for path in tmp_path.iterdir()] == ["bad.toml"]
+
+
+def test_masses_and_moments_of_inertia_of_one_body_are_joined(tmp_path):
+    """A rigid body has the frequencies of its parts, which do not move against it."""
+    (tmp_path / "heavy.toml").write_text(
+        ALONE.replace(
+            "actuated = true",
+            "actuated = true\njoint_stiffness = [3e4, 3e4, 2e4, 1e7, 1e7, 1e7]",
+        )
+        + "mass = 2.0\ncentre_of_mass = [0.02, 0.01, 0]\n"
+        "inertia = [0.01, 0.02, 0.02, 0.001, 0, 0.002]\nrotation = [0.3, 0.1, 0.2]\n"
+        '[[frame]]\nname = "flange"\nparent = "tip"\ntranslation = [0, 0.2, 0.1]\n'
+        "mass = 1.5\ncentre_of_mass = [0, 0.1, 0]\n"
+    )
+    convert(tmp_path / "heavy.toml", tmp_path / "drawn.toml", version=2)
+    text = (tmp_path / "drawn.toml").read_text()
+    assert text.count("mass = 3.5") == 1
+    assert text.count("inertia = ") == 1
+    found, expected = (
+        natural_modes(home_posture(load_robot(tmp_path / f"{name}.toml"))).frequencies
+        for name in ("drawn", "heavy")
+    )
+    np.testing.assert_allclose(found, expected, rtol=1e-10)
 
 
 def test_directions_of_a_mesh_are_kept(tmp_path):

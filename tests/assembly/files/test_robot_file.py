@@ -208,9 +208,15 @@ def every_joint(rng):
     yield {"joint": "revolute", "actuated": True, "limits": (-1.5, 2.0)}
     yield {"joint": "prismatic", "clearance": Clearance(1e-30, None, 0.0, 1.0)}
     yield {"joint": "revolute", "joint_stiffness": bearing}
-    yield {"joint": "prismatic", "joint_stiffness": slide}
+    yield {"joint": "prismatic", "joint_stiffness": slide, "drive_force": -1 / 3}
     yield {"joint": "prismatic", "actuated": True, "joint_stiffness": locked}
     yield {"joint": "revolute", "joint_stiffness": K, "clearance": Clearance(1 / 3)}
+
+
+def moments(rng):
+    """(3, 3) [kg m^2] of a point mass and a ball."""
+    arm = rng.normal(size=3)
+    return (arm @ arm + rng.uniform()) * np.eye(3) - np.outer(arm, arm)
 
 
 @pytest.mark.parametrize("seed", range(7))
@@ -226,6 +232,7 @@ def test_every_kind_of_link_and_joint_is_equal_after_writing_and_reading(
             name, parent, rng.normal(size=3) + [0, 0, 50], rng.normal(size=3),
             geometric_error=rng.normal(size=6), tolerance=rng.uniform(size=6),
             link=link, mass=rng.uniform(), centre_of_mass=rng.normal(size=3),
+            inertia=moments(rng),
             **joints[(k + seed) % len(joints)],
         ))  # fmt: skip
         parent = name

@@ -126,6 +126,30 @@ REFUSED = {
     "a negative mass": (
         "mass = 1.2", "mass = -1.2",
         'frame "coupler".mass: found -1.2, expected a finite number >= 0 [kg]'),
+    "a force of a drive that holds its coordinate": (
+        "actuated = true", "actuated = true\ndrive_force = 5.0",
+        'frame "crank".drive_force: found one on a joint that is not passive; expected '
+        'a joint = "revolute" | "prismatic" | "helical" that is not actuated: a drive '
+        "that applies a force holds no coordinate"),
+    "a force without a joint": (
+        "mass = 1.2", "mass = 1.2\ndrive_force = 5.0",
+        'frame "coupler".drive_force: found one on a joint that is not passive; '),
+    "a force that is no number": (
+        "position = 1.0\njoint_stiffness", "position = 1.0\ndrive_force = nan\n"
+        "joint_stiffness",
+        'frame "rocker".drive_force: found nan, expected a finite number'),
+    "moments of inertia of no body": (
+        "mass = 1.2", "mass = 1.2\ninertia = [1, 1, 2.1, 0, 0, 0]",
+        'frame "coupler".inertia: found principal moments 1, 1, 2.1; expected none '
+        "negative, and none larger than the sum of the other two"),
+    "a negative principal moment": (
+        "mass = 1.2", "mass = 1.2\ninertia = [1, 1, 1, 2, 0, 0]",
+        'frame "coupler".inertia: found principal moments -1, 1, 3; expected none '
+        "negative, and none larger than the sum of the other two"),
+    "moments of inertia as a matrix": (
+        "mass = 1.2", "mass = 1.2\ninertia = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]",
+        'frame "coupler".inertia: found [[1, 0, 0], [0, 1, 0], [0, 0, 1]] of length '
+        "3, expected 6 finite numbers [kg m^2]"),
     "an infinite length": (
         "translation = [0.3, 0.0, 0.0]", "translation = [0.3, -inf, 0.0]",
         'frame "wrist".translation: found -inf as number 2, expected 3 finite numbers '
