@@ -25,6 +25,7 @@ from forcefit.commands.options import (
     parse_direction,
     parse_point,
 )
+from forcefit.commands.path import path
 from forcefit.commands.platform_stiffness import stiffness
 from forcefit.commands.plot import plot
 from forcefit.commands.progress import one_thread
@@ -103,6 +104,6 @@ def error(
 
 
 for command in (
-    show, stiffness, deflection, frequencies, statistics, tolerances, sweep, plot
+    show, stiffness, deflection, frequencies, path, statistics, tolerances, sweep, plot,
 ):  # fmt: skip
     app.command()(command)

@@ -254,6 +254,15 @@ _SWEEP = Record(
     ).content,
     closed=False,
 )  # fmt: skip
+_PEAK = record(
+    "time unit?", value=number("largest value", ""), frame_=text("frame of the body")
+)  # fmt: skip
+_PATH = record(
+    "robot status reason? remarks first_frequency periods", output_=text("file"),
+    law=text("law of the motion"), duration=number("path time", "s"),
+    points=count("points"), solved=count("points with a result"),
+    largest_=Each(_PEAK), drives_=Each(_PEAK),
+)  # fmt: skip
 ASSEMBLY: Mapping[str, Content] = {
     "assembly solve": Either((SOLUTION, _EXACT, record("robot", zone=ZONE))),
     "assembly show": record(
@@ -271,6 +280,7 @@ ASSEMBLY: Mapping[str, Content] = {
     "assembly statistics": _STATISTICS,
     "assembly tolerances": _TOLERANCES,
     "assembly sweep": _SWEEP,
+    "assembly path": _PATH,
     "convert": record(
         "robot left_out", platform=text("platform"), frames=count("frames"),
         closures=count("closures"), files=text("files written", "file"),

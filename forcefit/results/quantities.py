@@ -462,6 +462,37 @@ QUANTITIES: Mapping[str, Quantity] = {
     "rank": count("possible ranks", "bound"),
     "postures": count("postures"),
     "grid": text("grid"),
+    # paths
+    "time": Quantity("time", "s"),
+    "joint_velocity": Quantity(
+        "joint velocity", "rad/s or m/s", ("joint",), "rate of every joint coordinate"
+    ),
+    "joint_acceleration": Quantity(
+        "joint acceleration", "rad/s^2 or m/s^2", ("joint",),
+        "second derivative of every joint coordinate",
+    ),
+    "platform_velocity": Quantity(
+        "platform velocity", "rad/s, m/s", _SCREW, "of the platform's origin, base axes"
+    ),
+    "platform_acceleration": Quantity(
+        "platform acceleration", "rad/s^2, m/s^2", _SCREW,
+        "of the platform's origin, base axes",
+    ),
+    "inertial_screw": Quantity(
+        "deflection by acceleration", "rad, m", _SCREW, "change of the pose error at "
+        "the platform's origin by the accelerations, base axes", shown="mrad, mm"
+    ),
+    "drive_force": Quantity(
+        "drive force", "N m or N", ("drive",),
+        "of each drive on the part that it carries",
+    ),
+    "first_frequency": Quantity(
+        "first natural frequency", "Hz",
+        meaning="least along the path, drives held, without load and gravity",
+    ),
+    "periods": Quantity(
+        "path time in periods", meaning="path time times the first natural frequency"
+    ),
     # measured data and comparisons
     "campaign": text("campaign"),
     "rows": count("rows"),
