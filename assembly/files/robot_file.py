@@ -1,7 +1,7 @@
 """Robot files read and written (``docs/robot_files.md``), with all rules checked."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from assembly.files.joint_file import (
     read_pitch,
 )
 from assembly.files.link_file import link_table, read_link
+from assembly.files.toml_text import file_text
 from assembly.kinematics.posture import home_posture
 from assembly.model.frame import FORCE_CONTROL
 from assembly.model.inertia import six_moments
@@ -41,7 +42,6 @@ from forcefit.inputs.table import (
 )
 from forcefit.inputs.writing import (
     ROBOT,
-    ROBOT_MARK,
     check_writable,
     path_from,
     write_text,
@@ -390,16 +390,8 @@ def write_robot(robot: Robot, path: Path | str) -> None:
     table = robot_table(robot, Path(path).parent)
     frames, closures = table.pop("frame"), table.pop("closure", [])
     effects, diagnosis = table.pop("effect", []), table.pop("diagnosis", {})
-    lines = [ROBOT_MARK, *(f"{k} = {_toml(v)}" for k, v in table.items())]
-    if diagnosis:
-        lines += ["", "[diagnosis]"]
-        lines += [f"{k} = {_toml(v)}" for k, v in diagnosis.items()]
     kinds = {"frame": frames, "closure": closures, "effect": effects}
-    for kind, tables in kinds.items():
-        for inner in tables:
-            pairs = (f"{k} = {_toml(v)}" for k, v in inner.items())
-            lines += ["", f"[[{kind}]]", *pairs]
-    write_text("\n".join(lines) + "\n", path)
+    write_text(file_text(table, kinds, diagnosis), path)
 
 
 def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
@@ -411,6 +403,25 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
 
     Returns:
         Plain values; :func:`robot_of` reads them back to the same robot.
+    """
+    table = root_table(robot, folder)
+    table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
+    if robot.closures:
+        table["closure"] = [{"frames": list(pair)} for pair in robot.closures]
+    if robot.has_effects:
+        table["effect"] = effect_tables(robot)
+    return table
+
+
+def root_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
+    """Return the content of a robot file without its frames and closures.
+
+    Args:
+        robot: any robot.
+        folder: folder of the file to be written, to which paths are made relative.
+
+    Returns:
+        Plain values.
     """
     table: dict[str, Any] = {"name": robot.name}
     if robot.description:
@@ -425,11 +436,6 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
         path = table["diagnosis"].get("covariance")
         if path and folder is not None:
             table["diagnosis"]["covariance"] = path_from(folder.resolve(), path)
-    table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
-    if robot.closures:
-        table["closure"] = [{"frames": list(pair)} for pair in robot.closures]
-    if robot.has_effects:
-        table["effect"] = effect_tables(robot)
     return table
 
 
@@ -476,29 +482,3 @@ def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
     if np.any(frame.inertia):
         table["inertia"] = six_moments(frame.inertia)
     return table
-
-
-def _toml(value: Any) -> str:
-    """Return a value in TOML, arrays and tables inline, floats with all digits."""
-    # tomli-w writes every number of an array on its own line
-    if isinstance(value, bool | np.bool_):
-        return str(value).lower()
-    if isinstance(value, str):
-        return f'"{"".join(map(_escaped, value))}"'
-    if isinstance(value, Mapping):
-        inner = ", ".join(f"{_key(k)} = {_toml(v)}" for k, v in value.items())
-        return "{ " + inner + " }"
-    if isinstance(value, Iterable):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    return repr(value) if isinstance(value, int) else repr(float(value))
-
-
-def _key(name: str) -> str:
-    """Return a key, in quotes if it would otherwise be read differently."""
-    bare = name and all(c.isascii() and (c.isalnum() or c in "-_") for c in name)
-    return name if bare else _toml(name)
-
-
-def _escaped(c: str) -> str:
-    """Return a character as written in double quotes."""
-    return f"\\u{ord(c):04x}" if c < " " or c in '"\\\x7f' else c

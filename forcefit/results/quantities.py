@@ -117,6 +117,23 @@ QUANTITIES: Mapping[str, Quantity] = {
         "smallest singular value of the constraints", meaning="smallest nonzero one of "
         "the constraint matrix, lengths over the robot's size",
     ),
+    "local_freedoms": count(
+        "degrees of freedom of legs alone", meaning="with the platform at rest"
+    ),
+    "actuation_redundancy": count(
+        "redundant drives", meaning="drives minus the degrees of freedom they lock"
+    ),
+    "singular_value_gap": Quantity(
+        "gap of the singular values", meaning="least one that counts over the largest "
+        "that does not, or over rounding; null where none counts",
+    ),
+    "counts_certain": flag("gap of the singular values of at least 100"),
+    "singular": flag("more degrees of freedom than at nearby poses"),
+    "finite_freedoms": count(
+        "degrees of freedom at nearby poses", meaning="0 where the motions at the pose "
+        "are infinitesimal only",
+    ),
+    "words": text("mobility in words"),
     "point": Quantity(
         "point", "m", ("axis",), "at which screws and wrenches are read; base axes for "
         "a stiffness, platform axes for a pose error",
