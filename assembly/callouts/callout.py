@@ -48,11 +48,13 @@ class Datum:
         shape: one of :data:`HELD`; a guide is an axis that holds the turn about itself
             too, a body holds all.
         axis: (3,) unit vector of its axis or normal, in the frame's axes.
+        at: (3,) [m] its middle, in the frame's axes.
     """
 
     frame: str
     shape: str = "axis"
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +81,7 @@ class Callout:
         general: general tolerance, such as ``"ISO 2768-mK"``, or empty.
         distribution: see :meth:`assembly.callouts.zone.Zone.draw`.
         cp: capability of a normal distribution.
+        at: (3,) [m] the middle of the feature, in the frame's axes.
     """
 
     name: str
@@ -95,6 +98,7 @@ class Callout:
     general: str = ""
     distribution: str = "uniform"
     cp: float = 1.0
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
     def words(self) -> str:

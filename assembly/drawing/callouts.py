@@ -57,18 +57,21 @@ def _of_frames(
     """One callout on the side of a frame that is on its body."""
     callout = drawn.callout
     frame, after, joint = _side(passed[callout.feature], drawn.body)
-    R = poses[frame][after][:3, :3]
+    pose = poses[frame][after]
+    R = pose[:3, :3]
     across = joint.across if callout.shape == "plane" else drawn.direction
     datums = []
     for datum in callout.datums:
         name, other, of_datum = _side(passed[datum.frame], drawn.body)
-        axis = poses[name][other][:3, :3].T @ _axis(of_datum, drawn.body)
+        of = poses[name][other]
+        axis = _vector(of[:3, :3].T @ _axis(of_datum, drawn.body))
         shape = _DATUM_SHAPES.get(of_datum.kind, "axis")
-        datums.append(Datum(name, shape, _vector(axis)))
+        datums.append(Datum(name, shape, axis, _point(of, of_datum)))
     return replace(
         callout, feature=frame, after=after, datums=tuple(datums),
         axis=_vector(R.T @ _axis(joint, drawn.body)),
         direction=None if across is None else _vector(R.T @ np.array(across)),
+        at=_point(pose, joint),
     )  # fmt: skip
 
 
@@ -84,6 +87,13 @@ def _axis(joint: DrawnJoint, body: str) -> NDArray:
     """(3,) the axis on a body, base axes at home."""
     second = joint.kind == "universal" and body == joint.second
     return joint.axis2 if second else joint.axis
+
+
+def _point(pose: NDArray, joint: DrawnJoint) -> Vector:
+    """The joint's point seen from a frame: not its origin where it is a contact."""
+    point = pose[:3, :3].T @ (joint.at - pose[:3, 3])
+    x, y, z = (float(v) + 0.0 for v in np.where(abs(point) < _ROUNDING, 0.0, point))
+    return x, y, z
 
 
 def _vector(vector: NDArray) -> Vector:

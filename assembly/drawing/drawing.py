@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.callouts.callout import Callout
+from assembly.drawing.contacts import Contact
 from assembly.model.robot import BeamLink, Clearance, Link, MeshLink
 
 # freedoms of each type: rows of the screw [RX RY RZ TX TY TZ] in the joint's axes; of a
@@ -18,6 +19,7 @@ FREE_ROWS: dict[str, tuple[int, ...]] = {
     "fixed": (),
     "revolute": (2,),
     "prismatic": (5,),
+    "helical": (2,),
     "cylindrical": (2, 5),
     "universal": (2, 2),
     "spherical": (0, 1, 2),
@@ -38,6 +40,7 @@ class JointNumbers:
         error: (6,) [rad, m] delta l.
         tolerance: (6,) [rad, m] standard deviations of it, or None.
         fit: ISO 286 fit whose mean radial clearance is in ``clearance``, or empty.
+        contacts: further clearance, by the sizes of the contacts.
     """
 
     clearance: Clearance | None = None
@@ -45,6 +48,7 @@ class JointNumbers:
     error: NDArray = field(default_factory=lambda: np.zeros(6))
     tolerance: NDArray | None = None
     fit: str = ""
+    contacts: tuple[Contact, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +70,7 @@ class DrawnJoint:
         actuated: whether a drive holds it.
         position: [rad or m] coordinate at home.
         limits: [rad or m] least and largest coordinate, or None.
+        pitch: [m] of a helical joint in a turn, 0 of others.
         numbers: one for the joint; for a universal joint one for each bearing.
     """
 
@@ -80,6 +85,7 @@ class DrawnJoint:
     actuated: bool = False
     position: float = 0.0
     limits: tuple[float, float] | None = None
+    pitch: float = 0.0
     numbers: tuple[JointNumbers, ...] = (JointNumbers(),)
 
 

@@ -5,6 +5,7 @@ In a file of frames a feature is a frame, in a file of bodies a joint of the bod
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -30,6 +31,7 @@ from forcefit.inputs.table import BadInput, Table, describe, nearest, quoted
 Parsed = TypeVar("Parsed")
 Vector = tuple[float, float, float]
 _Z = (0.0, 0.0, 1.0)
+_ORIGIN = (0.0, 0.0, 0.0)
 _LARGEST_CP = 5.0
 _SIZES = {"axis": 1, "plane": 2, "point": 0}  # numbers of "extent"
 _EXTENTS = {
@@ -67,7 +69,8 @@ def read_frame_callouts(root: Table, frames: list[str]) -> tuple[Callout, ...]:
         name = table.text("name", feature)
         after = table.boolean("after", False)
         axis = _direction(table, "axis") or _Z
-        found.append(_callout(table, name, feature, datums, shape, after, axis))
+        callout = _callout(table, name, feature, datums, shape, after, axis)
+        found.append(replace(callout, at=_point(table)))
         table.finish()
     return tuple(found)
 
@@ -146,15 +149,15 @@ def _datum(table: Table, value: Any, frames: list[str]) -> Datum:
         inner = Table(value, table.file, f"{table.place}.datums")
         name = inner.text("frame", expected="the name of a frame")
         shape = inner.choice("shape", HELD, "axis")
-        axis = _direction(inner, "axis") or _Z
+        axis, at = _direction(inner, "axis") or _Z, _point(inner)
         inner.finish()
     else:
         if not isinstance(value, str):
             fault = f"found {describe(value)}, expected names of frames"
             raise table.bad("datums", fault)
-        name, shape, axis = value, "axis", _Z
+        name, shape, axis, at = value, "axis", _Z, _ORIGIN
     _check_known(table, "datums", name, frames)
-    return Datum(name, shape, axis)
+    return Datum(name, shape, axis, at)
 
 
 def _check_known(table: Table, key: str, name: str, frames: list[str]) -> None:
@@ -247,6 +250,13 @@ def _across(table: Table, axis: Vector | None) -> Vector | None:
     return direction
 
 
+def _point(table: Table) -> Vector:
+    """[m] the middle of a feature in its frame's axes."""
+    default = np.zeros(3)
+    x, y, z = table.array("at", (3,), "m", default, largest=LARGEST_LENGTH).tolist()
+    return x, y, z
+
+
 def _direction(table: Table, key: str) -> Vector | None:
     """A unit vector, None if absent."""
     if not table.has(key):
@@ -282,6 +292,8 @@ def callout_table(callout: Callout) -> dict[str, Any]:
         table["shape"] = callout.shape
     if callout.axis != _Z:
         table["axis"] = list(callout.axis)
+    if callout.at != _ORIGIN:
+        table["at"] = list(callout.at)
     if callout.extent:
         table["extent"] = list(callout.extent)
     for word, width in callout.widths.items():
@@ -305,6 +317,7 @@ def callout_table(callout: Callout) -> dict[str, Any]:
 
 def _datum_value(datum: Datum) -> str | dict[str, Any]:
     """A datum as it is written."""
-    if datum.shape == "axis" and datum.axis == _Z:
+    if datum == Datum(datum.frame):
         return datum.frame
-    return {"frame": datum.frame, "shape": datum.shape, "axis": list(datum.axis)}
+    table = {"frame": datum.frame, "shape": datum.shape, "axis": list(datum.axis)}
+    return table if datum.at == _ORIGIN else table | {"at": list(datum.at)}

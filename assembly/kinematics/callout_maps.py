@@ -9,7 +9,7 @@ joint's frame carries move relative to it, by minus the screw.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from graphlib import CycleError, TopologicalSorter
 
 import numpy as np
@@ -25,9 +25,10 @@ from assembly.callouts.callout import (
 )
 from assembly.callouts.zone import Zone
 from assembly.kinematics.posture import Posture
+from assembly.model.placed_frames import own_motion
 from assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, quoted
-from stiffness.screws import rotation_matrix, screw_map, transform
+from stiffness.screws import screw_map, transform
 
 _RANK = 1e-9  # singular values below it are rounding
 
@@ -140,17 +141,9 @@ def _bodies(home: Posture) -> _Bodies:
     for a, b in robot.closures:
         group[root(robot.index(a))] = root(robot.index(b))
     pairs = zip(robot.frames, home.coordinates, strict=True)
-    motions = [_motion(frame.joint, float(q)) for frame, q in pairs]
+    motions = [own_motion(replace(frame, position=float(q))) for frame, q in pairs]
     after = home.transforms @ np.array(motions)
     return _Bodies(robot, home.transforms, after, tuple(root(i) for i in range(n + 1)))
-
-
-def _motion(joint: str, q: float) -> NDArray:
-    """(4, 4) motion of a joint about or along its z."""
-    if joint == "prismatic":
-        return transform([0, 0, q], np.eye(3))
-    turn = q if joint == "revolute" else 0.0
-    return transform(np.zeros(3), rotation_matrix([0, 0, turn]))
 
 
 def _datum_sides(
@@ -191,9 +184,9 @@ def _order(
 
 
 def _feature_pose(bodies: _Bodies, callout: Callout) -> NDArray:
-    """(4, 4) the feature at home: its frame's origin, z along its axis."""
+    """(4, 4) the feature at home: its middle, z along its axis."""
     pose = bodies.pose((callout.feature, callout.after))
-    return pose @ transform(np.zeros(3), callout.axes)
+    return pose @ transform(np.array(callout.at), callout.axes)
 
 
 def _datum_pose(
@@ -203,7 +196,7 @@ def _datum_pose(
     """(4, 4) of a datum at home, in the axes of its own callouts if it has any."""
     if side in sides:
         return _feature_pose(bodies, callouts[sides[side]])
-    return bodies.pose(side) @ transform(np.zeros(3), axes_along(datum.axis))
+    return bodies.pose(side) @ transform(np.array(datum.at), axes_along(datum.axis))
 
 
 def _zone(

@@ -8,6 +8,7 @@ import pytest
 from assembly.files.robot_file import read_robot, write_robot
 from assembly.kinematics.callout_maps import place_callouts
 from assembly.kinematics.posture import home_posture
+from assembly.statistics.linear_response import linear_response
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import ROBOT_MARK
 
@@ -200,6 +201,25 @@ def test_mistake_in_a_file_of_frames_is_reported_in_one_line(
 ):
     with pytest.raises(BadInput, match=re.escape(message)):
         read(tmp_path, FRAMES.replace(old, new, 1))
+
+
+def test_contacts_of_a_joint_do_not_move_its_feature(tmp_path):
+    """A bore is two frames at its ends; the feature is in its middle all the same."""
+    start = FILE.index('[[leg.body.tolerance]]\nfeature = "pad"')
+    end = FILE.index('[[leg.body.tolerance]]\nfeature = "foot"')
+    text = (FILE[:start] + FILE[end:]).replace('hole = "12 H7"\n', "")
+    text = text.replace(" (M)", "")
+    joint = 'name = "foot"\ntype = "revolute"'
+    bore = joint + '\nclearance = { radial = 1e-5, length = "20 mm" }'
+    moved = []
+    for name, one in (("plain.toml", text), ("bore.toml", text.replace(joint, bore))):
+        robot = read(tmp_path, one, name)
+        home = home_posture(robot)
+        to_platform = linear_response(home).platform
+        errors = [p.errors.reshape(6 * len(robot.frames), -1) for p in placed(robot)]
+        moved.append(np.hstack([to_platform @ one for one in errors]))
+    assert np.abs(moved[0]).max() > 1e-5
+    assert moved[1] == pytest.approx(moved[0], abs=1e-12)
 
 
 FIT = FRAMES.replace('name = "b"', 'name = "b"\nclearance = { fit = "12 H7/g6" }')
