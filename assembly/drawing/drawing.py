@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.callouts.callout import Callout
+from assembly.drawing.contacts import Contact
 from assembly.model.robot import BeamLink, Clearance, Link, MeshLink
 
 # freedoms of each type: rows of the screw [RX RY RZ TX TY TZ] in the joint's axes; of a
@@ -17,6 +19,7 @@ FREE_ROWS: dict[str, tuple[int, ...]] = {
     "fixed": (),
     "revolute": (2,),
     "prismatic": (5,),
+    "helical": (2,),
     "cylindrical": (2, 5),
     "universal": (2, 2),
     "spherical": (0, 1, 2),
@@ -36,12 +39,16 @@ class JointNumbers:
             along free motions; or None.
         error: (6,) [rad, m] delta l.
         tolerance: (6,) [rad, m] standard deviations of it, or None.
+        fit: ISO 286 fit whose mean radial clearance is in ``clearance``, or empty.
+        contacts: further clearance, by the sizes of the contacts.
     """
 
     clearance: Clearance | None = None
     stiffness: NDArray | None = None
     error: NDArray = field(default_factory=lambda: np.zeros(6))
     tolerance: NDArray | None = None
+    fit: str = ""
+    contacts: tuple[Contact, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +70,7 @@ class DrawnJoint:
         actuated: whether a drive holds it.
         position: [rad or m] coordinate at home.
         limits: [rad or m] least and largest coordinate, or None.
+        pitch: [m] of a helical joint in a turn, 0 of others.
         numbers: one for the joint; for a universal joint one for each bearing.
     """
 
@@ -77,6 +85,7 @@ class DrawnJoint:
     actuated: bool = False
     position: float = 0.0
     limits: tuple[float, float] | None = None
+    pitch: float = 0.0
     numbers: tuple[JointNumbers, ...] = (JointNumbers(),)
 
 
@@ -106,6 +115,21 @@ class DrawnBody:
 
 
 @dataclass(frozen=True, eq=False)
+class DrawnCallout:
+    """The callouts of a joint's feature on one of its two bodies.
+
+    Attributes:
+        body: name of the body, or ``"base"``.
+        callout: with names of joints in place of frames.
+        direction: (3,) in which the zones are, base axes at home; None for all.
+    """
+
+    body: str
+    callout: Callout
+    direction: Direction = None
+
+
+@dataclass(frozen=True, eq=False)
 class Drawing:
     """A robot of bodies and joints.
 
@@ -117,6 +141,7 @@ class Drawing:
         joints: likewise.
         description: one line.
         remarks: defaults of its file that are easily overlooked.
+        callouts: tolerances of features.
     """
 
     name: str
@@ -126,6 +151,7 @@ class Drawing:
     joints: tuple[DrawnJoint, ...]
     description: str = ""
     remarks: tuple[str, ...] = ()
+    callouts: tuple[DrawnCallout, ...] = ()
 
 
 def unit(vector: NDArray) -> NDArray:

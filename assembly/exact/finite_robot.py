@@ -20,6 +20,7 @@ from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
 from assembly.kinematics.se3 import exponential, inverse
 from assembly.linear.closure import VirtualJoints
+from assembly.model.links import own_screws
 from assembly.model.robot import Robot
 from stiffness.screws import rotation_matrix, transform
 
@@ -178,11 +179,8 @@ class FiniteRobot:
 
 
 def along_own(robot: Robot, coordinates: NDArray) -> NDArray:
-    """Return (..., n, 4, 4) motions about or along each joint's z axis by (..., n)."""
-    screws = np.zeros((*coordinates.shape, 6))
-    axes = [frame.own_axis for frame in robot.frames]
-    screws[..., np.arange(len(axes)), axes] = coordinates
-    return exponential(screws)
+    """Return the (..., n, 4, 4) motions about or along each joint's z by (..., n)."""
+    return exponential(coordinates[..., None] * own_screws(robot))
 
 
 def nominally_carried(posture: Posture) -> NDArray:

@@ -36,7 +36,7 @@ from assembly.linear.closure import (
 )
 from assembly.linear.load import FrameLoads
 from assembly.model.clearance import clearance_bounds, component_bounds
-from assembly.model.links import joint_compliances, link_compliances
+from assembly.model.links import joint_compliances, link_compliances, own_screws
 
 # relative size below which an eigenvalue is rounding; between this and RANK the rank is
 # ambiguous
@@ -261,15 +261,16 @@ def flexibility(postures: Posture) -> Flexibility:
         ValueError: the robot has clearances.
     """
     robot = postures.robot
-    # robots that differ only in errors and loads share one factorisation
-    arrays = link_compliances(robot), joint_compliances(robot), clearance_bounds(robot)
+    # robots that differ in errors and loads alone share one factorisation
+    springs = link_compliances(robot), joint_compliances(robot)
+    arrays = *springs, clearance_bounds(robot), own_screws(robot)
     return _factorise(content_of(postures, arrays, (robot.closures, robot.platform)))
 
 
 @lru_cache(maxsize=4)
 def _factorise(content: Content) -> Flexibility:
     """Return the system of every posture, and its inverse."""
-    postures, (C_body, C_joint, _) = content.postures, content.arrays
+    postures, (C_body, C_joint, *_) = content.postures, content.arrays
     robot = postures.robot
     joints = virtual_joints(robot)
     if joints.cones.shape[1]:

@@ -38,7 +38,7 @@ EXAMPLES = {
         "--plan examples/tolerance_allocation/mostly.toml",
     ),
     "drawn": _Example(
-        "robots as drawn: a 3-UPU, a Tricept and an Agile Eye",
+        "robots as drawn: a 3-UPU, a Tricept, an Agile Eye, a toleranced four-bar",
         ("examples/drawn",),
         "forcefit assembly solve examples/drawn/tricept.toml --load fx=100",
     ),
@@ -56,6 +56,11 @@ EXAMPLES = {
         "accuracy gained by half the clearance in a hexapod, in Python",
         ("examples/hexapod_accuracy.py", "examples/hexapod_errors.toml"),
         "python examples/hexapod_accuracy.py",
+    ),
+    "path": _Example(
+        "a path of the hexapod, for its errors under acceleration",
+        ("examples/hexapod_path.csv",),
+        "forcefit assembly path hexapod --path examples/hexapod_path.csv",
     ),
     "link_library": _Example(
         "stiffness of links for a grid of dimensions",

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble
+from assembly.linear.load import driven
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.robot import BeamLink
 from assembly.solvers.conic import SolverFailed
@@ -79,8 +80,9 @@ def _pieces_cost(
 ) -> Cost:
     """Return the error of replacing each beam by one spring."""
     if not any(isinstance(frame.link, BeamLink) for frame in posture.robot.frames):
-        raise _NotApplicable("the robot has no beam")
-    if load is None and gravity is None and not posture.robot.errors.any():
+        raise _NotApplicable("no beam")
+    unloaded = load is None and gravity is None and not driven(posture.robot)
+    if unloaded and not posture.robot.errors.any():
         raise _NotApplicable(NOTHING)
     return pieces_cost(posture, load, gravity)
 
