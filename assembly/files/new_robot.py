@@ -90,7 +90,8 @@ _LINK = (
     "link = {{ beam = {{ radius = {radius} }}, young = 2.1e11, poisson = 0.3, "
     "density = 7800 }}"
 )
-_PLAY = 'clearance = { radial = "5 um", axial = "5 um" }'
+_BALL = 'clearance = { ball = "5 um" }    # the gap of the ball in its socket'
+_BORE = 'clearance = { radial = "5 um", length = "20 mm", axial = "5 um" }'
 _ROTARY = "drive_stiffness = 2e4            # N m/rad"
 _LINEAR = "drive_stiffness = 2e7            # N/m"
 
@@ -176,7 +177,7 @@ def _ups(legs: int) -> str:
                      _axis(_cross(along, level), "axis2", "fixed to the tube"))
             + _joint("slide", "prismatic", "tube rod", a, _axis(along),
                      "actuated = true", _LINEAR)
-            + _joint("ball", "spherical", "rod platform", b, _PLAY)
+            + _joint("ball", "spherical", "rod platform", b, _BALL)
         )  # fmt: skip
 
     return _pairs(
@@ -197,8 +198,8 @@ def _rus(legs: int) -> str:
                      "actuated = true", _ROTARY)
             + _joint("elbow", "universal", "crank rod", elbow,
                      _axis((0, 1, 0), "axis", "fixed to the crank"),
-                     _axis(second, "axis2", "fixed to the rod"), _PLAY)
-            + _joint("ball", "spherical", "rod platform", b, _PLAY)
+                     _axis(second, "axis2", "fixed to the rod"), _BORE)
+            + _joint("ball", "spherical", "rod platform", b, _BALL)
         )  # fmt: skip
 
     return _pairs(
@@ -216,12 +217,12 @@ def _upu(legs: int) -> str:
         + _bodies("tube", "rod", rod="15 mm")
         + _joint("lower", "universal", "base tube", a,
                  _axis(y, "axis", "fixed to the base; parallel to that of upper"),
-                 _axis(inner, "axis2", "fixed to the tube"), _PLAY)
+                 _axis(inner, "axis2", "fixed to the tube"), _BORE)
         + _joint("slide", "prismatic", "tube rod", a, _axis(along),
                  "actuated = true", _LINEAR)
         + _joint("upper", "universal", "rod platform", b,
                  _axis(inner, "axis", "fixed to the rod"),
-                 _axis(y, "axis2", "fixed to the platform"), _PLAY)
+                 _axis(y, "axis2", "fixed to the platform"), _BORE)
     )  # fmt: skip
 
 
@@ -233,8 +234,8 @@ def _prs(legs: int) -> str:
         + _bodies("carriage", "arm", arm="30 mm")
         + _joint("rail", "prismatic", "base carriage", hinge, _axis((0, 0, 1)),
                  "actuated = true", _LINEAR)
-        + _joint("hinge", "revolute", "carriage arm", hinge, _axis((0, 1, 0)), _PLAY)
-        + _joint("ball", "spherical", "arm platform", ball, _PLAY)
+        + _joint("hinge", "revolute", "carriage arm", hinge, _axis((0, 1, 0)), _BORE)
+        + _joint("ball", "spherical", "arm platform", ball, _BALL)
     )  # fmt: skip
 
 
@@ -246,8 +247,8 @@ def _rrr(legs: int) -> str:
         + _bodies("near", "far", near="15 mm", far="12 mm")
         + _joint("drive", "revolute", "base near", (300, 0, 0), z, "actuated = true",
                  _ROTARY)
-        + _joint("elbow", "revolute", "near far", (200, 120, 0), z, _PLAY)
-        + _joint("pin", "revolute", "far platform", (80, 0, 0), z, _PLAY)
+        + _joint("elbow", "revolute", "near far", (200, 120, 0), z, _BORE)
+        + _joint("pin", "revolute", "far platform", (80, 0, 0), z, _BORE)
     )  # fmt: skip
 
 
@@ -264,7 +265,7 @@ def _delta(legs: int) -> str:
         for joint, between, (x, _, z) in (
             ("high", f"arm rod_{side}", elbow), ("low", f"rod_{side} platform", end)
         ):  # fmt: skip
-            text += _joint(f"{side}_{joint}", "spherical", between, (x, y, z), _PLAY)
+            text += _joint(f"{side}_{joint}", "spherical", between, (x, y, z), _BALL)
     return text
 
 

@@ -38,7 +38,7 @@ EXAMPLES = {
         "--plan examples/tolerance_allocation/mostly.toml",
     ),
     "drawn": _Example(
-        "robots as drawn: a 3-UPU, a Tricept and an Agile Eye",
+        "robots as drawn: a 3-UPU, a Tricept, an Agile Eye, a toleranced four-bar",
         ("examples/drawn",),
         "forcefit assembly solve examples/drawn/tricept.toml --load fx=100",
     ),

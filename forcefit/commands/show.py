@@ -73,10 +73,6 @@ def show(
     drawn = figure is not None or json is None
     if figure is not None:
         check_writable(figure, PIXELS)
-    elif drawn and not (
-        os.environ.get("DISPLAY") or sys.platform in {"win32", "darwin"}
-    ):
-        raise BadInput("no display to open a window on; name a file with --figure")
     for option, value, valid in (
         ("--error-body", error_body, PARTS), ("--assumption", assumption, ASSUMPTIONS)
     ):  # fmt: skip
@@ -101,6 +97,9 @@ def show(
         print(shown_text(results))
     if not drawn:
         return
+    display = os.environ.get("DISPLAY") or sys.platform in {"win32", "darwin"}
+    if figure is None and not display:
+        raise BadInput("no display to open a window on; name a file with --figure")
     try:
         assembly = solve_assembly(posture, wrench)
         _draw(assembly, figure, exaggeration, error_body, assumption)
