@@ -86,6 +86,8 @@ def _reader(file: Path, robot: str | None) -> tuple[str, Callable[[], object]]:
     if file.suffix.lower() in {".urdf", ".xml", ".sdf"}:
         return "robot", lambda: _robot(file)
     content = read_toml(file).content
+    if {"frame", "body", "joint", "leg"} & set(content):
+        return "robot", lambda: _robot(file)
     if "measurements" in content:
         return _campaign(file)
     if "tolerance" in content:
@@ -102,7 +104,7 @@ def _reader(file: Path, robot: str | None) -> tuple[str, Callable[[], object]]:
         from validation.study.study_file import read_study
 
         return "study", lambda: read_study(file, links=False)
-    if {"frame", "body", "joint", "leg", "platform"} & set(content):
+    if "platform" in content:
         return "robot", lambda: _robot(file)
     raise BadInput(f"{file}: found a file of another kind, expected a {_KINDS}")
 
