@@ -35,10 +35,10 @@ def check(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Print all messages about files, not only the first; compute nothing.
+    """Print all mistakes in files, not only the first.
 
-    The messages are those of the commands that read the files.  Exit status 2 if there
-    are any.
+    Nothing is computed.  The messages are those of the commands that read the files.
+    Exit status 2 if there are any.
     """
     results = [_checked(file, robot) for file in files]
     passed = not any(one["messages"] for one in results)
