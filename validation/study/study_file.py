@@ -69,12 +69,16 @@ class Study:
     __repr__, _repr_html_ = short_repr, html_table
 
 
-def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
+def read_study(
+    path: Path | str, folder: Path | str | None = None, *, links: bool = True
+) -> Study:
     """Return a study from its file.
 
     Args:
         path: path of the TOML file.
         folder: folder of the report, instead of the one in the file.
+        links: whether links given by meshes are solved; a study without them cannot be
+            run.
 
     Returns:
         The study; its whole content has been checked.
@@ -84,7 +88,7 @@ def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
     """
     path = Path(path)
     root = read_toml(path)
-    robot = _robot(root, path.parent)
+    robot = _robot(root, path.parent, links)
     robot, errors = _errors(root, robot)
     if root.has("rest") or root.has("mismatch"):
         errors = "; ".join([errors, *robot.remarks])
@@ -94,7 +98,7 @@ def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
     by_key = {"maps": "grid", "crosscheck": "scales"}
     asked_by_key = {check for check, key in by_key.items() if root.has(key)}
     scales = _scales(root)
-    service = read_service(root, robot)
+    service = read_service(root, robot, links)
     checks, named = _checks(root, bool(meshes), bool(grid), bool(scales))
     threads = [quoted(frame.name) for frame in robot.frames if frame.pitch]
     if threads and "crosscheck" in checks:
@@ -139,20 +143,20 @@ def _files(path: Path, root: Table, meshes: dict[str, MeshLink]) -> tuple[Path, 
     )
 
 
-def _robot(root: Table, folder: Path) -> Robot:
+def _robot(root: Table, folder: Path, links: bool) -> Robot:
     """Return the robot, built in or from a file, with closures that hold."""
     name = root.text("robot", expected="a built-in robot or a robot file")
     if name in BUILT_IN:
-        return _closed(root, name)
+        return _closed(root, name, links)
     if not os.path.isfile(folder / name):
         problem = (
             f"found {quoted(name)}, neither a built-in robot nor a file in this folder"
         )
         raise root.bad("robot", f"{problem}{nearest(name, BUILT_IN)}")
-    return _closed(root, folder / name)
+    return _closed(root, folder / name, links)
 
 
-def _closed(root: Table, name: Path | str) -> Robot:
+def _closed(root: Table, name: Path | str, links: bool) -> Robot:
     """Return the robot with closures adjusted as the keys of the study request."""
     rest = root.text("rest") if root.has("rest") else None
     mismatch = root.choice("mismatch", ("spring",)) if root.has("mismatch") else None
