@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import BeamLink, Clearance, Link, MeshLink
+from assembly.model.robot import BeamLink, Clearance, Link, LockedAt, MeshLink
 
 # freedoms of each type: rows of the screw [RX RY RZ TX TY TZ] in the joint's axes; of a
 # universal joint its two turns have axes of their own
@@ -36,12 +36,14 @@ class JointNumbers:
             along free motions; or None.
         error: (6,) [rad, m] delta l.
         tolerance: (6,) [rad, m] standard deviations of it, or None.
+        locked_at: where a fixed joint is bolted, with its clearance before; or None.
     """
 
     clearance: Clearance | None = None
     stiffness: NDArray | None = None
     error: NDArray = field(default_factory=lambda: np.zeros(6))
     tolerance: NDArray | None = None
+    locked_at: LockedAt | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -143,6 +143,7 @@ def _frames_of(plan: _Plan, step: Step) -> list[PlacedFrame]:
                 position=part.position, limits=item.limits,
                 clearance=numbers.clearance, joint_stiffness=numbers.stiffness,
                 geometric_error=numbers.error, tolerance=numbers.tolerance,
+                locked_at=numbers.locked_at,
             )  # fmt: skip
             placed.append((frame, part.pose))
             carrier = part.name

@@ -155,6 +155,7 @@ def _reversed(part: Part) -> Part:
         stiffness=None if K is None else _flipped(K),
         error=-_FLIP_SCREW * own.error,
         tolerance=own.tolerance,
+        locked_at=own.locked_at,
     )
     pose = part.pose @ transform(np.zeros(3), _FLIP)
     return replace(part, pose=pose, numbers=numbers)

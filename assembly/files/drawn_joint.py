@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.drawing.drawing import FREE_ROWS, DrawnJoint, JointNumbers, perpendicular
+from assembly.files.bolt_file import read_locked_at
 from assembly.files.joint_file import read_clearance, read_joint_stiffness
 from assembly.files.written_units import SCREW, without_units
 from assembly.model.largest import LARGEST, LARGEST_LENGTH
@@ -124,11 +125,13 @@ def _one(table: Table, kind: str, actuated: bool) -> JointNumbers:
         without_units(table, key, SCREW)
     zero = np.zeros(6)
     error = table.array("geometric_error", (6,), "rad, m", zero, largest=LARGEST_LENGTH)
+    clearance, bolt = read_locked_at(table, kind == "fixed", _clearance(table, kind))
     return JointNumbers(
-        clearance=_clearance(table, kind),
+        clearance=clearance,
         stiffness=_stiffness(table, kind, actuated),
         error=error,
         tolerance=_tolerance(table),
+        locked_at=bolt,
     )
 
 

@@ -29,13 +29,15 @@ def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
 
     Returns:
         (2, d) rotation [rad] and translation [m] for each rad or m; NaN for a group of
-        angles and lengths, and where none of the draws has a solution.
+        angles and lengths, where none of the draws has a solution, and for robots with
+        bolted joints, whose locked-in clearances depend on the errors too.
     """
     sources = experiment.sources
     values = design.A[:DRAWS]
     squares = np.zeros((2, len(sources)))
     draws = experiment.energies.solve(sources.errors(values))
     known = np.isfinite(draws.energy) & np.isfinite(draws.clearances).all(axis=1)
+    known &= not any(f.locked_at for f in sources.robot.frames)
     if known.any():
         slopes = platform_slopes(experiment.energies, draws[known])
         of_sources = slopes[:, :, sources.frame, sources.component]

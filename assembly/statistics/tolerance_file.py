@@ -31,9 +31,16 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
         The plan.
 
     Raises:
-        BadInput: the file breaks a rule.
+        BadInput: the file breaks a rule, or a joint of the robot is bolted at a pose.
     """
     root = read_toml(path)
+    bolted = [f.name for f in robot.frames if f.locked_at is not None]
+    if bolted:
+        raise BadInput(
+            f"{robot.name}: frame {quoted(bolted[0])}.locked_at: found a joint that is "
+            "bolted at a pose, through which tolerances are not allocated; expected "
+            "none, or assembly statistics, which bolts every drawn machine"
+        )
     cost = _choice(root, "cost", COSTS)
     distribution = _choice(root, "distribution", ("uniform", "truncated"))
     asked_yield = root.number("yield", "1", 1.0, above=0.0, largest=1.0)

@@ -181,7 +181,7 @@ def _least(
     d = movable.on_cones + by_motions
     u, strains, inner = np.zeros_like(last), np.zeros_like(h), np.zeros_like(right)
     for i in range(len(right)):
-        least = minimise_energy(G, h[i], d[i], H, k[i], movable.group, "reference")
+        least = minimise_energy(G, h[i], d[i], H, k[i], movable.group)
         if not least.feasible:
             raise CannotAssemble("neither springs nor clearances can close the rows")
         u[i] = _closest(least.clearances, last[i], np.vstack([G, H, d[i]]), movable)
@@ -212,7 +212,7 @@ def _closest(u: NDArray, last: NDArray, rows: NDArray, movable: Movable) -> NDAr
     zero = np.zeros(len(u))
     try:
         closest = minimise_energy(
-            np.eye(len(u)), -last, zero, kept, kept @ u, movable.group, "reference"
+            np.eye(len(u)), -last, zero, kept, kept @ u, movable.group
         )
     except SolverFailed:
         return u

@@ -19,6 +19,7 @@ from forcefit.commands.options import (
     RestOption,
     RobotArgument,
     note_closing,
+    note_loose,
     note_massless,
     parse_gravity,
     parse_load,
@@ -159,7 +160,7 @@ def statistics(
     posture = posture_of(
         robot, pose, joint, rest, mismatch, own_errors=not closing, note=False
     )
-    fixed = posture.robot.errors if closing else None
+    fixed = posture.robot.declared_errors if closing else None
     sources = read_sources(errors, posture.robot, fixed)
     wrench, g = parse_load(load), parse_gravity(gravity)
     note_closing(posture.robot, rest, mismatch)
@@ -315,6 +316,7 @@ def tolerances(
         check_writable(figure, PICTURE)
     machine = load_robot(robot, closing_of(rest, mismatch))
     note_closing(machine, rest, mismatch)
+    note_loose(machine)
     asked_plan = (
         None
         if plan is None
