@@ -483,7 +483,7 @@ def _told(
     return after, replace(
         result, energy=after.found.energy, load_work=load_work,
         work=np.zeros_like(gained) if releasing else gained,
-        lost=-gained if releasing else np.zeros_like(gained),
+        lost=0.0 - gained if releasing else np.zeros_like(gained),
         closing_wrench=wrench, spring_back=spring_back, wrenches=wrenches,
         platform_screw=machine.platform_screw(after.errors, after.found),
         balance=np.full(len(new), np.nan) if machine.cones.shape[1] else gained - half,

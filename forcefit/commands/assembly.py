@@ -34,6 +34,7 @@ from forcefit.commands.plot import plot
 from forcefit.commands.progress import one_thread
 from forcefit.commands.solve import solve
 from forcefit.commands.statistics import statistics, tolerances
+from forcefit.commands.steps import steps
 from forcefit.commands.sweep import sweep
 from forcefit.inputs.errors import BadInput, checked, nearest
 from forcefit.inputs.writing import (
@@ -188,6 +189,6 @@ def show(
 
 
 for command in (
-    stiffness, deflection, frequencies, statistics, tolerances, sweep, plot
+    stiffness, deflection, frequencies, statistics, tolerances, sweep, steps, plot
 ):  # fmt: skip
     app.command()(command)

@@ -13,7 +13,7 @@ from assembly.exchange.robot_files import load_robot
 from assembly.files.robot_file import write_robot
 from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import solve_assembly
-from assembly.model.error_distributions import tolerance_sources
+from assembly.model.error_distributions import read_sources, tolerance_sources
 from assembly.model.links import link_compliances
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.tolerance_file import read_plan
@@ -214,12 +214,27 @@ def test_sweep_has_the_energies_of_the_bolted_robot(tmp_path):
     assert energies == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
-def test_sweep_bolts_every_draw_and_every_design(tmp_path):
+def test_sweep_bolts_every_draw_with_its_own_errors(tmp_path):
     path = four_bar(tmp_path, at_angle(0.4))
     errors = tmp_path / "errors.toml"
-    errors.write_text(
-        '[[errors]]\nframes = ["pin2"]\nrx = { uniform = [0.001, 0.005] }\n'
+    errors.write_text('[[errors]]\nframes = ["pin2"]\nmost = [5e-3, 0, 0, 0, 0, 0]\n')
+    data = sweep(
+        path, grid="q.crank=0.8:2.0:0.4", errors=errors, draws=5, assumption="none"
     )
+    robot = load_robot(path)
+    sources = read_sources(errors, robot)
+    for i, own in enumerate(sources.errors(sources.draw(0, 5, 1))):
+        machine = bolted(robot.with_errors(own))
+        alone = [
+            solve_assembly(place_robot(machine, joints={"crank": a})).energy
+            for a in ANGLES[1:]
+        ]
+        energies = np.asarray(data["energy"].isel(draw=i)).ravel()
+        assert energies == pytest.approx(alone, rel=1e-6, abs=1e-12)
+
+
+def test_sweep_bolts_every_design(tmp_path):
+    path = four_bar(tmp_path, at_angle(0.4))
     data = sweep(
         path, grid="q.crank=2.0", assumption="none",
         vary=["pin2.link.beam.radius=0.01,0.02"],
@@ -284,6 +299,7 @@ def test_tolerances_of_a_bolted_robot_are_refused_in_one_line(tmp_path):
 DRAWN = """
 format = 2
 platform = "tool"
+platform_at = [0.2, 0, 0]
 [[body]]
 name = "stand"
 [[body]]
