@@ -84,6 +84,9 @@ _OWNERS = {
     "assembly.model.robot": (
         "BeamLink", "Clearance", "Frame", "MatrixLink", "Robot",
     ),
+    "assembly.files.step_file": ("read_steps",),
+    "assembly.steps.bolted": ("bolt_joints",),
+    "assembly.steps.run": ("assemble_in_steps",),
     "assembly.statistics.experiment": ("Experiment",),
     "assembly.statistics.monte_carlo": ("run_draws",),
     "assembly.statistics.summary": ("summarise",),

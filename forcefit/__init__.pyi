@@ -3,6 +3,7 @@
 from assembly.exact.exact import solve_exact
 from assembly.exchange.convert import convert
 from assembly.exchange.robot_files import load_robot, write_robot
+from assembly.files.step_file import read_steps
 from assembly.kinematics.mobility import mobility
 from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import CannotAssemble, solve_assembly
@@ -16,6 +17,8 @@ from assembly.platform_stiffness.vibration import natural_modes
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.summary import summarise
+from assembly.steps.bolted import bolt_joints
+from assembly.steps.run import assemble_in_steps
 from assembly.sweeps.dataset import open_dataset
 from assembly.sweeps.maps import figure_of
 from assembly.sweeps.point_table import point_table
@@ -47,8 +50,10 @@ __all__ = [
     "Material",
     "MatrixLink",
     "Robot",
+    "assemble_in_steps",
     "assumption_costs",
     "beam_compliance",
+    "bolt_joints",
     "bound_pose_error",
     "compensate",
     "convert",
@@ -70,6 +75,7 @@ __all__ = [
     "read_campaign",
     "read_commands",
     "read_sources",
+    "read_steps",
     "read_study",
     "rectangular_section",
     "round_section",

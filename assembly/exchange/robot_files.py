@@ -9,7 +9,7 @@ from assembly.files.robot_file import write_robot as write_robot_file
 from assembly.files.solved_links import solve_links
 from assembly.model.robot import Robot
 from assembly.robots import load_robot as load_declared
-from assembly.steps.bolted import bolted
+from assembly.steps.bolted import bolt_joints
 from forcefit.inputs.table import BadInput, read_bytes
 
 OTHERS = (".urdf", ".xml", ".sdf")
@@ -44,7 +44,7 @@ def load_robot(
     robot = _load_declared(name, close)
     try:
         if links or any(frame.locked_at for frame in robot.frames):
-            robot = bolted(solve_links(robot))
+            robot = bolt_joints(solve_links(robot))
         return robot
     except BadInput as error:
         raise BadInput(f"{name}: {error}") from None

@@ -55,7 +55,7 @@ class LockedAt:
         pose: components ``tx .. rz`` [m, rad] of the platform at that pose.
         joints: or coordinates [rad or m] of drives; home if both are empty.
         screw: (6,) [rad, m] clearance that is locked in; it is part of the geometric
-            error.  Computed by :func:`assembly.steps.bolted.bolted`.
+            error.  Computed by :func:`assembly.steps.bolted.bolt_joints`.
     """
 
     clearance: Clearance

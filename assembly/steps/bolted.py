@@ -24,7 +24,7 @@ from assembly.steps.run import first_state
 from forcefit.inputs.table import BadInput, quoted
 
 
-def bolted(robot: Robot) -> Robot:
+def bolt_joints(robot: Robot) -> Robot:
     """Return a robot with the clearances of its bolted joints locked in.
 
     Args:
@@ -63,7 +63,7 @@ def bolted_errors(robot: Robot, errors: NDArray) -> NDArray:
         bolted.
 
     Raises:
-        BadInput: see :func:`bolted`.
+        BadInput: see :func:`bolt_joints`.
     """
     total = errors
     for frames, machine in _bolts(_AsMade(robot)):

@@ -131,7 +131,7 @@ class StepResult:
         return np.linalg.norm(self.closing_wrench[:, 3:], axis=1)
 
 
-def assemble(
+def assemble_in_steps(
     plan: Plan,
     posture: Posture,
     errors: ArrayLike | None = None,
@@ -173,8 +173,8 @@ def first_state(
     Args:
         machine: columns and rows of the robot.
         plan: the steps; closures that they do not join are closed.
-        errors: see :func:`assemble`.
-        gravity: see :func:`assemble`.
+        errors: see :func:`assemble_in_steps`.
+        gravity: see :func:`assemble_in_steps`.
 
     Returns:
         The state.

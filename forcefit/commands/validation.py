@@ -78,11 +78,11 @@ def _with_errors(
     if errors is None:
         return posture
     from assembly.model.error_distributions import read_sources
-    from assembly.steps.bolted import bolted
+    from assembly.steps.bolted import bolt_joints
 
     sources = read_sources(errors, posture.robot, fixed)
     errors_drawn = sources.errors(sources.draw(0, 1, seed)[0])
-    return replace(posture, robot=bolted(posture.robot.with_errors(errors_drawn)))
+    return replace(posture, robot=bolt_joints(posture.robot.with_errors(errors_drawn)))
 
 
 def parse_scales(text: str) -> list[float]:

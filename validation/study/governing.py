@@ -12,7 +12,7 @@ from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.clearance import own_cone
 from assembly.model.robot import Frame, Robot
 from assembly.solvers.conic import SolverFailed
-from assembly.steps.bolted import bolted
+from assembly.steps.bolted import bolt_joints
 
 ERROR, CLEARANCE = "geometric error", "clearance"
 _KEYS = ("tilt", "spin", "radial", "axial")  # names of the bounds in clearance_bounds
@@ -65,7 +65,7 @@ def _improved(robot: Robot) -> list[tuple[str, str, Robot]]:
         if declared[i].any():
             errors = declared.copy()
             errors[i] = 0.0
-            cases.append((frame.name, ERROR, bolted(robot.with_errors(errors))))
+            cases.append((frame.name, ERROR, bolt_joints(robot.with_errors(errors))))
     for i, frame in enumerate(robot.frames):
         tight = _tight(frame)
         if tight is not None:

@@ -17,7 +17,7 @@ from assembly.model.error_distributions import read_sources, tolerance_sources
 from assembly.model.links import link_compliances
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.tolerance_file import read_plan
-from assembly.steps.bolted import bolted, loose_over_poses
+from assembly.steps.bolted import bolt_joints, loose_over_poses
 from assembly.sweeps.robot_sweep import sweep
 from forcefit.inputs.table import BadInput
 from stiffness.screws import rotation_matrix
@@ -197,7 +197,7 @@ def test_statistics_bolt_every_drawn_machine_with_its_own_errors(tmp_path):
     rows = experiment.solve(0, 6)
     errors = sources.errors(sources.draw(0, 6, 7))
     for row, own in zip(rows, errors, strict=True):
-        machine = bolted(robot.with_errors(own))
+        machine = bolt_joints(robot.with_errors(own))
         alone = solve_assembly(replace(posture, robot=machine)).energy
         assert row["energy"] == pytest.approx(alone, rel=1e-6, abs=1e-12)
         assert np.any(machine.frame("stand").locked_at.screw)
@@ -224,7 +224,7 @@ def test_sweep_bolts_every_draw_with_its_own_errors(tmp_path):
     robot = load_robot(path)
     sources = read_sources(errors, robot)
     for i, own in enumerate(sources.errors(sources.draw(0, 5, 1))):
-        machine = bolted(robot.with_errors(own))
+        machine = bolt_joints(robot.with_errors(own))
         alone = [
             solve_assembly(place_robot(machine, joints={"crank": a})).energy
             for a in ANGLES[1:]

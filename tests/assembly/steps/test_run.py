@@ -14,7 +14,7 @@ from assembly.model.placed_frames import place_frames
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.robots.placing import at, ball_joint, cardan_joint
 from assembly.steps.plan import Adjust, Fix, Join, Measure, Plan, Preload, Release
-from assembly.steps.run import assemble
+from assembly.steps.run import assemble_in_steps
 from forcefit.inputs.table import BadInput
 from tests.assembly.steps.robots_for_steps import (
     gough_points,
@@ -37,7 +37,7 @@ def test_two_bars_and_a_gap_store_and_lose_what_the_springs_say():
     """F = g k1 k2 / (k1 + k2), E = F g / 2; a wall removed loses all of it."""
     bolt = Join("bolt", ("wall", "bar2"))
     plan = Plan((bolt, Release("wall removed", ("bolt",))))
-    closed, released = assemble(plan, two_bars(2e-4))
+    closed, released = assemble_in_steps(plan, two_bars(2e-4))
     assert closed.closing_force == pytest.approx(150.0)
     assert closed.energy == pytest.approx(15e-3)
     assert closed.work == pytest.approx(15e-3)
@@ -50,7 +50,7 @@ def test_two_bars_and_a_gap_store_and_lose_what_the_springs_say():
 def test_a_bolt_of_limited_force_leaves_the_opening_that_the_springs_say():
     """90 N of 150 N close 120 um of 200 um: 80 um open, E = 0.36 * 15 mJ."""
     bolt = Join("bolt", ("wall", "bar2"), force_limit=90.0, leave_open=True)
-    (closed,) = assemble(Plan((bolt,)), two_bars(2e-4))
+    (closed,) = assemble_in_steps(Plan((bolt,)), two_bars(2e-4))
     assert closed.exceeded.all()
     assert closed.closing_force == pytest.approx(90.0)
     assert abs(closed.left_open[0, 5]) == pytest.approx(8e-5)
@@ -59,7 +59,7 @@ def test_a_bolt_of_limited_force_leaves_the_opening_that_the_springs_say():
 
 def test_a_force_limit_without_leave_open_is_reported_only():
     bolt = Join("bolt", ("wall", "bar2"), force_limit=90.0)
-    (closed,) = assemble(Plan((bolt,)), two_bars(2e-4))
+    (closed,) = assemble_in_steps(Plan((bolt,)), two_bars(2e-4))
     assert closed.exceeded.all()
     assert closed.closing_force == pytest.approx(150.0)
 
@@ -67,7 +67,7 @@ def test_a_force_limit_without_leave_open_is_reported_only():
 @pytest.mark.parametrize("order", list(permutations((1, 2, 3))))
 def test_pinned_legs_end_in_the_same_state_in_every_order(order):
     """x = sum k d / sum k = 23.33 um, E = 2.967 mJ, forces k (x - d)."""
-    last = assemble(Plan(tuple(join_leg(i) for i in order)), three_legs())[-1]
+    last = assemble_in_steps(Plan(tuple(join_leg(i) for i in order)), three_legs())[-1]
     assert last.platform_screw[0, 5] == pytest.approx(140 / 6 * 1e-6)
     assert last.energy == pytest.approx(2.966667e-3, rel=1e-6)
     forces = [abs(last.wrenches[f"join {i}"][0, 5]) for i in (1, 2, 3)]
@@ -75,7 +75,9 @@ def test_pinned_legs_end_in_the_same_state_in_every_order(order):
 
 
 def test_each_pinned_leg_needs_the_closing_force_of_the_springs_so_far():
-    results = assemble(Plan(tuple(join_leg(i) for i in (1, 2, 3))), three_legs())
+    results = assemble_in_steps(
+        Plan(tuple(join_leg(i) for i in (1, 2, 3))), three_legs()
+    )
     x = [r.platform_screw[0, 5] for r in results]
     assert x == pytest.approx([30e-6, -10e-6 / 3, 70e-6 / 3])
     energies = [r.energy[0] for r in results]
@@ -89,7 +91,9 @@ def test_each_pinned_leg_needs_the_closing_force_of_the_springs_so_far():
 def test_pinned_while_clamped_then_released_leaves_the_same_state():
     clamp = Fix("clamp", "platform", {"TZ": 10e-6})
     joins = tuple(join_leg(i) for i in (1, 2, 3))
-    results = assemble(Plan((clamp, *joins, Release("free", ("clamp",)))), three_legs())
+    results = assemble_in_steps(
+        Plan((clamp, *joins, Release("free", ("clamp",)))), three_legs()
+    )
     assert results[3].platform_screw[0, 5] == pytest.approx(10e-6)
     assert results[4].platform_screw[0, 5] == pytest.approx(140 / 6 * 1e-6)
     assert results[4].energy == pytest.approx(2.966667e-3, rel=1e-6)
@@ -102,7 +106,7 @@ def test_pinned_while_clamped_then_released_leaves_the_same_state():
 def test_last_leg_bolted_as_it_lies_leaves_the_pose_of_the_two_others(last, x, energy):
     first = [i for i in (1, 2, 3) if i != last]
     steps = (*(join_leg(i) for i in first), join_leg(last, locked=Z))
-    result = assemble(Plan(steps), three_legs())[-1]
+    result = assemble_in_steps(Plan(steps), three_legs())[-1]
     assert result.platform_screw[0, 5] == pytest.approx(x)
     assert result.energy == pytest.approx(energy, rel=1e-6)
     assert result.closing_force == pytest.approx(0.0, abs=1e-9)
@@ -114,7 +118,7 @@ def test_leg_bolted_while_the_platform_is_clamped_springs_back_by_its_share():
         join_leg(1), join_leg(2), Fix("clamp", "platform", {"TZ": 10e-6}),
         join_leg(3, locked=Z), Release("free", ("clamp",)),
     )  # fmt: skip
-    result = assemble(Plan(steps), three_legs())[-1]
+    result = assemble_in_steps(Plan(steps), three_legs())[-1]
     assert result.platform_screw[0, 5] == pytest.approx(10e-6 / 3)
     forces = [abs(result.wrenches[f"join {i}"][0, 5]) for i in (1, 2, 3)]
     assert forces == pytest.approx([26.66667, 46.66667, 20.0], rel=1e-6)
@@ -137,7 +141,7 @@ def test_slot_before_the_pin_differs_where_the_pin_moves_the_slot(
         Join(f"join {i}", (f"seat{i}", f"end{i}"), locked=ways.get(i, ()))
         for i in (1, 2, *order)
     )
-    result = assemble(Plan(steps), posture)[-1]
+    result = assemble_in_steps(Plan(steps), posture)[-1]
     slope = -result.platform_screw[0, 1]  # +RY lowers positive x
     assert slope == pytest.approx(turn)
     assert result.energy == pytest.approx(energy, rel=1e-6)
@@ -153,7 +157,7 @@ def test_slot_where_the_pin_does_not_move_it_ends_alike_in_both_orders():
             Join(f"{i}", (f"seat{i}", f"end{i}"), locked=Z if i == 4 else ())
             for i in (1, 2, *order)
         )
-        ends.append(assemble(Plan(steps), posture)[-1])
+        ends.append(assemble_in_steps(Plan(steps), posture)[-1])
     assert ends[0].platform_screw == pytest.approx(ends[1].platform_screw, abs=1e-16)
     assert ends[0].energy == pytest.approx(ends[1].energy)
 
@@ -174,7 +178,7 @@ def test_portal_welded_to_a_bent_base_keeps_its_share_of_the_rotation():
         Release("free", ("clamp 1", "clamp 2")),
         Measure("foot 1", "foot1", ("RY",)), Measure("foot 2", "foot2", ("RY",)),
     )  # fmt: skip
-    results = assemble(Plan(steps), portal())
+    results = assemble_in_steps(Plan(steps), portal())
     assert results[1].energy == pytest.approx(k_b * 1e-3**2, rel=1e-6)
     assert results[2].work == pytest.approx(0.0, abs=1e-12)
     turn = results[4].reading - results[5].reading
@@ -188,7 +192,7 @@ def test_work_of_all_steps_is_the_final_energy_and_the_losses():
         Preload("press", "platform", np.array([0, 0, 0, 0, 0, -30.0])),
         join_leg(3, locked=Z), Release("free", ("clamp",)), Release("end", ("press",)),
     )  # fmt: skip
-    results = assemble(Plan(steps), three_legs())
+    results = assemble_in_steps(Plan(steps), three_legs())
     work = sum(r.work + r.load_work for r in results)
     lost = sum(r.lost for r in results)
     assert work == pytest.approx(results[-1].energy + lost, rel=1e-9)
@@ -218,7 +222,7 @@ def legs_with_pins(places, bounds, k=(None, None, 2e6)):
 def test_two_pins_with_clearance_leave_the_platform_where_both_reach(order):
     """0 +- 20 um and 30 +- 20 um: the platform lies in [10, 20] um."""
     posture = legs_with_pins((0.0, 30e-6), (20e-6, 20e-6))
-    results = assemble(Plan(tuple(join_leg(i) for i in order)), posture)
+    results = assemble_in_steps(Plan(tuple(join_leg(i) for i in order)), posture)
     z = results[-1].platform_screw[0, 5]
     assert 10e-6 - 1e-12 < z < 20e-6 + 1e-12
     assert results[-1].energy == pytest.approx(0.0, abs=1e-12)
@@ -236,7 +240,7 @@ def test_slot_bolted_after_one_pin_costs_what_its_place_in_the_clearance_says(
         join_leg(1), Fix("clamp", "platform", {"TZ": at}), join_leg(3, locked=Z),
         Release("free", ("clamp",)), join_leg(2),
     )  # fmt: skip
-    last = assemble(Plan(steps), posture)[-1]
+    last = assemble_in_steps(Plan(steps), posture)[-1]
     assert abs(last.wrenches["join 3"][0, 5]) == pytest.approx(force, abs=1e-3)
     assert last.energy == pytest.approx(force**2 / 4e6, abs=1e-7)
 
@@ -249,7 +253,7 @@ def test_a_load_seats_the_clearance_in_which_the_slot_is_bolted():
         join_leg(1), Preload("weight", "platform", down), join_leg(3, locked=Z),
         Release("no weight", ("weight",)), join_leg(2),
     )  # fmt: skip
-    results = assemble(Plan(steps), posture)
+    results = assemble_in_steps(Plan(steps), posture)
     assert results[2].platform_screw[0, 5] == pytest.approx(-20e-6, rel=1e-6)
     force = abs(results[-1].wrenches["join 3"][0, 5])
     assert force == pytest.approx(60.0, rel=1e-6)
@@ -263,7 +267,7 @@ def test_a_joint_with_clearance_that_is_bolted_keeps_its_place():
         join_leg(1), Preload("weight", "platform", down), Join("bolt", "leg1"),
         Release("no weight", ("weight",)), join_leg(2),
     )  # fmt: skip
-    last = assemble(Plan(steps), posture)[-1]
+    last = assemble_in_steps(Plan(steps), posture)[-1]
     # the leg's end rests 20 um below, so pin 2 lifts it by 50 um
     assert abs(last.wrenches["join 1"][0, 5]) == pytest.approx(50.0, rel=1e-6)
 
@@ -324,7 +328,7 @@ def join_legs(count, but=()):
 
 
 def test_gough_platform_moves_by_the_inverse_jacobian_without_force():
-    last = assemble(Plan(join_legs(6)), gough(LENGTHS))[-1]
+    last = assemble_in_steps(Plan(join_legs(6)), gough(LENGTHS))[-1]
     expected = inverse_jacobian() @ LENGTHS
     assert last.platform_screw[0] == pytest.approx(expected, rel=1e-9)
     assert np.linalg.norm(expected[3:]) == pytest.approx(23.3e-6, abs=0.05e-6)
@@ -341,7 +345,7 @@ def test_one_adjustable_leg_brings_one_reading_to_zero_and_not_the_pose(
 ):
     reading = Measure("pose", "platform", components)
     steps = (*join_legs(6), Adjust("shim", "leg6", ("TZ",), reading))
-    last = assemble(Plan(steps), gough(LENGTHS))[-1]
+    last = assemble_in_steps(Plan(steps), gough(LENGTHS))[-1]
     assert last.adjustment[0, 0] == pytest.approx(change, abs=0.05e-6)
     assert np.linalg.norm(last.platform_screw[0, 3:]) == pytest.approx(left, abs=5e-8)
 
@@ -349,7 +353,7 @@ def test_one_adjustable_leg_brings_one_reading_to_zero_and_not_the_pose(
 def test_an_adjustment_is_rounded_to_its_increment():
     reading = Measure("pose", "platform", ("TZ",))
     steps = (*join_legs(6), Adjust("shim", "leg6", ("TZ",), reading, 25e-6))
-    last = assemble(Plan(steps), gough(LENGTHS))[-1]
+    last = assemble_in_steps(Plan(steps), gough(LENGTHS))[-1]
     assert last.adjustment[0, 0] == pytest.approx(-50e-6)
 
 
@@ -363,12 +367,12 @@ def test_seventh_leg_cut_to_the_measured_length_is_free_of_force():
     gamma = shares @ LENGTHS
     S = 5e6 / (1 + shares @ shares)
     posture, last = gough(np.r_[LENGTHS, 0.0], seventh=True), ("seat7", "end7")
-    pinned = assemble(Plan((*join_legs(6), Join("last", last))), posture)[-1]
+    pinned = assemble_in_steps(Plan((*join_legs(6), Join("last", last))), posture)[-1]
     assert pinned.closing_force == pytest.approx(S * abs(gamma), rel=1e-6)
     assert pinned.work == pytest.approx(S * gamma**2 / 2, rel=1e-6)
     assert np.linalg.norm(pinned.opening[0, 3:]) == pytest.approx(abs(gamma), rel=1e-6)
     cut = Adjust("cut", "leg7", ("TZ",), Measure("gap", last))
-    results = assemble(Plan((*join_legs(6), cut, Join("last", last))), posture)
+    results = assemble_in_steps(Plan((*join_legs(6), cut, Join("last", last))), posture)
     assert abs(results[-2].adjustment[0, 0]) == pytest.approx(abs(gamma), rel=1e-6)
     assert results[-1].closing_force == pytest.approx(0.0, abs=1e-6)
     assert results[-1].platform_screw[0] == pytest.approx(J @ LENGTHS, rel=1e-6)
@@ -378,9 +382,9 @@ def test_many_machines_have_the_results_of_each_alone(rng):
     errors = rng.normal(size=(4, 5, 6)) * [0, 0, 0, 0, 0, 3e-5]
     posture = three_legs()
     plan = Plan((join_leg(1), join_leg(3), join_leg(2, locked=Z)))
-    many = assemble(plan, posture, errors)
+    many = assemble_in_steps(plan, posture, errors)
     for i, own in enumerate(errors):
-        alone = assemble(plan, posture, own[None])
+        alone = assemble_in_steps(plan, posture, own[None])
         for one, several in zip(alone, many, strict=True):
             assert one.energy == pytest.approx(several.energy[i], rel=1e-9, abs=1e-18)
             assert one.closing_force == pytest.approx(
@@ -401,6 +405,6 @@ def test_many_machines_have_the_results_of_each_alone(rng):
 )
 def test_a_plan_that_does_not_fit_is_refused_in_one_line(steps, text):
     with pytest.raises(BadInput, match="step") as caught:
-        assemble(Plan(steps), three_legs())
+        assemble_in_steps(Plan(steps), three_legs())
     assert text in str(caught.value)
     assert "\n" not in str(caught.value)

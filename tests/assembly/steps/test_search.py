@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from assembly.steps.plan import Fix, Join, Plan, Release
-from assembly.steps.run import assemble
+from assembly.steps.run import assemble_in_steps
 from assembly.steps.search import OBJECTIVES, best_order, why_order_matters
 from forcefit.inputs.table import BadInput
 from tests.assembly.steps.robots_for_steps import planar_platform, three_legs
@@ -20,7 +20,7 @@ def join(i, **more):
 
 
 def outcome(plan, posture, objective):
-    results = assemble(plan, posture)
+    results = assemble_in_steps(plan, posture)
     if objective == "force":
         return max(r.closing_force[0] for r in results if isinstance(r.step, Join))
     if objective == "energy":

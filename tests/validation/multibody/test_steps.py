@@ -7,7 +7,7 @@ from assembly.kinematics.posture import home_posture
 from assembly.kinematics.se3 import logarithm
 from assembly.model.robot import BeamLink, Frame, Robot
 from assembly.steps.plan import Join, Plan, Preload, Release
-from assembly.steps.run import assemble
+from assembly.steps.run import assemble_in_steps
 from stiffness.screws import SCREW
 from validation.multibody.simulation import simulate_assembly
 
@@ -61,7 +61,7 @@ def test_bolted_and_forced_joints_differ_from_finite_motions_by_second_order():
         Join("bolt c", ("seat_c", "shim_c"), locked=SCREW),
         Join("force b", ("seat_b", "shim_b")), Release("free", ("press",)),
     ))  # fmt: skip
-    linear = assemble(plan, three_beams(errors, ("b", "c")))[-1]
+    linear = assemble_in_steps(plan, three_beams(errors, ("b", "c")))[-1]
     sizes = []
     for s in (1.0, 0.5, 0.25):
         scaled = {name: s * error for name, error in errors.items()}
