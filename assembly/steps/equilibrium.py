@@ -28,6 +28,8 @@ from assembly.linear.reference.reduction import FreeMotion, complement
 from assembly.solvers.conic import SolverFailed, minimise_energy
 
 _OPEN = 1e-12  # [rad, reference lengths] closure error that counts as rounding
+_ROUNDING = 1e-14  # share of the largest right side that counts as rounding
+_SOLVED = 1e-11  # share of its terms below which a strain counts as the solver's error
 _DRIVEN = 1e-8  # share of a load along a free motion that counts as rounding
 
 
@@ -132,6 +134,8 @@ def equilibrium(
     loaded[:, :ny] = movable.on_springs
     loaded += start @ B_y
     right = (held.right - loaded @ B_y.T) @ Z
+    rounding = _ROUNDING * np.abs(held.right).max(axis=1, initial=0.0)
+    right[np.abs(right) <= rounding[:, None]] = 0.0
     split = _split(Z.T @ B_y, tolerance, noise_of(B_y))
     u, strains, inner = _least(
         split, Z.T @ B_u, right, movable, start @ B_u, last[0], noise_of(B_u)
@@ -186,6 +190,8 @@ def _least(
             raise CannotAssemble("neither springs nor clearances can close the rows")
         u[i] = _closest(least.clearances, last[i], np.vstack([G, H, d[i]]), movable)
         strains[i] = G @ u[i] + h[i]
+        terms = np.abs(G) @ np.abs(u[i]) + np.abs(h[i])
+        strains[i][np.abs(strains[i]) <= _SOLVED * terms.max(initial=0.0)] = 0.0
         rigid_part = split.rigid @ U[:, :rank] @ least.rigid_multipliers
         inner[i] = split.elastic @ (strains[i] / S) + rigid_part
     return u, strains, inner
