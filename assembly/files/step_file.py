@@ -1,6 +1,7 @@
 """Plan files: the steps in which a robot is assembled (``docs/assembly_steps.md``)."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 
@@ -117,7 +118,7 @@ def _clamp(table: Table, name: str, robot: Robot) -> Step:
     frame = _frame(table, "clamp", robot)
     if not table.has("load"):
         position = _values(table, "at", "rad or m")
-        return _held(table, Fix(name, frame, position))
+        return _held(table, Fix(name, frame, position, kind="clamp"))
     if table.has("at"):
         raise table.bad("at", 'found together with "load", expected only one of them')
     return Preload(name, frame, _wrench(table))
@@ -133,7 +134,7 @@ def _held(table: Table, fix: Fix) -> Fix:
         if fix.position is not None and component not in fix.position:
             fault = 'found a component that "at" leaves free, expected one it holds'
             raise table.bad(f"stiffness.{component.lower()}", fault)
-    return Fix(fix.name, fix.frame, fix.position, stiffness)
+    return replace(fix, stiffness=stiffness)
 
 
 def _join(table: Table, name: str, robot: Robot) -> Join:

@@ -86,7 +86,7 @@ def kind_of(step: Step) -> str:
     """Return the kind of a step, as in a plan file."""
     kinds = {Join: "join", Preload: "preload", Release: "release", Adjust: "adjust"}
     if isinstance(step, Fix):
-        return "clamp" if step.position is None else "fix"
+        return step.kind
     return kinds.get(type(step), "measure")
 
 
@@ -122,7 +122,9 @@ def _totals(results: dict[str, Any]) -> dict[str, Any]:
     lost = sum(step["lost"] for step in steps)
     return {
         "work": work, "lost": lost, "energy": steps[-1]["energy"],
-        "peak_force": max(s["closing_force"] for s in steps),
+        "peak_force": max(
+            (s["closing_force"] for s in steps if s["kind"] == "join"), default=0.0
+        ),
         "platform_screw": steps[-1]["platform_screw"],
     }  # fmt: skip
 

@@ -29,12 +29,14 @@ class Fix:
         position: [rad, m] by component, the errors of the fixture; the other components
             are free.  None holds all six where the frame lies.
         stiffness: [N m/rad, N/m] of the fixture by component; rigid where absent.
+        kind: ``"fix"`` or ``"clamp"``, its name in results.
     """
 
     name: str
     frame: str
     position: Mapping[str, float] | None
     stiffness: Mapping[str, float] = field(default_factory=dict)
+    kind: str = "fix"
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture
+from assembly.linear.assembled import without_rounding
 from assembly.linear.load import FrameLoads, loads_on_frames, weights
 from assembly.steps.equilibrium import Equilibrium, Held, equilibrium
 from assembly.steps.machine import Machine, Part, machine_at
@@ -36,6 +37,7 @@ from assembly.steps.plan import (
 )
 from forcefit.inputs.table import BadInput
 
+_ROUNDED = 1e-13  # share of the energies below which their difference is rounding
 _HALVINGS = 50  # of the share of an opening that a limited force closes
 
 
@@ -437,12 +439,14 @@ def _blank(machine: Machine, state: State, step: Step) -> StepResult:
 
 def _wrenches(machine: Machine, state: State) -> dict[str, NDArray]:
     """Return the (k, 6) [N m, N] wrenches of all holds, each in its own axes."""
-    wrenches = {}
-    for name, multipliers in state.multipliers().items():
+    found = state.multipliers()
+    wrenches = np.zeros((len(state.errors), len(found), 6))
+    for i, (name, multipliers) in enumerate(found.items()):
         chosen = state.holds[name].components
-        wrenches[name] = np.zeros((len(multipliers), 6))
-        wrenches[name][:, chosen] = multipliers * machine.scale[chosen]
-    return wrenches
+        wrenches[:, i, chosen] = multipliers * machine.scale[chosen]
+    if found:
+        wrenches = without_rounding(wrenches)
+    return {name: wrenches[:, i] for i, name in enumerate(found)}
 
 
 def _told(
@@ -455,6 +459,8 @@ def _told(
     kept = [after.loads[name] for name in after.loads if name in before.loads]
     load_work = machine.work(kept, after) - machine.work(kept, before)
     gained = after.found.energy - before.found.energy - load_work
+    size = after.found.energy + before.found.energy + np.abs(load_work)
+    gained = np.where(np.abs(gained) <= _ROUNDED * size, 0.0, gained)
     releasing = isinstance(step, Release)
     wrench = spring_back = np.zeros((len(new), 6))
     wrenches = _wrenches(machine, after)
