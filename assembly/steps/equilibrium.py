@@ -145,6 +145,28 @@ def equilibrium(
     return Equilibrium(y[:, :ny], y[:, ny:], u, q, start + inner @ Z.T)
 
 
+def without_idle_weight(movable: Movable, weight: NDArray, rows: NDArray) -> Movable:
+    """Return the loads without weight along motions that nothing holds.
+
+    Args:
+        movable: columns that may move, and the loads on them.
+        weight: (nq,) [J] part of the loads on the free motions that is weight.
+        rows: (m, 6n) rows held.
+
+    Returns:
+        The same; the fitter carries parts that are still free.
+    """
+    if not len(weight):
+        return movable
+    _, S, Vt = (
+        np.linalg.svd(rows @ movable.free)
+        if len(rows)
+        else (0, (), np.eye(len(weight)))
+    )
+    idle = Vt[rank_of(np.asarray(S), RANK) :]
+    return movable._replace(on_free=movable.on_free - weight @ idle.T @ idle)
+
+
 def _balancing(B_q: NDArray, drive: NDArray) -> NDArray:
     """Return (k, m) multipliers that balance the loads on the free motions."""
     if not drive.any():

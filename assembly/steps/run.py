@@ -21,7 +21,12 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.kinematics.posture import Posture
 from assembly.linear.assembled import without_rounding
 from assembly.linear.load import FrameLoads, loads_on_frames, weights
-from assembly.steps.equilibrium import Equilibrium, Held, equilibrium
+from assembly.steps.equilibrium import (
+    Equilibrium,
+    Held,
+    equilibrium,
+    without_idle_weight,
+)
 from assembly.steps.machine import Machine, Part, machine_at
 from assembly.steps.plan import (
     Adjust,
@@ -108,7 +113,7 @@ class StepResult:
         platform_screw: (k, 6) [rad, m] afterwards, at its origin, base axes.
         wrenches: (k, 6) [N m, N] locked in afterwards, by step that holds, in its axes.
         balance: (k,) [J] difference of the work, or of the energy lost, from half the
-            multipliers times the opening; NaN where it is not linear (clearances).
+            multipliers times the opening; NaN with clearances or gravity.
     """
 
     step: Step
@@ -146,7 +151,8 @@ def assemble_in_steps(
         posture: pose at which the robot of n frames is assembled.
         errors: (k, n, 6) [rad, m] geometric errors of k machines; the robot's if
             absent.
-        gravity: (3,) [m/s^2] base axes; acts from the beginning.
+        gravity: (3,) [m/s^2] base axes; acts from the beginning.  It does not move
+            parts that nothing holds yet.
 
     Returns:
         The results, step by step.
@@ -259,6 +265,9 @@ def settle(machine: Machine, state: State) -> State:
     roots = _blocks([hold.roots for hold in held], len(rows))
     last, bolted = state.found, tuple(state.bolted.values())
     movable, cones, motions = machine.movable(tuple(state.loads.values()), bolted, k)
+    if "gravity" in state.loads:
+        weight = state.loads["gravity"].joint @ movable.free
+        movable = without_idle_weight(movable, weight, rows)
     fixed = state.errors.copy()
     fixed += last.clearances[:, ~cones] @ machine.cones[:, ~cones].T
     fixed += last.motions[:, ~motions] @ machine.free[:, ~motions].T
@@ -486,11 +495,12 @@ def _told(
             spring_back = np.zeros((len(new), 6))
             moved = (new - old) @ hold.rows.T
             spring_back[:, chosen] = moved / machine.scale[chosen]
+    linear = not machine.cones.shape[1] and "gravity" not in after.loads
     return after, replace(
         result, energy=after.found.energy, load_work=load_work,
         work=np.zeros_like(gained) if releasing else gained,
         lost=0.0 - gained if releasing else np.zeros_like(gained),
         closing_wrench=wrench, spring_back=spring_back, wrenches=wrenches,
         platform_screw=machine.platform_screw(after.errors, after.found),
-        balance=np.full(len(new), np.nan) if machine.cones.shape[1] else gained - half,
+        balance=gained - half if linear else np.full(len(new), np.nan),
     )  # fmt: skip

@@ -29,7 +29,7 @@ OBJECTIVES: tuple[Objective, ...] = ("force", "energy", "error")
 ALL_ORDERS = 8  # joins in a run of which all orders are searched, without a bound
 MOST_SETS = 14  # joins in a run whose sets are searched
 _EQUAL = 1e-9  # share by which an order must be better than the given one
-_MOST_STATES = 200_000  # states that are computed: some minutes
+MOST_STATES = 200_000  # states that are computed: some minutes
 
 
 # a partial order: its state, its peak force, steps done and left
@@ -83,6 +83,7 @@ def best_order(
     objective: Objective = "force",
     gravity: ArrayLike | None = None,
     progress: Callable[[int], None] = lambda done: None,
+    most: int = MOST_STATES,
 ) -> BestOrder:
     """Return the order of the joining steps with the least value of an objective.
 
@@ -94,6 +95,7 @@ def best_order(
             the end.
         gravity: (3,) [m/s^2] base axes.
         progress: called with the number of states computed.
+        most: number of states after which a search over orders ends with a bound.
 
     Returns:
         The order, with a bound.
@@ -107,7 +109,7 @@ def best_order(
     start = first_state(machine, plan, None, gravity)
     runs = [list(run) for _, run in groupby(plan.steps, lambda s: isinstance(s, Join))]
     longest = max((len(run) for run in runs if isinstance(run[0], Join)), default=0)
-    search = _Search(machine, objective, progress)
+    search = _Search(machine, objective, progress, most)
     given = search.value_of(start, plan.steps)
     pinned = not any(isinstance(s, Join) and _depends_on_state(s) for s in plan.steps)
     if pinned and objective == "force":
@@ -135,6 +137,7 @@ class _Search:
     machine: Machine
     objective: Objective
     progress: Callable[[int], None]
+    most: int
     done: int = 0
 
     def carry_out(self, state: State, step: Step) -> tuple[State, StepResult] | None:
@@ -248,7 +251,7 @@ def _over_orders(search: _Search, start: State, plan: Plan, given: float) -> Bes
     best, value = plan.steps, given
     stack: list[_Partial] = [(start, 0.0, (), plan.steps)]
     try:
-        while stack and search.done < _MOST_STATES:
+        while stack and search.done < search.most:
             state, peak, done, left = stack[-1]
             if not left and search.value(peak, state) < value * (1 - _EQUAL):
                 best, value = done, search.value(peak, state)

@@ -4,12 +4,14 @@ The expected numbers are those of springs in one direction, by hand (see each te
 platform on three legs stands at x = sum k d / sum k.
 """
 
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.placed_frames import place_frames
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.robots.placing import at, ball_joint, cardan_joint
@@ -408,3 +410,78 @@ def test_a_plan_that_does_not_fit_is_refused_in_one_line(steps, text):
         assemble_in_steps(Plan(steps), three_legs())
     assert text in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_release_before_welding_leaves_no_force_in_the_portal():
+    bent = {"TX": 0.0, "TZ": 0.0, "RY": 1e-3}
+    every = ("RX", "RY", "RZ", "TX", "TY", "TZ")
+    steps = (
+        Fix("clamp 1", "foot1", bent), Fix("clamp 2", "foot2", {"RY": -1e-3}),
+        Release("free", ("clamp 1", "clamp 2")),
+        Join("weld", ("corner", "top2"), locked=every),
+    )  # fmt: skip
+    results = assemble_in_steps(Plan(steps), portal())
+    assert results[-1].energy == pytest.approx(0.0, abs=1e-15)
+    assert results[2].lost == pytest.approx(results[1].energy, rel=1e-9)
+
+
+def test_influence_coefficients_give_the_spring_back_of_clamped_parts():
+    """Liu and Hu: U = K_assembly^-1 (sum of K_part V), two parts clamped to nominal."""
+    k, V = np.array([1e6, 2e6]), np.array([30e-6, -20e-6])
+    steps = (
+        Fix("clamp", "platform", {"TZ": 0.0}), join_leg(1), join_leg(2),
+        Release("free", ("clamp",)),
+    )  # fmt: skip
+    posture = legs_with_pins(V, (None, None), k=tuple(k))
+    results = assemble_in_steps(Plan(steps), posture)
+    expected = (k @ V) / k.sum()
+    assert results[-1].platform_screw[0, 5] == pytest.approx(expected)
+    assert results[-1].spring_back[0, 5] == pytest.approx(expected)
+    for i in (1, 2):  # the closing wrench presses each part to nominal
+        assert results[i].closing_force == pytest.approx(abs(k[i - 1] * V[i - 1]))
+
+
+def test_spring_of_a_fixture_shares_the_closing_force():
+    """A leg closed against a fixture of 2e6 N/m: series of both springs."""
+    fix = Fix("fixture", "platform", {"TZ": 0.0}, {"TZ": 2e6})
+    results = assemble_in_steps(Plan((fix, join_leg(1))), three_legs_alone())
+    series = 1e6 * 2e6 / 3e6
+    assert results[-1].closing_force == pytest.approx(series * 30e-6)
+    assert results[-1].energy == pytest.approx(series * 30e-6**2 / 2)
+    assert results[-1].platform_screw[0, 5] == pytest.approx(10e-6)
+
+
+def three_legs_alone():
+    """Leg 1 of the three legs."""
+    return legs_with_pins((30e-6,), (None,), k=(1e6,))
+
+
+def test_weight_bends_the_leg_before_the_slot_is_bolted():
+    """100 N on leg 1 of 1e6 N/m: 100 um down; the slot of leg 2 stays there."""
+    posture = legs_with_pins((0.0, 0.0), (None, None), k=(1e6, 1e6))
+    frames = [
+        replace(f, mass=10.0) if f.name == "platform" else f
+        for f in posture.robot.frames
+    ]
+    posture = home_posture(replace(posture.robot, frames=tuple(frames)))
+    down = [0, 0, -10.0]
+    for second, expected in (
+        (join_leg(2, locked=Z), -100e-6),
+        (join_leg(2), -50e-6),
+    ):
+        plan = Plan((join_leg(1), second))
+        results = assemble_in_steps(plan, posture, gravity=down)
+        assert results[0].platform_screw[0, 5] == pytest.approx(-100e-6)
+        assert results[1].platform_screw[0, 5] == pytest.approx(expected)
+
+
+def test_preload_on_a_part_that_nothing_holds_is_refused():
+    press = Preload("press", "platform", np.array([0, 0, 0, 0, 0, -10.0]))
+    with pytest.raises(FreeMotion, match="nothing resists"):
+        assemble_in_steps(Plan((press,)), legs_open())
+
+
+def legs_open():
+    """Three legs, the platform free before the first is joined."""
+    posture = three_legs()
+    return replace(posture, robot=replace(posture.robot, closures=()))

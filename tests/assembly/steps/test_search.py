@@ -90,3 +90,38 @@ def test_least_error_of_too_many_joins_is_refused():
     steps = tuple(join(i, locked=("TZ",)) for i in range(1, 10))
     with pytest.raises(BadInput, match="at most 8"):
         best_order(Plan(steps), posture, "error")
+
+
+@pytest.mark.parametrize("objective", ["force", "energy"])
+@pytest.mark.parametrize("most", [20, 60])
+def test_search_that_ends_early_brackets_the_best_order(objective, most, rng):
+    errors = rng.normal(size=5) * 40e-6
+    posture = planar_platform([0.0, 0.4, 0.1, 0.3, 0.25], errors)
+    steps = tuple(join(i, locked=("TZ",) if i in (2, 5) else ()) for i in range(1, 6))
+    every = best_order(Plan(steps), posture, objective)
+    early = best_order(Plan(steps), posture, objective, most=most)
+    assert early.bound <= every.value * (1 + 1e-9)
+    assert every.value <= early.value * (1 + 1e-9)
+    assert early.searched < every.searched
+
+
+def test_interrupted_search_returns_the_best_order_so_far():
+    posture = planar_platform([0.0, 0.4, 0.1, 0.3], [0, 3e-5, 4e-5, -2e-5])
+    steps = tuple(join(i, locked=("TZ",) if i == 4 else ()) for i in range(1, 5))
+
+    def stop(done):
+        if done == 12:
+            raise KeyboardInterrupt
+
+    found = best_order(Plan(steps), posture, "force", progress=stop)
+    assert found.bound <= found.value <= found.given
+
+
+def test_slot_last_or_first_decides_the_error_of_nine_legs():
+    """Beyond 8 joins the least energy is searched with bounds: zero, slots first."""
+    errors = np.array([0, 0, 10, 20, -10, 5, 15, -5, 25]) * 1e-6
+    posture = planar_platform(np.linspace(0, 0.4, 9), errors)
+    steps = tuple(join(i, locked=("TZ",) if i > 2 else ()) for i in range(1, 10))
+    found = best_order(Plan(steps[::-1]), posture, "energy")
+    assert found.value == pytest.approx(0.0, abs=1e-15)
+    assert found.bound == pytest.approx(0.0, abs=1e-15)
