@@ -13,7 +13,7 @@ from assembly.model.statuses import OK
 from assembly.solvers.conic import SolverFailed
 from assembly.steps.machine import machine_at
 from assembly.steps.plan import Adjust, Fix, Join, Plan, Preload, Release, Step
-from assembly.steps.run import StepResult, carry_out, first_state
+from assembly.steps.run import State, StepResult, carry_out, first_state
 from assembly.steps.search import BestOrder, why_order_matters
 from forcefit.inputs.errors import quoted
 from forcefit.results.display import listing, numbers
@@ -30,6 +30,7 @@ _IN_CLEARANCES = (
 def steps_of(
     plan: Plan, posture: Posture, gravity: ArrayLike | None = None,
     best: BestOrder | None = None, objective: str = "",
+    states: list[State] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """Return the results of ``assembly steps`` as plain values.
 
@@ -39,6 +40,7 @@ def steps_of(
         gravity: (3,) [m/s^2] base axes.
         best: order that was searched; its plan is carried out.
         objective: of that search.
+        states: list to which the state after each step is added.
 
     Returns:
         All steps that can be carried out; ``status`` is ``"ok"``, or says why the next
@@ -64,6 +66,8 @@ def steps_of(
         for step in plan.steps:
             state, result = carry_out(machine, state, step)
             results["steps"].append(_values(result))
+            if states is not None:
+                states.append(state)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         failed = plan.steps[len(results["steps"])].name
         reason = f"step {quoted(failed)}: {error}"

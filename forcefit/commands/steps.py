@@ -1,7 +1,7 @@
 """The command ``forcefit assembly steps``."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -18,7 +18,12 @@ from forcefit.commands.options import (
     posture_of,
 )
 from forcefit.commands.progress import one_thread, progress_lines
+from forcefit.commands.report import ReportOption, provenance
 from forcefit.inputs.errors import BadInput, nearest
+from forcefit.inputs.writing import write_text
+
+if TYPE_CHECKING:
+    from assembly.steps.run import State
 
 
 def steps(
@@ -45,6 +50,7 @@ def steps(
         int | None, typer.Option(help="Number of machines.", min=1, max=10**7)
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed.", min=0, max=2**63 - 1)] = 1,
+    report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
     """Assemble the robot step by step, in the order of a plan.
@@ -55,6 +61,8 @@ def steps(
     from assembly.files.step_file import read_steps
     from assembly.model.error_distributions import read_sources
     from assembly.report.steps import drawn_steps, steps_of, steps_text
+    from assembly.report.steps_page import steps_page
+    from assembly.steps.machine import machine_at
     from assembly.steps.search import OBJECTIVES, best_order
 
     if (errors is None) != (draws is None):
@@ -63,6 +71,7 @@ def steps(
     asked, g = read_steps(plan, posture.robot), parse_gravity(gravity)
     sources = None if errors is None else read_sources(errors, posture.robot)
     order = None
+    states: list[State] = []
     with one_thread():
         if best is not None:
             if best not in OBJECTIVES:
@@ -73,10 +82,13 @@ def steps(
                 order = best_order(
                     asked, posture, best, g, lambda done: update("orders", done, done)
                 )
-        results = steps_of(asked, posture, g, order, best or "")
+        results = steps_of(asked, posture, g, order, best or "", states)
         if sources is not None and draws is not None and results["status"] == "ok":
             drawn = sources.errors(sources.draw(0, draws, seed))
             carried = asked if order is None else order.plan
             results |= {"draws": draws}
             results["quantiles"] = drawn_steps(carried, posture, drawn, g)
+    if report is not None:
+        machine, source = machine_at(posture), provenance(robot, plan, errors)
+        write_text(steps_page(results, machine, states, source), report)
     answer(results, steps_text(results), results["status"], json)

@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+from tests.pages_for_tests import parse
+
 LEG = """
 [[frame]]
 name = "leg{i}"
@@ -151,3 +153,24 @@ def test_step_that_cannot_be_carried_out_ends_with_its_name(run, tmp_path):
     status, out, _ = run("assembly", "steps", robot, plan)
     assert status == 1
     assert 'step "join tool - stop"' in out
+
+
+def test_report_has_the_table_of_the_steps(run, files, tmp_path):
+    page = tmp_path / "steps.html"
+    status, _, _ = run("assembly", "steps", *files(SLOT), "--report", page)
+    table = parse(page.read_text()).table("step")
+    assert status == 0
+    assert [row[0].text for row in table[1:]][2] == "clamp platform"
+    # the clamp holds -20 um at 1e6 N/m and 30 um at 2e6 N/m: -20 + 60 N
+    assert table[3][4].value == pytest.approx(40.0)
+    # 20 um at 1e6 N/m and 30 um at 2e6 N/m
+    assert table[3][1].value == pytest.approx(1.1e-3)
+
+
+def test_report_in_a_missing_folder_is_refused_before_anything_is_computed(run, files):
+    robot, plan = files(SLOT)
+    words = ("assembly", "steps", robot, plan, "--report", "missing/steps.html")
+    status, out, err = run(*words)
+    assert status == 2
+    assert out == ""
+    assert err.count("\n") == 1
