@@ -77,12 +77,24 @@ def read_steps(path: Path | str, robot: Robot) -> Plan:
     if not 0 < len(tables) <= _MOST_STEPS:
         fault = f"found {len(tables)}" if tables else "missing"
         raise root.bad("step", f"{fault}; expected 1 to {_MOST_STEPS} [[step]]")
-    plan = Plan(tuple(_step(table, robot) for table in tables))
+    plan = Plan(_named([_step(table, robot) for table in tables], tables))
     try:
         check_plan(plan, robot)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
     return plan
+
+
+def _named(steps: list[Step], tables: list[Table]) -> tuple[Step, ...]:
+    """Return the steps; names that are not given are numbered where they repeat."""
+    count: dict[str, int] = {}
+    named = []
+    for step, table in zip(steps, tables, strict=True):
+        number = count[step.name] = count.get(step.name, 0) + 1
+        if number > 1 and "name" not in table.content:
+            step = replace(step, name=f"{step.name} {number}")
+        named.append(step)
+    return tuple(named)
 
 
 def _step(table: Table, robot: Robot) -> Step:

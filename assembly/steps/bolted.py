@@ -22,6 +22,9 @@ from assembly.steps.machine import Machine, machine_at
 from assembly.steps.plan import Plan
 from assembly.steps.run import first_state
 from forcefit.inputs.table import BadInput, quoted
+from forcefit.results.display import numbers
+
+_BOLTED = "is bolted at"  # words of a remark
 
 
 def bolt_joints(robot: Robot) -> Robot:
@@ -48,7 +51,16 @@ def bolt_joints(robot: Robot) -> Robot:
         if bolt is not None:
             bolt = replace(bolt, screw=error - own)
         frames.append(replace(frame, geometric_error=error, locked_at=bolt))
-    return replace(robot, frames=tuple(frames))
+    kept = [remark for remark in robot.remarks if _BOLTED not in remark]
+    remarks = [_remark(frame) for frame in frames if frame.locked_at is not None]
+    return replace(robot, frames=tuple(frames), remarks=(*kept, *remarks))
+
+
+def _remark(frame: Frame) -> str:
+    """Return the position in which a joint is bolted."""
+    assert frame.locked_at is not None
+    screw = numbers(frame.locked_at.screw)
+    return f"joint {quoted(frame.name)} {_BOLTED} {screw} rad, m in its clearance"
 
 
 def bolted_errors(robot: Robot, errors: NDArray) -> NDArray:

@@ -334,3 +334,21 @@ def test_moving_joint_of_a_drawn_robot_is_not_bolted(tmp_path):
     path.write_text(DRAWN.replace("actuated = true", 'locked_at = "home"'))
     with pytest.raises(BadInput, match="found a joint that moves"):
         load_robot(path)
+
+
+def test_sweep_notes_a_joint_that_is_loose_at_every_pose(tmp_path, run):
+    words = ("--grid", "q.crank=0.4", "--assumption", "none", "-o", tmp_path / "a.nc")
+    _, _, loose = run("assembly", "sweep", four_bar(tmp_path), *words)
+    assert 'note: bolted_four_bar: the clearance of the fixed joint "stand"' in loose
+    _, _, bolted = run(
+        "assembly", "sweep", four_bar(tmp_path, at_angle(0.4)), *words[:-1],
+        tmp_path / "b.nc",
+    )  # fmt: skip
+    assert "fixed joint" not in bolted
+
+
+def test_solve_notes_where_a_joint_is_bolted(tmp_path, run):
+    path = four_bar(tmp_path, at_angle(0.4))
+    status, out, _ = run("assembly", "solve", path, "--joint", "crank=2.0")
+    assert status == 0
+    assert out.count('joint "stand" is bolted at') == 1

@@ -111,7 +111,8 @@ def test_draws_have_the_quantiles_of_the_springs(run, files, tmp_path):
         ),
         ('[[step]]\njoin = "leg1"\n', "no clearance and no motion to bolt"),
         ('[[step]]\nrelease = "clamp"\n', 'step[1] "release clamp".release'),
-        (JOINS + '[[step]]\njoin = ["platform", "leg1"]\n', "the name of an earlier"),
+        (JOINS + '[[step]]\njoin = ["platform", "leg1"]\n', "is joined already"),
+        (2 * '[[step]]\nname = "a"\nmeasure = "leg1"\n', "the name of an earlier"),
         ('[[step]]\nfix = "leg1"\njoin = "leg2"\n', "found fix and join"),
         ('[[step]]\nname = "a"\n', "found none of its kinds"),
         ('[[step]]\nfix = "lge1"\n', 'did you mean "leg1"'),
@@ -174,3 +175,11 @@ def test_report_in_a_missing_folder_is_refused_before_anything_is_computed(run, 
     assert status == 2
     assert out == ""
     assert err.count("\n") == 1
+
+
+def test_steps_of_one_kind_and_part_are_numbered(run, files):
+    plan = JOINS + 2 * '[[step]]\nmeasure = "platform"\ncomponents = ["tz"]\n'
+    status, out, _ = run("assembly", "steps", *files(plan), "--json", "-")
+    names = [step["name"] for step in json.loads(out)["steps"]]
+    assert status == 0
+    assert names[3:] == ["measure platform", "measure platform 2"]
