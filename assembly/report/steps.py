@@ -13,8 +13,9 @@ from assembly.model.statuses import OK
 from assembly.solvers.conic import SolverFailed
 from assembly.steps.machine import machine_at
 from assembly.steps.plan import Adjust, Fix, Join, Plan, Preload, Release, Step
-from assembly.steps.run import State, StepResult, carry_out, first_state
+from assembly.steps.run import StepResult, carry_out
 from assembly.steps.search import BestOrder, why_order_matters
+from assembly.steps.state import State, first_state
 from forcefit.inputs.errors import quoted
 from forcefit.results.display import listing, numbers
 from forcefit.results.text import lines_of

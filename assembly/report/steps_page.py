@@ -12,7 +12,7 @@ from assembly.linear.load import no_loads
 from assembly.report.plot import displaced_bodies
 from assembly.report.scene import robot_scene
 from assembly.steps.machine import Machine
-from assembly.steps.run import State
+from assembly.steps.state import State
 from forcefit.page.charts import BLUE, RED, Axis, chart, grid
 from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table

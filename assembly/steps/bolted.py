@@ -20,7 +20,7 @@ from assembly.model.robot import Frame, LockedAt, Robot
 from assembly.solvers.conic import SolverFailed
 from assembly.steps.machine import Machine, machine_at
 from assembly.steps.plan import Plan
-from assembly.steps.run import first_state
+from assembly.steps.state import first_state
 from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import numbers
 

@@ -21,8 +21,9 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.reference.energy import CannotAssemble
 from assembly.steps.machine import Machine, machine_at
 from assembly.steps.plan import Adjust, Fix, Join, Plan, Step, check_plan
-from assembly.steps.run import State, StepResult, carry_out, first_state
-from forcefit.inputs.table import BadInput
+from assembly.steps.run import StepResult, carry_out
+from assembly.steps.state import State, first_state
+from forcefit.inputs.table import BadInput, quoted
 
 Objective = Literal["force", "energy", "error"]
 OBJECTIVES: tuple[Objective, ...] = ("force", "energy", "error")
@@ -196,7 +197,9 @@ def _over_sets(
         for step in run:
             found = search.carry_out(state, step)
             if found is None:
-                raise BadInput(f"step {step.name!r}: the robot cannot be assembled")
+                raise BadInput(
+                    f"step {quoted(step.name)}: the robot cannot be assembled"
+                )
             state = found[0]
         steps += run
     return BestOrder(Plan(tuple(steps)), peak, peak, given, search.done, "sets")

@@ -23,7 +23,7 @@ from forcefit.inputs.errors import BadInput, nearest
 from forcefit.inputs.writing import write_text
 
 if TYPE_CHECKING:
-    from assembly.steps.run import State
+    from assembly.steps.state import State
 
 
 def steps(

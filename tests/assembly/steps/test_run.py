@@ -18,6 +18,7 @@ from assembly.robots.placing import at, ball_joint, cardan_joint
 from assembly.steps.plan import Adjust, Fix, Join, Measure, Plan, Preload, Release
 from assembly.steps.run import assemble_in_steps
 from forcefit.inputs.table import BadInput
+from stiffness.screws import SCREW
 from tests.assembly.steps.robots_for_steps import (
     gough_points,
     planar_platform,
@@ -426,7 +427,7 @@ def test_release_before_welding_leaves_no_force_in_the_portal():
 
 
 def test_influence_coefficients_give_the_spring_back_of_clamped_parts():
-    """Liu and Hu: U = K_assembly^-1 (sum of K_part V), two parts clamped to nominal."""
+    """U = K_assembly^-1 (sum of K_part V), two parts clamped to nominal."""
     k, V = np.array([1e6, 2e6]), np.array([30e-6, -20e-6])
     steps = (
         Fix("clamp", "platform", {"TZ": 0.0}), join_leg(1), join_leg(2),
@@ -485,3 +486,48 @@ def legs_open():
     """Three legs, the platform free before the first is joined."""
     posture = three_legs()
     return replace(posture, robot=replace(posture.robot, closures=()))
+
+
+def test_legs_cut_to_increments_leave_the_rounding_of_their_lengths(rng):
+    """All six legs cut to 10 um: x = J r, |r| <= 5 um; at most 11.9, 12.4, 6.1 um."""
+    cuts = tuple(
+        Adjust(
+            f"cut {i}",
+            f"leg{i}",
+            ("TZ",),
+            Measure("gap", (f"seat{i}", f"end{i}")),
+            1e-5,
+        )  # fmt: skip
+        for i in range(1, 7)
+    )
+    held = Fix("fixture", "platform", dict.fromkeys(SCREW, 0.0))
+    plan = Plan((held, *cuts, *join_legs(6), Release("free", ("fixture",))))
+    posture = gough(np.zeros(6))
+    lengths = rng.uniform(-1e-4, 1e-4, (50, 6))
+    errors = np.zeros((50, len(posture.robot.frames), 6))
+    for i in range(6):
+        errors[:, posture.robot.index(f"leg{i + 1}"), 5] = lengths[:, i]
+    last = assemble_in_steps(plan, posture, errors)[-1]
+    J = inverse_jacobian()
+    rounding = lengths - 1e-5 * np.round(lengths / 1e-5)
+    assert last.platform_screw == pytest.approx(rounding @ J.T, abs=1e-12)
+    most = 5e-6 * np.abs(J).sum(axis=1)
+    assert most[3:] == pytest.approx([11.9e-6, 12.4e-6, 6.1e-6], abs=0.05e-6)
+    assert (np.abs(last.platform_screw) <= most).all()
+
+
+def test_adjustment_of_loose_clearances_is_refused_in_one_line():
+    posture = legs_with_pins((0.0, 30e-6), (20e-6, None))
+    shim = Adjust("shim", "leg2", ("TZ",), Measure("z", "platform", Z))
+    with pytest.raises(BadInput, match='step "shim": found clearances'):
+        assemble_in_steps(Plan((join_leg(1), shim, join_leg(2))), posture)
+
+
+def test_adjustment_is_possible_once_every_clearance_is_bolted():
+    """Pin 1 bolted in the middle of its clearance: leg 2 is cut to it."""
+    posture = legs_with_pins((10e-6, 30e-6), (20e-6, None), k=(1e6, 1e6))
+    cut = Adjust("cut", "leg2", ("TZ",), Measure("gap", LEG[2]))
+    steps = (Join("bolt", "leg1"), join_leg(1), cut, join_leg(2))
+    results = assemble_in_steps(Plan(steps), posture)
+    assert results[2].adjustment[0, 0] == pytest.approx(-20e-6)
+    assert results[3].closing_force == pytest.approx(0.0, abs=1e-9)
