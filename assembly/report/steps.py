@@ -1,5 +1,6 @@
 """The order of assembly as plain values and as text."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from assembly.linear.reference.energy import CannotAssemble
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.statuses import OK
 from assembly.solvers.conic import SolverFailed
-from assembly.steps.machine import machine_at
+from assembly.steps.machine import Machine, machine_at
 from assembly.steps.plan import Adjust, Fix, Join, Plan, Preload, Release, Step
 from assembly.steps.run import StepResult, carry_out
 from assembly.steps.search import BestOrder, why_order_matters
@@ -21,7 +22,8 @@ from forcefit.results.display import listing, numbers
 from forcefit.results.text import lines_of
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
-_BLOCK = 10_000  # machines that are carried through the steps together
+# machines that are carried through the steps together; with clearances one by one
+_BLOCK, _BLOCK_WITH_CLEARANCES = 10_000, 100
 _IN_CLEARANCES = (
     "clearances that no force determines stay as close as possible to where the last "
     "step left them; a clamp or a load determines them"
@@ -135,52 +137,64 @@ def _totals(results: dict[str, Any]) -> dict[str, Any]:
 
 
 def drawn_steps(
-    plan: Plan, posture: Posture, errors: NDArray, gravity: ArrayLike | None = None
-) -> dict[str, Any]:
+    plan: Plan, posture: Posture, errors: NDArray, gravity: ArrayLike | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> dict[str, Any]:  # fmt: skip
     """Return quantiles of the steps over many machines.
+
+    Ctrl-C ends with the machines that are assembled so far.
 
     Args:
         plan: the steps, checked.
         posture: pose at which the robot of n frames is assembled.
         errors: (k, n, 6) [rad, m] geometric errors of the machines.
         gravity: (3,) [m/s^2] base axes.
+        progress: called with the machines done and their number.
 
     Returns:
-        Quantiles of each step, by step and quantity.
+        ``draws``, the number of machines, and ``quantiles`` by step and quantity.
 
     Raises:
         CannotAssemble: rigid parts of a machine contradict each other.
         FreeMotion: a load drives a motion that nothing resists.
+        KeyboardInterrupt: Ctrl-C before any machine is assembled.
         SolverFailed: the solver of the clearances gave up.
     """
     machine = machine_at(posture)
-    rows: dict[str, dict[str, list[NDArray]]] = {}
-    for first in range(0, len(errors), _BLOCK):
-        state = first_state(machine, plan, errors[first : first + _BLOCK], gravity)
-        for step in plan.steps:
-            state, result = carry_out(machine, state, step)
-            screw = result.platform_screw
-            found = {
-                "energy": result.energy, "closing_force": result.closing_force,
-                "rotation": np.linalg.norm(screw[:, :3], axis=1),
-                "translation": np.linalg.norm(screw[:, 3:], axis=1),
-            }  # fmt: skip
-            for name, values in found.items():
-                rows.setdefault(step.name, {}).setdefault(name, []).append(values)
-    return {
-        step: {
-            name: {
-                f"{q:g}": float(value)
-                for q, value in zip(
-                    QUANTILES,
-                    np.quantile(np.concatenate(parts), QUANTILES),
-                    strict=True,
-                )  # fmt: skip
-            }
-            for name, parts in by_name.items()
-        }
-        for step, by_name in rows.items()
-    }
+    size = _BLOCK if not machine.cones.shape[1] else _BLOCK_WITH_CLEARANCES
+    blocks: list[dict[tuple[str, str], NDArray]] = []
+    try:
+        for first in range(0, len(errors), size):
+            some = errors[first : first + size]
+            blocks.append(_drawn_block(machine, plan, some, gravity))
+            progress(first + len(some), len(errors))
+    except KeyboardInterrupt:
+        if not blocks:
+            raise
+    quantiles: dict[str, dict[str, dict[str, float]]] = {}
+    for step, name in blocks[0]:
+        values = np.concatenate([block[step, name] for block in blocks])
+        found = np.quantile(values, QUANTILES).tolist()
+        named = {f"{q:g}": v for q, v in zip(QUANTILES, found, strict=True)}
+        quantiles.setdefault(step, {})[name] = named
+    return {"draws": len(values), "quantiles": quantiles}
+
+
+def _drawn_block(
+    machine: Machine, plan: Plan, errors: NDArray, gravity: ArrayLike | None
+) -> dict[tuple[str, str], NDArray]:
+    """Return the values of some machines by step and quantity."""
+    state, values = first_state(machine, plan, errors, gravity), {}
+    for step in plan.steps:
+        state, result = carry_out(machine, state, step)
+        screw = result.platform_screw
+        for name, found in (
+            ("energy", result.energy), ("closing_force", result.closing_force),
+            ("rotation", np.linalg.norm(screw[:, :3], axis=1)),
+            ("translation", np.linalg.norm(screw[:, 3:], axis=1)),
+        ):  # fmt: skip
+            values[step.name, name] = found
+    return values
 
 
 def steps_text(results: dict[str, Any]) -> str:

@@ -86,8 +86,10 @@ def steps(
         if sources is not None and draws is not None and results["status"] == "ok":
             drawn = sources.errors(sources.draw(0, draws, seed))
             carried = asked if order is None else order.plan
-            results |= {"draws": draws}
-            results["quantiles"] = drawn_steps(carried, posture, drawn, g)
+            with progress_lines() as update:
+                results |= drawn_steps(
+                    carried, posture, drawn, g, lambda d, n: update("machines", d, n)
+                )
     if report is not None:
         machine, source = machine_at(posture), provenance(robot, plan, errors)
         write_text(steps_page(results, machine, states, source), report)

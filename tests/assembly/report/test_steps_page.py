@@ -8,7 +8,7 @@ import pytest
 from assembly.kinematics.posture import home_posture
 from assembly.linear.energy import solve_assembly
 from assembly.report.plot import displaced_bodies
-from assembly.report.steps import steps_of
+from assembly.report.steps import drawn_steps, steps_of
 from assembly.report.steps_page import assembly_of, steps_page
 from assembly.robots import load_robot
 from assembly.steps.machine import machine_at
@@ -57,3 +57,17 @@ def test_page_has_the_numbers_of_every_step(four_bar):
     assert shown == pytest.approx([step["energy"] for step in results["steps"]])
     scene = next(f for f in page.figures if "closing" in f)
     assert np.shape(scene["closing"])[0] == len(results["steps"])
+
+
+def test_interrupted_draws_have_the_quantiles_of_the_machines_so_far(four_bar, rng):
+    """Blocks of 10000 machines: the second one is interrupted."""
+    plan = Plan(tuple(Join(" - ".join(c), c) for c in four_bar.robot.closures))
+    errors = rng.normal(size=(20_001, *four_bar.robot.errors.shape)) * 1e-5
+
+    def stop(done, total):
+        if done == 20_000:
+            raise KeyboardInterrupt
+
+    part = drawn_steps(plan, four_bar, errors, progress=stop)
+    assert part["draws"] == 20_000
+    assert part == drawn_steps(plan, four_bar, errors[:20_000])
