@@ -10,7 +10,7 @@ from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.zone import zone_margin
 from assembly.model.error_distributions import read_sources
-from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from assembly.model.robot import BeamLink, Clearance, Frame, LockedAt, MatrixLink, Robot
 from assembly.platform_stiffness.deflection import deflection_curve
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.platform_stiffness.vibration import natural_modes
@@ -47,6 +47,7 @@ __all__ = [
     "Clearance",
     "Experiment",
     "Frame",
+    "LockedAt",
     "Material",
     "MatrixLink",
     "Robot",
