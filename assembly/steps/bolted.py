@@ -24,6 +24,7 @@ from assembly.steps.state import first_state
 from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import numbers
 
+_ROUNDED = 1e-12  # share of its bound below which a clearance is rounding
 _BOLTED = "is bolted at"  # words of a remark
 
 
@@ -84,7 +85,8 @@ def bolted_errors(robot: Robot, errors: NDArray) -> NDArray:
         except (CannotAssemble, SolverFailed) as error:
             place = f"{robot.name}: frame {quoted(robot.frames[frames[0]].name)}"
             raise BadInput(f"{place}.locked_at: {error}") from None
-        moved = state.found.clearances @ machine.cones.T
+        u = state.found.clearances
+        moved = np.where(np.abs(u) > _ROUNDED, u, 0.0) @ machine.cones.T
         total = total.copy()
         total[:, frames] += moved.reshape(total.shape)[:, frames]
     return total
