@@ -78,6 +78,7 @@ _OWNERS = {
     "assembly.linear.pose_error": ("bound_pose_error",),
     "assembly.linear.zone": ("zone_margin",),
     "assembly.model.error_distributions": ("read_sources",),
+    "assembly.path.request": ("PathTimes", "errors_along_path"),
     "assembly.platform_stiffness.deflection": ("deflection_curve",),
     "assembly.platform_stiffness.platform_stiffness": ("platform_stiffness",),
     "assembly.platform_stiffness.vibration": ("natural_modes",),

@@ -11,6 +11,7 @@ from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.zone import zone_margin
 from assembly.model.error_distributions import read_sources
 from assembly.model.robot import BeamLink, Clearance, Frame, LockedAt, MatrixLink, Robot
+from assembly.path.request import PathTimes, errors_along_path
 from assembly.platform_stiffness.deflection import deflection_curve
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.platform_stiffness.vibration import natural_modes
@@ -50,6 +51,7 @@ __all__ = [
     "LockedAt",
     "Material",
     "MatrixLink",
+    "PathTimes",
     "Robot",
     "assemble_in_steps",
     "assumption_costs",
@@ -61,6 +63,7 @@ __all__ = [
     "crosscheck",
     "deflection_curve",
     "diagnose",
+    "errors_along_path",
     "figure_of",
     "inspect_campaign",
     "load_robot",

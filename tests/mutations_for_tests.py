@@ -99,9 +99,9 @@ MUTATIONS = {
         "assembly.linear.closure", "link_compliances", 0.995
     ),
     "joints twice as soft": _scaled(
-        "assembly.linear.closure", "joint_compliances", 2.0
+        "assembly.linear.closure", "spring_compliances", 2.0
     ),
-    "joints rigid": _scaled("assembly.linear.closure", "joint_compliances", 1e-9),
+    "joints rigid": _scaled("assembly.linear.closure", "spring_compliances", 1e-9),
 }
 
 BEAM_MUTATIONS = {

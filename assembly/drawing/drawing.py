@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.drawing.contacts import Contact
 from assembly.model.robot import BeamLink, Clearance, Link, LockedAt, MeshLink
 
 # freedoms of each type: rows of the screw [RX RY RZ TX TY TZ] in the joint's axes; of a
@@ -17,6 +18,7 @@ FREE_ROWS: dict[str, tuple[int, ...]] = {
     "fixed": (),
     "revolute": (2,),
     "prismatic": (5,),
+    "helical": (2,),
     "cylindrical": (2, 5),
     "universal": (2, 2),
     "spherical": (0, 1, 2),
@@ -36,6 +38,7 @@ class JointNumbers:
             along free motions; or None.
         error: (6,) [rad, m] delta l.
         tolerance: (6,) [rad, m] standard deviations of it, or None.
+        contacts: further clearance, by the sizes of the contacts.
         locked_at: where a fixed joint is bolted, with its clearance before; or None.
     """
 
@@ -43,6 +46,7 @@ class JointNumbers:
     stiffness: NDArray | None = None
     error: NDArray = field(default_factory=lambda: np.zeros(6))
     tolerance: NDArray | None = None
+    contacts: tuple[Contact, ...] = ()
     locked_at: LockedAt | None = None
 
 
@@ -65,6 +69,7 @@ class DrawnJoint:
         actuated: whether a drive holds it.
         position: [rad or m] coordinate at home.
         limits: [rad or m] least and largest coordinate, or None.
+        pitch: [m] of a helical joint in a turn, 0 of others.
         numbers: one for the joint; for a universal joint one for each bearing.
     """
 
@@ -79,6 +84,7 @@ class DrawnJoint:
     actuated: bool = False
     position: float = 0.0
     limits: tuple[float, float] | None = None
+    pitch: float = 0.0
     numbers: tuple[JointNumbers, ...] = (JointNumbers(),)
 
 

@@ -62,7 +62,7 @@ def robot_of_drawing(drawing: Drawing) -> Robot:
         if step.closes:
             placed += _ends(plan, step)
             closures.append((placed[-1][0].name, _seat(plan, step)))
-    remarks = (*_cuts(steps), *_inertias(drawing), *drawing.remarks)
+    remarks = (*_cuts(steps), *drawing.remarks)
     return Robot(
         drawing.name, drawing.platform, place_frames(placed), tuple(closures),
         drawing.description, remarks=remarks,
@@ -76,19 +76,13 @@ def _cuts(steps: list[Step]) -> tuple[str, ...]:
     return (f"loops close after {', '.join(names)}",) if names else ()
 
 
-def _inertias(drawing: Drawing) -> tuple[str, ...]:
-    """A remark on moments of inertia, which no frame holds."""
-    names = [quoted(body.name) for body in drawing.bodies if body.inertia.any()]
-    return (f"moments of inertia are not used: {', '.join(names)}",) if names else ()
-
-
 def _plan(drawing: Drawing, steps: list[Step]) -> _Plan:
     """Names of the frames, the users' where no joint has them."""
     joints = {joint.name: joint for joint in drawing.joints}
     bodies = {body.name: body for body in drawing.bodies}
     taken = {part.name for joint in drawing.joints for part in parts_of(joint)}
     met = {step.end for step in steps if step.closes} - {ROOT}
-    massive = {(body.name, True) for body in drawing.bodies if body.mass}
+    massive = {(body.name, True) for body in drawing.bodies if _has_mass(body)}
     linked = {s.end for s in steps if _is_body(drawing, s)}
     own: dict[Node, str] = {}
     for node in [(drawing.platform, True), *sorted(met | massive | linked)]:
@@ -138,9 +132,9 @@ def _frames_of(plan: _Plan, step: Step) -> list[PlacedFrame]:
     if isinstance(item, DrawnJoint):
         for part in parts_of(item, step.reverse):
             numbers = part.numbers
+            motion = _motion(item, part.position) if part.kind != "fixed" else {}
             frame = Frame(
-                part.name, carrier, joint=part.kind, actuated=item.actuated,
-                position=part.position, limits=item.limits,
+                part.name, carrier, joint=part.kind, **motion,
                 clearance=numbers.clearance, joint_stiffness=numbers.stiffness,
                 geometric_error=numbers.error, tolerance=numbers.tolerance,
                 locked_at=numbers.locked_at,
@@ -160,10 +154,26 @@ def _frames_of(plan: _Plan, step: Step) -> list[PlacedFrame]:
     return placed
 
 
+def _motion(joint: DrawnJoint, position: float) -> dict:
+    """The keys of a frame for the motion of a joint."""
+    return {
+        "pitch": joint.pitch, "actuated": joint.actuated, "position": position,
+        "limits": joint.limits,
+    }  # fmt: skip
+
+
 def _mass(body: DrawnBody, pose: NDArray) -> dict:
-    """The keys of a frame for the mass of a body."""
-    centre = pose[:3, :3].T @ (body.centre - pose[:3, 3])
-    return {"mass": body.mass, "centre_of_mass": centre} if body.mass else {}
+    """The keys of a frame for the mass and moments of inertia of a body."""
+    if not _has_mass(body):
+        return {}
+    R = pose[:3, :3]
+    centre, J = R.T @ (body.centre - pose[:3, 3]), R.T @ body.inertia @ R
+    return {"mass": body.mass, "centre_of_mass": centre, "inertia": (J + J.T) / 2}
+
+
+def _has_mass(body: DrawnBody) -> bool:
+    """Whether a body has a mass or moments of inertia."""
+    return bool(body.mass or body.inertia.any())
 
 
 def _end_pose(plan: _Plan, body: DrawnBody, tip: bool) -> NDArray:
@@ -183,7 +193,7 @@ def _pose(plan: _Plan, node: Node) -> NDArray:
     if body.ends:
         return _end_pose(plan, body, far)
     joint = next(j for j in plan.joints.values() if name in (j.first, j.second))
-    return transform(body.centre if body.mass else joint.at, body.axes)
+    return transform(body.centre if _has_mass(body) else joint.at, body.axes)
 
 
 def _body_frame(plan: _Plan, node: Node, carrier: str) -> PlacedFrame:

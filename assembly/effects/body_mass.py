@@ -1,7 +1,8 @@
 """Mass and centre of mass of a body that differ from the declared ones.
 
 With declared mass m and centre c, and true M and C, ``mass`` is M - m and ``moment`` is
-M C - m c.  The weight is linear in both; the true centre is (m c + moment)/M.
+M C - m c.  The weight is linear in both; the true centre is (m c + moment)/M.  Moments
+of inertia, which no weight shows, remain as declared.
 """
 
 from dataclasses import replace

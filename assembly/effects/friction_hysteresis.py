@@ -3,7 +3,7 @@
 from assembly.effects.effect import Effect, Unknown, Values
 from assembly.effects.places import own_unit, with_screws
 from assembly.measurement.conditions import Conditions
-from assembly.model.links import joint_compliances, own_screw
+from assembly.model.links import joint_compliances
 from assembly.model.robot import Frame, Robot
 
 
@@ -27,7 +27,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
     for name, tau in values.items():
         row = conditions.robot.index(name)
         # a torque inside the joint moves it by compliance x torque, without stress
-        deflection = C[row] @ own_screw(conditions.robot.frames[row])
+        deflection = C[row, :, conditions.robot.frames[row].own_axis]
         conditions = with_screws(
             conditions, name, -tau * conditions.approach[:, None] * deflection
         )

@@ -20,7 +20,9 @@ def moving_joints(robot: Robot) -> tuple[str, ...]:
 
 
 def _is_tight(clearance: Clearance | None) -> bool:
-    return clearance is None or not any(getattr(clearance, kind) for kind in _KINDS)
+    if clearance is None:
+        return True
+    return clearance.ball is None and not any(getattr(clearance, k) for k in _KINDS)
 
 
 def _with_clearance(frame: Frame, bound: dict[str, float]) -> Frame:

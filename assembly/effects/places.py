@@ -19,8 +19,8 @@ def drives(robot: Robot) -> tuple[str, ...]:
 
 
 def turning_drives(robot: Robot) -> tuple[str, ...]:
-    """Return the actuated revolute joints."""
-    return tuple(f.name for f in robot.frames if f.actuated and f.joint == "revolute")
+    """Return the actuated joints whose coordinate is an angle."""
+    return tuple(f.name for f in robot.frames if f.actuated and f.turns)
 
 
 def beams(robot: Robot) -> tuple[str, ...]:

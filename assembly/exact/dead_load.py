@@ -16,6 +16,8 @@ w       ``load``       (6,)        on the platform, see :mod:`assembly.exact.exa
 M       --             (3, 3)      sum of the points times their forces
 ======  =============  ==========  ==================================================
 
+The force of a drive works on the own components of its joint's unknowns, f . q.
+
 Linearised, these are the loads of :mod:`assembly.linear.load`.
 """
 
@@ -28,6 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.exact.finite_robot import LINK, nominally_carried
 from assembly.exact.placement import Placement
 from assembly.kinematics.posture import Posture
+from assembly.linear.load import drive_loads
 from assembly.model.robot import BeamLink, beam_axis
 from stiffness.beam.sections import declared_section
 from stiffness.screws import rotation_matrix, skew, transform
@@ -43,12 +46,14 @@ class DeadLoads:
         carried: (n, 3, 4) [N m, N] on what each frame's joint carries.
         distributed: (n, 3, 4) [N m, N] the part of ``bodies`` that acts along beams, or
             zero.
+        drives: (n, 6) [N m, N] of drives along the joints' motions, in frames' axes.
     """
 
     load: NDArray
     bodies: NDArray
     carried: NDArray
     distributed: NDArray = field(default_factory=lambda: np.zeros((3, 4)))
+    drives: NDArray = field(default_factory=lambda: np.zeros(6))
 
     @cached_property
     def beyond_platform(self) -> bool:
@@ -89,7 +94,8 @@ def dead_loads(
     if gravity is not None:
         g = np.asarray(gravity, dtype=float)
         distributed = _add_weights(posture, posture.robot.errors, g, on_bodies, carried)
-    return DeadLoads(wrench, on_bodies, carried, distributed)
+    drives = drive_loads(posture.robot)
+    return DeadLoads(wrench, on_bodies, carried, distributed, drives)
 
 
 def dead_loads_of_rows(
@@ -116,7 +122,7 @@ def dead_loads_of_rows(
         wrench[:, 3:] = 0.0
     if gravity.any():
         _add_weights(postures, errors, gravity, on_bodies, carried)
-    return DeadLoads(wrench, on_bodies, carried)
+    return DeadLoads(wrench, on_bodies, carried, drives=drive_loads(robot))
 
 
 def _add_weights(
@@ -165,6 +171,8 @@ def work_of(place: Placement, loads: DeadLoads) -> float:
             (loads.carried, place.carried, nominally_carried(posture)),
         ):
             work += float(np.sum(G * (T - nominal)[:, :3]))
+    if loads.drives.any():
+        work += float(_on_motions(place, loads) @ place.x)
     return work
 
 
@@ -174,6 +182,8 @@ def work_gradient(place: Placement, loads: DeadLoads) -> NDArray:
     if loads.beyond_platform:
         wrenches, _ = _on_unknowns(place, loads)
         gradient = gradient + np.sum(place.moves.T * wrenches, axis=1)
+    if loads.drives.any():
+        gradient = gradient + _on_motions(place, loads)
     return gradient
 
 
@@ -208,6 +218,8 @@ def load_magnitudes(place: Placement, loads: DeadLoads) -> NDArray:
     if loads.beyond_platform:
         wrenches, _ = _on_unknowns(place, loads)
         sizes = sizes + np.sum(np.abs(place.moves.T * wrenches), axis=1)
+    if loads.drives.any():
+        sizes = sizes + np.abs(_on_motions(place, loads))
     return sizes
 
 
@@ -218,6 +230,9 @@ def largest_wrench(place: Placement, loads: DeadLoads) -> float:
     if loads.beyond_platform:
         wrenches, _ = _on_unknowns(place, loads)
         largest = max(largest, float(np.abs(wrenches / scale).max(initial=0.0)))
+    if loads.drives.any():
+        of_drives = drive_wrenches(place.model.posture, loads, place.carried)
+        largest = max(largest, float(np.abs(of_drives / scale).max()))
     return largest
 
 
@@ -234,6 +249,8 @@ def wrenches_on_frames(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDA
     """
     robot = place.model.posture.robot
     body, joint, *_ = _on_frames(place, loads)
+    if loads.drives.any():
+        joint = joint + drive_wrenches(place.model.posture, loads, place.carried)
     if loads.load.any():
         # the platform's load acts on its body
         last = robot.index(robot.platform)
@@ -251,6 +268,31 @@ def distributed_at_tips(place: Placement, loads: DeadLoads) -> NDArray:
     return np.concatenate([
         np.einsum("nji,nj->ni", T[:, :3, :3], part) for part in (moment, force)
     ], axis=-1)  # fmt: skip
+
+
+def _on_motions(place: Placement, loads: DeadLoads) -> NDArray:
+    """Return the (N,) [J] work of the drives per unit of each unknown."""
+    model = place.model
+    work = np.vecdot(loads.drives[model.frame], model.columns)
+    return np.where(model.motion == LINK, 0.0, work)
+
+
+def drive_wrenches(posture: Posture, loads: DeadLoads, carried: NDArray) -> NDArray:
+    """Return the (..., n, 6) [N m, N] of drives on what their joints carry.
+
+    Args:
+        posture: nominal.
+        loads: on the robot.
+        carried: (..., n, 4, 4) frames after their joint's coordinate.
+
+    Returns:
+        Wrenches at the platform's nominal origin, base axes.
+    """
+    R, arms = carried[..., :3, :3], carried[..., :3, 3]
+    moment = np.einsum("...nij,nj->...ni", R, loads.drives[:, :3])
+    force = np.einsum("...nij,nj->...ni", R, loads.drives[:, 3:])
+    moment += np.cross(arms - posture.platform[..., None, :3, 3], force)
+    return np.concatenate([moment, force], axis=-1)
 
 
 def _on_unknowns(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:

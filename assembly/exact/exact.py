@@ -62,9 +62,11 @@ from assembly.linear.energy import solve_assembly
 from assembly.linear.rounding import differs_from_zero
 from assembly.model.clearance import (
     clearance_bounds,
+    clearance_components,
     clearance_excess,
     has_bounded_motion,
 )
+from assembly.model.links import own_screws
 from assembly.solvers.cones import into_cones
 from assembly.solvers.method import Method, check_method
 from forcefit.results.display import Figures, html_table, short_repr
@@ -234,9 +236,8 @@ class ExactAssembly:
     def clearance_screws(self) -> NDArray:
         """(n, 6) [rad, m] clearances, with motions of passive joints."""
         screws = self.placement.screws[CLEARANCE, self.cut.last]
-        axes = [frame.own_axis for frame in self.posture.robot.frames]
-        screws[np.arange(len(axes)), axes] += self.placement.own[self.cut.last]
-        return screws
+        own = self.placement.own[self.cut.last, None]
+        return screws + own * own_screws(self.posture.robot)
 
     @cached_property
     def closure_wrenches(self) -> NDArray:
@@ -293,8 +294,9 @@ class ExactAssembly:
 
     def clearance_excess(self) -> float:
         """Return the largest excess [-] of a clearance over its cone, relative."""
-        bounds = clearance_bounds(self.posture.robot)
-        return float(clearance_excess(self.clearance_screws, bounds))
+        robot = self.posture.robot
+        bounded = clearance_components(robot, self.clearance_screws)
+        return float(clearance_excess(bounded, clearance_bounds(robot)))
 
 
 def solve_exact(
@@ -419,7 +421,8 @@ def _search(
 def _first_guess(model: FiniteRobot, linear: Assembly) -> NDArray:
     """Return (N,) linear solution as first guess, clearances projected on the cones."""
     motions = np.hstack([model.joints.cones, model.joints.free])
-    moved = motions.T @ linear.clearance_screws.ravel() / np.sum(motions**2, axis=0)
+    screws = clearance_components(linear.posture.robot, linear.clearance_screws)
+    moved = motions.T @ screws.ravel() / np.sum(motions**2, axis=0)
     x = np.concatenate([linear.elastic, moved])
     turned = np.linalg.norm(place(model, x).screws[..., :3], axis=-1)
     x *= LONGEST_STEP / turned.max(initial=LONGEST_STEP)

@@ -20,6 +20,7 @@ from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
 from assembly.kinematics.se3 import exponential, inverse
 from assembly.linear.closure import VirtualJoints
+from assembly.model.links import own_screws
 from assembly.model.robot import Robot
 from stiffness.screws import rotation_matrix, transform
 
@@ -179,10 +180,7 @@ class FiniteRobot:
 
 def along_own(robot: Robot, coordinates: NDArray) -> NDArray:
     """Return the (..., n, 4, 4) motions about or along each joint's z by (..., n)."""
-    screws = np.zeros((*coordinates.shape, 6))
-    axes = [frame.own_axis for frame in robot.frames]
-    screws[..., np.arange(len(axes)), axes] = coordinates
-    return exponential(screws)
+    return exponential(coordinates[..., None] * own_screws(robot))
 
 
 def nominally_carried(posture: Posture) -> NDArray:

@@ -63,7 +63,8 @@ class Placement:
         """(n,) [rad or m] motion of passive joints beyond their coordinate."""
         m = self.model
         rows = m.motion == OWN
-        values = (self.x[:, None] * m.columns).sum(axis=1)
+        axes = np.array([frame.own_axis for frame in m.posture.robot.frames])
+        values = self.x * m.columns[np.arange(len(m.frame)), axes[m.frame]]
         return np.bincount(
             m.frame[rows], weights=values[rows], minlength=len(m.posture.coordinates)
         )

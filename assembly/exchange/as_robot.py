@@ -24,10 +24,14 @@ from assembly.exchange.mechanism import (
     chain,
 )
 from assembly.exchange.orientation import onto
+from assembly.exchange.rigid_bodies import (
+    lumped_body,
+    mass_keys,
+    with_possible_moments,
+)
 from assembly.exchange.springs import other_springs, springs_at_rest
-from assembly.model.robot import BASE, BeamLink, Frame, Robot, beam_axis
+from assembly.model.robot import BASE, Frame, Robot
 from forcefit.inputs.errors import BadInput
-from stiffness.beam.sections import declared_section
 from stiffness.screws import rotation_vector, transform
 
 Places = Mapping[str, tuple[str, NDArray]]
@@ -98,7 +102,7 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
         BadInput: no body can be the platform.
     """
     platform = mechanism.platform or guess_platform(mechanism)
-    mechanism = _without_base(mechanism)
+    mechanism = with_possible_moments(_without_base(mechanism))
     springs = springs_at_rest(mechanism)
     left_out = mechanism.left_out + other_springs(mechanism)
     mechanism = replace(mechanism, left_out=left_out)
@@ -124,7 +128,7 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
     for joint in mechanism.joints:
         parent, at = places[joint.parent]
         body = mechanism.bodies[joint.child]
-        mass = {"mass": body.mass, "centre_of_mass": body.centre} if body.mass else {}
+        mass = mass_keys(body)
         T = at @ joint.placement
         if joint.kind == "fixed":
             name = add(own(body), parent, T @ joint.after, **mass)
@@ -138,7 +142,7 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
         name = joint.name
         add(name, parent, T @ turn, position=joint.position, **motion)
         after = turn.T @ joint.after
-        seen = body.mass or body.name in met or body.name not in carriers
+        seen = mass or body.name in met or body.name not in carriers
         if seen or body.name == platform:
             name = add(own(body), name, after, **mass)
             after = np.eye(4)
@@ -245,6 +249,7 @@ def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
             Joint(
                 name, frame.joint, on[frame.parent], child, T,
                 position=float(q), actuated=frame.actuated, limits=frame.limits,
+                lead=frame.lead,
             )
         )  # fmt: skip
         on[frame.name] = child
@@ -252,7 +257,7 @@ def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
         places[child] = frame.name, np.eye(4)
     for parent in carriers:
         children = [f for f in robot.frames if f.parent == parent]
-        bodies[on[parent]] = _lumped(on[parent], children)
+        bodies[on[parent]] = lumped_body(on[parent], children)
     mechanism = Mechanism(
         name=robot.name,
         root=root,
@@ -271,32 +276,3 @@ def _unlike(name: str, taken: set[str]) -> str:
     while name in taken:
         name += "_"
     return name
-
-
-def _lumped(name: str, frames: list[Frame]) -> Body:
-    """Return one rigid body for all frames on a joint: masses, and beams as rods."""
-    masses, centres, spans = [], [], []
-    for frame in frames:
-        T = Robot("", frame.name, (replace(frame, parent=BASE),)).fixed_transforms[0]
-        if frame.mass:
-            masses.append(frame.mass)
-            centres.append(T[:3, :3] @ frame.centre_of_mass + T[:3, 3])
-            spans.append(np.zeros(3))
-        link = frame.link
-        if isinstance(link, BeamLink) and link.density:
-            length, axis = beam_axis(frame)
-            span = T[:3, :3] @ axis * length
-            area = declared_section(link.section, link.poisson).area
-            masses.append(link.density * area * length)
-            centres.append(T[:3, 3] - span / 2)
-            spans.append(span)
-    if not masses:
-        return Body(name)
-    total = sum(masses)
-    centre = np.average(centres, axis=0, weights=masses)
-    inertia = np.zeros((3, 3))
-    for mass, at, span in zip(masses, centres, spans, strict=True):
-        arm = at - centre
-        for v, factor in ((arm, 1.0), (span, 1 / 12)):  # a slender rod: m L^2 / 12
-            inertia += mass * factor * (v @ v * np.eye(3) - np.outer(v, v))
-    return Body(name, total, centre, inertia)

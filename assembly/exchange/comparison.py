@@ -15,9 +15,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from numpy.typing import NDArray
-
 from assembly.exchange.mechanism import Mechanism
+from assembly.model.inertia import MassProperties
 
 AGREED = 1e-9  # [rad, m, kg over the largest] accepted difference
 POSTURES = 20
@@ -34,12 +33,12 @@ class Comparison:
         file: the file that both read.
         why_not: the reason why it could not be compared, else empty.
         bodies: number of bodies compared.
-        masses: number of bodies whose mass was compared.
+        masses: number of bodies whose mass and moments of inertia were compared.
         loops: number of loops compared.
         difference: the largest, [rad, m] or relative mass; lengths are divided by the
             robot's size if that is above 1 m.
         where: place of the largest difference, in words.
-        weights: [kg] and (3,) [m] of bodies whose mass only the other program knows.
+        weights: mass properties of bodies whose mass only the other program knows.
     """
 
     reader: str
@@ -50,7 +49,7 @@ class Comparison:
     loops: int = 0
     difference: float = 0.0
     where: str = ""
-    weights: Mapping[str, tuple[float, NDArray]] = field(default_factory=dict)
+    weights: Mapping[str, MassProperties] = field(default_factory=dict)
 
     @property
     def agrees(self) -> bool:

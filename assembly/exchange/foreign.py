@@ -189,8 +189,8 @@ def _weighed(mechanism: Mechanism, comparison: Comparison) -> Mechanism:
     """Return bodies with the other program's masses of meshes, or report the lack."""
     known = comparison.weights
     bodies = dict(mechanism.bodies)
-    for name, (mass, centre) in known.items():
-        bodies[name] = replace(bodies[name], mass=mass, centre=centre)
+    for name, (mass, centre, J) in known.items():
+        bodies[name] = replace(bodies[name], mass=mass, centre=centre, inertia=J)
     unknown = [name for name in mechanism.unweighed if name not in known]
     what = "masses of mesh shapes"
     return replace(

@@ -43,7 +43,7 @@ class Joint:
 
     Attributes:
         name: unique among joints.
-        kind: ``"fixed"``, ``"revolute"`` or ``"prismatic"``.
+        kind: ``"fixed"``, ``"revolute"``, ``"prismatic"`` or ``"helical"``.
         parent: name of the body that carries it.
         child: name of the body it carries.
         placement: (4, 4) of the joint, seen from the parent.
@@ -54,6 +54,7 @@ class Joint:
         limits: [rad or m] least and largest coordinate, None where it has none.
         stiffness: [N m/rad or N/m] of a spring along its motion, 0 without one.
         rest: [rad or m] coordinate at which that spring is without load.
+        lead: [m/rad] translation of a helical joint per angle, 0 of others.
     """
 
     name: str
@@ -68,6 +69,7 @@ class Joint:
     limits: tuple[float, float] | None = None
     stiffness: float = 0.0
     rest: float = 0.0
+    lead: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,8 +206,8 @@ def body_poses(mechanism: Mechanism, coordinates: NDArray) -> dict[str, NDArray]
 def motion(joint: Joint, coordinate: float) -> NDArray:
     """Return the (4, 4) motion of a joint at a coordinate [rad or m]."""
     along = coordinate * joint.axis
-    if joint.kind == "revolute":
-        return transform(np.zeros(3), rotation_matrix(along))
+    if joint.kind in {"revolute", "helical"}:
+        return transform(joint.lead * along, rotation_matrix(along))
     return transform(along if joint.kind == "prismatic" else np.zeros(3), np.eye(3))
 
 

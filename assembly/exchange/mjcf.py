@@ -237,7 +237,7 @@ def _massive(node: Node, place: _Place, reading: _Reading) -> Body:
     written, shapes = None, []
     for inner, at in _elements(node, place):
         if inner.tag == "inertial":
-            written = written_mass(inner, at.offset)
+            written = written_mass(inner, at.offset, at.angles)
         elif inner.tag == "geom":
             geom = _filled(inner, at.childclass, reading)
             T = at.offset @ site_pose(geom, at.angles)

@@ -1,10 +1,11 @@
-"""Masses of MJCF's bodies: as written, or from shapes, bounded and scaled.
+"""Masses and moments of inertia of MJCF's bodies: written, or those of shapes.
 
 Sources:
     MuJoCo documentation, XML reference, compiler (``inertiafromgeom``,
-    ``inertiagrouprange``, ``boundmass``, ``settotalmass``) and geom (sizes, ``fromto``,
-    ``mass``, ``density``, ``shellinertia``); the area of an ellipsoid by Thomsen's
-    formula, which MuJoCo uses.
+    ``inertiagrouprange``, ``boundmass``, ``boundinertia``, ``balanceinertia``,
+    ``settotalmass``), inertial (``diaginertia``, ``fullinertia``) and geom (sizes,
+    ``fromto``, ``mass``, ``density``, ``shellinertia``); the area of an ellipsoid by
+    Thomsen's formula, which MuJoCo uses.
 """
 
 import math
@@ -15,11 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.exchange.mechanism import WORLD, Body
-from assembly.exchange.shapes import area, together, volume
+from assembly.exchange.mjcf_orientation import Angles, orientation
+from assembly.exchange.shapes import area, moments, shell_moments, volume
 from assembly.exchange.xml_file import Node
+from assembly.model.inertia import MassProperties, inertia_matrix, joined_bodies
 
 _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
-_REGULAR = 1e-6  # [kg] smaller bounds only allow bodies without mass to move
+# [kg, kg m^2] smaller bounds only allow bodies without mass to move
+_REGULAR, _REGULAR_INERTIA = 1e-6, 1e-9
 _KINDS = (*_SIZES, "plane", "hfield", "mesh", "sdf")
 
 
@@ -32,12 +36,16 @@ class MassRules:
         groups: least and largest group of the shapes that count.
         least: [kg] least mass of every body.
         total: [kg] sum to which all masses are scaled, if above zero.
+        least_inertia: [kg m^2] least principal moment of every body.
+        balanced: whether moments that no body has become their mean.
     """
 
     from_shapes: str = "auto"
     groups: tuple[float, float] = (0.0, 5.0)
     least: float = 0.0
     total: float = -1.0
+    least_inertia: float = 0.0
+    balanced: bool = False
 
     @staticmethod
     def of(root: Node) -> "MassRules":
@@ -54,32 +62,53 @@ class MassRules:
                 (float(groups[0]), float(groups[1])),
                 node.number("boundmass", "kg", rules.least),
                 node.number("settotalmass", "kg", rules.total),
+                node.number("boundinertia", "kg m^2", rules.least_inertia),
+                node.choice(
+                    "balanceinertia", ("false", "true"), str(rules.balanced).lower()
+                )
+                == "true",
             )
         return rules
 
     def applied(self, bodies: Mapping[str, Body]) -> dict[str, Body]:
-        """Return the bodies of a file, with least mass, scaled to the total."""
-        least = self.least if self.least > _REGULAR else 0.0
+        """Return the bodies of a file, with least masses, scaled to the total."""
         bounded = {
-            name: replace(body, mass=max(body.mass, least)) if name != WORLD else body
+            name: self._bounded(body) if name != WORLD else body
             for name, body in bodies.items()
         }  # fmt: skip
         total = sum(body.mass for body in bounded.values())
         if self.total <= 0 or not total:
             return bounded
         factor = self.total / total
-        return {k: replace(b, mass=b.mass * factor) for k, b in bounded.items()}
+        return {
+            name: replace(body, mass=body.mass * factor, inertia=body.inertia * factor)
+            for name, body in bounded.items()
+        }
+
+    def _bounded(self, body: Body) -> Body:
+        """Return a body with at least the least mass and principal moments."""
+        if self.least > _REGULAR:
+            body = replace(body, mass=max(body.mass, self.least))
+        if not self.balanced and self.least_inertia <= _REGULAR_INERTIA:
+            return body
+        principal, R = np.linalg.eigh(body.inertia)
+        if self.least_inertia > _REGULAR_INERTIA:
+            principal = np.maximum(principal, self.least_inertia)
+        if self.balanced and principal[2] > principal[0] + principal[1]:
+            principal[:] = principal.mean()
+        return replace(body, inertia=R @ np.diag(principal) @ R.T)
 
 
-def written_mass(inertial: Node, offset: NDArray) -> tuple[float, NDArray]:
-    """Return [kg] and (3,) [m] of ``inertial``, seen from its body.
+def written_mass(inertial: Node, offset: NDArray, angles: Angles) -> MassProperties:
+    """Return the mass properties of ``inertial``, seen from its body.
 
     Args:
         inertial: the element.
         offset: (4, 4) of its frame, seen from the body.
+        angles: conventions of the file.
 
     Returns:
-        Mass and centre.
+        Mass, centre and moments of inertia; these are zero if they are not written.
 
     Raises:
         BadInput: the mass is negative, or a number is invalid.
@@ -88,13 +117,18 @@ def written_mass(inertial: Node, offset: NDArray) -> tuple[float, NDArray]:
     if mass < 0:
         raise inertial.bad("mass", f"found {mass:g}, expected >= 0 [kg]")
     centre = inertial.numbers("pos", 3, "m", np.zeros(3))
-    return mass, offset[:3, :3] @ centre + offset[:3, 3]
+    six = np.zeros(6)
+    if inertial.has("fullinertia"):
+        six = inertial.numbers("fullinertia", 6, "kg m^2")
+    elif inertial.has("diaginertia"):
+        six[:3] = inertial.numbers("diaginertia", 3, "kg m^2")
+    R = offset[:3, :3] @ orientation(inertial, angles)
+    J = R @ inertia_matrix(six) @ R.T
+    return mass, offset[:3, :3] @ centre + offset[:3, 3], J
 
 
-def shape_mass(
-    geom: Node, T: NDArray, rules: MassRules
-) -> tuple[float, NDArray] | None:
-    """Return [kg] and (3,) [m] of a shape; None for a mesh, of unknown volume.
+def shape_mass(geom: Node, T: NDArray, rules: MassRules) -> MassProperties | None:
+    """Return the mass properties of a shape; None for a mesh, of unknown volume.
 
     Args:
         geom: the element, defaults filled in.
@@ -102,28 +136,29 @@ def shape_mass(
         rules: rules of the file.
 
     Returns:
-        Mass and centre.
+        Mass, centre and moments of inertia.
 
     Raises:
         BadInput: a size or mass is invalid.
     """
+    nothing = 0.0, T[:3, 3], np.zeros((3, 3))
     kind = geom.choice("type", _KINDS, "sphere")
     group = geom.number("group", "-", 0.0)
     if kind == "plane" or not rules.groups[0] <= group <= rules.groups[1]:
-        return 0.0, T[:3, 3]
+        return nothing
     given = geom.number("mass", "kg") if geom.has("mass") else None
     if given is not None and given < 0:
         raise geom.bad("mass", f"found {given:g}, expected >= 0 [kg]")
     if kind not in _SIZES or geom.has("mesh"):  # or a shape fitted to a mesh
-        return (0.0, T[:3, 3]) if given == 0.0 else None
-    if given is not None:
-        return given, T[:3, 3]
-    density = geom.number("density", "kg/m^3", 1000.0)
-    sizes = _sizes(geom, kind)
+        return nothing if given == 0.0 else None
+    density, sizes = geom.number("density", "kg/m^3", 1000.0), _sizes(geom, kind)
     if geom.optional("shellinertia") == "true":
         skin = _thomsen(sizes) if kind == "ellipsoid" else area(kind, sizes)
-        return density * skin, T[:3, 3]
-    return density * volume(kind, sizes), T[:3, 3]
+        mass, principal = density * skin, shell_moments(kind, sizes)
+    else:
+        mass, principal = density * volume(kind, sizes), moments(kind, sizes)
+    mass = mass if given is None else given
+    return mass, T[:3, 3], mass * T[:3, :3] @ np.diag(principal) @ T[:3, :3].T
 
 
 def _sizes(geom: Node, kind: str) -> list[float]:
@@ -157,15 +192,15 @@ def _thomsen(half_axes: list[float]) -> float:
 
 
 def body_of(
-    name: str, written: tuple[float, NDArray] | None,
-    shapes: list[tuple[float, NDArray]], rules: MassRules,
+    name: str, written: MassProperties | None, shapes: list[MassProperties],
+    rules: MassRules,
 ) -> Body:  # fmt: skip
     """Return a body from its written mass and its shapes.
 
     Args:
         name: name of the body.
-        written: [kg] and (3,) [m], None without ``inertial``.
-        shapes: [kg] and (3,) [m] of each shape.
+        written: mass properties, None without ``inertial``.
+        shapes: mass properties of each shape.
         rules: rules of the file.
 
     Returns:
@@ -176,4 +211,4 @@ def body_of(
         return Body(name, *written)
     if rules.from_shapes == "false" or not shapes:
         return Body(name)
-    return Body(name, *together(*zip(*shapes, strict=True)))
+    return Body(name, *joined_bodies(shapes))

@@ -92,10 +92,12 @@ def _bodies(mechanism: Mechanism) -> list[str]:
             lines.append(
                 f'{pad}  <joint name={name} type="{kind}" axis="{axis}"{limits}/>'
             )
-        if body.mass:
+        if body.mass or body.inertia.any():
+            J = body.inertia
             # the format refuses collinear masses, which have no inertia about their
             # line
-            J = body.inertia + _SMALLEST_INERTIA * np.eye(3)
+            if np.linalg.eigvalsh(J)[0] < _SMALLEST_INERTIA:
+                J = J + _SMALLEST_INERTIA * np.eye(3)
             full = numbers(np.array([J[0, 0], J[1, 1], J[2, 2],
                                      J[0, 1], J[0, 2], J[1, 2]]))  # fmt: skip
             lines.append(

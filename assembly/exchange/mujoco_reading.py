@@ -6,6 +6,7 @@ of constraints, in random postures.
 
 import pickle
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 from warnings import catch_warnings, simplefilter
@@ -17,12 +18,17 @@ from assembly.exchange.comparison import POSTURES, Comparison
 from assembly.exchange.mechanism import Mechanism, body_poses
 from assembly.exchange.orientation import to_quaternion
 from assembly.exchange.xml_file import read_xml
+from assembly.model.inertia import inertia_matrix
 from forcefit.inputs.errors import one_line
 from stiffness.screws import rotation_vector
 
 # [kg] largest mass that MuJoCo gives a body without mass, to move it
 _LIGHTEST = 1.01e-6
-_UNIT_INERTIA = {"ixx": "1", "iyy": "1", "izz": "1", "ixy": "0", "ixz": "0", "iyz": "0"}
+# [kg m^2] smaller principal moments are not compared: MuJoCo may raise them to 1e-9
+_LEAST_MOMENT = 1e-8
+_ROUNDING = 2e-12  # [kg m^2] at which MuJoCo ends its search of principal axes
+_KEYS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+_UNIT_INERTIA = dict(zip(_KEYS, ("1", "1", "1", "0", "0", "0"), strict=True))
 _DRAWN = {"visual", "collision", "gazebo", "transmission", "loop_joint"}
 
 
@@ -101,8 +107,8 @@ def _bare_urdf(path: Path) -> str:
     for element in list(root.iter()):
         if element.tag.endswith(":joint") or element.get("quat_xyzw"):
             raise ValueError(f"its URDF has no {element.tag} of this kind")
-        if element.tag == "inertia":  # refused for thin rods, and not compared
-            element.attrib.update(_UNIT_INERTIA)
+        if element.tag == "inertia" and not _comparable(_attributes(element.attrib)):
+            element.attrib.update(_UNIT_INERTIA)  # refused for thin rods
         for inner in list(element):
             if inner.tag in _DRAWN or ":" in inner.tag:
                 element.remove(inner)
@@ -127,7 +133,9 @@ def _compared(
         i for i, name in enumerate(bodies)
         if i and name in mechanism.bodies and whole and name not in unweighed
     ]  # fmt: skip
-    gaps = unread | _mass_gaps(model, mechanism, [(i, bodies[i]) for i in known])
+    weighed = [(i, bodies[i]) for i in known]
+    gaps = unread | _mass_gaps(model, mechanism, weighed)
+    gaps |= _inertia_gaps(mujoco, model, mechanism, weighed)
     rules = _rules(mujoco, model)
     loops = [loop for loop in mechanism.loops if loop.name in rules]
     random, data = np.random.default_rng(1), mujoco.MjData(model)
@@ -153,7 +161,10 @@ def _compared(
             _widen(gaps, f"loop {loop.name}", open_by)
     worst = max(gaps, key=lambda where: gaps[where], default="")
     weights = {
-        name: (float(model.body_mass[i]), np.array(model.body_ipos[i]))
+        name: (
+            float(model.body_mass[i]), np.array(model.body_ipos[i]),
+            _moments(mujoco, model, i),
+        )
         for i, name in enumerate(bodies) if whole and name in unweighed
     }  # fmt: skip
     compared = len([name for name in bodies[1:] if name in mechanism.bodies])
@@ -186,6 +197,38 @@ def _mass_gaps(
             off = np.abs(model.body_ipos[i] - body.centre).max()
             gaps[f"centre of mass of {name}"] = float(off)
     return gaps
+
+
+def _inertia_gaps(
+    mujoco: Any, model: Any, mechanism: Mechanism, bodies: list[tuple[int, str]]
+) -> dict[str, float]:
+    """Return the relative differences of moments of inertia."""
+    gaps: dict[str, float] = {}
+    for i, name in bodies:
+        J = mechanism.bodies[name].inertia
+        if _comparable(J):
+            off = np.abs(_moments(mujoco, model, i) - J).max() - _ROUNDING
+            gaps[f"moments of inertia of {name}"] = max(off, 0.0) / np.abs(J).max()
+    return gaps
+
+
+def _moments(mujoco: Any, model: Any, i: int) -> NDArray:
+    """Return the (3, 3) [kg m^2] of a body about its centre, in its axes."""
+    entries = np.zeros(9)
+    mujoco.mju_quat2Mat(entries, model.body_iquat[i])
+    R = entries.reshape(3, 3)
+    return np.asarray(R @ np.diag(model.body_inertia[i]) @ R.T)
+
+
+def _comparable(J: NDArray) -> bool:
+    """Return whether MuJoCo uses moments unchanged: of no thin rod or plate."""
+    least, middle, most = np.linalg.eigvalsh(J)
+    return bool(least > _LEAST_MOMENT and most < (1 - 1e-9) * (least + middle))
+
+
+def _attributes(six: Mapping[str, str]) -> NDArray:
+    """Return the (3, 3) [kg m^2] of an element of a URDF."""
+    return inertia_matrix([float(six.get(key, "0")) for key in _KEYS])
 
 
 def _rules(mujoco: Any, model: Any) -> dict[str, tuple[int, float]]:

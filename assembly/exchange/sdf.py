@@ -168,8 +168,6 @@ def _left_out(frames: Frames, root: Node) -> Iterator[str]:
             for inner in named.node.children():
                 if inner.tag not in held:
                     add(f"{tag} {inner.tag}", name)
-                elif inner.tag == "inertial" and inner.child("inertia") is not None:
-                    add("moments of inertia", name)
                 elif inner.tag in {"axis", "axis2"}:
                     for part in inner.children():
                         what = _of_axis(named.node, inner.tag, part)

@@ -1,9 +1,10 @@
-"""Masses of SDF's links: as written, by the format's default, or from shapes.
+"""Masses and moments of inertia of SDF's links: written, default, or of shapes.
 
 Sources:
     sdformat.org, specification 1.12, ``<inertial>``: a link without it, or without its
-    mass, has 1 kg; with ``auto`` densities of the collisions are used, 1000 kg/m^3 by
-    default, and a given mass is kept.
+    mass, has 1 kg, and moments that are not written are 1 kg m^2; with ``auto``
+    densities of the collisions are used, 1000 kg/m^3 by default, and a given mass is
+    kept, with the moments in proportion.
 """
 
 import numpy as np
@@ -11,10 +12,12 @@ from numpy.typing import NDArray
 
 from assembly.exchange.mechanism import Body
 from assembly.exchange.sdf_frames import Frames, Named, own_pose
-from assembly.exchange.shapes import together, volume
+from assembly.exchange.shapes import moments, volume
 from assembly.exchange.xml_file import Node
+from assembly.model.inertia import MassProperties, inertia_matrix, joined_bodies
 
 _DEFAULT_MASS = 1.0  # [kg] the format's default
+_DEFAULT_INERTIA = np.eye(3)  # [kg m^2] likewise
 _DEFAULT_DENSITY = 1000.0  # [kg/m^3] the format's default
 # keys of a shape's sizes, and how many numbers each has
 _SIZES = {"box": {"size": 3}, "sphere": {"radius": 1}, "ellipsoid": {"radii": 3},
@@ -40,28 +43,45 @@ def link_body(frames: Frames, name: str, named: Named) -> tuple[Body, str]:
     node = named.node
     inertial = node.child("inertial")
     if inertial is None:
-        return Body(name, _DEFAULT_MASS), "no inertial: 1 kg, the format's default"
+        words = "no inertial: 1 kg and 1 kg m^2, the format's defaults"
+        return Body(name, _DEFAULT_MASS, inertia=_DEFAULT_INERTIA), words
     mass, pose = inertial.child("mass"), inertial.child("pose")
     kilograms = None if mass is None else mass.number("", "kg")
     if kilograms is not None and kilograms < 0:
         raise node.bad("inertial.mass", f"found {kilograms:g}, expected >= 0 [kg]")
     if inertial.optional("auto") in {"true", "1"}:
-        made, centre = _of_shapes(frames, named, inertial)
-        if made:
-            taken = "" if kilograms is not None else "made of its shapes (auto)"
-            return Body(name, made if kilograms is None else kilograms, centre), taken
-    centre = np.zeros(3) if pose is None else own_pose(pose)[:3, 3]
-    if kilograms is None:
-        return Body(name, _DEFAULT_MASS, centre), "no mass: 1 kg, the format's default"
-    return Body(name, kilograms, centre), ""
+        made, centre, J = _of_shapes(frames, named, inertial)
+        if made and kilograms is None:
+            return Body(name, made, centre, J), "made of its shapes (auto)"
+        if made and kilograms is not None:
+            return Body(name, kilograms, centre, kilograms / made * J), ""
+    T, written = np.eye(4) if pose is None else own_pose(pose), _moments(inertial)
+    words = "no mass: 1 kg, the format's default" if kilograms is None else ""
+    J = _DEFAULT_INERTIA if written is None else written
+    if written is None:
+        lack = "no moments of inertia: 1 kg m^2"
+        words = f"{words}; {lack}" if words else f"{lack}, the format's default"
+    kilograms = _DEFAULT_MASS if kilograms is None else kilograms
+    return Body(name, kilograms, T[:3, 3], T[:3, :3] @ J @ T[:3, :3].T), words
 
 
-def _of_shapes(
-    frames: Frames, named: Named, inertial: Node
-) -> tuple[float, NDArray]:  # fmt: skip
-    """Return [kg] and (3,) [m] of all collisions of a link."""
+def _moments(inertial: Node) -> NDArray | None:
+    """Return the (3, 3) [kg m^2] of ``inertia`` in its pose's axes, None without it."""
+    inertia = inertial.child("inertia")
+    if inertia is None:
+        return None
+    six = []
+    for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"):
+        inner = inertia.child(key)
+        default = 1.0 if key[1] == key[2] else 0.0
+        six.append(default if inner is None else inner.number("", "kg m^2"))
+    return inertia_matrix(six)
+
+
+def _of_shapes(frames: Frames, named: Named, inertial: Node) -> MassProperties:
+    """Return the mass properties of all collisions of a link together."""
     density = _density(inertial, _DEFAULT_DENSITY)
-    masses, centres = [], []
+    parts = []
     for collision in named.node.children("collision"):
         geometry = collision.child("geometry")
         shape = None if geometry is None else next(geometry.children(), None)
@@ -76,9 +96,11 @@ def _of_shapes(
         sizes = _sizes(shape)
         # a cone's centre is at a quarter of its length from its foot
         above = -sizes[1] / 4 if shape.tag == "cone" else 0.0
-        centres.append(T[:3, :3] @ [0.0, 0.0, above] + T[:3, 3])
-        masses.append(_density(collision, density) * volume(shape.tag, sizes))
-    return together(masses, centres)
+        centre = T[:3, :3] @ [0.0, 0.0, above] + T[:3, 3]
+        mass = _density(collision, density) * volume(shape.tag, sizes)
+        J = mass * T[:3, :3] @ np.diag(moments(shape.tag, sizes)) @ T[:3, :3].T
+        parts.append((mass, centre, J))
+    return joined_bodies(parts)
 
 
 def _sizes(shape: Node) -> list[float]:

@@ -1,10 +1,12 @@
-"""Volumes and centres of simple bodies, for masses from shapes."""
+"""Volumes and moments of inertia of simple bodies, for masses from shapes."""
 
 import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+
+_SHELL = 1e-6  # [m] thickness of an ellipsoid's shell
 
 
 def volume(shape: str, sizes: Sequence[float]) -> float:
@@ -50,19 +52,73 @@ def area(shape: str, sizes: Sequence[float]) -> float:
     return 2 * math.pi * radius * length + caps
 
 
-def together(masses: Sequence[float], centres: Sequence[NDArray]) -> (
-    tuple[float, NDArray]
-):  # fmt: skip
-    """Return the mass and centre of several bodies together.
+def moments(shape: str, sizes: Sequence[float]) -> NDArray:
+    """Return the moments of inertia of a solid body about its centre.
 
     Args:
-        masses: [kg] of each.
-        centres: (3,) [m] of each.
+        shape: see :func:`volume`; length and cone along z.
+        sizes: [m] sizes of the shape.
 
     Returns:
-        [kg] and (3,) [m]; the origin without a mass.
+        (3,) [m^2] about x, y and z for 1 kg.
     """
-    total = float(sum(masses))
-    if not total:
-        return 0.0, np.zeros(3)
-    return total, np.asarray(np.average(centres, axis=0, weights=masses))
+    if shape == "box":
+        return _across(np.square(sizes)) / 12
+    if shape in {"sphere", "ellipsoid"}:
+        return _across(np.square(sizes if len(sizes) == 3 else [sizes[0]] * 3)) / 5
+    r2, length = sizes[0] ** 2, sizes[1]
+    if shape == "cone":
+        return _round(0.15 * r2 + 3 / 80 * length**2, 0.3 * r2)
+    bar = _round(r2 / 4 + length**2 / 12, r2 / 2)
+    if shape == "cylinder":
+        return bar
+    # halves of a ball, their centres at 3/8 of the radius from the bar's ends
+    far = length**2 / 4 + 3 / 8 * sizes[0] * length
+    ends = _round(0.4 * r2 + far, 0.4 * r2)
+    return np.asarray(
+        np.average([bar, ends], axis=0, weights=[length, 4 / 3 * sizes[0]])
+    )
+
+
+def shell_moments(shape: str, sizes: Sequence[float]) -> NDArray:
+    """Return the moments of inertia of a thin shell about its centre.
+
+    Args:
+        shape: as for :func:`moments`, except ``cone``; an ellipsoid's shell has half
+            axes 1 um longer outside than inside, as MuJoCo takes it.
+        sizes: [m] sizes of the shape.
+
+    Returns:
+        (3,) [m^2] about x, y and z for 1 kg.
+    """
+    if shape == "box":
+        squares, areas = np.square(sizes), math.prod(sizes) / np.array(sizes)
+        # a pair of faces is half an edge from the centre and a plate in its plane
+        faces = [_across(squares / 12 + squares / 6 * pair) for pair in np.eye(3)]
+        return np.asarray(np.average(faces, axis=0, weights=areas))
+    if shape == "sphere":
+        return np.full(3, 2 / 3 * sizes[0] ** 2)
+    if shape == "ellipsoid":
+        a, b, c = axes = np.array(sizes)
+        volume = (a * b + b * c + c * a + (a + b + c) * _SHELL + _SHELL**2) * _SHELL
+        outside = np.prod(axes + _SHELL) / volume  # of the shell's volume
+        thicker = outside * (2 * axes + _SHELL) * _SHELL
+        return (_across(axes**2) + _across(thicker)) / 5
+    r2, length = sizes[0] ** 2, sizes[1]
+    side = _round(r2 / 2 + length**2 / 12, r2)
+    if shape == "cylinder":
+        ends = _round(r2 / 4 + length**2 / 4, r2 / 2)
+        return np.asarray(np.average([side, ends], axis=0, weights=[length, sizes[0]]))
+    far = length**2 / 4 + sizes[0] * length / 2
+    ends = _round(2 / 3 * r2 + far, 2 / 3 * r2)
+    return np.asarray(np.average([side, ends], axis=0, weights=[length, 2 * sizes[0]]))
+
+
+def _across(squares: NDArray) -> NDArray:
+    """Return sums of the other two, as of squares of lengths along x, y and z."""
+    return np.asarray(np.sum(squares) - squares)
+
+
+def _round(across: float, along: float) -> NDArray:
+    """Return the moments of a body that is round about z."""
+    return np.array([across, across, along])

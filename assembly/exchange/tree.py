@@ -5,15 +5,20 @@ from numpy.typing import NDArray
 
 
 def place_frames(
-    parents: NDArray, kinds: NDArray, fixed: NDArray, q: NDArray
+    parents: NDArray,
+    kinds: NDArray,
+    fixed: NDArray,
+    q: NDArray,
+    leads: NDArray | float = 0.0,
 ) -> tuple[NDArray, NDArray]:
     """Return transforms of all frames, before and after their joint's motion.
 
     Args:
         parents: (n,) rows, each before its children, -1 for the base.
-        kinds: (n,) 0 fixed, 1 revolute, 2 prismatic.
+        kinds: (n,) 0 fixed, 1 revolute or helical, 2 prismatic.
         fixed: (n, 4, 4) frames in their parents.
         q: (n,) [rad or m] coordinates.
+        leads: (n,) [m/rad] translations of helical joints per angle, 0 of others.
 
     Returns:
         (n, 4, 4) before it and (n, 4, 4) after it, seen from the base.
@@ -24,7 +29,7 @@ def place_frames(
     motion[:, 0, 0] = motion[:, 1, 1] = np.cos(angle)
     motion[:, 1, 0] = np.sin(angle)
     motion[:, 0, 1] = -motion[:, 1, 0]
-    motion[:, 2, 3] = np.where(kinds == 2, q, 0.0)
+    motion[:, 2, 3] = np.where(kinds == 2, q, leads * angle)
     before, after = np.empty_like(motion), np.empty_like(motion)
     for i, parent in enumerate(parents.tolist()):
         before[i] = fixed[i] if parent < 0 else after[parent] @ fixed[i]

@@ -26,10 +26,11 @@ from assembly.exchange.ties import may_tie, refuse_ties
 from assembly.exchange.urdf_joint import joint_freedoms, pose_of
 from assembly.exchange.urdf_loops import with_closing_joints
 from assembly.exchange.xml_file import Node, counted, read_xml
+from assembly.model.inertia import inertia_matrix
 from forcefit.inputs.errors import BadInput, quoted
 
 _CONVERTED = ("link", "joint", "material", "transmission", "loop_joint")
-_ZERO = np.zeros(3)
+_MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 _DRAWN = ("visual", "collision")
 _HELD = {"origin", "parent", "child", "axis", "mimic"}
 
@@ -98,17 +99,20 @@ def _add(node: Node, parts: dict[str, list[str]], several: list[Joint]) -> None:
 
 
 def _body(node: Node) -> Body:
-    """Return a link and its mass."""
+    """Return a link with its mass and moments of inertia."""
     name, inertial = node.text("name"), node.child("inertial")
     mass = None if inertial is None else inertial.child("mass")
     if inertial is None or mass is None:
         return Body(name)
-    origin = inertial.child("origin")
-    centre = _ZERO if origin is None else origin.numbers("xyz", 3, "m", _ZERO)
+    origin, inertia = inertial.child("origin"), inertial.child("inertia")
+    T, J = HERE if origin is None else pose_of(origin), np.zeros((3, 3))
+    if inertia is not None:
+        six = [inertia.number(key, "kg m^2", 0.0) for key in _MOMENTS]
+        J = T[:3, :3] @ inertia_matrix(six) @ T[:3, :3].T
     value = mass.number("value", "kg")
     if value < 0:
         raise node.bad("inertial.mass", f"found {value:g}, expected >= 0 [kg]")
-    return Body(name, value, centre)
+    return Body(name, value, T[:3, 3], J)
 
 
 def _joints(node: Node) -> tuple[list[Joint], list[Body]]:
@@ -183,8 +187,6 @@ def _left_out(
                 drawn = inner.tag in _DRAWN
                 what = f"{inner.tag} shapes" if drawn else f"link {inner.tag}"
                 extra.setdefault(what, []).append(link.text("name"))
-            elif inner.child("inertia") is not None:
-                extra.setdefault("moments of inertia", []).append(link.text("name"))
     for other in root.children():
         if other.tag.split(":")[-1] not in _CONVERTED:
             for inner in other.children() if other.tag == "gazebo" else (other,):

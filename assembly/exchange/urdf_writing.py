@@ -47,9 +47,9 @@ def numbers(values: NDArray | tuple[float, ...]) -> str:
 
 
 def _link(body: Body) -> list[str]:
-    """Return ``<link>`` with its inertial, if it has a mass."""
+    """Return ``<link>`` with its inertial, if it has a mass or moments of inertia."""
     name = quoteattr(body.name)
-    if not body.mass:
+    if not body.mass and not body.inertia.any():
         return [f"  <link name={name}/>"]
     J = body.inertia
     entries = {"ixx": J[0, 0], "ixy": J[0, 1], "ixz": J[0, 2],

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from assembly.drawing.drawing import DrawnBody, DrawnJoint, turned_body
 from assembly.drawing.parts import joint_axes
 from assembly.files.drawn_link import Curve, curve_link, read_drawn_link
+from assembly.files.inertia_file import read_inertia
 from assembly.files.written_units import without_units
+from assembly.model.inertia import joined_bodies
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import BASE
 from forcefit.inputs.table import Table, nearest, quoted
@@ -50,7 +52,7 @@ def read_bodies(copied: Copy) -> Iterator[DrawnBody]:
             centre=table.array(
                 "centre", (3,), "m", np.zeros(3), largest=LARGEST_LENGTH
             ),
-            inertia=_inertia(table),
+            inertia=read_inertia(table),
             link=None if isinstance(link, Curve) else link,
         )
         for key in ("from", "to"):
@@ -63,23 +65,6 @@ def read_bodies(copied: Copy) -> Iterator[DrawnBody]:
 def place_of(owner: Table, kind: str, name: str) -> str:
     """Place of a body or a joint in messages."""
     return f"{owner.place + '.' if owner.place else ''}{kind} {quoted(name)}"
-
-
-def _inertia(table: Table) -> NDArray:
-    """(3, 3) [kg m^2] of Ixx, Iyy, Izz, Ixy, Ixz, Iyz, the last three products."""
-    if not table.has("inertia"):
-        return np.zeros((3, 3))
-    xx, yy, zz, xy, xz, yz = table.array("inertia", (6,), "kg m^2", largest=1e40)
-    J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    least, middle, most = np.linalg.eigvalsh(J)
-    rounding = 1e-6 * max(most, 0.0)
-    if least < -rounding or most > least + middle + rounding:
-        raise table.bad(
-            "inertia",
-            f"found principal moments {least:.4g}, {middle:.4g}, {most:.4g}; expected "
-            "none negative, and none larger than the sum of the other two",
-        )
-    return J
 
 
 def with_ends(
@@ -120,12 +105,12 @@ def with_ends(
         end = transform(point, np.eye(3))
     else:
         end = joint_axes(here[second])
-    matrix, mass, centre = curve_link(link, start, back @ end)
-    centre = (copied.T @ [*centre, 1.0])[:3]
-    total = body.mass + mass
+    matrix, mass, centre, J = curve_link(link, start, back @ end)
+    centre, R = (copied.T @ [*centre, 1.0])[:3], copied.T[:3, :3]
     if mass:
-        centre = (body.mass * body.centre + mass * centre) / total
-        body = replace(body, mass=total, centre=centre)
+        own = body.mass, body.centre, body.inertia
+        total, middle, whole = joined_bodies([own, (mass, centre, R @ J @ R.T)])
+        body = replace(body, mass=total, centre=middle, inertia=whole)
     return replace(body, link=matrix)
 
 

@@ -7,15 +7,15 @@ from numpy.typing import NDArray
 
 from assembly.drawing.drawing import FREE_ROWS, DrawnJoint, JointNumbers, perpendicular
 from assembly.files.bolt_file import read_locked_at
-from assembly.files.joint_file import read_clearance, read_joint_stiffness
+from assembly.files.drawn_clearance import read_drawn_clearance
+from assembly.files.joint_file import read_joint_stiffness, read_pitch
 from assembly.files.written_units import SCREW, without_units
 from assembly.model.largest import LARGEST, LARGEST_LENGTH
-from assembly.model.robot import Clearance
 from forcefit.inputs.table import Table
 
+ONE_FREEDOM = ("revolute", "prismatic", "helical")
 _PARALLEL = 1e-3  # sine of the angle between two axes below which they are parallel
 _KEYS = ("clearance", "joint_stiffness", "geometric_error", "tolerance")
-_BOUNDS = {"tilt": (0, 1), "spin": (2,), "radial": (3, 4), "axial": (5,)}
 _ROWS = ("RX", "RY", "RZ", "TX", "TY", "TZ")
 
 
@@ -34,20 +34,20 @@ def read_drawn_joint(table: Table, name: str, first: str, second: str) -> DrawnJ
     Raises:
         BadInput: a rule of the format is broken.
     """
-    kind = table.choice("type", (*FREE_ROWS, "helical"))
-    if kind == "helical":
-        raise table.bad("type", 'found "helical", which is not supported yet')
+    kind = table.choice("type", FREE_ROWS)
+    without_units(table, "pitch", "length")
     axis, across, axis2 = _axes(table, kind)
     without_units(table, "at", "length")
     actuated = table.boolean("actuated", False)
-    one = kind in {"revolute", "prismatic"}
-    dimension, unit = ("angle", "rad") if kind == "revolute" else ("length", "m")
+    one = kind in ONE_FREEDOM
+    dimension, unit = ("length", "m") if kind == "prismatic" else ("angle", "rad")
     for key in ("position", "limits"):
         without_units(table, key, dimension)
     given = [k for k in ("position", "limits", "drive_stiffness") if table.has(k)]
     if not one and (actuated or given):
         key = "actuated" if actuated else given[0]
-        fault = f'found one on a {kind} joint, expected "revolute" or "prismatic"'
+        names = " | ".join(f'"{name}"' for name in ONE_FREEDOM)
+        fault = f"found one on a {kind} joint, expected {names}"
         raise table.bad(key, fault)
     if "drive_stiffness" in given and not actuated:
         raise table.bad("drive_stiffness", "found one without actuated = true")
@@ -56,7 +56,7 @@ def read_drawn_joint(table: Table, name: str, first: str, second: str) -> DrawnJ
         at=table.array("at", (3,), "m", largest=LARGEST_LENGTH),
         axis=axis, across=across, axis2=axis2, actuated=actuated,
         position=table.number("position", unit, 0.0, largest=LARGEST_LENGTH),
-        limits=_limits(table, unit),
+        limits=_limits(table, unit), pitch=read_pitch(table, kind),
         numbers=_numbers(table, kind, actuated),
     )  # fmt: skip
     table.finish()
@@ -125,9 +125,11 @@ def _one(table: Table, kind: str, actuated: bool) -> JointNumbers:
         without_units(table, key, SCREW)
     zero = np.zeros(6)
     error = table.array("geometric_error", (6,), "rad, m", zero, largest=LARGEST_LENGTH)
-    clearance, bolt = read_locked_at(table, kind == "fixed", _clearance(table, kind))
+    clearance, contacts = read_drawn_clearance(table, kind)
+    clearance, bolt = read_locked_at(table, kind == "fixed", clearance)
     return JointNumbers(
         clearance=clearance,
+        contacts=contacts,
         stiffness=_stiffness(table, kind, actuated),
         error=error,
         tolerance=_tolerance(table),
@@ -144,24 +146,6 @@ def _tolerance(table: Table) -> NDArray | None:
         fault = f"found {sigma.min():g} in it, expected 6 numbers >= 0 [rad, m]"
         raise table.bad("tolerance", fault)
     return sigma
-
-
-def _clearance(table: Table, kind: str) -> Clearance | None:
-    """The bounds; none along the free motions of a joint of several freedoms."""
-    content = table.content.get("clearance")
-    if isinstance(content, dict):
-        inner = Table(content, table.file, f"{table.place}.clearance")
-        for key in _BOUNDS:
-            angle = key in {"tilt", "spin"}
-            without_units(inner, key, "angle" if angle else "length")
-    found = read_clearance(table)
-    free = FREE_ROWS[kind]
-    for key, rows in _BOUNDS.items():
-        if len(free) > 1 and found and getattr(found, key) is not None:
-            if set(rows) & set(free):
-                fault = f"found a bound of a free motion of a {kind} joint"
-                raise table.bad(f"clearance.{key}", f"{fault}, expected none")
-    return found
 
 
 def _stiffness(table: Table, kind: str, actuated: bool) -> NDArray | None:

@@ -66,8 +66,8 @@ def _plain_lengths(content: dict[str, Any], body: Table, place: str) -> None:
 
 def curve_link(
     curve: Curve, start: NDArray, tip: NDArray
-) -> tuple[MatrixLink, float, NDArray]:
-    """Stiffness and mass of a beam along a curve between two joints.
+) -> tuple[MatrixLink, float, NDArray, NDArray]:
+    """Return stiffness and mass of a beam along a curve between two joints.
 
     Args:
         curve: as read.
@@ -75,8 +75,8 @@ def curve_link(
         tip: (4, 4) point and axes of the joint at its end, axes of the file.
 
     Returns:
-        The stiffness at the tip in its axes, [kg] and (3,) [m] centre of the beam; no
-        mass without a density.
+        The stiffness at the tip in its axes, [kg], (3,) [m] centre of the beam and its
+        (3, 3) [kg m^2] about the centre; no mass without a density.
 
     Raises:
         BadInput: a piece or a material is not proper, or the curve ends elsewhere.
@@ -106,8 +106,8 @@ def curve_link(
         raise table.bad("curve", str(error)) from None
     turn = np.kron(np.eye(2), tip[:3, :3])
     K = np.linalg.inv(turn.T @ C @ turn)
-    mass, centre = 0.0, np.zeros(3)
+    mass, centre, J = 0.0, np.zeros(3), np.zeros((3, 3))
     if table.has("density"):
         density = table.number("density", "kg/m^3", above=0.0, largest=LARGEST)
-        mass, centre = curve_mass(pieces, density)
-    return MatrixLink((K + K.T) / 2), mass, centre
+        mass, centre, J = curve_mass(pieces, density)
+    return MatrixLink((K + K.T) / 2), mass, centre, J

@@ -3,42 +3,96 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.model.frame import ONE_OF_BALL, SLIDING_BALL
 from assembly.model.largest import LARGEST, LARGEST_LENGTH
-from assembly.model.robot import LOCKED, Clearance
+from assembly.model.robot import LOCKED, NO_SPIN, Clearance
 from forcefit.inputs.number_arrays import find_fault, number_array
 from forcefit.inputs.table import Table
 
 # [rad, m] smaller values are refused, because their square is 0
 _LEAST_CLEARANCE = 1e-30
-_CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad"}
+_LEAST_PITCH = 1e-9  # [m] smaller pitches are refused
+_LARGEST_PITCH = 1.0  # [m] larger pitches are refused
+_CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad", "ball": "m"}
 
 
-def read_clearance(table: Table) -> Clearance | None:
+def read_pitch(table: Table, joint: str) -> float:
+    """Return the ``pitch`` of a helical joint, 0 of other joints.
+
+    Args:
+        table: table of a frame or a drawn joint.
+        joint: type of the joint.
+
+    Returns:
+        [m] translation in a turn of 360 degrees, positive for a right-hand thread.
+
+    Raises:
+        BadInput: the pitch is missing, 0 or above 1 m, or the joint is not helical.
+    """
+    if joint != "helical":
+        if table.has("pitch"):
+            expected = "expected none, or a helical joint"
+            raise table.bad("pitch", f"found one on a {joint} joint, {expected}")
+        return 0.0
+    pitch = table.number("pitch", "m per turn", largest=_LARGEST_PITCH)
+    if abs(pitch) < _LEAST_PITCH:
+        expected = f"expected at least {_LEAST_PITCH:g} m, or at most minus that"
+        raise table.bad("pitch", f"found {pitch:g}, {expected}")
+    return pitch
+
+
+def read_clearance(table: Table, joint: str) -> Clearance | None:
     """Return the ``clearance`` table, None if absent.
 
     Args:
         table: table of a ``[[frame]]``.
+        joint: type of the joint.
 
     Returns:
         The given bounds.
 
     Raises:
-        BadInput: an unknown key, a value that is not a finite number >= 0, or one so
-            small that its square is 0.
+        BadInput: an unknown key, or a bound that :func:`read_bounds` refuses.
     """
     if not table.has("clearance"):
         return None
     inner = table.table("clearance")
+    bounds = read_bounds(inner, joint)
+    inner.finish()
+    return bounds
+
+
+def read_bounds(table: Table, joint: str) -> Clearance:
+    """Return the bounds of a ``clearance`` table, which may have other keys too.
+
+    Args:
+        table: the table.
+        joint: type of the joint.
+
+    Returns:
+        The given bounds.
+
+    Raises:
+        BadInput: a value is not a finite number >= 0, or so small that its square is 0;
+            or ``ball`` is given with another bound of the same motion.
+    """
     bounds = {
-        key: inner.number(key, unit, least=0.0, largest=LARGEST_LENGTH)
+        key: table.number(key, unit, least=0.0, largest=LARGEST_LENGTH)
         for key, unit in _CLEARANCE.items()
-        if inner.has(key)
+        if table.has(key)
     }
+    if joint == "helical" and "spin" in bounds:
+        raise table.bad("spin", f"found one on a helical joint, {NO_SPIN}")
     for key, bound in bounds.items():
         if 0.0 < bound < _LEAST_CLEARANCE:
             expected = f"expected 0 or at least {_LEAST_CLEARANCE:g}"
-            raise inner.bad(key, f"found {bound:g}, {expected}")
-    inner.finish()
+            raise table.bad(key, f"found {bound:g}, {expected}")
+    if "ball" in bounds:
+        if joint in {"prismatic", "helical"}:
+            raise table.bad("ball", SLIDING_BALL)
+        for key in ("radial", "axial"):
+            if key in bounds:
+                raise table.bad(key, ONE_OF_BALL)
     return Clearance(**bounds)
 
 

@@ -1,7 +1,7 @@
 """Robot files read and written (``docs/robot_files.md``), with all rules checked."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,10 +13,18 @@ from assembly.drawing.frames import robot_of_drawing
 from assembly.files.bolt_file import bolt_table, read_locked_at
 from assembly.files.drawing_file import is_drawing, read_drawing
 from assembly.files.effect_file import effect_tables, with_effects
-from assembly.files.joint_file import read_clearance, read_joint_stiffness
+from assembly.files.inertia_file import read_inertia
+from assembly.files.joint_file import (
+    read_clearance,
+    read_joint_stiffness,
+    read_pitch,
+)
 from assembly.files.link_file import link_table, read_link
+from assembly.files.toml_text import file_text
 from assembly.kinematics.posture import home_posture
-from assembly.model.largest import LARGEST_LENGTH
+from assembly.model.frame import FORCE_CONTROL
+from assembly.model.inertia import six_moments
+from assembly.model.largest import LARGEST, LARGEST_LENGTH
 from assembly.model.link_span import with_spans
 from assembly.model.robot import (
     BASE,
@@ -35,7 +43,6 @@ from forcefit.inputs.table import (
 )
 from forcefit.inputs.writing import (
     ROBOT,
-    ROBOT_MARK,
     check_writable,
     path_from,
     write_text,
@@ -230,17 +237,20 @@ def _frame(table: Table) -> Frame:
     if joint == "fixed" and (actuated or given):
         key = "actuated" if actuated else given[0]
         message = f'found {key} on a fixed joint; expected joint = "revolute" | '
-        raise table.bad(key, message + f'"prismatic", or no {key}')
+        raise table.bad(key, message + f'"prismatic" | "helical", or no {key}')
     translation, rotation = _placement(table)
     passive = joint != "fixed" and not actuated
     own = (5 if joint == "prismatic" else 2) if passive else None
-    clearance, bolt = read_locked_at(table, joint == "fixed", read_clearance(table))
+    clearance, bolt = read_locked_at(
+        table, joint == "fixed", read_clearance(table, joint)
+    )
     frame = Frame(
         name=name,
         parent=table.text("parent", expected='the name of a frame, or "base"'),
         translation=translation,
         rotation=rotation,
         joint=joint,
+        pitch=read_pitch(table, joint),
         actuated=actuated,
         position=table.number("position", "rad or m", 0.0, largest=LARGEST_LENGTH),
         limits=_limits(table),
@@ -249,9 +259,11 @@ def _frame(table: Table) -> Frame:
         clearance=clearance,
         locked_at=bolt,
         joint_stiffness=read_joint_stiffness(table, own),
+        drive_force=_drive_force(table, passive),
         link=read_link(table),
         mass=table.number("mass", "kg", 0.0, least=0.0, largest=1e40),
         centre_of_mass=_numbers(table, "centre_of_mass", 3, "m"),
+        inertia=read_inertia(table),
     )
     if not isinstance(frame.link, MeshLink) and "up" in table.content:
         raise table.bad(
@@ -267,6 +279,14 @@ def _numbers(table: Table, key: str, count: int, unit: str) -> NDArray:
     """Return the lengths or angles, zero where absent."""
     zero = np.zeros(count)
     return table.array(key, (count,), unit, zero, largest=LARGEST_LENGTH)
+
+
+def _drive_force(table: Table, passive: bool) -> float:
+    """Return the force of a drive on a passive joint, 0 if not given."""
+    if table.has("drive_force") and not passive:
+        fault = f"found one on a joint that is not passive; {FORCE_CONTROL}"
+        raise table.bad("drive_force", fault)
+    return table.number("drive_force", "N m or N", 0.0, largest=LARGEST)
 
 
 def _limits(table: Table) -> tuple[float, float] | None:
@@ -375,16 +395,8 @@ def write_robot(robot: Robot, path: Path | str) -> None:
     table = robot_table(robot, Path(path).parent)
     frames, closures = table.pop("frame"), table.pop("closure", [])
     effects, diagnosis = table.pop("effect", []), table.pop("diagnosis", {})
-    lines = [ROBOT_MARK, *(f"{k} = {_toml(v)}" for k, v in table.items())]
-    if diagnosis:
-        lines += ["", "[diagnosis]"]
-        lines += [f"{k} = {_toml(v)}" for k, v in diagnosis.items()]
     kinds = {"frame": frames, "closure": closures, "effect": effects}
-    for kind, tables in kinds.items():
-        for inner in tables:
-            pairs = (f"{k} = {_toml(v)}" for k, v in inner.items())
-            lines += ["", f"[[{kind}]]", *pairs]
-    write_text("\n".join(lines) + "\n", path)
+    write_text(file_text(table, kinds, diagnosis), path)
 
 
 def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
@@ -396,6 +408,25 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
 
     Returns:
         Plain values; :func:`robot_of` reads them back to the same robot.
+    """
+    table = root_table(robot, folder)
+    table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
+    if robot.closures:
+        table["closure"] = [{"frames": list(pair)} for pair in robot.closures]
+    if robot.has_effects:
+        table["effect"] = effect_tables(robot)
+    return table
+
+
+def root_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
+    """Return the content of a robot file without its frames and closures.
+
+    Args:
+        robot: any robot.
+        folder: folder of the file to be written, to which paths are made relative.
+
+    Returns:
+        Plain values.
     """
     table: dict[str, Any] = {"name": robot.name}
     if robot.description:
@@ -410,11 +441,6 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
         path = table["diagnosis"].get("covariance")
         if path and folder is not None:
             table["diagnosis"]["covariance"] = path_from(folder.resolve(), path)
-    table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
-    if robot.closures:
-        table["closure"] = [{"frames": list(pair)} for pair in robot.closures]
-    if robot.has_effects:
-        table["effect"] = effect_tables(robot)
     return table
 
 
@@ -433,6 +459,8 @@ def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
     table["rotation"] = frame.rotation.tolist()
     if frame.joint != "fixed":
         table |= {"joint": frame.joint, "position": frame.position}
+        if frame.pitch:
+            table["pitch"] = frame.pitch
         if frame.actuated:
             table["actuated"] = True
         if frame.limits is not None:
@@ -454,36 +482,14 @@ def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
         K = frame.joint_stiffness
         diagonal = np.array_equal(K, np.diag(np.diag(K)))
         table["joint_stiffness"] = (np.diag(K) if diagonal else K).tolist()
+    if frame.drive_force:
+        table["drive_force"] = frame.drive_force
     if frame.link is not None:
         table |= link_table(frame.link, folder)
     if frame.mass:
         table["mass"] = frame.mass
     if np.any(frame.centre_of_mass):
         table["centre_of_mass"] = frame.centre_of_mass.tolist()
+    if np.any(frame.inertia):
+        table["inertia"] = six_moments(frame.inertia)
     return table
-
-
-def _toml(value: Any) -> str:
-    """Return a value in TOML, arrays and tables inline, floats with all digits."""
-    # tomli-w writes every number of an array on its own line
-    if isinstance(value, bool | np.bool_):
-        return str(value).lower()
-    if isinstance(value, str):
-        return f'"{"".join(map(_escaped, value))}"'
-    if isinstance(value, Mapping):
-        inner = ", ".join(f"{_key(k)} = {_toml(v)}" for k, v in value.items())
-        return "{ " + inner + " }"
-    if isinstance(value, Iterable):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    return repr(value) if isinstance(value, int) else repr(float(value))
-
-
-def _key(name: str) -> str:
-    """Return a key, in quotes if it would otherwise be read differently."""
-    bare = name and all(c.isascii() and (c.isalnum() or c in "-_") for c in name)
-    return name if bare else _toml(name)
-
-
-def _escaped(c: str) -> str:
-    """Return a character as written in double quotes."""
-    return f"\\u{ord(c):04x}" if c < " " or c in '"\\\x7f' else c

@@ -21,6 +21,7 @@ from stiffness.surface.surface import UNITS
 
 _DIRECTION = number("direction", "1", "axis")
 _POINT = number("point", "m", "axis")
+_INERTIA = number("Ixx, Iyy, Izz, Ixy, Ixz, Iyz at the centre", "kg m^2", "moment")
 _INTERFACE = Either((
     text('interface, such as "z=0.452"'),
     record(
@@ -63,6 +64,11 @@ _LOCKED_AT = Either((
     record(pose_=Each(number("pose of the platform", "m, rad")),
            joints_=Each(number("coordinate of a drive", "rad or m"))),
 ))  # fmt: skip
+_CLEARANCE = record(
+    radial_=number("radial clearance", "m"), axial_=number("axial clearance", "m"),
+    tilt_=number("tilt clearance", "rad"), spin_=number("clearance about z", "rad"),
+    ball_=number("clearance of a ball in its socket", "m"),
+)  # fmt: skip
 _FRAME = record(
     name=text("name"), parent=text('name of a frame, or "base"'),
     translation_=number("translation from the parent", "m", "axis"),
@@ -73,20 +79,19 @@ _FRAME = record(
         alpha_=number("Denavit-Hartenberg alpha", "rad"),
     ),
     joint_=Words((*JOINTS,)), actuated_=flag("actuated"),
+    pitch_=number("translation of a helical joint in a turn", "m"),
     position_=number("coordinate at home", "rad or m"),
     limits_=number("least and largest coordinate", "rad or m", "bound"),
     geometric_error_="geometric_error",
     tolerance_=number("standard deviations of the geometric error", "rad, m", "screw"),
-    clearance_=record(
-        radial_=number("radial clearance", "m"), axial_=number("axial clearance", "m"),
-        tilt_=number("tilt clearance", "rad"), spin_=number("clearance about z", "rad"),
-    ),
+    clearance_=_CLEARANCE,
     locked_at_=_LOCKED_AT,
     joint_stiffness_=Either((
         number("diagonal stiffness", "N m/rad .. N/m", "screw"), _STIFFNESS,
     )),
+    drive_force_=number("force of a drive on a passive joint", "N m or N"),
     link_=_LINK, up_=_DIRECTION, mass_=number("mass", "kg"),
-    centre_of_mass_=number("centre of mass", "m", "axis"),
+    centre_of_mass_=number("centre of mass", "m", "axis"), inertia_=_INERTIA,
 )  # fmt: skip
 _NUMBERS = Each(number("parameter", ""))
 _EFFECT = record(
@@ -108,10 +113,28 @@ _OF_FRAMES = record(
     frame=Listed(_FRAME),
     closure_=Listed(record(frames=text("two frames that meet", "frame"))),
 )  # fmt: skip
+_GAP = number("gap from the middle to one side", "m")
+_CONTACTS = record(
+    "", _CLEARANCE, length_=number("length of the bore", "m"),
+    bearings_=Listed(record(z=number("height", "m"), radial=_GAP)),
+    guide_=record(
+        gap=Either((_GAP, number("gaps along x and y", "m", "axis"))),
+        length=number("length along the axis", "m"),
+        width=number("width along x", "m"), height=number("height along y", "m"),
+    ),
+    pad_=record(
+        gap=_GAP, length=number("length along x", "m"),
+        width=number("width along y", "m"),
+    ),
+)  # fmt: skip
 # of a universal joint one for each of its two bearings
 _OF_JOINT = record(**{
-    f"{key}_": Either((_FRAME.content[key], Listed(_FRAME.content[key])))
-    for key in ("clearance", "joint_stiffness", "geometric_error", "tolerance")
+    f"{key}_": Either((one, Listed(one)))
+    for key, one in (
+        ("clearance", _CONTACTS),
+        *((k, _FRAME.content[k]) for k in ("joint_stiffness", "geometric_error",
+                                           "tolerance")),
+    )
 })  # fmt: skip
 _PIECE = record(
     end_=_POINT, center_=_POINT,
@@ -121,7 +144,7 @@ _PIECE = record(
 _BODY = record(
     name=text("name"), mass_=number("mass in addition to the link's", "kg"),
     centre_=_POINT,
-    inertia_=number("Ixx, Iyy, Izz, Ixy, Ixz, Iyz at the centre", "kg m^2", "moment"),
+    inertia_=_INERTIA,
     link_=record(
         "", _LINK, curve_=Listed(_PIECE), theory_=Words(("timoshenko", "euler"))
     ),
@@ -131,6 +154,7 @@ _BODY = record(
 _JOINT = record(
     "", _OF_JOINT, name=text("name"), type=Words((*FREE_ROWS,)),
     between=text("two bodies", "body"), at=_POINT, axis_=_DIRECTION, axis2_=_DIRECTION,
+    pitch_=number("translation of a helical joint in a turn", "m"),
     actuated_=flag("actuated"), position_=number("coordinate at home", "rad or m"),
     limits_=number("least and largest coordinate", "rad or m", "bound"),
     drive_stiffness_=number("stiffness of the drive", "N m/rad or N/m"),

@@ -16,7 +16,7 @@ struct Robot {
     const int64_t *cone_frame, *cone_axis;
     const double *cone_size;
     const int64_t *starts, *free_frame, *free_axis;
-    const double *free_bound;
+    const double *free_lead, *free_bound;
     int64_t n, closures, np, ny, ng, nu, cones, nq;
 };
 
@@ -118,13 +118,14 @@ struct FarthestPoints {
 };
 
 // A robot's frames, in the order of their parents: fixed (n, 4, 4) transforms, kinds of
-// joints (0 fixed, 1 turns, 2 slides), pairs of frames that closures join, and for each
-// closure, then the platform, the joints that move it, with signs.
+// joints (0 fixed, 1 turns, 2 slides), leads [m/rad] of helical joints (which turn, too),
+// pairs of frames that closures join, and for each closure, then the platform, the joints
+// that move it, with signs.
 struct Tree {
     int64_t n, closures, platform;
     double size;
     const int64_t *parents, *kinds, *pairs, *moves, *groups;
-    const double *fixed;
+    const double *fixed, *leads;
 };
 
 // (n,) coordinates at home, (k, 6) poses, if any, and (k, n) coordinates held, NaN where

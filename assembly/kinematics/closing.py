@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from assembly.kinematics.closure_rates import closure_matrices, redundant_drives
 from assembly.kinematics.nominal import Target, follow, mobile
 from assembly.kinematics.posture import joint_target
+from assembly.model.links import own_screw
 from assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, nearest
 from stiffness.screws import rotation_matrix, rotation_vector, transform
@@ -158,7 +159,7 @@ def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
     frames = []
     for frame, value in zip(closed.frames, differs.tolist(), strict=True):
         error = frame.geometric_error.copy()
-        error[frame.own_axis] += value
+        error += value * own_screw(frame)
         own = frame.own_stiffness
         if abs(value) > _OPEN and (own is None or np.isinf(own)):
             raise BadInput(

@@ -18,8 +18,10 @@ from assembly.kinematics.continuation_side_by_side import (
     tree_of,
 )
 from assembly.kinematics.track import Track
-from assembly.model.robot import JOINTS, Robot
+from assembly.model.robot import Robot
 
+# number of each joint type in C++: a helical joint is revolute with a lead
+KINDS = {"fixed": 0, "revolute": 1, "prismatic": 2, "helical": 1}
 NOT_CLOSED = "expected a configuration in which every closure holds"
 
 
@@ -70,6 +72,9 @@ def motion_screws(robot: Robot, T: NDArray) -> NDArray:
     prismatic = np.array([f.joint == "prismatic" for f in robot.frames])[:, None]
     turning = np.concatenate([z, np.cross(p, z)], axis=-1)
     sliding = np.concatenate([np.zeros_like(z), z], axis=-1)
+    leads = np.array([f.lead for f in robot.frames])
+    if leads.any():
+        turning = turning + leads[:, None] * sliding
     return np.where(prismatic, sliding, turning) * mobile(robot)[:, None]
 
 
@@ -84,8 +89,9 @@ def _tree(robot: Robot) -> dict[str, Any]:
     moves = [(j, int(signs[j])) for signs in moved for j in np.flatnonzero(signs)]
     return dict(
         parents=np.array(robot.parents),
-        kinds=np.array([JOINTS.index(f.joint) for f in robot.frames]),
+        kinds=np.array([KINDS[f.joint] for f in robot.frames]),
         fixed=np.array(robot.fixed_transforms),
+        leads=np.array([f.lead for f in robot.frames]),
         pairs=np.array(pairs, dtype=int).reshape(-1, 2),
         moves=np.array(moves, dtype=int).reshape(-1, 2),
         groups=np.cumsum([0, *map(np.count_nonzero, moved)]),

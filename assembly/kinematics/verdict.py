@@ -81,7 +81,7 @@ def limits_passed(robot: Robot, q: NDArray) -> str:
         slides = frame.joint == "prismatic"
         room = _ROUNDING * (size_of(robot) if slides else 1.0)
         low, high = frame.limits[0] - room, frame.limits[1] + room
-        if frame.passive and not slides:
+        if frame.passive and frame.joint == "revolute":
             # whole turns of a joint that is no drive do not count
             value -= 2 * np.pi * np.floor((value - low) / (2 * np.pi))
         if not low <= value <= high:

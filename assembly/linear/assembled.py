@@ -35,7 +35,11 @@ from assembly.linear.load import (
 from assembly.linear.reference.reduction import reduce_problem
 from assembly.linear.rounding import ROUNDING, closure_rounding, differs_from_zero
 from assembly.linear.solution import Solution
-from assembly.model.clearance import clearance_bounds, clearance_excess
+from assembly.model.clearance import (
+    clearance_bounds,
+    clearance_components,
+    clearance_excess,
+)
 from assembly.model.point_results import N, plain
 from assembly.model.statuses import OK
 from assembly.solvers.cones import cone_sizes, cone_sums
@@ -271,7 +275,8 @@ class Assembly(Solution[N]):
         if not own_axes_free and "_excess" in vars(self):
             return self._excess
         bounds = clearance_bounds(self.posture.robot, own_axes_free)
-        return plain(clearance_excess(self.clearance_screws, bounds))
+        bounded = clearance_components(self.posture.robot, self.clearance_screws)
+        return plain(clearance_excess(bounded, bounds))
 
     @cached_property
     def _excess(self) -> N:
@@ -365,6 +370,7 @@ def all_loads(
     load: ArrayLike | None,
     bodies: ArrayLike | None,
     gravity: ArrayLike | None,
+    carried: ArrayLike | None = None,
 ) -> FrameLoads:
     """Return the loads on all small screws, from the arguments of ``solve_assembly``.
 
@@ -373,13 +379,14 @@ def all_loads(
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
         bodies: (n, 6) [N m, N] wrenches on the bodies of all frames.
         gravity: (3,) [m/s^2] base axes.
+        carried: (n, 6) [N m, N] wrenches on the parts that the frames' joints carry.
 
     Returns:
         The loads.
     """
-    carried = None
     if gravity is not None:
-        body_weights, carried = weights(posture, gravity)
-        bodies = body_weights if bodies is None else body_weights + np.asarray(bodies)
+        on_bodies, on_parts = weights(posture, gravity)
+        bodies = on_bodies if bodies is None else on_bodies + np.asarray(bodies)
+        carried = on_parts if carried is None else on_parts + np.asarray(carried)
     loads = loads_on_frames(posture, load, bodies, carried)
     return loads if gravity is None else with_distributed(loads, posture, gravity)

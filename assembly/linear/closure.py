@@ -13,7 +13,7 @@ k is the wrench its second chain exerts on its first, read there.
 symbol  code           shape       meaning
 ======  =============  ==========  ================================================
 y       ``elastic``    (6n, ny)    links and joint springs, scaled: energy = y.y / 2
-u       ``cones``      (6n, nu)    clearances, scaled: discs and intervals of size 1
+u       ``cones``      (6n, nu)    clearances, scaled: discs, intervals, balls, size 1
 q       ``free``       (6n, nq)    motions without bound, in units of their screws
 ======  =============  ==========  ================================================
 """
@@ -33,7 +33,12 @@ from assembly.model.clearance import (
     scales_with_margin,
 )
 from assembly.model.largest import LARGEST_LENGTH
-from assembly.model.links import compliance_factor, joint_compliances, link_compliances
+from assembly.model.links import (
+    compliance_factor,
+    link_compliances,
+    motion_map,
+    spring_compliances,
+)
 from assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import html_table, short_repr
@@ -48,7 +53,7 @@ class VirtualJoints:
         elastic: (6n, ny) columns of links and joint springs.
         links: (ny,) bool, columns that belong to links; the others are joints'.
         cones: (6n, nu) columns of bounded clearances, each the size of its bound.
-        group: (nu,) cone of each column: two columns for a disc.
+        group: (nu,) cone of each column: two columns for a disc, three for a ball.
         scaled: (nu,) bool, whether the margin's factor scales the column's cone.
         free: (6n, nq) unit columns of unbounded motions.
         bounded_motion: frames whose passive joint's own motion keeps its bound.
@@ -103,7 +108,7 @@ def _parts(robot: Robot) -> tuple:
     """Return what virtual joints depend on; links by identity, the robot keeps them."""
     return tuple(
         (
-            f.parent, f.joint, f.actuated, f.clearance, id(f.link),
+            f.parent, f.joint, f.pitch, f.actuated, f.clearance, id(f.link),
             f.translation.tobytes(), f.rotation.tobytes(),
             None if f.joint_stiffness is None else f.joint_stiffness.tobytes(),
         )
@@ -126,12 +131,12 @@ def _virtual_joints(
     )
     links = joints = np.zeros((0, 6, 6))
     if springs:
-        links, joints = link_compliances(robot), joint_compliances(robot)
+        links, joints = link_compliances(robot), spring_compliances(robot)
     if springs and own_axes_free:
         for C, frame in zip(joints, robot.frames, strict=True):
             if frame.compliant:
                 C[frame.own_axis] = C[:, frame.own_axis] = 0.0
-    elastic, is_link = _elastic(links, joints, len(robot.frames))
+    elastic, is_link = _elastic(links, joints, robot)
     cones, group, cone_scaled = _cones(bounds, scaled)
     return VirtualJoints(
         robot=robot,
@@ -140,17 +145,22 @@ def _virtual_joints(
         cones=cones,
         group=group,
         scaled=cone_scaled,
-        free=_free(bounds),
+        free=_free(bounds, robot),
         bounded_motion=bounded_motion,
     )
 
 
-def _elastic(links: NDArray, joints: NDArray, count: int) -> tuple[NDArray, NDArray]:
+def _elastic(
+    links: NDArray, joints: NDArray, robot: Robot
+) -> tuple[NDArray, NDArray]:  # fmt: skip
     """Return the columns of links and springs, and which of them are links'."""
+    count = len(robot.frames)
     columns, is_link = [np.zeros((6 * count, 0))], []
     for compliances, link in ((links, True), (joints, False)):
         for i, C in enumerate(compliances):
             L = compliance_factor(C)
+            if not link and robot.frames[i].pitch:
+                L = motion_map(robot.frames[i]) @ L
             block = np.zeros((6 * count, L.shape[1]))
             block[6 * i : 6 * i + 6] = L
             columns.append(block)
@@ -178,11 +188,14 @@ def _cones(bounds: NDArray, scales: NDArray) -> tuple[NDArray, NDArray, NDArray]
     )
 
 
-def _free(bounds: NDArray) -> NDArray:
-    """Return the unit columns of the motions without bound."""
+def _free(bounds: NDArray, robot: Robot) -> NDArray:
+    """Return the unit columns of motions without bound; of a thread [0 0 1 0 0 h]."""
     rows = [6 * i + r for i, cone in np.argwhere(np.isinf(bounds)) for r in CONES[cone]]
     columns = np.zeros((6 * len(bounds), len(rows)))
     columns[rows, np.arange(len(rows))] = 1.0
+    for k, row in enumerate(rows):
+        if row % 6 == 2 and (lead := robot.frames[row // 6].lead):
+            columns[row + 3, k] = lead
     return columns
 
 

@@ -23,7 +23,7 @@ from assembly.linear.closure import (
     virtual_joints,
 )
 from assembly.linear.lanes import assemble_side_by_side
-from assembly.linear.load import FrameLoads, no_loads
+from assembly.linear.load import FrameLoads, driven, no_loads
 from assembly.linear.reference.energy import CannotAssemble, least_energy
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.robot_structure import Structure, structure_of
@@ -60,6 +60,7 @@ _Rows = dict[str, NDArray]
 def solve_assembly(
     posture: Posture, load: ArrayLike | None = None, bodies: ArrayLike | None = None,
     gravity: ArrayLike | None = None, errors: None = None, method: Method = "compiled",
+    carried: ArrayLike | None = None,
 ) -> Assembly[float]: ...  # fmt: skip
 
 
@@ -68,6 +69,7 @@ def solve_assembly(
     posture: Sequence[Posture], load: ArrayLike | None = None,
     bodies: ArrayLike | None = None, gravity: ArrayLike | None = None,
     errors: ArrayLike | None = None, method: Method = "compiled",
+    carried: ArrayLike | None = None,
 ) -> Assembly[NDArray]: ...  # fmt: skip
 
 
@@ -75,7 +77,7 @@ def solve_assembly(
 def solve_assembly(
     posture: Posture, load: ArrayLike | None = None, bodies: ArrayLike | None = None,
     gravity: ArrayLike | None = None, *, errors: ArrayLike,
-    method: Method = "compiled",
+    method: Method = "compiled", carried: ArrayLike | None = None,
 ) -> Assembly[NDArray]: ...  # fmt: skip
 
 
@@ -86,6 +88,7 @@ def solve_assembly(
     gravity: ArrayLike | None = None,
     errors: ArrayLike | None = None,
     method: Method = "compiled",
+    carried: ArrayLike | None = None,
 ) -> Assembly:
     """Close a manipulator at least energy, problem (22), under optional loads.
 
@@ -103,6 +106,8 @@ def solve_assembly(
         method: ``"compiled"``, with the reference for points whose answer it does not
             prove; or ``"reference"``, numpy and Clarabel alone.  The answer's
             ``method`` says which of them solved each point.
+        carried: (n, 6) or (k, n, 6) [N m, N] wrenches on the parts that the joints of
+            all frames carry, each at its frame's origin, base axes.
 
     Returns:
         The assembled manipulator; :func:`assembly.linear.certificate.unproved` says
@@ -121,8 +126,9 @@ def solve_assembly(
     if not isinstance(posture, Posture):
         posture = together(posture)
     loads = no_loads(posture.robot.errors.size)
-    if load is not None or bodies is not None or gravity is not None:
-        loads = all_loads(posture, load, bodies, gravity)
+    given = any(one is not None for one in (load, bodies, gravity, carried))
+    if given or driven(posture.robot):
+        loads = all_loads(posture, load, bodies, gravity, carried)
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     if posture.transforms.ndim == 3 and errors is None and loads.body.ndim == 1:
         return _solve_one(posture, wrench, loads, method)

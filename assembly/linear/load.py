@@ -3,6 +3,8 @@
 A dead load does work on every small screw between it and the base.  A load on the body
 of frame j acts before j's joint: it works on the body's own error and deformation, but
 not on the joint's clearance and spring.  A load ``carried`` by j's joint acts after it.
+The force of a drive (``drive_force`` of its frame) acts between j's body and what its
+joint carries, so it works on the joint's motion alone.
 
 The weight of a beam is spread over its length.  Its equivalent at the two ends is half
 the weight at each, and the moments of a beam clamped at both, -+ r x W / 12: the tip
@@ -105,7 +107,7 @@ def loads_on_frames(
         carried: (n, 6) [N m, N] on the part that each frame's joint carries, there.
 
     Returns:
-        The loads; all zero where nothing is given.
+        The loads, those of drives among them; all zero where there are none.
 
     Raises:
         BadInput: a number is not finite, or so large that its square overflows; or a
@@ -140,8 +142,28 @@ def loads_on_frames(
         own += after
         halves = _moved(given, -arms).reshape(*lead, 2, n, 2, 3)
         given = halves @ T[..., None, :, :3, :3]
+    if driven(robot):
+        given = given.reshape(*lead, 2, n, 6)
+        given[..., 1, :, :] += drive_loads(robot)
     on = given.reshape(*lead, 2, 6 * n)
     return FrameLoads(on[..., 0, :], on[..., 1, :])
+
+
+@lru_cache(maxsize=32)
+def driven(robot: Robot) -> bool:
+    """Return whether a drive of the robot applies a force."""
+    return any(frame.drive_force for frame in robot.frames)
+
+
+def drive_loads(robot: Robot) -> NDArray:
+    """Return the (n, 6) [N m, N] wrenches of drives on what their joints carry.
+
+    At each frame's origin, in its axes; the drive exerts the opposite on the body.
+    """
+    wrenches = np.zeros((len(robot.frames), 6))
+    for wrench, frame in zip(wrenches, robot.frames, strict=True):
+        wrench[frame.own_axis] = frame.drive_force
+    return wrenches
 
 
 def _with_leading(
@@ -316,13 +338,13 @@ def loads_with_weight(postures: Posture, load: NDArray, gravity: NDArray) -> Fra
         errors, springs and clearances alone share them.
     """
     robot = postures.robot
-    arrays = load, gravity, _masses(robot)
+    arrays = load, gravity, _masses(robot), drive_loads(robot)
     return _loads_with_weight(content_of(postures, arrays, robot.platform))
 
 
 @lru_cache(maxsize=4)
 def _loads_with_weight(content: Content) -> FrameLoads:
-    load, gravity, _ = content.arrays
+    load, gravity, *_ = content.arrays
     bodies = carried = None
     if gravity.any():
         bodies, carried = weights(content.postures, gravity)

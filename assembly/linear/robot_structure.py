@@ -41,6 +41,7 @@ class Structure(NamedTuple):
         starts: (cones + 1,) first clearance of each cone, and nu.
         free_frame: (nq,) frame of each free motion.
         free_axis: (nq,) component of its screw.
+        free_lead: (nq,) [m/rad] translation along z per angle, of a helical joint.
         free_bound: (nq,) [rad or m] bound that was left out, inf where there is none.
     """
 
@@ -62,6 +63,7 @@ class Structure(NamedTuple):
     starts: NDArray
     free_frame: NDArray
     free_axis: NDArray
+    free_lead: NDArray
     free_bound: NDArray
 
 
@@ -115,7 +117,8 @@ def _structure(joints: VirtualJoints, tree: _Tree, own_axes_free: bool) -> Struc
     cone_frame, cones = _by_frame(joints.cones)
     free_frame, free = _by_frame(joints.free)
     bounds = component_bounds(clearance_bounds(robot, own_axes_free))
-    free_axis = np.abs(free).argmax(axis=1) if len(free) else np.zeros(0, dtype=int)
+    # a helical joint's rotation comes before its translation
+    free_axis = (free != 0).argmax(axis=1) if len(free) else np.zeros(0, dtype=int)
     cone_axis = np.abs(cones).argmax(axis=1) if len(cones) else np.zeros(0, dtype=int)
     return Structure(
         size=size_of(robot),
@@ -136,6 +139,7 @@ def _structure(joints: VirtualJoints, tree: _Tree, own_axes_free: bool) -> Struc
         starts=cone_starts(joints.group),
         free_frame=free_frame,
         free_axis=free_axis,
+        free_lead=np.where(free_axis == 2, free[:, 5], 0.0),
         free_bound=bounds[free_frame, free_axis],
     )
 

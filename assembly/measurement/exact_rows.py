@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from assembly.kinematics.pieces import cut_beams
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.row_state import Rows, RowState
-from assembly.measurement.without_clearance import (
-    flexibility,
-)
+from assembly.measurement.without_clearance import flexibility
+from assembly.model.links import own_screws
+from assembly.model.robot import Robot
 
 _MOST_ITERATIONS = 60  # largest number of iterations; 5 to 12 are usual
 _CONVERGED = 1e-12  # [rad, reference lengths] largest change of a screw at the end
@@ -57,21 +57,25 @@ def solve_rows(
     )
     distinct, posture_of_row = conditions.postures.distinct
     flexible = flexibility(distinct)
-    own_axes = [
-        6 * i + f.own_axis for i, f in enumerate(conditions.robot.frames) if f.passive
-    ]
-    moved = np.flatnonzero(flexible.free.any(axis=1))
-    if not np.isin(moved, own_axes).all():
-        return (
-            screws,
-            converged,
-        )  # a fixed joint with a free motion
+    if not _of_passive_joints(flexible.free, conditions.robot):
+        return screws, converged
     for begin in range(0, len(conditions), _BATCH):
         rows = slice(begin, begin + _BATCH)
         some = conditions.take(np.arange(len(conditions))[rows])
         batch = Rows(some, flexible, posture_of_row[rows], linear_deflections[rows])
         screws[rows], converged[rows] = _solve(batch)
     return screws, converged
+
+
+def _of_passive_joints(free: NDArray, robot: Robot) -> bool:
+    """Return whether all free motions (6n, q) are those of passive joints."""
+    passive = np.array([frame.passive for frame in robot.frames])
+    own = own_screws(robot) * passive[:, None]
+    for column in free.T.reshape(-1, len(robot.frames), 6):
+        row = np.abs(column).max(axis=1).argmax()
+        if not np.array_equal(column[row], own[row]):
+            return False
+    return True
 
 
 def _solve(rows: Rows) -> tuple[NDArray, NDArray]:

@@ -17,7 +17,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exact.dead_load import DeadLoads, dead_loads_of_rows, resultants
+from assembly.exact.dead_load import (
+    DeadLoads,
+    dead_loads_of_rows,
+    drive_wrenches,
+    resultants,
+)
 from assembly.exact.finite_robot import along_own
 from assembly.kinematics.closure_rates import closure_signs
 from assembly.kinematics.nominal import size_of
@@ -34,6 +39,7 @@ from assembly.measurement.without_clearance import (
     at_postures,
     pseudo_inverse,
 )
+from assembly.model.links import own_screw
 from stiffness.screws import rotation_matrix, rotation_vector, transform
 
 _LINEAR_BELOW = 1e-9  # [rad or m] below it the law of a contact is linear
@@ -86,7 +92,7 @@ class Rows:
         ))
         for k, law in enumerate(self.conditions.laws):
             i = self.conditions.robot.index(law.frame)
-            columns[6 * i + self.conditions.robot.frames[i].own_axis, k] = 1.0
+            columns[6 * i : 6 * i + 6, k] = own_screw(self.conditions.robot.frames[i])
         return columns
 
     @cached_property
@@ -204,7 +210,8 @@ class RowState:
     def passive_motion(self) -> NDArray:
         """(R, n) [rad or m] motions of passive joints from their coordinates."""
         moved = self.motions @ self.rows.flexible.free.T
-        return moved.reshape(*self.screws.shape[1:]).sum(axis=-1)
+        own = [f.own_axis for f in self.rows.conditions.robot.frames]
+        return moved.reshape(*self.screws.shape[1:])[..., np.arange(len(own)), own]
 
     @cached_property
     def poses(self) -> tuple[NDArray, NDArray, NDArray, NDArray]:
@@ -276,6 +283,9 @@ class RowState:
         if loads.beyond_platform:
             carried = self.poses[3] @ self.rows.commanded
             total += resultants(posture, loads, self.poses[1], carried)[:2]
+        if loads.drives.any():
+            carried = self.poses[3] @ self.rows.commanded
+            total[1] += drive_wrenches(posture, loads, carried)
         return total
 
     def wrenches(self, total: NDArray, poses: NDArray, frames: NDArray) -> NDArray:

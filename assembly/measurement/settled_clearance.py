@@ -17,6 +17,7 @@ from assembly.measurement.without_clearance import flexibility
 from assembly.model.clearance import (
     CONES,
     clearance_bounds,
+    clearance_components,
     component_bounds,
     scales_with_margin,
 )
@@ -55,10 +56,10 @@ def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArra
         size = np.linalg.norm(parts, axis=2)
         rests = size > _UNLOADED * size.max(initial=0.0)
         unit = parts / np.where(rests, size, 1.0)[:, :, None]
-        clearance_screws[:, :, list(rows)] = (
-            unit * (rests * bounds[:, cone])[:, :, None]
-        )
-        undetermined |= np.any(~rests & (bounds[:, cone] > 0.0), axis=1)
+        # a joint with a ball has neither radial nor axial clearance, and conversely
+        bound = np.where(np.isnan(bounds[:, cone]), 0.0, bounds[:, cone])
+        clearance_screws[:, :, list(rows)] += unit * (rests * bound)[:, :, None]
+        undetermined |= np.any(~rests & (bound > 0.0), axis=1)
     return replace(tight, errors=conditions.errors + clearance_screws), undetermined
 
 
@@ -103,9 +104,8 @@ def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
     """
     bounds = _component_bounds(robot)
     finite = np.isfinite(bounds) & (bounds > 0)
-    return np.divide(
-        clearance_screws, bounds, out=np.zeros_like(clearance_screws), where=finite
-    )
+    bounded = clearance_components(robot, clearance_screws)
+    return np.divide(bounded, bounds, out=np.zeros_like(bounded), where=finite)
 
 
 def without_joint_clearances(robot: Robot) -> Robot:

@@ -36,7 +36,7 @@ from assembly.linear.closure import (
 )
 from assembly.linear.load import FrameLoads
 from assembly.model.clearance import clearance_bounds, component_bounds
-from assembly.model.links import joint_compliances, link_compliances
+from assembly.model.links import joint_compliances, link_compliances, own_screws
 
 # relative size below which an eigenvalue is rounding; up to RANK the rank is ambiguous
 _ROUNDING = 1e-13
@@ -259,14 +259,15 @@ def flexibility(postures: Posture) -> Flexibility:
     """
     robot = postures.robot
     # robots that differ in errors and loads alone share one factorisation
-    arrays = link_compliances(robot), joint_compliances(robot), clearance_bounds(robot)
+    springs = link_compliances(robot), joint_compliances(robot)
+    arrays = *springs, clearance_bounds(robot), own_screws(robot)
     return _factorise(content_of(postures, arrays, (robot.closures, robot.platform)))
 
 
 @lru_cache(maxsize=4)
 def _factorise(content: Content) -> Flexibility:
     """Return the system of every posture, and its inverse."""
-    postures, (C_body, C_joint, _) = content.postures, content.arrays
+    postures, (C_body, C_joint, *_) = content.postures, content.arrays
     robot = postures.robot
     joints = virtual_joints(robot)
     if joints.cones.shape[1]:

@@ -8,21 +8,30 @@ carries the children.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.model.inertia import inertia_fault, six_moments
 from assembly.model.link_kinds import BeamLink, Link
 from forcefit.inputs.table import BadInput, quoted
-from forcefit.results.display import html_table, short_repr
+from forcefit.results.display import Figures, brief, html_table, short_repr
 from stiffness.screws import rotation_matrix
 
-JOINTS = ("fixed", "revolute", "prismatic")
+JOINTS = ("fixed", "revolute", "prismatic", "helical")
 BASE = "base"
 LOCKED = (
     "found inf along the own motion of a passive joint, which would lock it; expected "
     '0 (free, as a bearing), a number > 0 (a spring), or joint = "fixed"'
+)
+SLIDING_BALL = "found one on a joint that slides, expected radial"
+ONE_OF_BALL = 'found together with "ball", expected one of them'
+NO_SPIN = "expected none: its motion along the thread has no clearance bound"
+
+FORCE_CONTROL = (
+    'expected a joint = "revolute" | "prismatic" | "helical" that is not actuated: a '
+    "drive that applies a force holds no coordinate"
 )
 
 
@@ -38,12 +47,20 @@ class Clearance:
         axial: [m] bound of abs(TZ), eq. (3).
         tilt: [rad] radius of the disc for (RX, RY), eq. (4).
         spin: [rad] bound of abs(RZ), eq. (5).
+        ball: [m] radius of the ball for (TX, TY, TZ), in place of ``radial`` and
+            ``axial``: a ball in its socket.
     """
 
     radial: float | None = None
     axial: float | None = None
     tilt: float | None = None
     spin: float | None = None
+    ball: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.ball is not None and (self.radial, self.axial) != (None, None):
+            key = "axial" if self.radial is None else "radial"
+            raise BadInput(f"clearance.{key}: {ONE_OF_BALL}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +93,8 @@ class Frame:
         parent: name of the parent frame, or ``"base"``.
         translation: (3,) [m] origin seen from the parent's frame after its joint.
         rotation: (3,) [rad] rotation vector of the axes, seen from there too.
-        joint: ``"fixed"``, ``"revolute"`` or ``"prismatic"``, about or along own z.
+        joint: ``"fixed"``, ``"revolute"`` or ``"prismatic"``, about or along own z, or
+            ``"helical"``, both together; its coordinate is the angle.
         actuated: whether the joint is locked at a command; otherwise its motion is
             free.
         position: [rad or m] joint coordinate in the home pose.
@@ -89,9 +107,15 @@ class Frame:
             not.
         joint_stiffness: (6, 6) K_B with ``inf`` on the diagonal where rigid, or None;
             0 along a passive joint's own motion (its row and column) leaves it free.
+        drive_force: [N m or N] with which a drive pushes a passive joint along its
+            motion, independent of its coordinate; positive where the coordinate grows.
         link: elasticity of the body, None if rigid.
         mass: [kg] of the body in addition to its link's own.
         centre_of_mass: (3,) [m] of that mass, in the frame's axes.
+        inertia: (3, 3) [kg m^2] of that mass about its centre, in the frame's axes;
+            symmetric, its principal moments those of a body.
+        pitch: [m] translation of a helical joint in a turn, positive for a right-hand
+            thread; 0 of other joints.
     """
 
     name: str
@@ -107,9 +131,12 @@ class Frame:
     clearance: Clearance | None = None
     locked_at: LockedAt | None = None
     joint_stiffness: NDArray | None = None
+    drive_force: float = 0.0
     link: Link | None = None
     mass: float = 0.0
     centre_of_mass: NDArray = field(default_factory=lambda: np.zeros(3))
+    inertia: NDArray = field(default_factory=lambda: np.zeros((3, 3)))
+    pitch: float = 0.0
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -124,9 +151,45 @@ class Frame:
                 f"frame {quoted(self.name)}.locked_at: found a joint that moves or has "
                 'a clearance besides; expected joint = "fixed"'
             )
+        if (self.joint == "helical") != (self.pitch != 0.0):
+            raise BadInput(
+                f"frame {quoted(self.name)}.pitch: found {self.pitch:g} on a "
+                f"{self.joint} joint; expected 0 except on a helical joint, "
+                "where it is not 0"
+            )
+        if self.pitch and self.clearance and self.clearance.spin is not None:
+            place = f"frame {quoted(self.name)}.clearance.spin"
+            raise BadInput(f"{place}: found one on a helical joint, {NO_SPIN}")
+        ball = self.clearance is not None and self.clearance.ball is not None
+        if ball and self.joint in {"prismatic", "helical"}:
+            raise BadInput(f"frame {quoted(self.name)}.clearance.ball: {SLIDING_BALL}")
         own = self.own_stiffness
         if self.passive and own is not None and np.isinf(own):
             raise BadInput(f"frame {quoted(self.name)}.joint_stiffness: {LOCKED}")
+        if self.drive_force and not self.passive:
+            kind = "actuated" if self.actuated else "fixed"
+            raise BadInput(
+                f"frame {quoted(self.name)}.drive_force: found {self.drive_force:g} on "
+                f"a {kind} joint; {FORCE_CONTROL}"
+            )
+        if self.inertia.any():
+            fault = inertia_fault(self.inertia)
+            if fault:
+                raise BadInput(f"frame {quoted(self.name)}.inertia: {fault}")
+            # files have the upper triangle
+            J = locked((self.inertia + self.inertia.T) / 2, (3, 3), "inertia")
+            object.__setattr__(self, "inertia", J)
+
+    def _figures(self) -> Figures:
+        """Return the fields in short; the rarest only where they are not zero."""
+        shown = {f.name: brief(getattr(self, f.name)) for f in fields(self)[1:]}
+        for name in ("drive_force", "pitch"):
+            if not getattr(self, name):
+                del shown[name]
+        del shown["inertia"]
+        if self.inertia.any():
+            shown["inertia"] = brief(np.array(six_moments(self.inertia)))
+        return shown
 
     @property
     def passive(self) -> bool:
@@ -148,8 +211,22 @@ class Frame:
         return np.diag(K)
 
     @property
+    def lead(self) -> float:
+        """[m/rad] translation of a helical joint per angle, 0 of others."""
+        return self.pitch / (2 * math.pi)
+
+    @property
+    def turns(self) -> bool:
+        """Whether the coordinate is an angle: of a revolute or helical joint."""
+        return self.joint in {"revolute", "helical"}
+
+    @property
     def own_axis(self) -> int:
-        """Index of the joint's own component of a screw: RZ, or TZ if prismatic."""
+        """Index of the joint's own component of a screw: RZ, or TZ if prismatic.
+
+        RZ of a helical joint is its whole motion, the translation included
+        (:func:`assembly.model.links.motion_map`).
+        """
         return 5 if self.joint == "prismatic" else 2
 
     @property
@@ -176,6 +253,7 @@ _SHAPES = {
     "tolerance": (6,),
     "joint_stiffness": (6, 6),
     "centre_of_mass": (3,),
+    "inertia": (3, 3),
 }
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.model.links import own_screw
 from assembly.model.robot import BeamLink, Frame, Link, MeshLink, Robot
 from forcefit.inputs.table import BadInput, quoted
 from stiffness.beam.beam import section_axes
@@ -16,8 +17,9 @@ _SAME_POINT = 1e-9  # [m] two origins nearer than this coincide
 def with_spans(robot: Robot, home: NDArray) -> Robot:
     """Return the robot with every link's length known and checked.
 
-    A beam connects the two origins at home.  After a prismatic joint that is not at
-    zero there, this differs from the frame's translation, and the length is stored.
+    A beam connects the two origins at home.  After a prismatic or helical joint that is
+    not at zero there, this differs from the frame's translation, and the length is
+    stored.
 
     Args:
         robot: robot as read.
@@ -32,8 +34,9 @@ def with_spans(robot: Robot, home: NDArray) -> Robot:
     links: dict[str, Link] = {}
     for i, frame in enumerate(robot.frames):
         parent = robot.parents[i]
-        slides = parent >= 0 and robot.frames[parent].joint == "prismatic"
-        shift = float(home[parent]) if slides else 0.0
+        # a prismatic joint moves its children by q along z, a helical one by h q
+        travel = own_screw(robot.frames[parent])[5] if parent >= 0 else 0.0
+        shift = float(home[parent] * travel)
         shift = shift if abs(shift) > _SAME_POINT else 0.0
         if isinstance(frame.link, BeamLink):
             links[frame.name] = _with_span(frame, frame.link, shift)
@@ -64,7 +67,7 @@ def _check_mesh(frame: Frame, link: MeshLink, shift: float) -> None:
     if link.axis is None and shift:
         raise BadInput(
             f"frame {quoted(frame.name)}.link.mesh: found a mesh on a frame "
-            f"below a prismatic joint whose home position is {shift:g} m; "
+            f"below a sliding joint whose home position is {shift:g} m; "
             'expected a home position of 0, or the "axis" of the mesh from '
             "base to tip"
         )

@@ -74,6 +74,23 @@ def joint_compliances(robot: Robot) -> NDArray:
     Returns:
         (n, 6, 6) [rad/(N m) .. m/N] at each frame, in its axes.
     """
+    C = spring_compliances(robot)
+    for i, frame in enumerate(robot.frames):
+        if frame.pitch:
+            S = motion_map(frame)
+            C[i] = S @ C[i] @ S.T
+    return C
+
+
+def spring_compliances(robot: Robot) -> NDArray:
+    """Return K_B^-1 of every joint in its components, see :func:`motion_map`.
+
+    Args:
+        robot: robot of n frames.
+
+    Returns:
+        (n, 6, 6) [rad/(N m) .. m/N], zero where rigid, free or not given.
+    """
     C = np.zeros((len(robot.frames), 6, 6))
     for i, frame in enumerate(robot.frames):
         K = frame.springs
@@ -103,7 +120,34 @@ def compliance_factor(C: NDArray) -> NDArray:
 
 def own_screw(frame: Frame) -> NDArray:
     """Return the (6,) unit screw of a joint's own motion."""
-    return np.eye(6)[frame.own_axis]
+    return motion_map(frame)[:, frame.own_axis]
+
+
+def own_screws(robot: Robot) -> NDArray:
+    """Return the (n, 6) unit screws of all joints' own motions."""
+    frames = robot.frames
+    screws = np.zeros((len(frames), 6))
+    screws[np.arange(len(frames)), [frame.own_axis for frame in frames]] = 1.0
+    screws[:, 5] += [frame.lead for frame in frames]
+    return screws
+
+
+def motion_map(frame: Frame) -> NDArray:
+    """Return the (6, 6) map of a joint's components to its screw in the frame's axes.
+
+    The identity; of a helical joint, component RZ is the motion along the thread,
+    [0 0 1 0 0 h], and component TZ is the translation in addition, TZ - h RZ.  K_B and
+    clearances are in components, so they hold relative to the thread.
+
+    Args:
+        frame: frame of a robot.
+
+    Returns:
+        (6, 6) [-; m/rad in row TZ, column RZ].
+    """
+    S = np.eye(6)
+    S[5, 2] = frame.lead
+    return S
 
 
 def in_series(stiffness: NDArray | None, row: int, compliance: float) -> NDArray:

@@ -37,4 +37,4 @@ def _own_motion(frame: Frame) -> NDArray:
     along = np.array([0.0, 0.0, frame.position])
     if frame.joint == "prismatic":
         return transform(along, np.eye(3))
-    return transform(np.zeros(3), rotation_matrix(along))
+    return transform(frame.lead * along, rotation_matrix(along))

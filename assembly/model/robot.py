@@ -16,6 +16,7 @@ from assembly.model.frame import (
     BASE,
     JOINTS,
     LOCKED,
+    NO_SPIN,
     Clearance,
     Frame,
     LockedAt,
@@ -35,8 +36,9 @@ from forcefit.results.display import Figures, html_table, largest, short_repr
 from stiffness.screws import rotation_matrix, transform
 
 __all__ = [
-    "BASE", "JOINTS", "LOCKED", "BeamLink", "Clearance", "Frame", "LibraryLink",
-    "Link", "LockedAt", "MatrixLink", "MeshLink", "Robot", "beam_axis", "parents_first",
+    "BASE", "JOINTS", "LOCKED", "NO_SPIN", "BeamLink", "Clearance", "Frame",
+    "LibraryLink", "Link", "LockedAt", "MatrixLink", "MeshLink", "Robot", "beam_axis",
+    "parents_first",
 ]  # fmt: skip
 
 

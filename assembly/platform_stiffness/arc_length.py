@@ -119,6 +119,7 @@ class _Path:
     def reference_load(self, local: Expansion) -> NDArray:
         """Return the (N,) work of a unit load per unit of each unknown."""
         unit = dead_loads(self.posture, np.eye(6)[self.component])
+        unit = replace(unit, drives=0 * unit.drives)
         return work_gradient(local.placement, unit)
 
     def covector(self, local: Expansion, motion: NDArray) -> NDArray:

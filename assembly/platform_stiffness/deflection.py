@@ -24,7 +24,9 @@ from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import VirtualJoints
 from assembly.linear.energy import Assembly, solve_assembly
+from assembly.linear.load import driven
 from assembly.linear.nearest_pose import nearest_pose
+from assembly.model.clearance import bound_name
 from assembly.platform_stiffness.active_set import contacts
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import in_contact
@@ -48,14 +50,6 @@ _CHANGES = 8
 _STAYS = 1e-6
 _STILL = 1e-12  # [characteristic lengths] size below which motions are rounding
 _JUMP = 5.0  # times the motion predicted by the tangents on both sides
-_BOUNDS = (
-    "tilt",
-    "tilt",
-    "spin",
-    "radial",
-    "radial",
-    "axial",
-)  # by row of a screw
 # relative to the largest load: below it clearances may leave the pose open
 _NO_LOAD = 1e-9
 
@@ -253,7 +247,8 @@ def _settled(
     If clearances leave it open, the one nearest to nominal.
     """
     equilibrium = point.equilibrium
-    idle = not rest.any() and gravity is None and abs(point.load) <= _NO_LOAD * largest
+    others = rest.any() or gravity is not None or driven(equilibrium.posture.robot)
+    idle = not others and abs(point.load) <= _NO_LOAD * largest
     if idle and isinstance(equilibrium, Assembly):
         nearest, open_ = nearest_pose(equilibrium, np.zeros(3), method)
         return nearest.platform_screw, open_
@@ -272,9 +267,9 @@ def clearance_names(joints: VirtualJoints, marked: NDArray) -> frozenset[str]:
     """
     names = set()
     for k in np.flatnonzero(marked):
-        column = int(np.flatnonzero(joints.group == k)[0])
-        row = int(np.abs(joints.cones[:, column]).argmax())
-        names.add(f"{joints.robot.frames[row // 6].name} {_BOUNDS[row % 6]}")
+        columns = joints.cones[:, joints.group == k]
+        frame = joints.robot.frames[int(columns.any(axis=1).argmax()) // 6]
+        names.add(f"{frame.name} {bound_name(columns)}")
     return frozenset(names)
 
 

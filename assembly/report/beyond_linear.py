@@ -20,7 +20,8 @@ def far_from_linear(assembly: ExactAssembly) -> list[str]:
     Returns:
         One sentence, or none.
     """
-    if not (assembly.load.any() or assembly.loads.beyond_platform):
+    loads = assembly.loads
+    if not (loads.load.any() or loads.beyond_platform or loads.drives.any()):
         return []
     scale = np.repeat([assembly.linear.linearisation.size, 1.0], 3)
     exact = scale * assembly.platform_screw

@@ -13,6 +13,7 @@ from assembly.linear.energy import (
     failure_status,
     solve_assembly,
 )
+from assembly.linear.load import driven
 from assembly.linear.pose_error import PoseError, bound_pose_error
 from assembly.linear.reference.pose_error import ASSUMPTIONS, reachable_screws
 from assembly.linear.reference.reduction import FreeMotion
@@ -51,7 +52,7 @@ def pose_error_of(
     Raises:
         BadInput: assumption ``budget`` with a load.
     """
-    loaded = bool(np.any(load) or np.any(gravity))
+    loaded = bool(np.any(load) or np.any(gravity) or driven(posture.robot))
     if loaded and "budget" in (assumptions or ()):
         raise BadInput(
             "assumption budget: found a load, expected none; use frozen or "

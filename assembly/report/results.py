@@ -1,13 +1,12 @@
 """Results of assemblies as plain values (the keys of the public format) and as text."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from assembly.exact.exact import ExactAssembly, solve_exact
-from assembly.kinematics.mobility import mobility
 from assembly.kinematics.posture import Posture
 from assembly.kinematics.verdict import posture_remarks
 from assembly.linear.certificate import (
@@ -30,6 +29,7 @@ from assembly.model.statuses import NOT_PROVED, UNSTABLE
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.report.beyond_linear import far_from_linear
 from assembly.report.first_order import first_order_status, linearisation_of
+from assembly.report.mobility import mobility_lines, mobility_of
 from assembly.report.wrench_table import wrench_lines
 from assembly.solvers.conic import SolverFailed
 from forcefit.results.display import listing
@@ -106,7 +106,7 @@ def solution_of(
         "pose": posture.pose(),
         "joints": dict(zip(names, posture.coordinates.tolist(), strict=True)),
         "nominal_mismatch": posture.mismatch,
-        "mobility": vars(mobility(posture)),
+        "mobility": mobility_of(posture),
         "remarks": [
             *robot.remarks,
             *posture_remarks(posture),
@@ -210,7 +210,8 @@ def exact_of(
         ``"unstable"`` where the potential decreases along a motion.
     """
     results: dict[str, Any] = {
-        "robot": posture.robot.name, "status": "ok", "pose": posture.pose()
+        "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
+        "mobility": mobility_of(posture),
     }  # fmt: skip
     try:
         assembly = solve_exact(posture, load, gravity=gravity, progress=progress)
@@ -227,8 +228,8 @@ def exact_of(
         "energy": assembly.linear.energy,
         "platform_screw": assembly.linear.platform_screw,
     }
-    loaded = assembly.load.any() or gravity is not None
-    if loaded and not exact_tangent(assembly).stable:
+    loaded = assembly.load.any() or assembly.loads.drives.any()
+    if (loaded or gravity is not None) and not exact_tangent(assembly).stable:
         results |= {"status": UNSTABLE, "reason": _UNSTABLE}
     return results | {
         **_screws_and_wrenches(assembly),
@@ -243,7 +244,9 @@ def exact_text(results: dict[str, Any]) -> str:
     """Return an exact solution as text."""
     return listing(
         results["robot"],
-        lines_of(results, "pose status reason energy platform_screw")
+        lines_of(results, "pose")
+        | mobility_lines(results["mobility"])
+        | lines_of(results, "status reason energy platform_screw")
         | _linearisation_lines(results)
         | lines_of(results.get("certificate", {}), _PROOF),
         results.get("remarks", ()),
@@ -260,7 +263,8 @@ def solution_text(results: dict[str, Any]) -> str:
         Text without colours.
     """
     solved = results["energy"] is not None
-    lines = lines_of(results, f"pose {_ZONE} status reason")
+    lines = lines_of(results, "pose") | mobility_lines(results["mobility"])
+    lines |= lines_of(results, f"{_ZONE} status reason")
     if solved:
         lines |= lines_of(results, "energy platform_screw reading")
         lines |= _linearisation_lines(results) | _bound_lines(results)
@@ -309,11 +313,6 @@ def status_line(results: dict[str, Any]) -> str:
     """Return the status and reason of a result whose status is not ok."""
     status, reason = results["status"], results["reason"]
     return reason if reason.startswith(status) else f"{status}: {reason}"
-
-
-def remark_lines(remarks: Sequence[str]) -> list[str]:
-    """Return the remarks on defaults of a robot's file, a line each."""
-    return [f"note: {remark}" for remark in remarks]
 
 
 def worst(assembly: Assembly) -> dict[str, Any] | None:

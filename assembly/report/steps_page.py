@@ -154,7 +154,7 @@ def assembly_of(machine: Machine, state: State) -> Assembly:
         linearisation=linearise(replace(posture, robot=robot)), joints=machine.joints,
         load=np.zeros(6), frame_loads=no_loads(robot.errors.size),
         elastic=found.springs[0], clearances=found.clearances[0],
-        motions=machine.joints.free.T @ machine.free @ found.motions[0],
+        motions=machine.free_size * found.motions[0],
         multipliers=multipliers.ravel(), energy_without_clearance=0.0,
         method="reference",
     )  # fmt: skip

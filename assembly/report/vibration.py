@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble, failure_status
+from assembly.linear.load import driven
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.statuses import FREE_MOTION, UNSTABLE
 from assembly.platform_stiffness.vibration import natural_modes
@@ -48,7 +49,8 @@ def vibration_of(
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
         "state": state, "remarks": [],
     }  # fmt: skip
-    if state == "nominal" and (np.any(load) or np.any(gravity)):
+    loaded = np.any(load) or np.any(gravity) or driven(posture.robot)
+    if state == "nominal" and loaded:
         results["remarks"] = [_NOMINAL]
     try:
         modes = natural_modes(posture, count, load, gravity, state)

@@ -1,4 +1,4 @@
-"""Vectors of clearances by their cones, discs and intervals of radius 1."""
+"""Vectors of clearances by their cones: discs, intervals and balls of radius 1."""
 
 import numpy as np
 from numpy.typing import NDArray

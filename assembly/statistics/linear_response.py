@@ -186,7 +186,7 @@ def linear_response(
         screws=lin.platform @ (screws + free @ motions),
         platform=lin.platform,
         motions=motions,
-        ranges=bounds[np.flatnonzero(free.any(axis=1))],
+        ranges=bounds[(free != 0).argmax(axis=0)],
         wrench=wrenches.reshape(len(robot.frames), 6, -1) / size,
         load=wrench if loads else None,
         gravity=g if loads else None,

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.clearance import BOUND_OF_COMPONENT
+from assembly.model.clearance import bound_name
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.linear_response import LinearResponse
 from assembly.statistics.quantities import POSE_ERRORS, UNITS
@@ -23,7 +23,6 @@ from assembly.statistics.worst_clearance import bound_worst_errors, worst_error_
 _DRAWS = 200  # number of positions of a random clearance model, whose median is used
 _PRECISION = (1e-9, 1e-9)  # [rad, m] required precision of the largest pose errors
 _SHARE = 1e-3  # relative to the largest pose error: smaller parts are not listed
-_KEYS = ("tilt", "spin", "radial", "axial")
 _OWN = 0.02  # relative to the largest pose error: precision of the parts
 OWN_MOTION = "own motion of passive joints"
 _EXCEEDED = 1e-9  # relative excess above a limit
@@ -89,14 +88,12 @@ def _clearance_parts(prepared: LinearResponse) -> dict[str, dict[str, float]]:
 
 def _clearance_kinds(prepared: LinearResponse) -> list[str]:
     """Return the kind of each cone, such as ``hinge.tilt``, common to all legs."""
-    rows: NDArray = np.abs(prepared.joints.cones[:, prepared.starts[:-1]]).argmax(
-        axis=0
-    )
-    frames = prepared.posture.robot.frames
-    return [
-        f"{kind_of(frames[row // 6].name)}.{_KEYS[BOUND_OF_COMPONENT[row % 6]]}"
-        for row in rows.tolist()
-    ]
+    frames, kinds = prepared.posture.robot.frames, []
+    for first, end in zip(prepared.starts[:-1], prepared.starts[1:], strict=True):
+        columns: NDArray = prepared.joints.cones[:, first:end]
+        frame = frames[int(columns.any(axis=1).argmax()) // 6]
+        kinds.append(f"{kind_of(frame.name)}.{bound_name(columns)}")
+    return kinds
 
 
 def stored_perfect_parts(experiment: Experiment) -> str:

@@ -76,19 +76,22 @@ def stiffness_report(
         level: level of confidence.
 
     Returns:
-        By axis: the number of draws with a result, the share of draws with a free
-        motion, and of the other draws mean and quantiles with intervals.  And the free
-        motions of most draws.
+        By axis: the number of draws with a result, the shares of draws with a free
+        motion and (if any) with a rigid platform, and of the other draws mean and
+        quantiles with intervals.  And the free motions of most draws.
     """
     axes: dict[str, Any] = {}
     for name, values in zip(WRENCH, stiffnesses.T, strict=True):
-        known = values[np.isfinite(values)]
-        held = known[known > 0.0]
+        known = values[~np.isnan(values)]
+        held = known[(known > 0.0) & np.isfinite(known)]
         axes[name.lower()] = {
             "unit": "N m/rad" if name.startswith("M") else "N/m",
             "draws": len(known),
-            "free": proportion(len(known) - len(held), len(known), level),
-        }  # fmt: skip
+        }
+        for share, there in (("free", known == 0.0), ("rigid", np.isinf(known))):
+            if len(known) and (share == "free" or there.any()):
+                found = proportion(int(there.sum()), len(known), level)
+                axes[name.lower()][share] = found
         if len(held) > 1:
             axes[name.lower()] |= {
                 "mean": mean(held, level),
@@ -111,7 +114,12 @@ def stiffness_spread_text(report: Mapping[str, Any]) -> str:
     """Return the spread as text, a line for each axis."""
     lines = [f"stiffness of the platform, {report['means']}:"]
     for name, one in report["axes"].items():
-        text = "no resistance"
+        shares = {
+            share: one[share]["probability"]
+            for share in ("free", "rigid")
+            if share in one and one[share]["probability"]
+        }
+        text = "no finite stiffness" if "rigid" in shares else "no resistance"
         if "quantiles" in one:
             low, half, high = (
                 one["quantiles"][q]["value"] for q in ("0.05", "0.5", "0.95")
@@ -119,8 +127,8 @@ def stiffness_spread_text(report: Mapping[str, Any]) -> str:
             text = (
                 f"median {half:.4g} {one['unit']}, 90 % within {low:.4g} to {high:.4g}"
             )
-        free = one["free"]["probability"]
-        lines.append(f"  {name}: {text}" + (f"; free in {free:.3g}" if free else ""))
+        also = [f"{share} in {value:.3g}" for share, value in shares.items()]
+        lines.append(f"  {name}: {'; '.join([text, *also])}")
     for one in report["free_motions"]:
         screw = numbers(one["screw"])
         lines.append(

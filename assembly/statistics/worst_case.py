@@ -169,15 +169,17 @@ def _affine_clearances(
     size = np.linalg.norm(asked) or 1.0
     V, largest = cp.Variable((nu, m)), cp.Variable()
     single = starts[:-1][np.diff(starts) == 1]
-    double = starts[:-1][np.diff(starts) == 2]
     limit = largest if G is None else 1.0
     constraints = []
     if len(single):
         constraints.append(cp.sum(cp.abs(V[single, :]), axis=1) <= limit)
-    if len(double):
-        pairs = cp.vstack([cp.vec(V[double + i, :], order="C") for i in (0, 1)])
-        sizes = cp.reshape(cp.norm(pairs, 2, axis=0), (len(double), m), order="C")
-        constraints.append(cp.sum(sizes, axis=1) <= limit)
+    for width in (2, 3):
+        heads = starts[:-1][np.diff(starts) == width]
+        if len(heads):
+            of_cone = [cp.vec(V[heads + i, :], order="C") for i in range(width)]
+            sizes = cp.norm(cp.vstack(of_cone), 2, axis=0)
+            sizes = cp.reshape(sizes, (len(heads), m), order="C")
+            constraints.append(cp.sum(sizes, axis=1) <= limit)
     if G is None or h is None:
         constraints.append(B @ V == asked / size)
         goal = cp.Minimize(largest)

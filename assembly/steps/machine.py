@@ -48,11 +48,16 @@ class Machine:
         return self.joints.cones
 
     @cached_property
+    def free_size(self) -> NDArray:
+        """(nq,) size of each free motion: 1 rad, or the reference length [m]."""
+        angles = np.tile(np.repeat([True, False], 3), len(self.joints.free) // 6)
+        turns = self.joints.free[angles].any(axis=0)
+        return np.where(turns, 1.0, self.size)
+
+    @cached_property
     def free(self) -> NDArray:
         """(6n, nq) columns of free motions, lengths in reference lengths."""
-        free = self.joints.free
-        lengths = np.tile(np.repeat([False, True], 3), len(free) // 6)
-        return free * np.where(lengths, self.size, 1.0)[:, None]
+        return self.joints.free * self.free_size
 
     @property
     def scale(self) -> NDArray:

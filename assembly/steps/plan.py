@@ -156,8 +156,15 @@ def check_plan(plan: Plan, robot: Robot) -> None:
 
     Raises:
         BadInput: a name is used twice or unknown, a part is joined twice, or what is
-            released is not held; the message begins with the step.
+            released is not held; the message begins with the step.  Or a drive of the
+            robot applies a force.
     """
+    driven = [frame.name for frame in robot.frames if frame.drive_force]
+    if driven:
+        raise BadInput(
+            f"{robot.name}: frame {quoted(driven[0])}.drive_force: found a drive that "
+            "applies a force, which steps of assembly do not compute; expected none"
+        )
     names: set[str] = set()
     held: dict[str, Closure | str | None] = {}
     for number, step in enumerate(plan.steps, 1):

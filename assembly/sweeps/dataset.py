@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 Texts = dict[str, dict[int, str]]
 # kinds of files that commands write, and an attribute that identifies each
 KINDS = {
-    "a sweep": "near", "draws": "sources_and_posture_sha256", "tolerances": "cost_law"
+    "a sweep": "near", "draws": "sources_and_posture_sha256", "tolerances": "cost_law",
+    "a path": "path_law",
 }  # fmt: skip
 _TEXT = {name: QUANTITIES[name].meaning for name in ("status", *TEXTS)}
 _TEXT["status"] += ": " + ", ".join(OF_POINTS[1:])

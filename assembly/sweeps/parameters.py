@@ -4,7 +4,8 @@ A path is the frame's name and the keys of the number, such as
 ``leg1.link_a.link.beam.radius`` or ``leg1.elbow.clearance.radial``.  A frame's name
 without its leg means that frame in every leg.  Three numbers in brackets are x, y, z;
 six are rx .. tz, and so are the rows and columns of six by six (``stiffness.rx.ty``
-sets both entries of a symmetric matrix).
+sets both entries of a symmetric matrix); six moments of inertia are xx, yy, zz, xy,
+xz, yz.
 """
 
 import copy
@@ -22,6 +23,7 @@ from assembly.steps.bolted import bolt_joints
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 
 _AXES = {3: ("x", "y", "z"), 6: ("rx", "ry", "rz", "tx", "ty", "tz")}
+_MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 _ABSENT: dict[str, Any] = {  # values of keys that a frame may omit
     "geometric_error": [0.0] * 6, "mass": 0.0, "centre_of_mass": [0.0] * 3
 }  # fmt: skip
@@ -29,11 +31,12 @@ _PLACED: dict[str, Any] = {"translation": [0.0] * 3, "rotation": [0.0] * 3}
 _DH_UNITS = {"theta": "rad", "d": "m", "a": "m", "alpha": "rad"}
 _UNITS = {
     "translation": "m", "rotation": "rad", "radial": "m", "axial": "m",
-    "tilt": "rad", "spin": "rad",
+    "tilt": "rad", "spin": "rad", "ball": "m",
     "radius": "m", "inner_radius": "m", "width": "m", "height": "m", "length": "m",
     "area": "m^2", "I_y": "m^4", "I_z": "m^4", "J": "m^4", "shear_y": "1",
     "shear_z": "1", "young": "Pa", "poisson": "1", "density": "kg/m^3", "mass": "kg",
-    "centre_of_mass": "m", "position": "rad or m",
+    "centre_of_mass": "m", "inertia": "kg m^2", "drive_force": "N m or N",
+    "position": "rad or m",
 }  # fmt: skip
 
 Setter = Callable[[float], None]
@@ -198,7 +201,7 @@ def _inside(path: str, table: dict[str, Any]) -> Iterator[tuple[str, float, Sett
         elif isinstance(value, dict):
             yield from _inside(path_of_key, value)
         elif isinstance(value, list) and len(value) in _AXES:
-            axes = _AXES[len(value)]
+            axes = _MOMENTS if key == "inertia" else _AXES[len(value)]
             for i, name in enumerate(axes):
                 if _is_number(value[i]):
                     yield f"{path_of_key}.{name}", value[i], _setter(value, i)

@@ -18,6 +18,7 @@ from assembly.linear.energy import (
     solve_assembly,
     together_at,
 )
+from assembly.linear.load import driven
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.measurement.conditions import Conditions, as_declared
 from assembly.measurement.predict import assemble_row
@@ -62,7 +63,8 @@ def point_conditions(
 def is_loaded(conditions: Conditions) -> bool:
     """Return whether there are loads, weights, or compliant effects or contacts."""
     loaded = conditions.load.any() or conditions.gravity.any()
-    return bool(loaded or conditions.laws or conditions.yields)
+    compliant = conditions.laws or conditions.yields
+    return bool(loaded or driven(conditions.robot) or compliant)
 
 
 def assemble_rows(conditions: Conditions) -> tuple[Assembly, NDArray, NDArray]:

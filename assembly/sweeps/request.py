@@ -203,7 +203,7 @@ def _check_assumption(question: Question) -> None:
     )
     if is_loaded(home) and (question.assumption or question.clearance_only):
         raise BadInput(
-            "--assumption: found a loaded robot (--load, --gravity or an "
+            "--assumption: found a loaded robot (--load, --gravity, drive_force or an "
             "effect), but the bounds of the pose error hold for an unloaded "
             "one; expected --assumption none, and no bounds by clearances alone"
         )

@@ -176,13 +176,14 @@ def parse_values(whose: str, spec: str) -> NDArray:
     return start + step * np.arange(int(np.floor(count + 1e-9)) + 1)
 
 
-def read_targets(path: Path | str, robot: Robot) -> Targets:
+def read_targets(path: Path | str, robot: Robot, extra: Sequence[str] = ()) -> Targets:
     """Return the postures of a table: columns ``pose.tx`` or ``q.<frame>``, ``id``.
 
     Args:
         path: CSV file with a header, one row a posture.
         robot: robot with actuated joints that may be columns; joints without one keep
             their ``position``.
+        extra: names of further columns of numbers, returned among the components.
 
     Returns:
         The postures in the order of the file.
@@ -200,12 +201,14 @@ def read_targets(path: Path | str, robot: Robot) -> Targets:
     header = [cell.strip() for cell in rows[0][1]]
     names = [cell.removeprefix("pose.") for cell in header if cell != "id"]
     for name in names:
-        _check_name(f"{path}: line 1", "column", name, robot)
+        if name not in extra:
+            _check_name(f"{path}: line 1", "column", name, robot)
         if names.count(name) > 1 or header.count("id") > 1:
             raise BadInput(f"{path}: line 1: a column is given twice: {quoted(name)}")
-    if not names:
+    components = [name for name in names if name not in extra]
+    if not components:
         raise BadInput(f"{path}: line 1: found no posture; expected pose.tx, .. or q.*")
-    _check_kind(f"{path}: line 1", names)
+    _check_kind(f"{path}: line 1", components)
     values, labels = np.empty((len(rows) - 1, len(names))), []
     for i, (line, cells) in enumerate(rows[1:]):
         if len(cells) != len(header):

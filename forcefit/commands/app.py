@@ -17,6 +17,7 @@ from forcefit.commands import assembly, report, stiffness, validation
 from forcefit.commands.convert import convert
 from forcefit.commands.example import example
 from forcefit.commands.help import Commands
+from forcefit.commands.new import new
 from forcefit.commands.old_names import with_new_names
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars, report_loading
@@ -45,6 +46,7 @@ app.add_typer(
 app.add_typer(report.app, name="report", help="Comparison of two runs.")
 app.command()(convert)
 app.command()(example)
+app.command()(new)
 app.command()(schema)
 
 

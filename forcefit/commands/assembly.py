@@ -1,8 +1,5 @@
 """The commands ``forcefit assembly ...``: parse, call one function, print or save."""
 
-import os
-import sys
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -14,6 +11,7 @@ from forcefit.commands.help import Commands
 from forcefit.commands.options import (
     AlongOption,
     AtOption,
+    DriveForceOption,
     GravityOption,
     JointOption,
     JsonOption,
@@ -25,23 +23,18 @@ from forcefit.commands.options import (
     UnderOption,
     declared_under,
     parse_direction,
-    parse_load,
     parse_point,
-    posture_of,
 )
+from forcefit.commands.path import path
 from forcefit.commands.platform_stiffness import stiffness
 from forcefit.commands.plot import plot
 from forcefit.commands.progress import one_thread
+from forcefit.commands.show import show
 from forcefit.commands.solve import solve
 from forcefit.commands.statistics import statistics, tolerances
 from forcefit.commands.steps import steps
 from forcefit.commands.sweep import sweep
-from forcefit.inputs.errors import BadInput, checked, nearest
-from forcefit.inputs.writing import (
-    PIXELS,
-    check_writable,
-    save_pixels,
-)
+from forcefit.inputs.errors import BadInput, nearest
 
 app = Commands(no_args_is_help=True)
 app.command()(solve)
@@ -62,6 +55,7 @@ def error(
         ),
     ] = None,
     load: LoadOption = None,
+    drive_force: DriveForceOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
     energy_budget: Annotated[
@@ -97,8 +91,9 @@ def error(
             expected = f"a finite number > 0, at most {LARGEST_LENGTH:g}"
             raise BadInput(f"{option}: found {value}, expected {expected}")
     applied = declared_under(
-        robot, pose, joint, load, gravity, under, rest=rest, mismatch=mismatch
-    )
+        robot, pose, joint, load, gravity, under, rest=rest, mismatch=mismatch,
+        drive_force=drive_force,
+    )  # fmt: skip
     with one_thread():
         results = pose_error_of(
             applied.posture, assumption or None,
@@ -109,86 +104,8 @@ def error(
     answer(results, pose_error_text(results), results["status"], json)
 
 
-@app.command()
-def show(
-    robot: RobotArgument,
-    figure: Annotated[
-        Path | None,
-        typer.Option(
-            "--figure",
-            help="Picture to write: PNG, JPEG, BMP or TIFF; without it a window opens.",
-        ),
-    ] = None,
-    pose: PoseOption = None,
-    joint: JointOption = None,
-    rest: RestOption = None,
-    mismatch: MismatchOption = None,
-    load: LoadOption = None,
-    exaggeration: Annotated[
-        float | None, typer.Option(help="Factor on displacements.")
-    ] = None,
-    error_body: Annotated[
-        str | None,
-        typer.Option(
-            help="Also show the set of possible platform errors: translation | "
-            "rotation."
-        ),
-    ] = None,
-    assumption: Annotated[
-        str | None,
-        typer.Option(
-            help="Assumption of that set: frozen | free | budget. Default: budget; "
-            "under a load frozen."
-        ),
-    ] = None,
-) -> None:
-    """Plot the nominal and the forced robot, and its errors."""
-    from assembly.linear.energy import CannotAssemble, failure_status, solve_assembly
-    from assembly.linear.reference.pose_error import ASSUMPTIONS
-    from assembly.linear.reference.reduction import FreeMotion
-    from assembly.report.error_body import PARTS
-    from assembly.report.plot import plot_assembly
-    from assembly.report.results import remark_lines
-    from assembly.solvers.conic import SolverFailed
-
-    if figure is not None:
-        check_writable(figure, PIXELS)
-    elif not (os.environ.get("DISPLAY") or sys.platform in {"win32", "darwin"}):
-        raise BadInput("no display to open a window on; name a file with --figure")
-    for option, value, valid in (
-        ("--error-body", error_body, PARTS), ("--assumption", assumption, ASSUMPTIONS)
-    ):  # fmt: skip
-        if value is not None and value not in valid:
-            raise BadInput(f'{option}: found "{value[:60]}"{nearest(value, valid)}')
-    if exaggeration is not None:
-        checked("--exaggeration", exaggeration, "1", above=0)
-    wrench = parse_load(load)
-    loaded = wrench is not None and any(wrench)
-    if loaded and error_body is not None and assumption == "budget":
-        raise BadInput(
-            "--assumption: found budget together with --load, but the budget bound "
-            "is defined for a robot without load; expected frozen or free"
-        )
-    assumption = assumption or ("frozen" if loaded else "budget")
-    posture = posture_of(robot, pose, joint, rest, mismatch)
-    for line in remark_lines(posture.robot.remarks):
-        print(line)
-    try:
-        assembly = solve_assembly(posture, wrench)
-        plotter = plot_assembly(
-            assembly, exaggeration, error_body, assumption, figure is not None
-        )
-    except (CannotAssemble, FreeMotion, SolverFailed) as error:
-        print(f"{failure_status(error)}: {error}")
-        raise typer.Exit(1) from None
-    if figure is None:
-        plotter.show()
-    else:
-        save_pixels(plotter.screenshot(return_img=True), figure)
-    plotter.close()
-
-
 for command in (
-    stiffness, deflection, frequencies, statistics, tolerances, sweep, steps, plot
+    show, stiffness, deflection, frequencies, path, statistics, tolerances, sweep,
+    steps, plot,
 ):  # fmt: skip
     app.command()(command)

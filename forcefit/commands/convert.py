@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from forcefit.commands.options import JsonOption, MismatchOption, RestOption
+from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import write_json
 
 
@@ -23,6 +24,14 @@ def convert(
             "-o", "--output", help="File to write: .toml, .urdf or .xml (MJCF)."
         ),
     ],
+    version: Annotated[
+        int,
+        typer.Option(
+            "--format",
+            help="Format of a robot file: 1, frames and closures, or 2, bodies and "
+            "joints by points and axes.",
+        ),
+    ] = 1,
     loops: Annotated[
         Path | None,
         typer.Option(
@@ -56,12 +65,14 @@ def convert(
     from assembly.exchange.convert import convert as convert_robot
     from assembly.kinematics.closing import closing_of
 
+    if version not in (1, 2):
+        raise BadInput(f"--format: found {version}, expected 1 or 2")
     named = None
     if points is not None:
         names = [name.strip() for name in points.split(",")]
         named = [] if names == ["none"] else names
     close = closing_of(rest, mismatch)
-    conversion = convert_robot(source, output, loops, overlay, named, close)
+    conversion = convert_robot(source, output, loops, overlay, named, close, version)
     write_json(conversion.table(), json)
     if json != "-":
         print(conversion.text())

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from forcefit.commands.options import (
+    DriveForceOption,
     FigureOption,
     GravityOption,
     JointOption,
@@ -39,6 +40,7 @@ def deflection(
     rest: RestOption = None,
     mismatch: MismatchOption = None,
     load: LoadOption = None,
+    drive_force: DriveForceOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
     state: Annotated[
@@ -85,7 +87,7 @@ def deflection(
     loads = [*loads, *reversed(loads[:-1])] if back else loads
     applied = declared_under(
         robot, pose, joint, load, gravity, under, finite=exact or follow,
-        rest=rest, mismatch=mismatch,
+        rest=rest, mismatch=mismatch, drive_force=drive_force,
     )  # fmt: skip
     with one_thread(), progress_lines() as update:
         results = deflection_of(

@@ -62,6 +62,11 @@ EXAMPLES = {
         ("examples/hexapod_accuracy.py", "examples/hexapod_errors.toml"),
         "python examples/hexapod_accuracy.py",
     ),
+    "path": _Example(
+        "a path of the hexapod, for its errors under acceleration",
+        ("examples/hexapod_path.csv",),
+        "forcefit assembly path hexapod --path examples/hexapod_path.csv",
+    ),
     "link_library": _Example(
         "stiffness of links for a grid of dimensions",
         ("examples/link_library.toml",),

@@ -6,6 +6,7 @@ import typer
 
 from forcefit.commands.answer import answer
 from forcefit.commands.options import (
+    DriveForceOption,
     GravityOption,
     JointOption,
     JsonOption,
@@ -28,6 +29,7 @@ def frequencies(
     rest: RestOption = None,
     mismatch: MismatchOption = None,
     load: LoadOption = None,
+    drive_force: DriveForceOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
     state: Annotated[
@@ -49,7 +51,7 @@ def frequencies(
     word = parse_state(state, ("nominal", "exact"))
     applied = declared_under(
         robot, pose, joint, load, gravity, under, finite=word == "exact", rest=rest,
-        mismatch=mismatch,
+        mismatch=mismatch, drive_force=drive_force,
     )  # fmt: skip
     with one_thread():
         results = vibration_of(

@@ -8,7 +8,7 @@ from typer.core import TyperCommand
 _WHAT = "What"  # options of no other group
 GROUPS = {
     "Where": (
-        "pose joint grid poses rest mismatch under at along over base tip nodes "
+        "pose joint grid poses path rest mismatch under at along over base tip nodes "
         "configurations reach stroke setup"
     ),
     "How sure": (

@@ -58,6 +58,15 @@ LoadOption = Annotated[
 ]
 
 
+DriveForceOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--drive-force",
+        help="Forces of drives that hold no coordinate [N m or N], such as elbow=200.",
+    ),
+]
+
+
 AtOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -273,7 +282,7 @@ def parse_direction(texts: list[str] | None) -> list[float] | None:
 def posture_of(
     robot: str, pose: list[str] | None, joint: list[str] | None,
     rest: str | None = None, mismatch: str | None = None, own_errors: bool = True,
-    note: bool = True, links: bool = True,
+    note: bool = True, links: bool = True, drive_force: list[str] | None = None,
 ) -> Any:  # fmt: skip
     """Return the posture of ``--pose`` or ``--joint``; home without either.
 
@@ -286,6 +295,7 @@ def posture_of(
         own_errors: whether the robot keeps its declared errors in addition.
         note: whether to print remarks on the posture to stderr.
         links: of :func:`assembly.exchange.robot_files.load_robot`.
+        drive_force: of ``--drive-force``.
 
     Returns:
         The posture, with the effects of the robot's file applied.
@@ -296,7 +306,7 @@ def posture_of(
     from assembly.effects.robot_effects import apply_robot_effects
 
     declared = declared_posture(
-        robot, pose, joint, rest, mismatch, own_errors, note, links
+        robot, pose, joint, rest, mismatch, own_errors, note, links, drive_force
     )
     applied = apply_robot_effects(declared)
     if applied.gravity is not None or applied.load.any():
@@ -310,7 +320,7 @@ def posture_of(
 def declared_posture(
     robot: str, pose: list[str] | None, joint: list[str] | None,
     rest: str | None = None, mismatch: str | None = None, own_errors: bool = True,
-    note: bool = True, links: bool = True,
+    note: bool = True, links: bool = True, drive_force: list[str] | None = None,
 ) -> Any:  # fmt: skip
     """Return the posture of the options, of the robot without the effects of its file.
 
@@ -320,11 +330,15 @@ def declared_posture(
     from assembly.kinematics.closing import closing_of
     from assembly.kinematics.posture import home_posture, place_robot
     from assembly.kinematics.verdict import posture_remarks
-    from assembly.model.largest import LARGEST_LENGTH
+    from assembly.model.force_control import with_drive_forces
+    from assembly.model.largest import LARGEST, LARGEST_LENGTH
 
     joints = parse_assignments(joint, "--joint", LARGEST_LENGTH) if joint else None
     close = closing_of(rest, mismatch, joints, own_errors)
     machine = load_robot(robot, close, links=links)
+    if drive_force:
+        forces = parse_assignments(drive_force, "--drive-force", LARGEST)
+        machine = with_drive_forces(machine, forces)
     if mismatch is not None and not pose:
         posture = home_posture(machine)
     else:
@@ -349,6 +363,7 @@ def declared_under(
     rest: str | None = None,
     mismatch: str | None = None,
     note: bool = True,
+    drive_force: list[str] | None = None,
 ) -> Any:
     """Return the robot under loads and covariates, its file's effects applied.
 
@@ -363,13 +378,16 @@ def declared_under(
         rest: of ``--rest``.
         mismatch: of ``--mismatch``.
         note: whether to print remarks on the posture to stderr.
+        drive_force: of ``--drive-force``.
 
     Returns:
         The posture, loads and conditions with the effects applied.
     """
     from assembly.effects.robot_effects import apply_robot_effects
 
-    posture = declared_posture(robot, pose, joint, rest, mismatch, note=note)
+    posture = declared_posture(
+        robot, pose, joint, rest, mismatch, note=note, drive_force=drive_force
+    )
     g = parse_gravity(gravity)
     note_massless(posture.robot, g)
     return apply_robot_effects(

@@ -7,6 +7,7 @@ import typer
 from forcefit.commands.options import (
     AlongOption,
     AtOption,
+    DriveForceOption,
     FigureOption,
     GravityOption,
     JointOption,
@@ -25,7 +26,7 @@ from forcefit.commands.options import (
     parse_state,
 )
 from forcefit.commands.progress import one_thread
-from forcefit.inputs.errors import checked
+from forcefit.inputs.errors import BadInput, checked
 from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ def stiffness(
     rest: RestOption = None,
     mismatch: MismatchOption = None,
     load: LoadOption = None,
+    drive_force: DriveForceOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
     at: AtOption = None,
@@ -77,6 +79,11 @@ def stiffness(
 
     if figure is not None:
         check_writable(figure, PICTURE)
+    if by and drive_force:
+        raise BadInput(
+            "--by: found together with --drive-force; write drive_force into the robot "
+            "file, from which the derivatives are computed"
+        )
     if length is not None:
         checked("--length", length, "m", above=0)
     point = parse_point(at)
@@ -84,7 +91,7 @@ def stiffness(
     word = parse_state(state)
     applied = declared_under(
         robot, pose, joint, load, gravity, under, finite=word == "exact", rest=rest,
-        mismatch=mismatch,
+        mismatch=mismatch, drive_force=drive_force,
     )  # fmt: skip
     with one_thread():
         results = stiffness_of(

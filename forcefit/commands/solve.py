@@ -6,6 +6,7 @@ import typer
 
 from forcefit.commands.answer import answer
 from forcefit.commands.options import (
+    DriveForceOption,
     GravityOption,
     JointOption,
     JsonOption,
@@ -32,6 +33,7 @@ def solve(
     rest: RestOption = None,
     mismatch: MismatchOption = None,
     load: LoadOption = None,
+    drive_force: DriveForceOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
     state: Annotated[
@@ -54,11 +56,11 @@ def solve(
     exact = parse_state(state, ("contact", "exact")) == "exact"
     if quantities is not None:
         _check_margins(quantities, exact, load=load, gravity=gravity, under=under)
-        _solve_margins(robot, pose, joint, rest, mismatch, json)
+        _solve_margins(robot, pose, joint, rest, mismatch, drive_force, json)
         return
     applied = declared_under(
         robot, pose, joint, load, gravity, under, finite=exact, rest=rest,
-        mismatch=mismatch, note=exact,
+        mismatch=mismatch, note=exact, drive_force=drive_force,
     )  # fmt: skip
     results, text = _exact_results(applied) if exact else _results(applied)
     answer(results, text, results["status"], json)
@@ -104,13 +106,15 @@ def _check_margins(quantities: str, exact: bool, **loads: list[str] | None) -> N
 
 def _solve_margins(
     robot: str, pose: list[str] | None, joint: list[str] | None, rest: str | None,
-    mismatch: str | None, json: str | None,
+    mismatch: str | None, drive_force: list[str] | None, json: str | None,
 ) -> None:  # fmt: skip
     """Write and print the zone margins; link stiffnesses are not computed."""
     from assembly.report.first_order import singular_status
     from assembly.report.results import zone_of, zone_text
 
-    posture = posture_of(robot, pose, joint, rest, mismatch, links=False)
+    posture = posture_of(
+        robot, pose, joint, rest, mismatch, links=False, drive_force=drive_force
+    )
     margins = zone_of(posture) | singular_status(posture)
     results = {"robot": robot, "zone": margins}
     answer(

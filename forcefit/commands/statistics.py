@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from forcefit.commands.options import (
+    DriveForceOption,
     FigureOption,
     GravityOption,
     JointOption,
@@ -64,6 +65,7 @@ def statistics(
     pose: PoseOption = None,
     joint: JointOption = None,
     load: LoadOption = None,
+    drive_force: DriveForceOption = None,
     gravity: GravityOption = None,
     rest: RestOption = None,
     mismatch: MismatchOption = None,
@@ -158,8 +160,9 @@ def statistics(
         check_writable(figure, PICTURE)
     closing = rest is not None or mismatch is not None
     posture = posture_of(
-        robot, pose, joint, rest, mismatch, own_errors=not closing, note=False
-    )
+        robot, pose, joint, rest, mismatch, own_errors=not closing, note=False,
+        drive_force=drive_force,
+    )  # fmt: skip
     fixed = posture.robot.declared_errors if closing else None
     sources = read_sources(errors, posture.robot, fixed)
     wrench, g = parse_load(load), parse_gravity(gravity)

@@ -14,6 +14,7 @@ from forcefit.commands.generate import generate
 from forcefit.commands.help import Commands
 from forcefit.commands.inspect import inspect
 from forcefit.commands.options import (
+    DriveForceOption,
     FigureOption,
     GravityOption,
     JointOption,
@@ -119,6 +120,7 @@ def crosscheck(
     errors: ErrorsOption = None,
     seed: SeedOption = 1,
     load: LoadOption = None,
+    drive_force: DriveForceOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
     scale: Annotated[
@@ -184,10 +186,10 @@ def crosscheck(
         )
     if figure is not None:
         check_writable(figure, PICTURE)
-    if grid is not None and (pose or joint or figure):
+    if grid is not None and (pose or joint or figure or drive_force):
         raise BadInput(
-            "--grid: found together with --pose, --joint or --figure; expected only "
-            "one of them"
+            "--grid: found together with --pose, --joint, --drive-force or --figure; "
+            "expected only one of them"
         )
 
     own = errors is None or rest is mismatch is None
@@ -219,7 +221,9 @@ def crosscheck(
         machine = load_robot(robot, closing_of(rest, mismatch, own_errors=own))
         _crosscheck_grid(machine, grid, compare, json)
         return
-    posture = declared_posture(robot, pose, joint, rest, mismatch, own)
+    posture = declared_posture(
+        robot, pose, joint, rest, mismatch, own, drive_force=drive_force
+    )
     results, failure = attempt(posture.robot.name, lambda: compare(posture))
     write_json(failure if results is None else results.table(), json)
     if json != "-":

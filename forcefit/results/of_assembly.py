@@ -36,14 +36,24 @@ _LINEARISATION = record(
     rotation_=number("rotation, linear minus exact", "rad", *_AXIS),
     translation_=number("translation, linear minus exact", "m", *_AXIS),
 )
+_COUNTS = record(
+    "freedoms platform_freedoms freedoms_drives_locked platform_freedoms_drives_locked "
+    "redundant_constraints drives locked_freedoms overconstraint "
+    "smallest_singular_value local_freedoms actuation_redundancy singular_value_gap"
+)
+MOBILITY = record(
+    "counts_certain singular finite_freedoms words", _COUNTS, near_=_COUNTS,
+    motions=Listed(record(
+        kind=Words(("translation", "turn", "screw")),
+        direction=number("direction of a motion or its axis, base axes", "1", *_AXIS),
+        point_=number("point of the axis, base axes", "m", *_AXIS),
+        pitch_=number("pitch of a screw", "m"),
+    )),
+)  # fmt: skip
 SOLUTION = record(
     "nominal_mismatch remarks load gravity reading? method?", _POSTURE, _SOLVED,
     joints=Each(number("joint coordinate", "rad or m")),
-    mobility=record(
-        "freedoms platform_freedoms freedoms_drives_locked "
-        "platform_freedoms_drives_locked redundant_constraints drives "
-        "locked_freedoms overconstraint smallest_singular_value"
-    ),
+    mobility=MOBILITY,
     zone_=ZONE,
     certificate_=record(
         "closure_residual reference_length clearance_excess duality_gap relative_gap "
@@ -55,7 +65,7 @@ SOLUTION = record(
     worst_error_=record("assumption rotation translation"),
 )  # fmt: skip
 _EXACT = record(
-    "remarks?", _POSTURE,
+    "remarks?", _POSTURE, mobility=MOBILITY,
     energy_="energy", potential_="potential", platform_screw_="platform_screw",
     frames_=_SOLVED.content["frames"], closures_=_SOLVED.content["closures"],
     certificate_=record(
@@ -144,7 +154,10 @@ _OF_DRAWS = record(
 _LIMITED = record("", INTERVAL, clearance_=_CLEARANCE_MODEL)
 _STIFFNESS_OF_DRAWS = record(
     "state", means=text("meaning of the state"),
-    axes=Each(record("unit draws", free=INTERVAL, mean_=_MEAN, quantiles_=_QUANTILES)),
+    axes=Each(record(
+        "unit draws", free_=INTERVAL, rigid_=INTERVAL, mean_=_MEAN,
+        quantiles_=_QUANTILES,
+    )),
     free_motions=Listed(record("screw draws")),
 )  # fmt: skip
 _IMPORTANCE = record(
@@ -276,8 +289,25 @@ _STEPS = record(
     peak_force_=number("largest closing force", "N"),
     draws_=count("machines"), quantiles_=Each(Each(_BY_QUANTILE)),
 )  # fmt: skip
+_PEAK = record(
+    "time unit?", value=number("largest value", ""), frame_=text("frame of the body")
+)  # fmt: skip
+_PATH = record(
+    "robot status reason? remarks first_frequency periods", output_=text("file"),
+    law=text("law of the motion"), duration=number("path time", "s"),
+    points=count("points"), solved=count("points with a result"),
+    largest_=Each(_PEAK), drives_=Each(_PEAK),
+)  # fmt: skip
 ASSEMBLY: Mapping[str, Content] = {
     "assembly solve": Either((SOLUTION, _EXACT, record("robot", zone=ZONE))),
+    "assembly show": record(
+        "robot remarks", pose=POSE, mobility=MOBILITY,
+        axes=Each(record(
+            at=number("origin of the frame, base axes", "m", *_AXIS),
+            x=number("its x axis, base axes", "1", *_AXIS),
+            z=number("its z axis, base axes", "1", *_AXIS),
+        )),
+    ),
     "assembly error": _ERROR,
     "assembly stiffness": PLATFORM_STIFFNESS,
     "assembly deflection": _DEFLECTION,
@@ -286,6 +316,7 @@ ASSEMBLY: Mapping[str, Content] = {
     "assembly tolerances": _TOLERANCES,
     "assembly sweep": _SWEEP,
     "assembly steps": _STEPS,
+    "assembly path": _PATH,
     "convert": record(
         "robot left_out", platform=text("platform"), frames=count("frames"),
         closures=count("closures"), files=text("files written", "file"),

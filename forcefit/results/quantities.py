@@ -117,6 +117,23 @@ QUANTITIES: Mapping[str, Quantity] = {
         "smallest singular value of the constraints", meaning="smallest nonzero one of "
         "the constraint matrix, lengths over the robot's size",
     ),
+    "local_freedoms": count(
+        "degrees of freedom of legs alone", meaning="with the platform at rest"
+    ),
+    "actuation_redundancy": count(
+        "redundant drives", meaning="drives minus the degrees of freedom they lock"
+    ),
+    "singular_value_gap": Quantity(
+        "gap of the singular values", meaning="least one that counts over the largest "
+        "that does not, or over rounding; null where none counts",
+    ),
+    "counts_certain": flag("gap of the singular values of at least 100"),
+    "singular": flag("more degrees of freedom than at nearby poses"),
+    "finite_freedoms": count(
+        "degrees of freedom at nearby poses", meaning="0 where the motions at the pose "
+        "are infinitesimal only",
+    ),
+    "words": text("mobility in words"),
     "point": Quantity(
         "point", "m", ("axis",), "at which screws and wrenches are read; base axes for "
         "a stiffness, platform axes for a pose error",
@@ -445,6 +462,37 @@ QUANTITIES: Mapping[str, Quantity] = {
     "rank": count("possible ranks", "bound"),
     "postures": count("postures"),
     "grid": text("grid"),
+    # paths
+    "time": Quantity("time", "s"),
+    "joint_velocity": Quantity(
+        "joint velocity", "rad/s or m/s", ("joint",), "rate of every joint coordinate"
+    ),
+    "joint_acceleration": Quantity(
+        "joint acceleration", "rad/s^2 or m/s^2", ("joint",),
+        "second derivative of every joint coordinate",
+    ),
+    "platform_velocity": Quantity(
+        "platform velocity", "rad/s, m/s", _SCREW, "of the platform's origin, base axes"
+    ),
+    "platform_acceleration": Quantity(
+        "platform acceleration", "rad/s^2, m/s^2", _SCREW,
+        "of the platform's origin, base axes",
+    ),
+    "inertial_screw": Quantity(
+        "deflection by acceleration", "rad, m", _SCREW, "change of the pose error at "
+        "the platform's origin by the accelerations, base axes", shown="mrad, mm"
+    ),
+    "drive_force": Quantity(
+        "drive force", "N m or N", ("drive",),
+        "of each drive on the part that it carries",
+    ),
+    "first_frequency": Quantity(
+        "first natural frequency", "Hz",
+        meaning="least along the path, drives held, without load and gravity",
+    ),
+    "periods": Quantity(
+        "path time in periods", meaning="path time times the first natural frequency"
+    ),
     # measured data and comparisons
     "campaign": text("campaign"),
     "rows": count("rows"),

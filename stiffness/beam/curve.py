@@ -181,24 +181,34 @@ def curve_compliance(
     )
 
 
-def curve_mass(pieces: Sequence[Piece], density: float) -> tuple[float, NDArray]:
-    """Mass and centre of a beam along a curve.
+def curve_mass(
+    pieces: Sequence[Piece], density: float
+) -> tuple[float, NDArray, NDArray]:
+    """Return mass, centre and moments of inertia of a beam along a curve.
 
     Args:
         pieces: base to tip.
         density: [kg/m^3].
 
     Returns:
-        [kg], and (3,) [m] in the axes the pieces are given in.
+        [kg], (3,) [m], and (3, 3) [kg m^2] about that centre, in the axes the pieces
+        are given in; its sections are plane, normal to the curve.
     """
-    mass, moment = 0.0, np.zeros(3)
+    mass, moment, second, own = 0.0, np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3))
     for piece in pieces:
         for x, weight in zip(_POINTS, _WEIGHTS, strict=True):
             t = (x + 1) / 2
-            line = density * piece.section(t).area * np.linalg.norm(piece.tangent(t))
+            section, tangent, place = piece.section(t), piece.tangent(t), piece.place(t)
+            line = density * section.area * np.linalg.norm(tangent)
             mass += weight / 2 * line
-            moment += weight / 2 * line * piece.place(t)
-    return float(mass), moment / mass
+            moment += weight / 2 * line * place
+            second += weight / 2 * line * np.outer(place, place)
+            R = section_axes(tangent, None if piece.up is None else piece.up(t))
+            across = [section.I_y + section.I_z, section.I_y, section.I_z]
+            own += weight / 2 * line / section.area * R @ np.diag(across) @ R.T
+    centre = moment / mass
+    second -= mass * np.outer(centre, centre)
+    return float(mass), centre, own + np.trace(second) * np.eye(3) - second
 
 
 def curve_length(pieces: Sequence[Piece]) -> float:

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble
+from assembly.linear.load import driven
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.robot import BeamLink
 from assembly.solvers.conic import SolverFailed
@@ -79,7 +80,8 @@ def _pieces_cost(
     """Return the error of beams that are one spring each."""
     if not any(isinstance(frame.link, BeamLink) for frame in posture.robot.frames):
         raise _NotApplicable("no beam")
-    if load is None and gravity is None and not posture.robot.errors.any():
+    unloaded = load is None and gravity is None and not driven(posture.robot)
+    if unloaded and not posture.robot.errors.any():
         raise _NotApplicable(NOTHING)
     return pieces_cost(posture, load, gravity)
 

@@ -37,9 +37,10 @@ def check_commands(table: MeasurementTable, robot: Robot) -> None:
     reach = _body_length(robot)
     for name, values in table.columns.items():
         group, _, rest = name.partition(".")
-        turning = group == "q" and robot.frame(rest).joint == "revolute"
-        if turning:
-            _within(table, name, values, _TURNS, f"an angle in rad{_UNITS}")
+        if group == "q" and robot.frame(rest).turns:
+            lead = abs(robot.frame(rest).lead)  # [m/rad] a screw makes many turns
+            largest = max(_TURNS, 10 * reach / lead) if lead else _TURNS
+            _within(table, name, values, largest, f"an angle in rad{_UNITS}")
         elif group == "q":
             _within(table, name, values, 10 * reach, f"a travel in m{_UNITS}")
         elif group == "pose":

@@ -329,7 +329,7 @@ def _unit_key(name: str, robot: Robot) -> str:
     if group == "pose":
         return "command_rotation" if rest[0] == "r" else "command_position"
     if group == "q":
-        turns = robot.frame(rest).joint == "revolute"
+        turns = robot.frame(rest).turns
         return "command_rotation" if turns else "command_position"
     if group == "load":
         return "moment" if rest[0] == "m" else "force"

@@ -211,7 +211,7 @@ def scaled(posture: Posture, scale: float) -> Posture:
 
     Args:
         posture: nominal.
-        scale: on geometric errors and clearances.
+        scale: on geometric errors, clearances and forces of drives.
 
     Returns:
         A posture of another robot.
@@ -223,7 +223,8 @@ def scaled(posture: Posture, scale: float) -> Posture:
             bounds = {k: v if v is None else scale * v for k, v in vars(given).items()}
             given = Clearance(**bounds)
         error = scale * frame.geometric_error
-        return replace(frame, geometric_error=error, clearance=given)
+        force = scale * frame.drive_force
+        return replace(frame, geometric_error=error, clearance=given, drive_force=force)
 
     frames = tuple(smaller(frame) for frame in posture.robot.frames)
     return replace(posture, robot=replace(posture.robot, frames=frames))

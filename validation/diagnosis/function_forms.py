@@ -85,7 +85,7 @@ _ANGLE = ("0.cosine", *_WAVE)
 def is_angle(robot: Robot, name: str) -> bool:
     """Return whether a variable is the coordinate of a joint that turns."""
     kind, _, rest = name.partition(".")
-    return kind == "q" and robot.frame(rest).joint == "revolute"
+    return kind == "q" and robot.frame(rest).turns
 
 
 def first(conditions: Conditions, name: str) -> list[CandidateShape]:

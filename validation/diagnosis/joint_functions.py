@@ -65,7 +65,7 @@ def _knees(functions: Functions, name: str, component: str) -> list[CandidateSha
         return []
     load = functions.sensitivities.wrenches[:, robot.index(name), axis]
     # clearance of a slide along its own axis is an effect of the library
-    return forms.knees(np.abs(load), jump=frame.joint == "revolute")
+    return forms.knees(np.abs(load), jump=frame.turns)
 
 
 def _by_kind(functions: Functions) -> Iterator[tuple[str, Parts, list[CandidateShape]]]:

@@ -196,7 +196,7 @@ def _candidates(
             continue
         q = conditions.coordinates[:, i]
         yield f"q.{frame.name} and its square", _powers(q)
-        if frame.joint == "revolute":
+        if frame.turns:
             for n in (1, 2):
                 wave = np.column_stack([np.sin(n * q), np.cos(n * q)])
                 yield f"q.{frame.name}, {'once' if n == 1 else 'twice'} a turn", wave

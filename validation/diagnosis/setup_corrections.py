@@ -169,7 +169,7 @@ def _of_joints(campaign: Campaign) -> Iterator[Correction]:
         kinds.setdefault(frame.joint, []).append(i)
         change = partial(np.multiply, np.where(own, -1.0, 1.0))
         yield of("sign", name, "with its sign reversed", change=change)
-        for degrees in (90, 180, -90) if frame.joint == "revolute" else ():
+        for degrees in (90, 180, -90) if frame.turns else ():
             change = partial(np.add, np.where(own, np.deg2rad(degrees), 0.0))
             yield of(
                 "quarter_turn", name, f"with {degrees} degrees added", change=change

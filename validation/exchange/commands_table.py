@@ -153,7 +153,7 @@ def _units(name: str, robot: Robot) -> Mapping[str, float] | None:
     if name.startswith("pose."):
         return UNITS["command_rotation"] if name[5] == "r" else lengths
     if name.startswith("q.") and name[2:] in {f.name for f in robot.frames}:
-        turns = robot.frame(name[2:]).joint == "revolute"
+        turns = robot.frame(name[2:]).turns
         return UNITS["command_rotation"] if turns else lengths
     return None
 

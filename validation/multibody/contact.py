@@ -1,7 +1,7 @@
 """Joint clearances as smooth, conservative contact.
 
 A joint moves freely inside its cones: discs for (TX, TY) and (RX, RY), intervals for TZ
-and RZ.  At distance r from the middle of a cone of size c,
+and RZ, or a ball for (TX, TY, TZ).  At distance r from the middle of a cone of size c,
 
     x = (r^2 - c^2) / 2c,   P = (x + sqrt(x^2 + w^2)) / 2,   energy = k P^2 / 2,
 
@@ -24,12 +24,15 @@ SHIFT_STIFFNESS = 1e12  # [N/m] translational stiffness of the contact
 # [-] first and last width of the smoothing, in sizes of the cone
 WIDE, NARROW = 3.0, 3e-4
 _UNBOUNDED = 0.5  # [rad, m] larger bounds of own motions are checked afterwards
-_CONES = (("tilt", (0, 1)), ("spin", (2,)), ("radial", (3, 4)), ("axial", (5,)))
+_CONES = (
+    ("tilt", (0, 1)), ("spin", (2,)), ("radial", (3, 4)), ("axial", (5,)),
+    ("ball", (3, 4, 5)),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class ClearanceCone:
-    """A disc or an interval that bounds components of a screw.
+    """A disc, an interval or a ball that bounds components of a screw.
 
     Attributes:
         rows: rows of the screw, which it bounds together.
@@ -44,7 +47,7 @@ class ClearanceCone:
     arm: float = 0.0
 
     def offsets(self, screw: Sequence[float]) -> list[float]:
-        """Return one or two components [rad or m] of a screw (6,) that it bounds."""
+        """Return the one to three components [rad or m] of a screw that it bounds."""
         if self.arm:
             return [
                 screw[3] + self.arm * screw[1],

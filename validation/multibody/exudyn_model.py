@@ -34,7 +34,8 @@ class Regularisation:
     """Springs and tolerances of the simulation that do not belong to a robot.
 
     Attributes:
-        closing: [N m/rad, N/m] of the connectors that close the closures.
+        closing: [N m/rad, N/m] of the connectors that close the closures; ``inf`` makes
+            them joints without freedom, for a robot built closed.
         idle: [N m/rad, N/m] residual stiffness of free motions.
         narrow: [-] last width of the smoothing of contacts, which centres clearances.
         tolerance: [m, rad, -] of Newton's last increment; convergence is quadratic.
@@ -222,11 +223,18 @@ class Model:
         return tuple(parts), tuple(bodies)
 
     def add_closure(self, first: Place, second: Place, closed: NDArray) -> Closure:
-        """Return a connector that is stress-free while the closure is open."""
+        """Add a connector that is stress-free while the closure is open."""
         gap = inverse(first.built) @ second.built
         marker = self.add_marker(first.moved(gap))
         markers = [marker, self.add_marker(second)]
-        connector = self._connect(markers, np.eye(6) * self.regularisation.closing)
+        stiffness = self.regularisation.closing
+        if np.isinf(stiffness):
+            joint = self.item.GenericJoint(
+                markerNumbers=markers, constrainedAxes=[1] * 6
+            )
+            connector = int(self.mbs.AddObject(joint))
+        else:
+            connector = self._connect(markers, np.eye(6) * stiffness)
         return Closure(first, second, marker, connector, closed)
 
     def add_load(self, place: Place, wrench: NDArray) -> None:
@@ -236,6 +244,17 @@ class Model:
         )
         self.mbs.AddLoad(torque)
         self.add_force(place, wrench[3:])
+
+    def add_following_load(self, place: Place, wrench: NDArray) -> None:
+        """Add a wrench at a place, in its axes, which turns with its body."""
+        marker = self.add_marker(place)
+        for load, vector in (
+            (self.item.LoadTorqueVector, wrench[:3]),
+            (self.item.LoadForceVector, wrench[3:]),
+        ):
+            self.mbs.AddLoad(
+                load(markerNumber=marker, bodyFixed=True, loadVector=vector.tolist())
+            )
 
     def add_force(self, place: Place, force: NDArray) -> None:
         """Add a force (3,) [N] at a place, in base axes, of constant direction."""

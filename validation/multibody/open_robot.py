@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.robot import BASE, BeamLink, Frame, MatrixLink, Robot
-from forcefit.inputs.table import BadInput
+from forcefit.inputs.table import BadInput, quoted
 from stiffness.beam.sections import declared_section
 from validation.multibody.beams import beam_axes, beam_span, element_stiffness
 from validation.multibody.contact import joint_clearance
@@ -137,8 +137,12 @@ def build(model: Model, case: Case) -> OpenTree:
 
     Returns:
         The parts of the model.
+
+    Raises:
+        BadInput: the robot has a helical joint.
     """
     posture, robot = case.posture, case.posture.robot
+    refuse_helical(robot)
     nominal = _nominal(posture)
     tree = OpenTree(platform=nominal[robot.platform])
     after = {BASE: model.ground}
@@ -157,6 +161,16 @@ def build(model: Model, case: Case) -> OpenTree:
     if case.gravity.any():
         _add_weights(model, robot, tree, case.gravity)
     return tree
+
+
+def refuse_helical(robot: Robot) -> None:
+    """Raise BadInput if a robot has a helical joint, which no simulation here has."""
+    for frame in robot.frames:
+        if frame.pitch:
+            raise BadInput(
+                f"{robot.name}: frame {quoted(frame.name)}: found a helical joint, "
+                "expected revolute, prismatic and fixed joints for a simulation"
+            )
 
 
 def _add_frame(
@@ -187,6 +201,11 @@ def _add_frame(
     if frame.passive and not frame.compliant and frame.name not in tree.contacts:
         tree.idle[frame.name] = model.add_idle(place, frame.own_axis)
         place = tree.idle[frame.name].far
+    if case.scale * frame.drive_force:
+        force = np.zeros(6)
+        force[frame.own_axis] = case.scale * frame.drive_force
+        model.add_following_load(place, force)
+        model.add_following_load(tree.bodies[frame.name], -force)
     tree.before[frame.name] = place
     return place
 

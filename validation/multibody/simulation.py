@@ -19,6 +19,7 @@ Sources:
 
 import contextlib
 import io
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -182,7 +183,7 @@ def simulate_assembly(
 
     Args:
         posture: the robot and its joint coordinates; actuated joints are locked there.
-        scale: factor on the robot's geometric errors.
+        scale: factor on the robot's geometric errors and on the forces of its drives.
         model: options for links and joints.
         load: (6,) [N m, N] on the platform at its origin, base axes, of constant
             direction.
@@ -268,7 +269,6 @@ def simulated_frequencies(
 
     Raises:
         BadInput: a link's stiffness is unknown.
-        SimulationFailed: no equilibrium was found.
     """
     robot = without_clearance(posture.robot)
     robot = robot.with_errors(np.zeros_like(robot.errors))
@@ -278,16 +278,20 @@ def simulated_frequencies(
         meshes={}, elements=elements, clearances=False, bushes=False,
         load=np.zeros(6), gravity=np.zeros(3), couple=np.zeros(3),
     )  # fmt: skip
-    model = Model(*import_exudyn(), robot.name, _TIGHT[0])
+    # built closed and without load, the robot is in equilibrium
+    model = Model(
+        *import_exudyn(), robot.name, Regularisation(math.inf, IDLE_STIFFNESS)
+    )
     model.deadline = time.monotonic() + TIME_LIMIT
     try:
         tree = build(model, case)
-        bodies = {
-            f.name: (tree.bodies[f.name].moved(shifted(f.centre_of_mass)), f.mass)
+        bodies = [
+            (tree.bodies[f.name].moved(shifted(f.centre_of_mass)), f.mass, f.inertia)
             for f in robot.frames
-        }
-        solve(model, tree.closures)
-        set_masses(model, list(bodies.values()))
+        ]
+        model.mbs.Assemble()
+        model.hold_idle(model.regularisation.idle)
+        set_masses(model, bodies)
         return natural_frequencies(model)[:count]
     finally:
         model.discard()

@@ -9,13 +9,12 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.clearance import own_cone
+from assembly.model.clearance import BOUNDS, own_cone
 from assembly.model.robot import Frame, Robot
 from assembly.solvers.conic import SolverFailed
 from assembly.steps.bolted import bolt_joints
 
 ERROR, CLEARANCE = "geometric error", "clearance"
-_KEYS = ("tilt", "spin", "radial", "axial")  # names of the bounds in clearance_bounds
 
 
 def governing(posture: Posture, assumption: str = "frozen") -> list[dict[str, Any]]:
@@ -77,7 +76,7 @@ def _improved(robot: Robot) -> list[tuple[str, str, Robot]]:
 def _tight(frame: Frame) -> Frame | None:
     """Return the joint without its clearances; None if it has none."""
     own = own_cone(frame)
-    clearances = [key for k, key in enumerate(_KEYS) if k != own]
+    clearances = [key for k, key in enumerate(BOUNDS) if k != own]
     if not any(getattr(frame.clearance, key, None) for key in clearances):
         return None
     assert frame.clearance is not None

@@ -117,7 +117,8 @@ def solution_section(results: StudyResults) -> str:
     ]
     rows: list[list[Any]] = [[in_words(k), str(v)] if isinstance(v, int) else
                              [in_words(k), Value(v)]
-                             for k, v in solution["mobility"].items()]  # fmt: skip
+                             for k, v in solution["mobility"].items()
+                             if type(v) in (int, float)]  # fmt: skip
     zone = solution.get("zone", {})
     for key in ("margin", "margin_free"):
         rows.append([f"{in_words(key)}, eq. (21)", _number(zone.get(key), "")])

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from assembly.exchange.robot_files import load_robot
 from assembly.kinematics.closing import closing_of
 from assembly.kinematics.posture import POSE
+from assembly.linear.load import driven
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_named
 from assembly.model.robot import BeamLink, MeshLink, Robot
@@ -97,6 +98,10 @@ def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
     scales = _scales(root)
     service = read_service(root, robot)
     checks, named = _checks(root, bool(meshes), bool(grid), bool(scales))
+    threads = [quoted(frame.name) for frame in robot.frames if frame.pitch]
+    if threads and "crosscheck" in checks:
+        fault = f"found helical joints ({', '.join(threads)}), which are not simulated"
+        raise root.bad("checks", f"{fault}; set crosscheck = false under [checks]")
     wanted = tuple(c for c in checks if c in named | asked_by_key)
     wanted += ("service",) if service is not None else ()
     asked = root.text("output", f"{path.stem}_study")
@@ -155,7 +160,14 @@ def _closed(root: Table, name: Path | str) -> Robot:
     mismatch = root.choice("mismatch", ("spring",)) if root.has("mismatch") else None
     own_errors = not root.has("errors")
     try:
-        return load_robot(name, closing_of(rest, mismatch, own_errors=own_errors))
+        robot = load_robot(name, closing_of(rest, mismatch, own_errors=own_errors))
+        if driven(robot):
+            raise root.bad(
+                "robot",
+                "found a robot with drive_force; expected one without, because a study "
+                "bounds errors of a robot without load (assembly solve computes it)",
+            )
+        return robot
     except BadInput as error:
         for key, option in (("rest", "--rest: "), ("mismatch", "--mismatch spring: ")):
             _, found, reason = str(error).partition(option)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from assembly.model.robot import BASE, Frame, Robot
 from validation.multibody.motion import placement, shifted, turn_of
+from validation.multibody.open_robot import refuse_helical
 from validation.synthetic.delays import behind, with_delays
 from validation.synthetic.effects import (
     CHANGES,
@@ -69,8 +70,10 @@ def simulate_readings(
         the reference point's position, base axes.
 
     Raises:
+        BadInput: the robot has a helical joint.
         SimulationFailed: a row has no equilibrium.
     """
+    refuse_helical(robot)
     pointed = with_point(robot, reference_point)
     changing = [effect for effect in effects if effect.name in _ALL_CHANGES]
     used = sorted({c for e in changing for c in _ALL_COVARIATES.get(e.name, ())})

@@ -12,8 +12,9 @@ struct KeptTree {
 };
 
 KeptTree tree_of(
-    nb::handle parents, nb::handle kinds, nb::handle fixed, nb::handle pairs,
-    nb::handle moves, nb::handle groups, int64_t platform, double size) {
+    nb::handle parents, nb::handle kinds, nb::handle fixed, nb::handle leads,
+    nb::handle pairs, nb::handle moves, nb::handle groups, int64_t platform,
+    double size) {
     Size n, closures, count, ends;
     Tree own = {};
     own.size = size, own.platform = platform;
@@ -22,6 +23,7 @@ KeptTree tree_of(
         if (own.parents[i] >= i) throw nb::value_error("parents: expected frames before");
     own.kinds = indices(kinds, "kinds", 3, n);
     own.fixed = reals(fixed, "fixed", n, 4, 4);
+    own.leads = reals(leads, "leads", n);
     own.pairs = integers(pairs, "pairs", closures, 2);
     for (int64_t i = 0; i < 2 * closures.value; ++i)
         if (own.pairs[i] < 0 || own.pairs[i] >= n.value)
@@ -35,7 +37,7 @@ KeptTree tree_of(
     if (platform < 0 || platform >= n.value)
         throw nb::value_error("platform: expected the row of a frame");
     own.n = n.value, own.closures = closures.value;
-    return {nb::make_tuple(parents, kinds, fixed, pairs, moves, groups), own};
+    return {nb::make_tuple(parents, kinds, fixed, leads, pairs, moves, groups), own};
 }
 
 void call_follow_all(
@@ -62,8 +64,9 @@ void call_follow_all(
 void bind_kinematics(nb::module_ &m) {
     nb::class_<KeptTree>(m, "Tree")
         .def(nb::new_(&tree_of),
-        nb::arg("parents"), nb::arg("kinds"), nb::arg("fixed"), nb::arg("pairs"),
-        nb::arg("moves"), nb::arg("groups"), nb::arg("platform"), nb::arg("size"));
+        nb::arg("parents"), nb::arg("kinds"), nb::arg("fixed"), nb::arg("leads"),
+        nb::arg("pairs"), nb::arg("moves"), nb::arg("groups"), nb::arg("platform"),
+        nb::arg("size"));
     m.def(
         "follow_all", &call_follow_all,
         nb::arg("tree"), nb::arg("start"), nb::arg("poses"), nb::arg("held"),

@@ -103,7 +103,8 @@ void Motion::forward() {
             for (int k = 0; k < 3; ++k) at[k] = real(fixed[4 * k + 3]);
         } else {
             const int64_t parent = tree.parents[i];
-            const bool turns_on = tree.kinds[parent] == 1, slides_on = tree.kinds[parent] == 2;
+            const bool turns_on = tree.kinds[parent] == 1;
+            const bool slides_on = tree.kinds[parent] == 2 || tree.leads[parent] != 0.0;
             const Real *A = turns_on ? &after_R[9 * parent] : &R[9 * parent];
             const Real *o = slides_on ? &after_p[3 * parent] : &p[3 * parent];
             for (int k = 0; k < 3; ++k) {
@@ -124,6 +125,9 @@ void Motion::forward() {
                 A[3 * k] = c * a + s * b, A[3 * k + 1] = c * b - s * a;
                 A[3 * k + 2] = own[3 * k + 2];
             }
+            if (const double lead = tree.leads[i])
+                for (int k = 0; k < 3; ++k)
+                    after_p[3 * i + k] = at[k] + lead * q[i] * own[3 * k + 2];
         } else if (tree.kinds[i] == 2) {
             for (int k = 0; k < 3; ++k) after_p[3 * i + k] = at[k] + q[i] * own[3 * k + 2];
         }
@@ -155,6 +159,8 @@ void Motion::equations() {
                 row[3] = (v[1] * d[2] - v[2] * d[1]) * scale;
                 row[4] = (v[2] * d[0] - v[0] * d[2]) * scale;
                 row[5] = (v[0] * d[1] - v[1] * d[0]) * scale;
+                if (const double lead = tree.leads[j])
+                    for (int k = 0; k < 3; ++k) row[3 + k] += v[k] * (lead * scale);
             } else {
                 for (int k = 0; k < 3; ++k) row[k] = Real{}, row[3 + k] = v[k] * scale;
             }

@@ -36,6 +36,7 @@ KeptRobot robot_of(nb::object s) {
     r.starts = starts(own("starts"), "starts", nu.value, true, cone_ends);
     r.free_frame = indices(own("free_frame"), "free_frame", n.value, nq);
     r.free_axis = indices(own("free_axis"), "free_axis", 6, nq);
+    r.free_lead = reals(own("free_lead"), "free_lead", nq);
     r.free_bound = reals(own("free_bound"), "free_bound", nq);
     r.n = n.value, r.closures = closures.value, r.np = np.value, r.ny = ny.value;
     r.ng = ng.value, r.nu = nu.value, r.cones = cone_ends.value - 1, r.nq = nq.value;

@@ -170,12 +170,18 @@ inline void Linearised::column(int64_t j, int64_t axis, Real *out) const {
 
 // Columns of free motions, clearances and springs.
 inline void Linearised::columns() {
-    for (int c = 0; c < nq; ++c) column(s.free_frame[c], s.free_axis[c], motion[c]);
+    Real step[6];
+    for (int c = 0; c < nq; ++c) {
+        column(s.free_frame[c], s.free_axis[c], motion[c]);
+        if (const double lead = s.free_lead[c]) {
+            column(s.free_frame[c], 5, step);
+            for (int a = 0; a < 6; ++a) motion[c][a] += lead * step[a];
+        }
+    }
     for (int c = 0; c < nu; ++c) {
         column(s.cone_frame[c], s.cone_axis[c], play[c]);
         for (int a = 0; a < 6; ++a) play[c][a] *= s.cone_size[c];
     }
-    Real step[6];
     largest_spring = Real{};
     for (int c = 0; c < s.ny; ++c) {
         std::fill(elastic[c], elastic[c] + 6, Real{});

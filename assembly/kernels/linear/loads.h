@@ -91,6 +91,8 @@ inline Whole Loaded::balance(
     Real most = {};
     for (int c = 0; c < nq; ++c) {
         drive[c] = load(1, s.free_frame[c], s.free_axis[c]);
+        if (const double lead = s.free_lead[c])
+            drive[c] += lead * load(1, s.free_frame[c], 5);
         most = larger(magnitude(drive[c]), most);
     }
     const Whole loose = hold_free_motions(rank, drive, STILL_OF_DRIVE * most, holding);

@@ -22,7 +22,7 @@ from assembly.model.clearance import (
     clearance_bounds,
     scales_with_margin,
 )
-from assembly.model.links import joint_compliances, link_compliances
+from assembly.model.links import link_compliances, spring_compliances
 
 OPTIMAL = {"optimal", "optimal_inaccurate"}
 _UNIT = 1e-3  # screws are in mrad and mm here
@@ -52,9 +52,9 @@ def energy_as_printed(
     bounds = clearance_bounds(posture.robot) / _UNIT
     constraints = _clearance_constraints(c, bounds, np.ones_like(bounds))
     errors = posture.robot.errors / _UNIT
-    constraints += _assembly_constraints(posture, x_p, errors + c + e + b)
+    constraints += _assembly_constraints(posture, x_p, errors + e, c + b)
     energy: Any = cp.Constant(0.0)
-    for screws, compliances in ((e, link_compliances), (b, joint_compliances)):
+    for screws, compliances in ((e, link_compliances), (b, spring_compliances)):
         C = np.array(compliances(posture.robot))
         hard = np.diagonal(C, axis1=1, axis2=2) <= 0
         constraints.append(screws[hard] == 0)
@@ -85,7 +85,7 @@ def margin_as_printed(posture: Posture, own_axes_free: bool = False) -> float | 
     factor = np.where(scales_with_margin(posture.robot), t, 1.0)
     constraints = _clearance_constraints(c, bounds, factor)
     errors = posture.robot.errors / _UNIT
-    constraints += _assembly_constraints(posture, x_p, errors + c)
+    constraints += _assembly_constraints(posture, x_p, errors, c)
     problem = cp.Problem(cp.Minimize(t), constraints)
     _solve(problem, OPTIMAL | {"infeasible"})
     return None if problem.status == "infeasible" else float(t.value)
@@ -102,7 +102,7 @@ def _root_of_stiffness(C: NDArray) -> NDArray:
 
 
 def _clearance_constraints(c: Any, bounds: NDArray, factor: NDArray) -> list:
-    """Return the constraints (2)-(5); ``factor`` (n, 4) multiplies the bounds."""
+    """Return the constraints (2)-(5); ``factor`` (n, 5) multiplies the bounds."""
     import cvxpy as cp
 
     constraints = []
@@ -120,12 +120,19 @@ def _clearance_constraints(c: Any, bounds: NDArray, factor: NDArray) -> list:
     return constraints
 
 
-def _assembly_constraints(posture: Posture, x_p: Any, screws: Any) -> list:
-    """Return eqs (16)-(20): every chain's end, and the platform's pose error x_p."""
+def _assembly_constraints(
+    posture: Posture, x_p: Any, bodies: Any, joints: Any
+) -> list:  # fmt: skip
+    """Return eqs (16)-(20): every chain's end, and the platform's pose error x_p.
+
+    Screws (n, 6) of bodies, and components (n, 6) of joints.
+    """
     import cvxpy as cp
 
     robot = posture.robot
-    stacked = cp.vec(screws, "C")
+    leads = np.array([[frame.lead] for frame in robot.frames])
+    along_threads = cp.multiply(leads, joints[:, 2:3]) @ np.eye(6)[5:]
+    stacked = cp.vec(bodies + joints + along_threads, "C")
 
     def pose_error(name: str) -> Any:
         """Return the displacement of a frame by the screws along its path, eq. (8)."""

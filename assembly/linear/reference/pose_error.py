@@ -35,6 +35,7 @@ from assembly.linear.reference.energy import least_energy
 from assembly.linear.reference.reduction import complement
 from assembly.model.clearance import (
     clearance_bounds,
+    clearance_components,
     component_bounds,
     scales_with_margin,
 )
@@ -357,7 +358,7 @@ class _Motion:
 
 def clearances_in(assembly: Assembly, joints: VirtualJoints) -> NDArray:
     """Return the (nu,) clearances of an assembly in the unit cones of other joints."""
-    screws = assembly.clearance_screws.ravel()
+    screws = clearance_components(joints.robot, assembly.clearance_screws).ravel()
     u = joints.cones.T @ screws / (joints.cones**2).sum(axis=0)
     return into_cones(u, joints.group)
 
@@ -380,7 +381,7 @@ def loaded_cones(assembly: Assembly, joints: VirtualJoints) -> NDArray:
     """
     wrenches = assembly.joint_wrenches.ravel()
     load = cone_sizes(joints.cones.T @ wrenches, joints.group)
-    screws = assembly.clearance_screws.ravel()
+    screws = clearance_components(joints.robot, assembly.clearance_screws).ravel()
     u = joints.cones.T @ screws / (joints.cones**2).sum(axis=0)
     slack = np.maximum(0.0, 1.0 - cone_sizes(u, joints.group))
     # load times slack is about the solver's gap: one of them is nearly zero

@@ -14,6 +14,7 @@ from assembly.linear.closure import (
 from assembly.linear.reference.reduction import Reduction, reduce_problem
 from assembly.model.clearance import (
     clearance_bounds,
+    clearance_components,
     clearance_excess,
     scales_with_margin,
 )
@@ -39,7 +40,7 @@ def least_margin(posture: Posture, own_axes_free: bool) -> tuple[float, float]:
     margin, bound, screws = margin_with(lin, joints)
     bounds = clearance_bounds(robot, own_axes_free)
     ranges = np.where(scales_with_margin(robot), np.inf, bounds)
-    if clearance_excess(screws, ranges) > 1e-9:
+    if clearance_excess(clearance_components(robot, screws), ranges) > 1e-9:
         # the range of a passive joint's motion was left out, but it is active
         joints = virtual_joints(robot, False, own_axes_free, bounded_motion=True)
         margin, bound, _ = margin_with(lin, joints)

@@ -29,14 +29,18 @@ AT, AXIS, AXIS2 = (
 )
 # free screws at the joint's point in its axes, of the page on joints (1.1)
 RX, RY, RZ, TX, TY, TZ = np.eye(6)
+PITCH = 0.02  # [m]
 FREE = {
     "fixed": [], "revolute": [RZ], "prismatic": [TZ], "cylindrical": [RZ, TZ],
     "spherical": [RX, RY, RZ], "planar": [RZ, TX, TY],
+    "helical": [RZ + PITCH / (2 * np.pi) * TZ],
 }  # fmt: skip
 
 
 def joint(kind, first="base", second="table", name="j", at=AT, **more):
     across = perpendicular(AXIS, AXIS2)
+    if kind == "helical":
+        more["pitch"] = PITCH
     return DrawnJoint(name, kind, first, second, at, AXIS, across, AXIS2, **more)
 
 
@@ -95,11 +99,11 @@ def numbers(rng, free):
     return JointNumbers(play, K, rng.normal(size=6) * 1e-4)
 
 
-@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+@pytest.mark.parametrize("kind", ["revolute", "prismatic", "helical"])
 def test_a_joint_written_the_other_way_is_the_same(kind):
     """Bodies exchanged, z turned round: rows y and z of its numbers change sign."""
     rng = np.random.default_rng(5)
-    given = numbers(rng, 2 if kind == "revolute" else 5)
+    given = numbers(rng, 5 if kind == "prismatic" else 2)
     signs = np.array([1, -1, -1, 1, -1, -1])
     other = JointNumbers(
         given.clearance, given.stiffness * np.outer(signs, signs), -signs * given.error
@@ -107,7 +111,7 @@ def test_a_joint_written_the_other_way_is_the_same(kind):
     here = joint(kind, numbers=(given,))
     across = here.across
     there = DrawnJoint("j", kind, "table", "base", AT, -AXIS, across, across,
-                       numbers=(other,))  # fmt: skip
+                       pitch=here.pitch, numbers=(other,))  # fmt: skip
     point = np.array([0.7, 0.3, 0.1])
     held = joint("spherical", name="ball", at=point)
     # no path leads from the base in the direction of these two

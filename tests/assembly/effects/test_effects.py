@@ -204,6 +204,25 @@ def test_friction_turns_an_elastic_drive_against_the_approach_direction():
         assert seen[2] == pytest.approx(-2.0 * approach / K, rel=1e-9)
 
 
+def test_effects_of_a_driven_screw_move_along_its_thread():
+    """Each turns the nut by an angle, which moves it by the lead times the angle."""
+    lead, F = 0.004 / (2 * pi), 500.0
+    K_B = np.diag([np.inf, np.inf, K, np.inf, np.inf, np.inf])
+    drive = Frame("drive", joint="helical", pitch=0.004, actuated=True)
+    rigid = Robot("screw", "tip", (drive, Frame("tip", "drive")))
+    soft = replace(rigid, frames=(replace(drive, joint_stiffness=K_B), rigid.frames[1]))
+    loaded = here(rigid, (0, 0, 0, 0, 0, F))
+    for conditions, name, values, angle in (
+        (here(rigid), "encoder_offset", {"drive": 1e-5}, 1e-5),
+        (loaded, "drive_compliance", {"drive": K}, F * lead / K),
+        (here(soft, approach=1.0), "friction_hysteresis", {"drive": 2.0}, -2.0 / K),
+    ):
+        seen = change(conditions, name, values)
+        assert seen == pytest.approx(
+            [0, 0, angle, 0, 0, angle * lead], rel=1e-9, abs=1e-18
+        )
+
+
 @pytest.mark.parametrize("exponent", [1.5, 2.0, 3.0])
 def test_contact_stiffening_deflects_by_its_power_law(exponent):
     F, c = -25.0, 1e7

@@ -81,6 +81,22 @@ KINDS = {
         </body><body name="c"><joint/><geom type="capsule" size="0.1 0.2"
         shellinertia="true"/><geom type="ellipsoid" size="0.1 0.2 0.3" pos="0 1 0"
         shellinertia="true"/></body><geom type="plane" size="1 1 1"/></worldbody>""",
+    "moments of inertia": """<worldbody><body name="a"><inertial pos="0 0 1" mass="1"
+        diaginertia="1 2 2.5" quat="1 2 3 4"/><joint/><body name="b"><inertial
+        pos="1 0 0" mass="2" fullinertia="1 2 2.5 0.1 0.2 0.3"/><joint/><frame
+        euler="10 20 30"><body name="c"><frame euler="-40 20 10"><inertial pos="0 1 0"
+        mass="1" euler="5 6 7" diaginertia="0.1 0.2 0.25"/></frame><joint/></body>
+        </frame></body></body></worldbody>""",
+    "moments of inertia of shells": """<default><geom shellinertia="true"/></default>
+        <worldbody><body name="a"><joint/><geom type="box" size="0.1 0.2 0.3"/></body>
+        <body name="b"><joint/><geom type="cylinder" size="0.1 0.2" euler="0 90 0"/>
+        <geom size="0.2" mass="3" pos="1 0 0"/></body><body name="c"><joint/><geom
+        type="capsule" size="0.1 0.2"/></body></worldbody>""",
+    "moments of inertia bounded and balanced": """<compiler boundinertia="0.5"
+        balanceinertia="true"/><worldbody><body name="a"><inertial pos="0 0 1"
+        mass="1" diaginertia="0.7 0.1 0.4" quat="1 2 3 4"/><joint/></body><body
+        name="b"><inertial pos="0 0 1" mass="1" diaginertia="0.7 0.8 2"
+        quat="1 2 3 4"/><joint/></body></worldbody>""",
     "masses bounded": """<compiler boundmass="0.5"/><worldbody><body name="a">
         <inertial pos="0 0 1" mass="0.1" diaginertia="1 1 1"/><joint/><body name="b">
         [M]<joint/></body></body></worldbody>""",
@@ -232,6 +248,7 @@ def test_settotalmass_scales_all_masses(tmp_path):
         </body></body></worldbody>"""
     bodies = read_mjcf(file_of(tmp_path, text)).bodies
     assert [bodies[name].mass for name in "ab"] == pytest.approx([2.5, 7.5])
+    assert [bodies[k].inertia[0, 0] for k in "ab"] == pytest.approx([0.025, 2.5])
 
 
 def test_legs_of_a_free_platform_carry_equal_shares_of_the_load(run, tmp_path):

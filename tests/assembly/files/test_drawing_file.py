@@ -111,11 +111,10 @@ def test_names_of_the_user_are_those_of_frames(read):
 
 
 def test_remarks_name_the_joints_after_which_loops_close(read):
-    cut, inertia = read(TSAI).remarks
+    (cut,) = read(TSAI).remarks
     assert cut == (
         'loops close after "leg2.upper" (at "platform"), "leg3.upper" (at "platform")'
     )
-    assert inertia == 'moments of inertia are not used: "platform"'
 
 
 def test_a_remark_says_between_which_of_many_joints_a_link_is(read):
@@ -398,7 +397,54 @@ def test_a_link_of_a_platform_with_one_joint_ends_at_its_point(read):
 
 def test_a_rod_may_have_no_inertia_about_itself(read):
     text = TSAI.replace("inertia = [0.01, 0.01, 0.02,", "inertia = [0, 0.01, 0.01,")
-    assert "moments of inertia" in read(text).remarks[1]
+    expected = np.diag([0, 0.01, 0.01])
+    np.testing.assert_array_equal(read(text).frame("platform").inertia, expected)
+
+
+def inertia_in_base_axes(robot, name):
+    """(3, 3) [kg m^2] of a frame about its centre, at home."""
+    R = home_posture(robot).transforms[robot.index(name)][:3, :3]
+    return R @ robot.frame(name).inertia @ R.T
+
+
+def test_moments_of_inertia_of_a_body_are_copied_with_its_leg(read):
+    """Half a turn about z: Ixz and Iyz change sign, the others stay."""
+    text = ARC.replace("count = 1", "count = 2").replace("  density = 7800\n", "")
+    text = text.replace("density = 7800\n", "").replace(
+        'name = "arc"', 'name = "arc"\ninertia = [3, 4, 5, 0.1, 0.2, 0.3]'
+    )
+    text = text.replace('between = ["arc", "hand"]', 'between = ["arc", "end"]')
+    text = text.replace("[[leg.joint]]", '[[leg.body]]\nname = "end"\n[[leg.joint]]', 1)
+    text = text.replace('[[body]]\nname = "hand"\n', "")
+    robot = read(text.replace('platform = "hand"', 'platform = "leg1.end"'))
+    for leg, sign in (("leg1", 1), ("leg2", -1)):
+        expected = [[3, 0.1, 0.2 * sign], [0.1, 4, 0.3 * sign],
+                    [0.2 * sign, 0.3 * sign, 5]]  # fmt: skip
+        J = inertia_in_base_axes(robot, f"{leg}.arc")
+        np.testing.assert_allclose(J, expected, atol=1e-14)
+
+
+def test_an_arc_has_the_moments_of_inertia_of_a_quarter_of_a_ring(read):
+    """Discs along a circle: each has m rho^2 / 4 about its diameters, m rho^2 / 2 about
+    the tangent.  A ball of 2 kg at the origin joins it by Steiner's rule."""
+    r, rho, mass = 0.1, 0.005, 7800 * np.pi * 0.005**2 * np.pi / 2 * 0.1
+    c = 2 / np.pi * r
+    about_axis = mass * (r**2 + rho**2 / 4) - mass * 2 * c**2
+    across = mass * (r**2 / 2 + rho**2 / 4 * 1.5) - mass * c**2
+    product = -(mass * r**2 / np.pi - mass * c**2) - mass * rho**2 / 4 / np.pi
+    expected = [[across, product, 0], [product, across, 0], [0, 0, about_axis]]
+    J = inertia_in_base_axes(read(ARC), "leg1.arc")
+    np.testing.assert_allclose(J, expected, rtol=1e-10, atol=1e-15)
+    ball = 2 / 5 * 2 * 0.03**2
+    text = ARC.replace(
+        'name = "arc"', f'name = "arc"\nmass = 2\ninertia = {[ball] * 3 + [0] * 3}'
+    )
+    whole, way = read(text).frame("leg1.arc"), np.array([c, c, 0])
+    assert whole.mass == pytest.approx(2 + mass, rel=1e-14)
+    both = 2 * mass / (2 + mass)  # reduced mass
+    expected += ball * np.eye(3) + both * (way @ way * np.eye(3) - np.outer(way, way))
+    J = inertia_in_base_axes(read(text), "leg1.arc")
+    np.testing.assert_allclose(J, expected, rtol=1e-10, atol=1e-15)
 
 
 def test_coordinates_of_passive_joints_are_zero_at_home(read):
@@ -442,9 +488,15 @@ REFUSED = {
     "unknown type": (
         'type = "prismatic"', 'type = "prismatc"',
         'leg "leg".joint "slide".type: found \'prismatc\', expected "fixed" | "revol'),
-    "helical": (
+    "missing pitch": (
         'type = "prismatic"', 'type = "helical"',
-        'leg "leg".joint "slide".type: found "helical", which is not supported yet'),
+        'leg "leg".joint "slide".pitch: missing; expected a finite number [m per '),
+    "no pitch": (
+        'type = "prismatic"', 'type = "helical"\npitch = 0',
+        'leg "leg".joint "slide".pitch: found 0, expected at least 1e-09'),
+    "pitch of another joint": (
+        'type = "prismatic"', 'type = "prismatic"\npitch = "5 mm"',
+        'leg "leg".joint "slide".pitch: found one on a prismatic joint, expected none'),
     "unknown key": (
         "drive_stiffness", "drive_stifness",
         'leg "leg".joint "slide": unknown key "drive_stifness"; did you mean '),
@@ -504,6 +556,58 @@ REFUSED = {
     "end of a link": (
         'name = "rod"', 'name = "rod"\nto = "lower"',
         'leg "leg".body "rod".to: found "lower", expected a joint of this body'),
+    "a bore without its gap": (
+        "axis2 = [0, 1, 0]", 'axis2 = [0, 1, 0]\nclearance = { length = "30 mm" }',
+        'leg "leg".joint "upper", first bearing.clearance.radial: missing; '),
+    "a bore without length": (
+        "axis2 = [0, 1, 0]",
+        "axis2 = [0, 1, 0]\nclearance = { radial = 1e-5, length = 0 }",
+        'leg "leg".joint "upper", first bearing.clearance.length: found 0, '),
+    "tilt of a bore": (
+        "drive_stiffness = 2e7",
+        "clearance = { radial = 1e-5, length = 0.1, tilt = 1 }",
+        'leg "leg".joint "slide".clearance.tilt: found together with "length", '),
+    "unknown key of a clearance": (
+        "drive_stiffness = 2e7", "clearance = { radial = 1e-5, lenght = 0.1 }",
+        'leg "leg".joint "slide".clearance: unknown key "lenght"; did you '),
+    "length of a ball": (
+        'name = "upper"\ntype = "universal"',
+        'name = "upper"\ntype = "spherical"\nclearance = { length = 0.1 }',
+        'leg "leg".joint "upper".clearance.length: found the clearance of a sh'),
+    "a guide of a cross": (
+        "axis2 = [0, 1, 0]", "axis2 = [0, 1, 0]\nclearance = { guide = { gap = 1 } }",
+        'first bearing.clearance.guide: found one on a revolute joint, expected none'),
+    "a guide with tilt": (
+        "drive_stiffness = 2e7", "clearance = { tilt = 1e-4, guide = { gap = 1e-5 } }",
+        'leg "leg".joint "slide".clearance.tilt: found together with "guide", which '),
+    "a guide without height": (
+        "drive_stiffness = 2e7",
+        "clearance = { guide = { gap = 1e-5, length = 1, width = 1 } }",
+        'leg "leg".joint "slide".clearance.guide.height: missing; expected a finite '),
+    "a guide of negative gap": (
+        "drive_stiffness = 2e7",
+        "clearance = { guide = { gap = [1, -1], length = 1, width = 1, height = 1 } }",
+        'leg "leg".joint "slide".clearance.guide.gap: found -1, expected 2 numbers >='),
+    "a guide and a bore": (
+        "drive_stiffness = 2e7", "clearance = { length = 0.1, guide = { gap = 1e-5 } }",
+        '.clearance.guide: found together with "length", expected one of them'),
+    "three bearings": (
+        "drive_stiffness = 2e7", "clearance = { bearings = [1, 2, 3] }",
+        'leg "leg".joint "slide".clearance.bearings: found [1, 2, 3], expected two t'),
+    "bearings at one place": (
+        "drive_stiffness = 2e7",
+        "clearance = { bearings = [{ z = 0, radial = 1 }, { z = 0, radial = 1 }] }",
+        'leg "leg".joint "slide".clearance.bearings: found both at z = 0 m, expected '),
+    "a bearing without gap": (
+        "drive_stiffness = 2e7",
+        "clearance = { bearings = [{ z = 0, radial = 1 }, { z = 1 }] }",
+        'leg "leg".joint "slide".clearance.bearings[2].radial: missing; expected a '),
+    "radial beside bearings": (
+        "drive_stiffness = 2e7", "clearance = { radial = 1, bearings = [] }",
+        'leg "leg".joint "slide".clearance.radial: found together with "bearings", '),
+    "a pad on a slide": (
+        "drive_stiffness = 2e7", "clearance = { pad = { gap = 1e-5 } }",
+        'leg "leg".joint "slide".clearance.pad: found one on a prismatic joint, exp'),
     "copies": (
         "count = 3", "count = 0",
         'leg "leg".repeat.count: found 0, expected a whole number >= 1'),

@@ -102,21 +102,54 @@ REFUSED = {
     "a joint of another kind": (
         'joint = "revolute"\nactuated', 'joint = "revolut"\nactuated',
         'frame "crank".joint: found \'revolut\', expected "fixed" | "revolute" | '
-        '"prismatic"; did you mean "revolute"?'),
+        '"prismatic" | "helical"; did you mean "revolute"?'),
+    "a helical joint without pitch": (
+        'joint = "revolute"\nactuated', 'joint = "helical"\nactuated',
+        'frame "crank".pitch: missing; expected a finite number [m per turn]'),
+    "a pitch of 0": (
+        'joint = "revolute"\nactuated', 'joint = "helical"\npitch = 0\nactuated',
+        'frame "crank".pitch: found 0, expected at least 1e-09 m, or at most minus'),
+    "a pitch of another joint": (
+        'joint = "revolute"\nactuated', 'joint = "revolute"\npitch = 0.01\nactuated',
+        'frame "crank".pitch: found one on a revolute joint, expected none, or a hel'),
     "a number for true": (
         "actuated = true", "actuated = 1",
         'frame "crank".actuated: found 1, expected true or false'),
     "a position of a fixed joint": (
         'joint = "revolute"\nactuated = true', "",
         'frame "crank".position: found position on a fixed joint; expected joint = '
-        '"revolute" | "prismatic", or no position'),
+        '"revolute" | "prismatic" | "helical", or no position'),
     "an actuated fixed joint": (
         'joint = "revolute"\nactuated = true\nposition = 1.0', "actuated = true",
         'frame "crank".actuated: found actuated on a fixed joint; expected joint = '
-        '"revolute" | "prismatic", or no actuated'),
+        '"revolute" | "prismatic" | "helical", or no actuated'),
     "a negative mass": (
         "mass = 1.2", "mass = -1.2",
         'frame "coupler".mass: found -1.2, expected a finite number >= 0 [kg]'),
+    "a force of a drive that holds its coordinate": (
+        "actuated = true", "actuated = true\ndrive_force = 5.0",
+        'frame "crank".drive_force: found one on a joint that is not passive; expected '
+        'a joint = "revolute" | "prismatic" | "helical" that is not actuated: a drive '
+        "that applies a force holds no coordinate"),
+    "a force without a joint": (
+        "mass = 1.2", "mass = 1.2\ndrive_force = 5.0",
+        'frame "coupler".drive_force: found one on a joint that is not passive; '),
+    "a force that is no number": (
+        "position = 1.0\njoint_stiffness", "position = 1.0\ndrive_force = nan\n"
+        "joint_stiffness",
+        'frame "rocker".drive_force: found nan, expected a finite number'),
+    "moments of inertia of no body": (
+        "mass = 1.2", "mass = 1.2\ninertia = [1, 1, 2.1, 0, 0, 0]",
+        'frame "coupler".inertia: found principal moments 1, 1, 2.1; expected none '
+        "negative, and none larger than the sum of the other two"),
+    "a negative principal moment": (
+        "mass = 1.2", "mass = 1.2\ninertia = [1, 1, 1, 2, 0, 0]",
+        'frame "coupler".inertia: found principal moments -1, 1, 3; expected none '
+        "negative, and none larger than the sum of the other two"),
+    "moments of inertia as a matrix": (
+        "mass = 1.2", "mass = 1.2\ninertia = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]",
+        'frame "coupler".inertia: found [[1, 0, 0], [0, 1, 0], [0, 0, 1]] of length '
+        "3, expected 6 finite numbers [kg m^2]"),
     "an infinite length": (
         "translation = [0.3, 0.0, 0.0]", "translation = [0.3, -inf, 0.0]",
         'frame "wrist".translation: found -inf as number 2, expected 3 finite numbers '
@@ -143,6 +176,14 @@ REFUSED = {
     "a clearance whose square is no number": (
         "radial = 29e-6", "radial = 1e-200",
         'frame "elbow".clearance.radial: found 1e-200, expected 0 or'),
+    "a ball beside a radial clearance": (
+        "radial = 29e-6", "ball = 1e-5, radial = 29e-6",
+        'frame "elbow".clearance.radial: found together with "ball", expected one of '
+        "them"),
+    "a ball on a slide": (
+        'joint = "revolute"\nposition = -1.0\n' + PLAY,
+        'joint = "prismatic"\nclearance = { ball = 1e-5 }',
+        'frame "elbow".clearance.ball: found one on a joint that slides, '),
     "a number for a clearance": (
         PLAY, "clearance = 1e-5",
         'frame "elbow".clearance: found 1e-05, expected a table'),

@@ -9,7 +9,12 @@ from dataclasses import is_dataclass
 import numpy as np
 
 from assembly.kernels.choice import kernels
-from assembly.kinematics.posture import home_posture, place_many, together
+from assembly.kinematics.posture import (
+    home_posture,
+    place_many,
+    place_many_joints,
+    together,
+)
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.zone import zone_margin
@@ -81,6 +86,22 @@ def answers():
     ), (("end", "wall"),))  # fmt: skip
     errors = 1e-4 * rng.normal(size=(11, 4, 6))
     yield "slider within its bound", solve_assembly(home_posture(slider), errors=errors)
+    springs = np.diag([2e4, 2e4, 0, 1e8, 1e8, 5e7])
+    lift = Robot("lift", "table", (
+        Frame("screw", joint="revolute", actuated=True),
+        Frame("nut", "screw", [0, 0, 0.4], joint="helical", pitch=0.005,
+              clearance=play, joint_stiffness=springs),
+        Frame("table", "nut", [0.2, 0, 0], link=link),
+        Frame("column", translation=[0.2, 0, 0.4], joint="prismatic"),
+        Frame("collar", "column"),
+    ), (("table", "collar"),))  # fmt: skip
+    turns = np.full((11, 5), np.nan)
+    turns[:, 0] = rng.uniform(-40, 40, 11)
+    lifted = [one for one in place_many_joints(lift, turns)[0] if one is not None]
+    yield "lift placed", [one.transforms for one in lifted]
+    errors = 1e-4 * rng.normal(size=(11, 5, 6))
+    yield "lift loaded", solve_assembly(lifted, LOAD, errors=errors)
+    yield "lift (21)", zone_margin(lifted, errors=errors)
     group = np.repeat(np.arange(4), [1, 2, 3, 4])
     H = rng.normal(size=(2, 10))
     given = rng.normal(size=(5, 10)), 3 * rng.normal(size=5), rng.normal(size=10)

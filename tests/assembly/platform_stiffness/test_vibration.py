@@ -52,14 +52,15 @@ def test_frequency_of_a_mass_on_a_torsion_spring_equals_its_closed_form():
     assert modes.shares[0] == {("hinge", "joint"): pytest.approx(1.0)}
 
 
-def test_weight_lowers_the_frequency_of_a_standing_pendulum():
-    """omega^2 = (k - m g l) / (m l^2); the exact tangent has the geometric part."""
+@pytest.mark.parametrize("moment", [0.0, 0.1])
+def test_weight_lowers_the_frequency_of_a_standing_pendulum(moment):
+    """omega^2 = (k - m g l) / (m l^2 + J); the tangent has the geometric part."""
     k, m, length, g = 50.0, 2.0, 0.4, 9.81
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, k))
-    arm = Frame("arm", "hinge", [length, 0, 0], mass=m)
+    arm = Frame("arm", "hinge", [length, 0, 0], mass=m, inertia=moment * np.eye(3))
     posture = home_posture(Robot("arm", "arm", (hinge, arm)))
     modes = natural_modes(posture, gravity=[-g, 0, 0], state="exact")
-    expected = np.sqrt((k - m * g * length) / (m * length**2)) / (2 * np.pi)
+    expected = np.sqrt((k - m * g * length) / (m * length**2 + moment)) / (2 * np.pi)
     np.testing.assert_allclose(modes.frequencies, [expected], rtol=1e-9)
 
 

@@ -152,3 +152,18 @@ def test_free_motions_equal_to_two_decimals_are_counted_together():
     np.testing.assert_array_equal(free[0]["screw"], np.eye(6)[5])
     assert not np.signbit(free[0]["screw"]).any()
     np.testing.assert_array_equal(free[1]["screw"], [0.5, 0, 0, 0, 0, 1])
+
+
+def test_stiffness_of_a_platform_that_does_not_yield_is_reported_as_rigid():
+    """Along fx all draws are rigid, along fy one of four; without draws, no shares."""
+    stiffnesses = np.full((4, 6), 2.0)
+    stiffnesses[:, 3], stiffnesses[0, 4], stiffnesses[:, 5] = np.inf, np.inf, np.nan
+    said = stiffness_report(stiffnesses, np.full((4, 6, 6), np.nan), "contact", 0.95)
+    axes, lines = said["axes"], stiffness_spread_text(said).splitlines()
+    assert axes["fx"]["rigid"]["probability"] == 1.0
+    assert axes["fx"]["free"]["probability"] == 0.0
+    assert "mean" not in axes["fx"]
+    assert lines[4] == "  fx: no finite stiffness; rigid in 1"
+    assert axes["fy"]["rigid"]["probability"] == 0.25
+    assert axes["fy"]["mean"]["value"] == pytest.approx(2.0)
+    assert axes["fz"] == {"unit": "N/m", "draws": 0}

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.model.robot import MatrixLink
+from assembly.model.robot import Frame, MatrixLink, Robot
 from assembly.robots import BUILT_IN, load_robot
 from assembly.sweeps.identity import robot_hash
 from assembly.sweeps.parameters import design_of, load_design, unit_of
@@ -55,6 +55,14 @@ def test_path_without_a_leg_changes_every_leg(design):
 )  # fmt: skip
 def test_every_kind_of_number_has_a_path(design, path, value, read):
     assert read(design.robot({path: value})) == value
+
+
+def test_path_of_a_product_of_inertia_names_its_two_axes():
+    """Given in the file: a body without moments has no such number."""
+    tip = Frame("tip", mass=1.0, inertia=np.diag([1.0, 2.0, 2.5]))
+    design = design_of(Robot("ball", "tip", (tip,)))
+    assert design.robot({"tip.inertia.xz": 0.3}).frame("tip").inertia[2, 0] == 0.3
+    assert unit_of("tip.inertia.xz") == "kg m^2"
 
 
 def test_path_into_a_symmetric_matrix_changes_both_entries():

@@ -1,0 +1,70 @@
+"""Drives that apply a force instead of holding a coordinate."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from assembly.model.frame import Frame
+from assembly.model.robot import Robot
+from forcefit.inputs.table import BadInput, nearest, quoted
+
+
+def with_drive_forces(robot: Robot, forces: Mapping[str, float]) -> Robot:
+    """Return a robot some of whose drives apply a force and hold no coordinate.
+
+    Such a joint is passive: its own motion is free of the drive's stiffness and
+    clearance, and the force acts between its body and what it carries.
+
+    Args:
+        robot: any robot.
+        forces: [N m or N] by the name of the drive's frame, positive where the
+            coordinate grows.
+
+    Returns:
+        The robot; the stiffness of its joints in other directions is unchanged.
+
+    Raises:
+        BadInput: no drive has this name, or its stiffness couples its motion with
+            another direction.
+    """
+    drives = [f.name for f in robot.frames if f.actuated or f.drive_force]
+    for name in forces:
+        if name not in drives:
+            raise BadInput(
+                f"{robot.name}: drive force: no drive {quoted(name[:60])}"
+                f"{nearest(name, drives) if drives else '; the robot has none'}"
+            )
+    frames = (
+        _released(f, float(forces[f.name])) if f.name in forces else f
+        for f in robot.frames
+    )
+    texts = (
+        f"{name} {force:g} {'N' if robot.frame(name).joint == 'prismatic' else 'N m'}"
+        for name, force in forces.items()
+    )
+    remark = f"drives that apply a force and hold no coordinate: {', '.join(texts)}"
+    return replace(robot, frames=tuple(frames), remarks=(remark, *robot.remarks))
+
+
+def _released(frame: Frame, force: float) -> Frame:
+    """Return a frame whose joint is free along its motion but for a force."""
+    if not frame.actuated:
+        return replace(frame, drive_force=force)
+    own, K, clearance = frame.own_axis, frame.joint_stiffness, frame.clearance
+    if K is not None:
+        others = np.arange(6) != own
+        if K[own, others].any():
+            raise BadInput(
+                f"frame {quoted(frame.name)}.joint_stiffness: found the drive's motion "
+                "coupled with other directions; expected zeros in its row and column "
+                "for a drive that applies a force"
+            )
+        K = K.copy()
+        K[own, own] = 0.0
+    if clearance is not None:
+        key = "axial" if frame.joint == "prismatic" else "spin"
+        clearance = replace(clearance, **{key: None})
+    return replace(
+        frame, actuated=False, joint_stiffness=K, clearance=clearance, drive_force=force
+    )

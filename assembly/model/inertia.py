@@ -1,0 +1,70 @@
+"""Moments of inertia of rigid bodies: checks, axes, and bodies joined together."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+# mass [kg], centre (3,) [m] and moments of inertia (3, 3) [kg m^2] about that centre
+MassProperties = tuple[float, NDArray, NDArray]
+
+_ROUNDING = 1e-6  # [-] of the largest moment: files have few digits
+_SIX = (np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2]))
+
+
+def inertia_matrix(six: ArrayLike) -> NDArray:
+    """Return the (3, 3) matrix of its entries Ixx, Iyy, Izz, Ixy, Ixz, Iyz."""
+    J = np.zeros((3, 3))
+    J[_SIX] = six
+    J[_SIX[::-1]] = six
+    return J
+
+
+def six_moments(J: NDArray) -> list[float]:
+    """Return the entries Ixx, Iyy, Izz, Ixy, Ixz, Iyz of a (3, 3) matrix."""
+    return [float(value) for value in J[_SIX]]
+
+
+def inertia_fault(J: NDArray) -> str:
+    """Return why no body has these moments of inertia, or an empty text.
+
+    Args:
+        J: (3, 3) [kg m^2].
+
+    Returns:
+        What was found and expected, for a message.
+    """
+    if not np.abs(J - J.T).max() <= _ROUNDING * np.abs(J).max():
+        return "found a matrix that is not symmetric, expected a symmetric one"
+    least, middle, most = np.linalg.eigvalsh(J)
+    rounding = _ROUNDING * max(most, 0.0)
+    if least < -rounding or most > least + middle + rounding:
+        return (
+            f"found principal moments {least:.4g}, {middle:.4g}, {most:.4g}; expected "
+            "none negative, and none larger than the sum of the other two"
+        )
+    return ""
+
+
+def point_inertia(mass: float, arm: NDArray) -> NDArray:
+    """Return the (3, 3) [kg m^2] of a point mass [kg] at ``arm`` (3,) [m]."""
+    return np.asarray(mass * (arm @ arm * np.eye(3) - np.outer(arm, arm)))
+
+
+def joined_bodies(parts: Sequence[MassProperties]) -> MassProperties:
+    """Return mass, centre and moments of inertia of bodies that form one rigid body.
+
+    Args:
+        parts: mass properties of each body, in common axes.
+
+    Returns:
+        Theirs together, by the parallel axis theorem; the centre is the origin without
+        a mass.
+    """
+    masses, centres = [mass for mass, _, _ in parts], [at for _, at, _ in parts]
+    total, centre, J = float(sum(masses)), np.zeros(3), np.zeros((3, 3))
+    if total:
+        centre = np.asarray(np.average(centres, axis=0, weights=masses))
+    for mass, at, own in parts:
+        J += own + point_inertia(mass, at - centre)
+    return total, centre, J

@@ -1,0 +1,220 @@
+"""Helical joints: a screw and its nut."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.exact.exact import solve_exact
+from assembly.files.robot_file import read_robot
+from assembly.kinematics.mobility import mobility
+from assembly.kinematics.posture import home_posture, place_robot, together
+from assembly.kinematics.verdict import limits_passed
+from assembly.linear.energy import solve_assembly
+from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.reference.as_printed import energy_as_printed
+from assembly.measurement.conditions import as_declared
+from assembly.measurement.exact_rows import solve_rows
+from assembly.measurement.predict import assemble_row, predict
+from assembly.model.error_distributions import tolerance_sources
+from assembly.platform_stiffness.deflection import deflection_curve
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from assembly.platform_stiffness.vibration import natural_modes
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.linear_response import linear_response
+from assembly.statistics.monte_carlo import run_draws
+from assembly.sweeps.sweep import sweep_poses
+from tests.screws_for_tests import DIFFERENTIAL, LIFT, NUT
+
+METHODS = ["compiled", "reference"]
+LEAD = 0.005 / (2 * np.pi)  # [m/rad] of the lift
+
+
+@pytest.fixture
+def read(tmp_path):
+    def robot(text=LIFT):
+        (tmp_path / "lift.toml").write_text(text)
+        return read_robot(tmp_path / "lift.toml")
+
+    return robot
+
+
+def test_screw_lift_has_one_freedom_and_three_redundant_constraints(read):
+    """Column and screw both hold two tilts, and the distance between their axes."""
+    found = mobility(home_posture(read()))
+    assert (found.freedoms, found.platform_freedoms) == (1, 1)
+    assert (found.freedoms_drives_locked, found.redundant_constraints) == (0, 3)
+
+
+def test_turn_of_the_screw_moves_the_table_by_the_pitch(read):
+    """Down if a right-hand screw turns about +z, up if a left-hand one does."""
+    for text, step in ((LIFT, -0.005), (LIFT.replace('"5 mm"', '"-5 mm"'), 0.005)):
+        pose = place_robot(read(text), joints={"bearing": 2 * np.pi}).pose()
+        expected = [0.3, 0, 0.4 + step, 0, 0, 0]
+        assert list(pose.values()) == pytest.approx(expected, abs=1e-14)
+
+
+def test_height_of_the_table_needs_eighty_turns_of_the_screw(read):
+    at = place_robot(read(), pose={"tz": 0.8})
+    angle = at.coordinates[at.robot.index("bearing")]
+    assert angle == pytest.approx(-80 * 2 * np.pi, rel=1e-12)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_compliance_of_the_table_is_lead_squared_over_drive_stiffness(method, read):
+    C = platform_stiffness(home_posture(read()), method=method).compliance
+    expected = np.zeros((6, 6))
+    expected[5, 5] = LEAD**2 / 200
+    assert expected[5, 5] == pytest.approx(3.16629e-9, rel=1e-6)
+    assert np.abs(C - expected).max() < 1e-12 * expected[5, 5]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_energy_under_a_load_is_that_of_the_drive_spring(method, read):
+    """F^2 lead^2 / 2 k, with finite motions too: the table moves straight."""
+    at, load = home_posture(read()), [0, 0, 0, 0, 0, 1000.0]
+    found = solve_assembly(at, load, method=method)
+    energy = 1e6 * LEAD**2 / 400
+    assert found.energy == pytest.approx(energy, rel=1e-12)
+    assert found.clearance_excess() < 1e-12
+    assert found.platform_screw[5] == pytest.approx(1e3 * LEAD**2 / 200, rel=1e-12)
+    assert solve_exact(at, load).energy == pytest.approx(energy, rel=1e-9)
+
+
+def test_weight_of_the_table_turns_the_drive_by_its_moment(read):
+    """The drive carries m g times the lead."""
+    found = solve_assembly(home_posture(read()), gravity=[0, 0, -9.81])
+    turn = found.joint_screws[found.posture.robot.index("bearing"), 2]
+    assert turn == pytest.approx(8 * 9.81 * LEAD / 200, rel=1e-12)
+
+
+def test_frequency_of_the_table_is_that_of_its_mass_on_the_screw(read):
+    found = natural_modes(home_posture(read()))
+    expected = np.sqrt(200 / LEAD**2 / 8) / (2 * np.pi)
+    assert found.frequencies == pytest.approx([expected], rel=1e-9)
+
+
+@pytest.mark.parametrize("state", ["contact", "exact"])
+def test_deflection_of_the_table_grows_by_the_compliance_of_the_screw(state, read):
+    at, loads = home_posture(read()), np.arange(0.0, -501.0, -250.0)
+    curve = deflection_curve(at, 5, loads, state=state)
+    np.testing.assert_allclose(curve.deflection, loads * LEAD**2 / 200, rtol=1e-9)
+    np.testing.assert_allclose(curve.stiffness, 200 / LEAD**2, rtol=1e-6)
+
+
+def test_rotation_error_of_the_screw_lowers_the_table_by_its_lead(read):
+    """Exact, however large the rotation is: all axes are parallel."""
+    robot, errors = read(), np.zeros((6, 6))
+    errors[robot.index("bearing"), 2] = 0.3
+    at = home_posture(robot.with_errors(errors))
+    expected = [0, 0, 0, 0, 0, -0.3 * LEAD]
+    for found in (solve_assembly(at), solve_exact(at)):
+        np.testing.assert_allclose(found.platform_screw, expected, rtol=0, atol=1e-12)
+    drawn = linear_response(home_posture(robot)).solve(np.stack([errors, -errors]))
+    np.testing.assert_allclose(drawn.platform_screw[:, 5], [-0.3 * LEAD, 0.3 * LEAD])
+
+
+def test_sweep_of_heights_has_the_error_of_the_pitch_everywhere(read):
+    robot, errors = read(), np.zeros((6, 6))
+    errors[robot.index("bearing"), 2] = 1e-3
+    data = sweep_poses(robot.with_errors(errors), {"tz": np.array([0.3, 0.4, 0.5])})
+    assert set(data["status"].values.tolist()) == {"ok"}
+    np.testing.assert_allclose(data["platform_screw"].values[:, 5], -1e-3 * LEAD)
+
+
+def test_differential_screw_moves_by_the_difference_of_its_pitches(read):
+    """A turn of the screw moves it by 5 mm, and the table back by 4 mm on the screw."""
+    robot = read(DIFFERENTIAL)
+    pose = place_robot(robot, joints={"coarse": 2 * np.pi}).pose()
+    assert pose["tz"] == pytest.approx(0.101, abs=1e-14)
+    C = platform_stiffness(home_posture(robot)).compliance
+    assert C[5, 5] == pytest.approx((0.001 / (2 * np.pi)) ** 2 / 50, rel=1e-9)
+
+
+@pytest.mark.parametrize(("guide", "row", "most"), [
+    ("revolute", 2, 25e-6 / 0.004 * 2 * np.pi), ("prismatic", 5, 25e-6),
+])  # fmt: skip
+def test_nut_clearance_is_axial_or_a_rotation_by_the_thread(guide, row, most, read):
+    """Tr 16 x 4, 50 um from flank to flank: 25 um, or 39.3 mrad with TZ held."""
+    robot = read(NUT.replace('"revolute"', f'"{guide}"'))
+    bound = bound_pose_error(solve_assembly(home_posture(robot)))
+    error = bound.rotation_error if row == 2 else bound.translation_error
+    assert most == pytest.approx([39.27e-3, 25e-6][row == 5], rel=1e-4)
+    assert np.ravel(error) == pytest.approx([most, most], rel=1e-3)
+
+
+def test_uniform_positions_of_a_nut_fill_its_axial_clearance(read):
+    """(0, b) uniform: mean of |TZ| b / 2, with 400 draws to 3 sigma, b / 23."""
+    at = home_posture(read(NUT.replace('"revolute"', '"prismatic"')))
+    sources = tolerance_sources(at.robot, [0, 0, 0, 0, 0, 1e-12])
+    data = run_draws(Experiment(at, sources, clearance="uniform"), 400)
+    sizes = data["translation"].values / 25e-6
+    assert sizes.max() == pytest.approx(1.0, abs=0.02)
+    assert sizes.mean() == pytest.approx(0.5, abs=1 / 23)
+
+
+def test_driven_nut_is_elastic_along_its_thread(read):
+    """C = s s^T / k of the unit screw s = [0 0 1 0 0 h]."""
+    text = NUT[: NUT.index("clearance")] + "actuated = true\ndrive_stiffness = 50\n"
+    C = platform_stiffness(home_posture(read(text))).compliance
+    s = np.array([0, 0, 1, 0, 0, 0.004 / (2 * np.pi)])
+    assert np.abs(C - np.outer(s, s) / 50).max() < 1e-14
+
+
+SPRUNG = LIFT.replace("pitch =", (
+    "clearance = { radial = 1e-5, axial = 2e-5, tilt = 1e-4 }\n"
+    "joint_stiffness = [2e4, 2e4, 0, 1e8, 1e8, 5e7]\npitch ="
+))  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_compiled_reference_and_printed_energies_of_a_loaded_lift_agree(seed, read):
+    """Three solvers; the printed one has the thread as a constraint of its own."""
+    robot, rng = read(SPRUNG), np.random.default_rng(seed)
+    robot = robot.with_errors(rng.normal(size=(len(robot.frames), 6)) * 1e-4)
+    at, load = home_posture(robot), rng.normal(size=6) * 100
+    found, expected = (solve_assembly(at, load, method=method) for method in METHODS)
+    assert found.method == "compiled"
+    assert found.energy == pytest.approx(expected.energy, rel=1e-9)
+    energy, screw = energy_as_printed(at, load)
+    assert energy == pytest.approx(expected.energy, rel=1e-5)
+    np.testing.assert_allclose(screw, found.platform_screw, rtol=0, atol=1e-9)
+    assert expected.energy > 1e-3
+
+
+@pytest.mark.parametrize("pitch", ["5 mm", "9 mm"])
+def test_exact_rows_of_a_measured_lift_equal_single_exact_solutions(pitch, read):
+    """A chord iteration, and Newton's method of the other engine."""
+    text = SPRUNG.replace("clearance =", "# ").replace("5 mm", pitch)
+    robot, rng = read(text), np.random.default_rng(4)
+    robot = robot.with_errors(rng.normal(size=(len(robot.frames), 6)) * 1e-4)
+    postures = [place_robot(robot, pose={"tz": z}) for z in (0.4, 0.42)]
+    here = as_declared(
+        together(postures), rng.normal(size=(2, 6)) * 50,
+        mismatch=[p.mismatch for p in postures], point=np.zeros(3),
+        gravity=[0, 0, -9.81],
+    )  # fmt: skip
+    here = replace(here, exact=True)
+    screws, found = solve_rows(here, np.zeros((2, 0)))
+    assert found.all()
+    for row in range(2):
+        alone = assemble_row(here, row).platform_screw
+        np.testing.assert_allclose(screws[row], alone, rtol=0, atol=2e-11)
+
+
+def test_readings_of_lifts_that_differ_in_pitch_are_those_of_their_own(read):
+    """At the same frames, an error of 1 mrad moves the tables by their own lead."""
+    for pitch in (0.005, 0.009):
+        robot = read(LIFT.replace('"5 mm"', str(pitch)))
+        errors = np.zeros((6, 6))
+        errors[robot.index("bearing"), 2] = 1e-3
+        at = home_posture(robot.with_errors(errors))
+        found = predict(as_declared(at, np.zeros(6))).deviation[0]
+        assert found[5] == pytest.approx(-1e-3 * pitch / (2 * np.pi), rel=1e-9)
+
+
+def test_whole_turns_of_a_passive_nut_count_against_its_limits(read):
+    """After a turn a helical joint is elsewhere; a revolute joint is not."""
+    robot = read(LIFT.replace("pitch =", "limits = [-6.0, 6.0]\npitch ="))
+    at = place_robot(robot, joints={"bearing": -7.0})
+    assert limits_passed(robot, at.coordinates) == "nut at 7 rad, limits -6 to 6"

@@ -1,0 +1,225 @@
+"""Drives that apply a force: statics of redundantly actuated robots, by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.exact.exact import solve_exact
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.linear.reference.reduction import FreeMotion
+from assembly.model.force_control import with_drive_forces
+from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.inputs.table import BadInput
+from tests.assembly.exact.test_exact import only
+
+ALONG_X = [0.0, np.pi / 2, 0.0]  # turns z to x
+METHODS = ("compiled", "reference")
+
+
+def opposing_slides(k_rod, k_first=np.inf, k_second=np.inf):
+    """Two slides on one line, from both sides, with a spring between them along x.
+
+    The slide's coordinates grow along +x, both; the rod's tip is at the second slide.
+    """
+    stiff = np.diag([1e9, 1e9, 1e9, k_rod, 1e9, 1e9])
+    frames = (
+        Frame("first", rotation=ALONG_X, joint="prismatic", actuated=True,
+              joint_stiffness=_along(k_first)),
+        Frame("rod", "first", [0, 0, 1.0], [0, -np.pi / 2, 0],
+              link=MatrixLink(stiff)),
+        Frame("second", translation=[2.0, 0, 0], rotation=ALONG_X, joint="prismatic",
+              actuated=True, joint_stiffness=_along(k_second)),
+        Frame("block", "second", [0, 0, -1.0], [0, -np.pi / 2, 0]),
+    )  # fmt: skip
+    return Robot("slides", "block", frames, (("rod", "block"),))
+
+
+def _along(k):
+    return np.diag([np.inf] * 5 + [k])
+
+
+@pytest.mark.parametrize("solve", [solve_assembly, solve_exact])
+@pytest.mark.parametrize("method", METHODS)
+def test_force_of_one_of_two_opposing_slides_is_that_of_the_rod(solve, method):
+    """F = 200 N stretches rod and first drive in series: x = F (1/k_rod + 1/k_1)."""
+    F, k_rod, k_1 = 200.0, 4e6, 1e7
+    robot = with_drive_forces(opposing_slides(k_rod, k_1, 3e7), {"second": F})
+    assembly = solve(home_posture(robot), method=method)
+    x = F / k_rod + F / k_1
+    assert assembly.platform_screw[3] == pytest.approx(x, rel=1e-9)
+    # the rod is pulled: the outer part pulls its tip along +x
+    np.testing.assert_allclose(assembly.tip_wrenches[1], [0, 0, 0, F, 0, 0], atol=2e-6)
+    assert assembly.energy == pytest.approx(F * x / 2, rel=1e-9)
+    # the drive holds its block against the block's pull along -x
+    assert assembly.tip_wrenches[2][5] == pytest.approx(-F, rel=1e-9)
+    assert assembly.posture.platform[0, 3] == 1.0  # no nominal motion
+
+
+def test_energy_of_linear_answer_balances_the_work_of_the_drive():
+    """Constant force from rest: work = 2 energy; the certificate closes."""
+    robot = with_drive_forces(opposing_slides(4e6), {"second": 120.0})
+    assembly = solve_assembly(home_posture(robot))
+    assert assembly.work == pytest.approx(2 * assembly.energy, rel=1e-12)
+    assert assembly.certified
+    assert assembly.loaded
+
+
+def test_force_control_removes_the_stiffness_of_the_drive():
+    """Held, the two drives are in parallel: k_2 + 1/(1/k_1 + 1/k_rod)."""
+    k_rod, k_1, k_2 = 4e6, 1e7, 3e7
+    robot = opposing_slides(k_rod, k_1, k_2)
+    series = 1 / (1 / k_rod + 1 / k_1)
+    for machine, expected in (
+        (robot, series + k_2), (with_drive_forces(robot, {"second": 500.0}), series)
+    ):  # fmt: skip
+        posture = home_posture(machine)
+        for state in ("nominal", "contact", "exact"):
+            C = platform_stiffness(posture, state=state).compliance
+            assert C[3, 3] == pytest.approx(1 / expected, rel=1e-9)
+
+
+def crossed_cranks(radius=0.004):
+    """A four-bar with both cranks driven: crank 0.3 m, coupler 0.5 m, ground 0.5 m.
+
+    A parallelogram with cranks at 60 deg, the coupler a beam along x without shear.
+    """
+    beam = BeamLink({"radius": radius}, 7e10, 0.3, None, "euler")
+    up = np.pi / 3
+    frames = (
+        Frame("crank", joint="revolute", actuated=True, position=up),
+        Frame("pin", "crank", [0.3, 0, 0], joint="revolute", position=-up),
+        Frame("coupler", "pin", [0.5, 0, 0], link=beam),
+        Frame("rocker", translation=[0.5, 0, 0], joint="revolute", actuated=True,
+              position=up),
+        Frame("knee", "rocker", [0.3, 0, 0], joint="revolute", position=-up),
+        Frame("end", "knee"),
+    )  # fmt: skip
+    return Robot("cranks", "coupler", frames, (("coupler", "end"),))
+
+
+@pytest.mark.parametrize("torque", [12.0, -3.0])
+def test_torque_of_a_redundant_crank_loads_the_coupler_by_its_lever_arm(torque):
+    """Moments about the rocker's pivot: the coupler's force N r sin 60 = -torque.
+
+    A positive torque turns the rocker towards the crank and presses the coupler.  The
+    crank's drive holds the same moment; the rocker turns by N L / (EA r sin 60).
+    """
+    robot = with_drive_forces(crossed_cranks(), {"rocker": torque})
+    posture = home_posture(robot)
+    assembly = solve_assembly(posture)
+    force = torque / (0.3 * np.sin(np.pi / 3))
+    np.testing.assert_allclose(
+        assembly.tip_wrenches[2], [0, 0, 0, -force, 0, 0], atol=1e-9 * abs(force)
+    )
+    shorter = force * 0.5 / (7e10 * np.pi * 0.004**2)
+    assert assembly.platform_screw[3] == pytest.approx(-shorter, rel=1e-9)
+    turned = assembly.clearance_screws[robot.index("rocker"), 2]
+    assert turned == pytest.approx(shorter / (0.3 * np.sin(np.pi / 3)), rel=1e-9)
+    assert assembly.work == pytest.approx(torque * turned, rel=1e-12)
+    # moment that the crank's drive transmits to the base's side
+    assert assembly.tip_wrenches[0][2] == pytest.approx(torque, rel=1e-9)
+    assert solve_exact(posture).platform_screw[3] == pytest.approx(-shorter, rel=1e-3)
+
+
+def test_drive_that_alone_holds_a_motion_cannot_apply_a_force():
+    robot = crossed_cranks()
+    crank = replace(robot.frames[3], actuated=False)
+    robot = replace(robot, frames=(*robot.frames[:3], crank, *robot.frames[4:]))
+    posture = home_posture(with_drive_forces(robot, {"crank": 1.0}))
+    with pytest.raises(FreeMotion, match="the load drives a motion that no joint"):
+        solve_assembly(posture)
+
+
+@pytest.mark.parametrize("torque", [1e-3, 40.0])
+def test_torque_on_a_hinge_spring_turns_it_by_torque_over_stiffness(torque):
+    """Also far: 40 N m on 50 N m/rad is 0.8 rad, since the torque follows the hinge."""
+    hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, 50.0),
+                  drive_force=torque)  # fmt: skip
+    robot = Robot("arm", "arm", (hinge, Frame("arm", "hinge", [0.4, 0, 0])))
+    posture = home_posture(robot)
+    angle = torque / 50.0
+    assert solve_assembly(posture).platform_screw[2] == pytest.approx(angle, rel=1e-9)
+    exact = solve_exact(posture)
+    expected = [0, 0, angle, 0.4 * (np.cos(angle) - 1), 0.4 * np.sin(angle), 0]
+    np.testing.assert_allclose(exact.platform_screw, expected, atol=1e-9)
+    assert exact.energy == pytest.approx(50.0 * angle**2 / 2, rel=1e-9)
+
+
+@pytest.mark.parametrize("solve", [solve_assembly, solve_exact])
+def test_force_of_a_drive_can_balance_a_weight(solve):
+    """m g l on the hinge: nothing moves, and its spring is free of load."""
+    hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, 50.0),
+                  drive_force=2.0 * 9.81 * 0.4)  # fmt: skip
+    arm = Frame("arm", "hinge", [0.4, 0, 0], mass=2.0)
+    posture = home_posture(Robot("arm", "arm", (hinge, arm)))
+    assembly = solve(posture, gravity=[0, -9.81, 0])
+    np.testing.assert_allclose(assembly.platform_screw, np.zeros(6), atol=1e-15)
+
+
+def test_drive_force_turns_clearance_of_other_joints_to_one_side():
+    """Axial play of the rod's end +-20 um: the pull takes all of it up."""
+    robot = opposing_slides(4e6)
+    first = replace(robot.frames[0], clearance=Clearance(axial=2e-5))
+    robot = replace(robot, frames=(first, *robot.frames[1:]))
+    for F in (100.0, -100.0):
+        driven = with_drive_forces(robot, {"second": F})
+        screw = solve_assembly(home_posture(driven)).platform_screw
+        assert screw[3] == pytest.approx(np.sign(F) * 2e-5 + F / 4e6, rel=1e-9)
+
+
+def test_many_postures_and_errors_have_the_forces_of_single_ones():
+    robot = with_drive_forces(crossed_cranks(), {"rocker": 5.0})
+    postures = [place_robot(robot, joints={"crank": q}) for q in (0.7, 1.0, 1.2)]
+    together = solve_assembly(postures)
+    for k, posture in enumerate(postures):
+        one = solve_assembly(posture)
+        np.testing.assert_allclose(together[k].platform_screw, one.platform_screw)
+        assert together[k].energy == pytest.approx(one.energy, rel=1e-9)
+
+
+def test_clearance_and_stiffness_of_the_drive_itself_are_released():
+    drive = Frame(
+        "drive", joint="prismatic", actuated=True, joint_stiffness=_along(1e6),
+        clearance=Clearance(radial=1e-5, axial=2e-5),
+    )  # fmt: skip
+    robot = Robot("slide", "tip", (drive, Frame("tip", "drive")))
+    frame = with_drive_forces(robot, {"drive": 7.0}).frame("drive")
+    assert not frame.actuated
+    assert frame.drive_force == 7.0
+    assert frame.clearance == Clearance(radial=1e-5)
+    assert frame.own_stiffness == 0.0
+
+
+def test_unknown_and_coupled_drives_are_refused():
+    robot = crossed_cranks()
+    with pytest.raises(BadInput, match=r'no drive "rockr"; did you mean "rocker"'):
+        with_drive_forces(robot, {"rockr": 1.0})
+    with pytest.raises(BadInput, match='no drive "pin"'):
+        with_drive_forces(robot, {"pin": 1.0})
+    K = np.diag([1e3] * 3 + [1e6] * 3)
+    K[0, 2] = K[2, 0] = 10.0
+    rocker = replace(robot.frames[3], joint_stiffness=K)
+    robot = replace(robot, frames=(*robot.frames[:3], rocker, *robot.frames[4:]))
+    with pytest.raises(BadInput, match=r'"rocker"\.joint_stiffness: found the drive'):
+        with_drive_forces(robot, {"rocker": 1.0})
+    with pytest.raises(BadInput, match=r'"a"\.drive_force: found 3 on a fixed joint'):
+        Frame("a", drive_force=3.0)
+
+
+@pytest.mark.parametrize("solve", [solve_assembly, solve_exact])
+def test_torque_of_a_screw_drive_presses_by_the_torque_over_the_lead(solve):
+    """2 pi M x = F P per turn: a nut that cannot turn presses a spring with M / h."""
+    pitch, k, M = 0.005, 2e6, 3.0
+    screw = Frame("screw", joint="helical", pitch=pitch, actuated=True)
+    nut = Frame("nut", "screw", joint="revolute")
+    rail = Frame("rail", joint="prismatic", joint_stiffness=_along(k))
+    frames = screw, nut, Frame("end", "nut"), rail, Frame("table", "rail")
+    robot = Robot("press", "table", frames, (("end", "table"),))
+    posture = home_posture(with_drive_forces(robot, {"screw": M}))
+    assembly = solve(posture)
+    force = M / (pitch / (2 * np.pi))
+    assert assembly.platform_screw[5] == pytest.approx(force / k, rel=1e-9)
+    assert assembly.energy == pytest.approx(force**2 / k / 2, rel=1e-9)
