@@ -352,3 +352,23 @@ def test_solve_notes_where_a_joint_is_bolted(tmp_path, run):
     status, out, _ = run("assembly", "solve", path, "--joint", "crank=2.0")
     assert status == 0
     assert out.count('joint "stand" is bolted at') == 1
+
+
+def test_conversion_to_bodies_and_joints_keeps_the_bolt(tmp_path, run):
+    path, drawn = four_bar(tmp_path, at_angle(0.4)), tmp_path / "bodies.toml"
+    status, _, err = run("convert", path, "--format", "2", "-o", drawn)
+    assert status == 0, err
+    energies = [
+        solve_assembly(place_robot(load_robot(p), joints={"crank": 2.0})).energy
+        for p in (path, drawn)
+    ]
+    assert energies[1] == pytest.approx(energies[0], rel=1e-6)
+
+
+def test_conversion_of_a_bolt_at_a_rotation_of_the_platform_is_refused(tmp_path, run):
+    path = four_bar(tmp_path, "{ pose = { rz = 0.5 } }")
+    drawn = tmp_path / "bodies.toml"
+    status, _, err = run("convert", path, "--format", "2", "-o", drawn)
+    assert status == 2
+    assert "locked_at: found a rotation of the platform" in err
+    assert not drawn.exists()
