@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.drawing.callouts import frame_callouts, frame_fits
 from assembly.drawing.drawing import Drawing, DrawnBody, DrawnJoint
 from assembly.drawing.links import link_at_tip
 from assembly.drawing.parts import joint_axes, parts_of
@@ -66,6 +67,7 @@ def robot_of_drawing(drawing: Drawing) -> Robot:
     return Robot(
         drawing.name, drawing.platform, place_frames(placed), tuple(closures),
         drawing.description, remarks=remarks,
+        callouts=frame_callouts(drawing, steps, placed), fits=frame_fits(steps),
     )  # fmt: skip
 
 

@@ -170,6 +170,7 @@ def _reversed(part: Part) -> Part:
         error=-_FLIP_SCREW * own.error,
         tolerance=own.tolerance,
         locked_at=own.locked_at,
+        fit=own.fit,
     )
     pose = part.pose @ transform(np.zeros(3), _FLIP)
     return replace(part, pose=pose, numbers=numbers)

@@ -17,6 +17,7 @@ from assembly.files.robot_file import root_table
 from assembly.files.toml_text import file_text
 from assembly.model.inertia import six_moments
 from assembly.model.robot import Robot
+from forcefit.inputs.table import BadInput
 
 _ROUNDING = 1e-15  # relative: smaller parts of points and directions are written as 0
 _AT_ZERO = 1e-12  # [rad or m] coordinates nearer to 0 are not written
@@ -32,7 +33,15 @@ def drawing_text(robot: Robot, drawing: Drawing, folder: Path) -> str:
 
     Returns:
         The text.
+
+    Raises:
+        BadInput: the robot has tolerances of a drawing or fits.
     """
+    if robot.callouts or robot.fits:
+        raise BadInput(
+            f"{robot.name}: found [[tolerance]] or a fit, which are not written as "
+            "bodies and joints; expected none, or --format 1"
+        )
     table = root_table(robot, folder)
     diagnosis = table.pop("diagnosis", {})
     table |= {"platform": drawing.platform, "platform_at": _point(drawing.platform_at)}

@@ -38,6 +38,9 @@ def read_drawn_clearance(table: Table, kind: str) -> _Clearance:
     if len(contacts) > 1:
         fault = f"found together with {quoted(contacts[0])}"
         raise inner.bad(contacts[1], f"{fault}, expected one of them")
+    if contacts and inner.has("fit"):
+        fault = f"found together with {quoted(contacts[0])}, expected a radial gap"
+        raise inner.bad("fit", fault)
     found: _Clearance = bounds, ()
     for key in contacts:
         found = _CONTACTS[key](inner, kind, bounds)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from assembly.drawing.drawing import FREE_ROWS, DrawnJoint, JointNumbers, perpendicular
 from assembly.files.bolt_file import read_locked_at
 from assembly.files.drawn_clearance import read_drawn_clearance
-from assembly.files.joint_file import read_joint_stiffness, read_pitch
+from assembly.files.joint_file import read_fit, read_joint_stiffness, read_pitch
 from assembly.files.written_units import SCREW, without_units
 from assembly.model.largest import LARGEST, LARGEST_LENGTH
 from forcefit.inputs.table import Table
@@ -134,6 +134,7 @@ def _one(table: Table, kind: str, actuated: bool) -> JointNumbers:
         error=error,
         tolerance=_tolerance(table),
         locked_at=bolt,
+        fit=read_fit(table),
     )
 
 

@@ -3,11 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.callouts.fits import Fit, clearance_fit
 from assembly.model.frame import ONE_OF_BALL, SLIDING_BALL
 from assembly.model.largest import LARGEST, LARGEST_LENGTH
 from assembly.model.robot import LOCKED, NO_SPIN, Clearance
 from forcefit.inputs.number_arrays import find_fault, number_array
-from forcefit.inputs.table import Table
+from forcefit.inputs.table import BadInput, Table
 
 # [rad, m] smaller values are refused, because their square is 0
 _LEAST_CLEARANCE = 1e-30
@@ -87,6 +88,8 @@ def read_bounds(table: Table, joint: str) -> Clearance:
         if 0.0 < bound < _LEAST_CLEARANCE:
             expected = f"expected 0 or at least {_LEAST_CLEARANCE:g}"
             raise table.bad(key, f"found {bound:g}, {expected}")
+    if fit := _fit(table):
+        bounds["radial"] = fit.mean_radial
     if "ball" in bounds:
         if joint in {"prismatic", "helical"}:
             raise table.bad("ball", SLIDING_BALL)
@@ -94,6 +97,26 @@ def read_bounds(table: Table, joint: str) -> Clearance:
             if key in bounds:
                 raise table.bad(key, ONE_OF_BALL)
     return Clearance(**bounds)
+
+
+def read_fit(table: Table) -> str:
+    """Return the ISO 286 fit of the ``clearance`` table, empty if it has none."""
+    content = table.content.get("clearance")
+    fit = content.get("fit") if isinstance(content, dict) else None
+    return fit.strip() if isinstance(fit, str) else ""
+
+
+def _fit(inner: Table) -> Fit | None:
+    """Return the fit of a clearance, None if it has none."""
+    if not inner.has("fit"):
+        return None
+    if inner.has("radial"):
+        raise inner.bad("radial", 'found it together with "fit", expected one of them')
+    text = inner.text("fit", expected='a fit such as "12 H7/g6"')
+    try:
+        return clearance_fit(text)
+    except BadInput as error:
+        raise inner.bad("fit", str(error)) from None
 
 
 def read_joint_stiffness(table: Table, free: int | None = None) -> NDArray | None:

@@ -9,18 +9,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.callouts.fits import parse_fit
 from assembly.drawing.frames import robot_of_drawing
 from assembly.files.bolt_file import bolt_table, read_locked_at
+from assembly.files.callout_file import callout_table, read_frame_callouts
 from assembly.files.drawing_file import is_drawing, read_drawing
 from assembly.files.effect_file import effect_tables, with_effects
 from assembly.files.inertia_file import read_inertia
 from assembly.files.joint_file import (
     read_clearance,
+    read_fit,
     read_joint_stiffness,
     read_pitch,
 )
 from assembly.files.link_file import link_table, read_link
 from assembly.files.toml_text import file_text
+from assembly.kinematics.callout_maps import place_callouts
 from assembly.kinematics.posture import home_posture
 from assembly.model.frame import FORCE_CONTROL
 from assembly.model.inertia import six_moments
@@ -89,7 +93,9 @@ def robot_of(root: Table, name: str, close: Closing | None = None) -> Robot:
     robot = declared_robot(root, name)
     try:
         robot = robot if close is None else close(robot)
-        return with_spans(robot, home_posture(robot).coordinates)
+        home = home_posture(robot)
+        place_callouts(home)  # whether they fit the geometry
+        return with_spans(robot, home.coordinates)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
 
@@ -120,8 +126,9 @@ def declared_robot(root: Table, name: str) -> Robot:
     effects = root.tables("effect")
     robot = (_drawn if is_drawing(root) else _framed)(root, name, description)
     robot = replace(
-        robot, learned_range=ranges, reference_point=point, diagnosis=diagnosis
-    )
+        robot, learned_range=ranges, reference_point=point, diagnosis=diagnosis,
+        remarks=(*robot.remarks, *_fit_remarks(robot)),
+    )  # fmt: skip
     return with_effects(robot, effects)
 
 
@@ -143,6 +150,7 @@ def _framed(root: Table, name: str, description: str) -> Robot:
     """Return the robot of a file of frames and closures."""
     platform = root.text("platform", expected="the name of a frame")
     tables = root.tables("frame"), root.tables("closure")
+    root.tables("tolerance")  # read when all frames are known
     root.finish()
     if not 0 < len(tables[0]) <= MOST_FRAMES:
         fault = f"found {len(tables[0])}" if tables[0] else "missing"
@@ -150,11 +158,14 @@ def _framed(root: Table, name: str, description: str) -> Robot:
     frames = tuple(_frame(table) for table in tables[0])
     names = [frame.name for frame in frames]
     closures = tuple(_closure(table, names) for table in tables[1])
+    callouts = read_frame_callouts(root, names)
     _check_known(root, "platform", platform, names)
     try:
         robot = Robot(
-            name, platform, frames, closures, description, remarks=_remarks(tables[0])
-        )
+            name, platform, frames, closures, description,
+            remarks=_remarks(tables[0]), callouts=callouts,
+            fits={t.content["name"]: fit for t in tables[0] if (fit := read_fit(t))},
+        )  # fmt: skip
         _check_meeting_frames(robot)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
@@ -225,6 +236,18 @@ def _remarks(tables: list[Table]) -> tuple[str, ...]:
     if not without_alpha:
         return ()
     return (f"dh without alpha, taken as 0: {', '.join(without_alpha)}",)
+
+
+def _fit_remarks(robot: Robot) -> tuple[str, ...]:
+    """Return a remark on the fits, of which one clearance is used."""
+    texts = []
+    for name, text in robot.fits.items():
+        fit = parse_fit(text)
+        mean, (least, most) = 1e6 * fit.mean_radial, (1e6 * r for r in fit.radial)
+        texts.append(
+            f"{quoted(name)} {text}, {mean:.4g} um of {least:.4g} to {most:.4g}"
+        )
+    return (f"mean radial clearance of fits: {'; '.join(texts)}",) if texts else ()
 
 
 def _frame(table: Table) -> Frame:
@@ -394,8 +417,11 @@ def write_robot(robot: Robot, path: Path | str) -> None:
     check_writable(path, ROBOT)
     table = robot_table(robot, Path(path).parent)
     frames, closures = table.pop("frame"), table.pop("closure", [])
+    callouts = table.pop("tolerance", [])
     effects, diagnosis = table.pop("effect", []), table.pop("diagnosis", {})
-    kinds = {"frame": frames, "closure": closures, "effect": effects}
+    kinds = {
+        "frame": frames, "closure": closures, "tolerance": callouts, "effect": effects
+    }  # fmt: skip
     write_text(file_text(table, kinds, diagnosis), path)
 
 
@@ -411,8 +437,14 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
     """
     table = root_table(robot, folder)
     table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
+    for frame in table["frame"]:
+        if frame["name"] in robot.fits:
+            del frame["clearance"]["radial"]
+            frame["clearance"]["fit"] = robot.fits[frame["name"]]
     if robot.closures:
         table["closure"] = [{"frames": list(pair)} for pair in robot.closures]
+    if robot.callouts:
+        table["tolerance"] = [callout_table(callout) for callout in robot.callouts]
     if robot.has_effects:
         table["effect"] = effect_tables(robot)
     return table

@@ -1,5 +1,7 @@
 """What a robot file holds, for editors: the keys that its reader knows."""
 
+from assembly.callouts.callout import HELD, LOCATIONS, ORIENTATIONS, SHAPES
+from assembly.callouts.zone import DISTRIBUTIONS
 from assembly.drawing.drawing import FREE_ROWS
 from assembly.effects import LIBRARY
 from assembly.effects.forms import FORMS
@@ -68,6 +70,7 @@ _CLEARANCE = record(
     radial_=number("radial clearance", "m"), axial_=number("axial clearance", "m"),
     tilt_=number("tilt clearance", "rad"), spin_=number("clearance about z", "rad"),
     ball_=number("clearance of a ball in its socket", "m"),
+    fit_=text('fit of ISO 286 in place of radial, such as "12 H7/g6"'),
 )  # fmt: skip
 _FRAME = record(
     name=text("name"), parent=text('name of a frame, or "base"'),
@@ -93,6 +96,26 @@ _FRAME = record(
     link_=_LINK, up_=_DIRECTION, mass_=number("mass", "kg"),
     centre_of_mass_=number("centre of mass", "m", "axis"), inertia_=_INERTIA,
 )  # fmt: skip
+_WIDTH = Either((number("width", "m"), text('width, such as "0.05 mm"')))
+_CALLOUT = record(
+    feature=text("frame, or joint of the body"), name_=text("name in tables"),
+    **{f"{word}_": _WIDTH for word in (*LOCATIONS, *ORIENTATIONS)},
+    extent_=Either((_WIDTH, Listed(_WIDTH))),
+    hole_=text('size of a hole with (M), such as "12 H7"'),
+    direction_=_DIRECTION, length_=text('length, such as "452 +- 0.1 mm"'),
+    general_=text('"ISO 2768-mK"'), distribution_=Words((*DISTRIBUTIONS,)),
+    cp_=number("capability of a normal distribution"),
+)  # fmt: skip
+_OF_FRAME_FEATURE = record(
+    "", _CALLOUT, after_=flag("feature after the joint"), shape_=Words((*SHAPES,)),
+    axis_=_DIRECTION, at_=_POINT,
+    datums=Listed(Either((
+        text("frame"),
+        record(frame=text("frame"), shape_=Words((*HELD,)), axis_=_DIRECTION,
+               at_=_POINT),
+    ))),
+)  # fmt: skip
+_OF_BODY_FEATURE = record("", _CALLOUT, datums=text("joints, A first", "joint"))
 _NUMBERS = Each(number("parameter", ""))
 _EFFECT = record(
     name=Words((*LIBRARY, FUNCTION)), parameters_=_NUMBERS, session_=text("session"),
@@ -112,6 +135,7 @@ _OF_FRAMES = record(
     "", _COMMON, format_=Words((1,)), platform=text("name of the platform's frame"),
     frame=Listed(_FRAME),
     closure_=Listed(record(frames=text("two frames that meet", "frame"))),
+    tolerance_=Listed(_OF_FRAME_FEATURE),
 )  # fmt: skip
 _GAP = number("gap from the middle to one side", "m")
 _CONTACTS = record(
@@ -150,6 +174,7 @@ _BODY = record(
     ),
     up_=_DIRECTION, from_=text("joint at which the link begins"),
     to_=text("joint at which the link ends"),
+    tolerance_=Listed(_OF_BODY_FEATURE),
 )  # fmt: skip
 _JOINT = record(
     "", _OF_JOINT, name=text("name"), type=Words((*FREE_ROWS,)),
@@ -168,5 +193,6 @@ _LEG = record(
 _OF_BODIES = record(
     "", _COMMON, format_=Words((2,)), platform=text("name of the platform's body"),
     platform_at_=_POINT, body_=Listed(_BODY), leg_=Listed(_LEG), joint_=Listed(_JOINT),
+    tolerance_=Listed(_OF_BODY_FEATURE),
 )  # fmt: skip
 ROBOT_FILE = Either((_OF_FRAMES, WithUnits(_OF_BODIES)))

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.callouts.callout import Callout
 from assembly.model.frame import (
     BASE,
     JOINTS,
@@ -66,6 +67,9 @@ class Robot:
         diagnosis: information in the file on its diagnosis: verdict, rows fitted,
             hold-out error, digest of the campaign, path of the covariance.
         remarks: defaults of its file that are easily overlooked.
+        callouts: tolerances of features, as the drawing states them.
+        fits: ISO 286 fits such as ``"12 H7/g6"`` by frame; ``radial`` of its clearance
+            is the mean.
     """
 
     name: str
@@ -82,6 +86,8 @@ class Robot:
     reference_point: tuple[float, float, float] | None = None
     diagnosis: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+    callouts: tuple[Callout, ...] = ()
+    fits: Mapping[str, str] = field(default_factory=dict)
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.error_distributions import KINDS
+from assembly.statistics.callout_sources import CalloutSources
 from assembly.statistics.clearance_positions import clearance_means, contact_length_of
 from assembly.statistics.quantities import UNITS
 from assembly.statistics.requirement import Plan
@@ -81,6 +82,7 @@ def allocation_of(allocation: Allocation) -> dict[str, Any]:
             "share": float(shares[g]),
             "loosest_allowed": plan.most[g],
             "at_loosest": bool(allocation.tolerances[g] >= plan.most[g] * (1 - 1e-3)),
+            **({"width": True} if _is_width(plan, g) else {}),
         }
         for g, name in enumerate(plan.names)
     ]
@@ -149,8 +151,10 @@ def _taken(
 
 def _distribution(plan: Plan) -> dict[str, Any]:
     """Return how errors are distributed within their tolerances."""
-    kind = KINDS[int(plan.sources.kind[0])]
-    cut = float(plan.sources.limit[0]) if kind == "truncated" else None
+    sources = plan.sources
+    own = sources.independent if isinstance(sources, CalloutSources) else sources
+    kind = "as in the robot file" if own is None else KINDS[int(own.kind[0])]
+    cut = float(own.limit[0]) if own is not None and kind == "truncated" else None
     return {"distribution": kind, "deviations": cut}
 
 
@@ -164,14 +168,28 @@ def _contact_length(plan: Plan) -> float | None:
 def _unit(allocation: Allocation, group: int) -> str:
     """Return the unit of a class of tolerances."""
     first = int(np.flatnonzero(allocation.plan.group == group)[0])
-    return "rad" if allocation.plan.sources.component[first] < 3 else "m"
+    # callouts are shifts and tilts together, within a zone of a width
+    return "rad" if allocation.plan.sources.units[first] == "rad" else "m"
+
+
+def _is_width(plan: Plan, group: int) -> bool:
+    """Return whether a tolerance is the full width of a zone, not to each side."""
+    if not isinstance(plan.sources, CalloutSources):
+        return False
+    columns = set(np.flatnonzero(plan.group == group).tolist())
+    return any(
+        bool(placed.callout.widths) and bool(columns & set(of.tolist()))
+        for placed, of in zip(plan.sources.placed, plan.sources.columns, strict=True)
+    )
 
 
 def allocation_text(results: dict[str, Any]) -> str:
     """Return an allocation as text."""
     lines = []
     for one in results["tolerances"]:
-        line = f"  {one['name']}: +-{in_unit(one['tolerance'], _SHOWN[one['unit']])}"
+        sides = "" if one.get("width") else "+-"
+        size = in_unit(one["tolerance"], _SHOWN[one["unit"]])
+        line = f"  {one['name']}: {sides}{size}"
         note = "the loosest allowed" if one["at_loosest"] else f"{one['share']:.0%}"
         lines.append(f"{line} ({note})")
     if lines:

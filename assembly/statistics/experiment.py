@@ -1,7 +1,7 @@
 """A Monte Carlo experiment: distributions at a posture, quantities of each draw."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,8 +11,9 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.assembled import without_rounding
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.zone import MARGINS
-from assembly.model.error_distributions import ErrorSources, draw_generator
+from assembly.model.error_distributions import draw_generator
 from assembly.model.link_stress import peak_stresses, stressed_links
+from assembly.statistics.callout_sources import CalloutSources, Sources
 from assembly.statistics.clearance_positions import (
     CLEARANCE_MODELS,
     CLEARANCE_STREAM,
@@ -58,7 +59,7 @@ class Experiment:
     """
 
     posture: Posture
-    sources: ErrorSources
+    sources: Sources
     seed: int = 1
     clearance: str = "worst"
     margins: bool = True
@@ -174,6 +175,26 @@ class Experiment:
             With the worst clearance model, rotation and translation are upper bounds of
             the largest, and the platform's screw is that of the solution of (22).
         """
+        if not isinstance(self.sources, CalloutSources) or not self.sources.fits:
+            parts = [self._without_stress(values, draws)]
+        else:
+            parts = []
+            for own, draw in zip(values, np.asarray(draws).tolist(), strict=True):
+                # every draw has clearances of its own
+                robot = self.sources.with_clearances(own)
+                one = replace(self, posture=replace(self.posture, robot=robot))
+                parts.append(one._without_stress(own[None], [draw]))
+        rows, wrenches, at_tips = (
+            np.concatenate(arrays) for arrays in zip(*parts, strict=True)
+        )
+        if self.links:
+            rows["stress"] = peak_stresses(self.posture.robot, wrenches, at_tips)
+        return rows
+
+    def _without_stress(
+        self, values: NDArray, draws: Sequence[int] | NDArray
+    ) -> tuple[NDArray, NDArray, NDArray]:
+        """Return records with the posture's clearances, wrenches, and their weights."""
         errors = bolted_errors(self.posture.robot, self.sources.errors(values))
         solved = self.energies.solve(errors)
         rows = np.zeros(len(values), dtype=self.record_type)
@@ -203,15 +224,13 @@ class Experiment:
             through = wrenches[..., part] - at_tips[..., part]
             sizes = np.sqrt((through**2).sum(axis=-1))
             rows[name] = sizes.max(axis=1)
-        if self.links:
-            rows["stress"] = peak_stresses(self.posture.robot, wrenches, at_tips)
         for name, zone in self.zones.items():
             rows[name] = zone.solve(errors).margin
         if self.stiffness:
             rows["stiffness"], rows["free_motion"] = draw_stiffnesses(
                 self.posture, errors, self.stiffness, self.load, self.gravity
             )
-        return rows
+        return rows, wrenches, np.broadcast_to(at_tips, wrenches.shape)
 
 
 def precision_for(

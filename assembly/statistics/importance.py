@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.error_distributions import ErrorSources
-from assembly.statistics.ranking import kind_of
+from assembly.statistics.callout_sources import CalloutSources, Sources
+from assembly.statistics.ranking import group_of
 
 STREAMS = (
     2,
@@ -171,7 +172,7 @@ def linear_importance(
     return shares / parts.sum(axis=1, keepdims=True)
 
 
-def source_groups(sources: ErrorSources, by: str) -> list[tuple[str, NDArray]]:
+def source_groups(sources: Sources, by: str) -> list[tuple[str, NDArray]]:
     """Return the groups of sources: each by itself, by frame, or by kind of error.
 
     Args:
@@ -187,9 +188,9 @@ def source_groups(sources: ErrorSources, by: str) -> list[tuple[str, NDArray]]:
     """
     if by not in {"source", "frame", "kind"}:
         raise ValueError(f"by is {by!r}, expected 'source', 'frame' or 'kind'")
-    keys = [
-        {"source": label, "frame": label.rpartition(".")[0], "kind": kind_of(label)}[by]
-        for label in sources.labels
-    ]
+    if isinstance(sources, CalloutSources):
+        keys = sources.groups_by(by)
+    else:
+        keys = [group_of(label, by) for label in sources.labels]
     names = list(dict.fromkeys(keys))
     return [(n, np.flatnonzero([k == n for k in keys])) for n in names]

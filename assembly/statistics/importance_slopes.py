@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.energy import Assembly
-from assembly.model.error_distributions import ErrorSources
+from assembly.statistics.callout_sources import Sources
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance import SaltelliDesign
 from assembly.statistics.linear_response import LinearResponse
@@ -40,7 +40,7 @@ def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
     known &= not any(f.locked_at for f in sources.robot.frames)
     if known.any():
         slopes = platform_slopes(experiment.energies, draws[known])
-        of_sources = slopes[:, :, sources.frame, sources.component]
+        of_sources = sources.of_numbers(slopes)
         mean = (of_sources**2).mean(axis=1)
         squares = np.stack([mean[:3].sum(axis=0), mean[3:].sum(axis=0)])
     gains = np.full((2, len(design.groups)), np.nan)
@@ -70,7 +70,8 @@ def platform_slopes(prepared: LinearResponse, draws: Assembly) -> NDArray:
     return slopes.reshape(6, count, frames, 6)
 
 
-def error_units(sources: ErrorSources, design: SaltelliDesign) -> list[str]:
+def error_units(sources: Sources, design: SaltelliDesign) -> list[str]:
     """Return the units of the errors of each group."""
-    angles = [sources.component[columns] < 3 for _, columns in design.groups]
-    return ["rad" if a.all() else "rad, m" if a.any() else "m" for a in angles]
+    units = sources.units
+    of_groups = [{units[i] for i in columns} for _, columns in design.groups]
+    return [of.pop() if len(of) == 1 else "rad, m" for of in of_groups]

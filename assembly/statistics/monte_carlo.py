@@ -166,11 +166,7 @@ def provenance(experiment: Experiment) -> dict[str, str | int | float]:
     """Return the values that must be equal for two runs to have the same draws."""
     posture, sources = experiment.posture, experiment.sources
     contact = experiment.used_contact_length
-    numbers = [
-        sources.frame, sources.component, sources.kind, sources.centre, sources.scale,
-        sources.least, sources.limit, sources.signed, posture.transforms,
-        *([] if sources.fixed is None else [sources.fixed]),
-    ]  # fmt: skip
+    numbers = [*sources.identity, posture.transforms]
     digest = sha256(b"".join(np.ascontiguousarray(n).tobytes() for n in numbers))
     return {
         "robot": posture.robot.name,

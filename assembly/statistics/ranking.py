@@ -70,6 +70,13 @@ def named_together(names: Iterable[str], among: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(together))
 
 
+def group_of(label: str, by: str) -> str:
+    """Return the group of an error ``hinge.RX`` by source, frame or kind."""
+    return {
+        "source": label, "frame": label.rpartition(".")[0], "kind": kind_of(label)
+    }[by]  # fmt: skip
+
+
 def kind_of(name: str) -> str:
     """Return a frame's or an error's name without its leg's: ``hinge.RX``."""
     frame, dot, component = name.rpartition(".")

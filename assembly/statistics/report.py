@@ -11,6 +11,7 @@ from assembly.statistics.quantities import POSE_ERRORS, UNITS
 from assembly.statistics.ranking import NOT_DISTINGUISHED, rank_text
 from assembly.statistics.summary import WORDS
 from assembly.statistics.tightening import ranked, tightening_tiles
+from assembly.statistics.worst_pose_report import worst_section
 from forcefit.page.charts import BLUE, GREY, RED, Axis, bars, chart, grid
 from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
@@ -63,7 +64,9 @@ def draws_page(
                 section(
                     "Distributions", _quantities(summary), _histograms(summary, data)
                 ),
+                _capability(summary),
                 _importance(summary),
+                worst_section(summary["worst_case"]) if "worst_case" in summary else "",
             ],
             assumed=_ASSUMED,
             provenance=provenance,
@@ -192,6 +195,19 @@ def _histogram(name: str, one: Mapping[str, Any], values: NDArray) -> str:
         })  # fmt: skip
     caption = f"clearance {one['clearance']}" if "clearance" in one else ""
     return chart(traces, Axis(name, one["unit"]), Axis("draws"), caption)
+
+
+def _capability(summary: Mapping[str, Any]) -> str:
+    """Return the table of Cpk and parts per million."""
+    rows: list[list[Cell]] = [
+        [NAMES[key], Value(one["limit"], one["unit"]),
+         *(one["cpk"][k] for k in ("value", "lower", "upper")),
+         *(one["ppm"][k] for k in ("value", "lower", "upper"))]
+        for key, one in summary.get("capability", {}).items()
+    ]  # fmt: skip
+    words = ("Cpk", "at least", "at most", "ppm above", "ppm at least", "ppm at most")
+    head: list[str | Column] = ["", "limit", *map(Column, words)]
+    return section("Capability", table(head, rows, "capability")) if rows else ""
 
 
 def _importance(summary: Mapping[str, Any]) -> str:

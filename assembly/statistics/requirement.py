@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from assembly.kinematics.posture import Posture
 from assembly.linear.zone import MARGINS
 from assembly.model.error_distributions import ErrorSources
+from assembly.statistics.callout_sources import Sources
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.quantities import POSE_ERRORS, UNITS
@@ -32,7 +33,8 @@ class Plan:
     """Costs and limits of tolerances.
 
     Attributes:
-        sources: m errors within tolerances of 1 [rad or m].
+        sources: m errors within tolerances of 1 [rad or m]; zones of callouts of
+            width 1 m.
         group: (m,) class of each.
         names: names of the G classes.
         costs: (G,) > 0.
@@ -51,7 +53,7 @@ class Plan:
             :class:`assembly.statistics.experiment.Experiment`.
     """
 
-    sources: ErrorSources
+    sources: Sources
     group: NDArray
     names: tuple[str, ...]
     costs: NDArray
@@ -238,11 +240,12 @@ class Requirement:
 
     def worst_corner(self, key: str, i: int, t: NDArray, corners: NDArray) -> Corner:
         """Return the worst corner of tolerances (G,) found at posture i."""
-        spread = self.plan.spread(t)
+        spread, sources = self.plan.spread(t), self.plan.sources
+        assert isinstance(sources, ErrorSources)  # callouts have no corners
 
         def search() -> tuple:
             corner = worst_corner(
-                self.prepared[key][i], self.plan.sources, spread, corners, key,
+                self.prepared[key][i], sources, spread, corners, key,
                 self.plan.clearance, self.plan.contact_length,
             )  # fmt: skip
             return corner.value, corner.signs, corner.slopes
@@ -296,13 +299,11 @@ class Requirement:
         Raises:
             BadInput: there is one; the message names it.
         """
-        sources = self.plan.sources
-        columns = 6 * sources.frame + sources.component
+        sources, n = self.plan.sources, len(self.postures[0].robot.frames)
         for key, prepared in self.convex.items():
             for posture in prepared:
-                residual = np.abs(posture.infeasible[:, columns]).max(
-                    axis=0, initial=0.0
-                )
+                rows = posture.infeasible.reshape(-1, n, 6)
+                residual = np.abs(sources.of_numbers(rows)).max(axis=0, initial=0.0)
                 if residual.max(initial=0.0) > 1e-9:
                     name = sources.labels[int(residual.argmax())]
                     raise BadInput(

@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.energy import Assembly
-from assembly.model.error_distributions import ErrorSources, draw_generator
+from assembly.model.error_distributions import draw_generator
 from assembly.model.link_stress import WEIGHTLESS, LinkStress, stressed_links
+from assembly.statistics.callout_sources import Sources
 from assembly.statistics.clearance_positions import (
     CLEARANCE_STREAM,
     position_clearances,
@@ -22,7 +23,7 @@ _PARTS = {"moment": slice(0, 3), "force": slice(3, 6)}
 
 
 def respond(
-    prepared: PostureMargins | LinearResponse, sources: ErrorSources, values: NDArray,
+    prepared: PostureMargins | LinearResponse, sources: Sources, values: NDArray,
     key: str = "energy", clearance: str = "worst",
     contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
@@ -48,10 +49,10 @@ def respond(
     if isinstance(prepared, PostureMargins):
         margins = prepared.solve(errors)
         slopes = prepared.slopes(margins)
-        return margins.margin, slopes[:, sources.frame, sources.component]
+        return margins.margin, sources.of_numbers(slopes)
     draws = prepared.solve(errors)
     if key == "energy":
-        return draws.energy, -draws.wrenches[:, sources.frame, sources.component]
+        return draws.energy, -sources.of_numbers(draws.wrenches)
     size = np.full(len(values), np.nan)
     slopes = np.full(errors.shape, np.nan)
     # without clearances in unit cones their active bounds are unknown
@@ -70,7 +71,7 @@ def respond(
         slopes[solved] = solution_slopes(
             prepared, some, by_wrench, by_screw, by_clearance
         )
-    return size, slopes[:, sources.frame, sources.component]
+    return size, sources.of_numbers(slopes)
 
 
 def _pose_error(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.zone import ASSEMBLABLE
+from assembly.statistics.capability import capability_text, draws_capability
 from assembly.statistics.clearance_positions import clearance_means
 from assembly.statistics.estimates import (
     bracketed,
@@ -48,6 +49,7 @@ def summarise(
     limits: Mapping[str, float] | None = None,
     strength: float | None = None,
     level: float = 0.95,
+    capable: bool = False,
 ) -> dict[str, Any]:
     """Return a summary of draws of :func:`assembly.statistics.monte_carlo.run_draws`.
 
@@ -56,6 +58,7 @@ def summarise(
         limits: limits by quantity; a draw meets them if none is exceeded.
         strength: [Pa] yield strength of the links.
         level: level of confidence of all intervals.
+        capable: whether Cpk and parts per million of every limit are added.
 
     Returns:
         ``draws`` and the number of them that are ``assembled``; ``clearance``, its
@@ -121,6 +124,11 @@ def summarise(
             str(data.attrs["stiffness"]),
             level,
         )
+    if capable:
+        report["capability"] = {
+            key: draws_capability(_worst(data, key), one, level)
+            for key, one in report["exceeds"].items()
+        }
     if "total_index" in data:
         report["importance"] = importance_report(data)
     return report
@@ -225,6 +233,8 @@ def summary_text(summary: Mapping[str, Any]) -> str:
     if "within_limits" in summary:
         results = summary["within_limits"]
         lines.append(f"{_titled('yield', results)}, all limits met: {_share(results)}")
+    if "capability" in summary:
+        lines.append(capability_text(summary["capability"]))
     lines += perfect_text(summary)
     lines.append(f"of the {assembled} of {draws} draws that assemble:")
     if not assembled:
@@ -245,6 +255,10 @@ def summary_text(summary: Mapping[str, Any]) -> str:
         lines.append(stiffness_spread_text(summary["stiffness"]))
     if "importance" in summary:
         lines.append(importance_text(summary["importance"]))
+    if "worst_case" in summary:
+        from assembly.statistics.worst_pose_report import worst_text
+
+        lines.append(worst_text(summary["worst_case"]))
     return "\n".join(lines)
 
 

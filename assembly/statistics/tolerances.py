@@ -72,8 +72,8 @@ def left_out_text(left_out: dict[str, int]) -> str:
 def identity_of(postures: Sequence[Posture], plan: Plan, fresh: int) -> dict[str, Any]:
     """Return the values that must be equal for two allocations to share results."""
     arrays = [p.transforms for p in postures]
-    for one in (plan, plan.sources):
-        arrays += [v for v in vars(one).values() if isinstance(v, np.ndarray)]
+    arrays += [v for v in vars(plan).values() if isinstance(v, np.ndarray)]
+    arrays += plan.sources.identity
     digest = sha256(b"".join(np.ascontiguousarray(a).tobytes() for a in arrays))
     return {
         "robot_sha256": robot_hash(plan.sources.robot),

@@ -147,6 +147,25 @@ def _loose(frame: Frame) -> Frame:
     return replace(frame, clearance=bolt.clearance, locked_at=None)
 
 
+def refuse_bolted(robot: Robot, what: str) -> None:
+    """Refuse a robot with bolted joints, where errors must act linearly.
+
+    Args:
+        robot: any robot.
+        what: what is computed, in words.
+
+    Raises:
+        BadInput: a joint is bolted at a pose.
+    """
+    bolted = [frame.name for frame in robot.frames if frame.locked_at is not None]
+    if bolted:
+        raise BadInput(
+            f"{robot.name}: frame {quoted(bolted[0])}.locked_at: found a joint that is "
+            f"bolted at a pose, which the {what} does not cover; expected none, or "
+            "assembly statistics, which bolts every drawn machine"
+        )
+
+
 def loose_over_poses(robot: Robot) -> list[str]:
     """Return a remark on fixed joints whose clearance is loose at every pose.
 

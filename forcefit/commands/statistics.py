@@ -61,7 +61,13 @@ ContactLengthOption = Annotated[
 
 def statistics(
     robot: RobotArgument,
-    errors: Annotated[Path, typer.Option(help="Distributions of the errors (TOML).")],
+    errors: Annotated[
+        Path | None,
+        typer.Option(
+            help="Distributions of the errors (TOML), in addition to the "
+            "[[tolerance]] of the robot file."
+        ),
+    ] = None,
     pose: PoseOption = None,
     joint: JointOption = None,
     load: LoadOption = None,
@@ -114,6 +120,20 @@ def statistics(
             "contact (clearances pressed or free) | exact (internal forces too)."
         ),
     ] = None,
+    capability: Annotated[
+        bool,
+        typer.Option(
+            "--capability", help="Also Cpk and parts per million of every --limit."
+        ),
+    ] = False,
+    worst_case: Annotated[
+        bool,
+        typer.Option(
+            "--worst-case",
+            help="Also the largest pose errors over all errors within tolerance and "
+            "all clearances.",
+        ),
+    ] = False,
     confidence: Annotated[
         float, typer.Option(help="Confidence of all intervals.")
     ] = 0.95,
@@ -136,6 +156,7 @@ def statistics(
     from assembly.model.error_distributions import read_sources
     from assembly.report.first_order import posture_status
     from assembly.report.results import status_line
+    from assembly.statistics.callout_sources import sources_of
     from assembly.statistics.experiment import Experiment, precision_for
     from assembly.statistics.importance_table import ImportanceOptions
     from assembly.statistics.monte_carlo import run_draws
@@ -154,6 +175,8 @@ def statistics(
     if yield_strength is not None and not 0 < yield_strength < float("inf"):
         raise BadInput(f"--yield-strength: found {yield_strength}, expected > 0")
     limits = dict(map(parse_limit, limit or ()))
+    if capability and not limits:
+        raise BadInput("--capability: found no --limit, expected one or more")
     if output is not None:
         check_dataset(output, "draws")
     if figure is not None:
@@ -164,7 +187,10 @@ def statistics(
         drive_force=drive_force,
     )  # fmt: skip
     fixed = posture.robot.declared_errors if closing else None
-    sources = read_sources(errors, posture.robot, fixed)
+    independent = None
+    if errors is not None:
+        independent = read_sources(errors, posture.robot, fixed)
+    sources = sources_of(posture.robot, independent, fixed)
     wrench, g = parse_load(load), parse_gravity(gravity)
     note_closing(posture.robot, rest, mismatch)
     note_massless(posture.robot, g)
@@ -181,6 +207,11 @@ def statistics(
         contact_length=contact_length,
     )  # fmt: skip
     experiment.check_limits([*limits, *(["stress"] if yield_strength else [])])
+    worst = None
+    if worst_case:
+        from assembly.statistics.worst_pose_report import worst_results
+
+        worst = worst_results(experiment.energies, sources, seed)
     options = None
     if importance is not None:
         options = ImportanceOptions(importance, by, confidence)
@@ -197,8 +228,10 @@ def statistics(
     summary = {
         "robot": posture.robot.name, "pose": posture.pose(), "seed": seed,
         "load": wrench, "gravity": g,
-        **summarise(data, limits, yield_strength, confidence),
+        **summarise(data, limits, yield_strength, confidence, capability),
     }  # fmt: skip
+    if worst is not None:
+        summary["worst_case"] = worst
     write_json(summary, json)
     if report is not None:
         from assembly.statistics.report import draws_page

@@ -193,12 +193,25 @@ _STATISTICS = record(
     safety_=number("safety", "1", "link"),
     stress_error_=number("its error", "1", "link"),
     stiffness_=_STIFFNESS_OF_DRAWS, importance_=_IMPORTANCE,
+    capability_=Each(
+        record("limit unit", cpk=_ESTIMATE, ppm=_ESTIMATE)
+    ),
+    worst_case_=Each(
+        record(
+            "unit", reading=text("which worst case"), means=text("its meaning"),
+            attained=number("value attained", ""), bound=number("certified bound", ""),
+            direction=number("direction of the value attained", "1", "axis"),
+            shares=Each(number("part by an error or a clearance", "")),
+            rigid_=number("value attained without any force", ""),
+        )
+    ),
 )  # fmt: skip
 _CLASS = record(
     "name tolerance unit", share=_SHARE,
     scaled_alike=number("with one factor on all tolerances", ""),
     cost=number("cost"), loosest_allowed=number("largest allowed", ""),
     at_loosest=flag("at the largest allowed"),
+    width_=flag("whether it is the full width of a zone, not to each side"),
 )  # fmt: skip
 _VERIFICATION = record(
     "draws verdict confidence", look=count("interim test"),

@@ -16,7 +16,9 @@ from assembly.linear.energy import solve_assembly
 from assembly.model.error_distributions import read_sources, tolerance_sources
 from assembly.model.links import link_compliances
 from assembly.statistics.experiment import Experiment
+from assembly.statistics.linear_response import linear_response
 from assembly.statistics.tolerance_file import read_plan
+from assembly.statistics.worst_pose import worst_pose
 from assembly.steps.bolted import bolt_joints, loose_over_poses
 from assembly.sweeps.robot_sweep import sweep
 from forcefit.inputs.table import BadInput
@@ -292,7 +294,7 @@ def test_tolerances_of_a_bolted_robot_are_refused_in_one_line(tmp_path):
     robot = load_robot(four_bar(tmp_path, at_angle(0.4)))
     plan = tmp_path / "plan.toml"
     plan.write_text('cost = "inverse"\n')
-    with pytest.raises(BadInput, match="tolerances are not allocated"):
+    with pytest.raises(BadInput, match="bolted at a pose"):
         read_plan(plan, robot)
 
 
@@ -372,3 +374,11 @@ def test_conversion_of_a_bolt_at_a_rotation_of_the_platform_is_refused(tmp_path,
     assert status == 2
     assert "locked_at: found a rotation of the platform" in err
     assert not drawn.exists()
+
+
+def test_worst_case_of_a_bolted_robot_is_refused(tmp_path):
+    robot = load_robot(four_bar(tmp_path, at_angle(0.4)))
+    sources = tolerance_sources(robot, np.full(6, 1e-4), ("pin2",))
+    prepared = linear_response(place_robot(robot, joints={"crank": 2.0}))
+    with pytest.raises(BadInput, match="bolted at a pose"):
+        worst_pose(prepared, sources, "translation")
