@@ -284,6 +284,7 @@ def test_python_blocks_of_a_page_print_the_documented_output(
     name, tmp_path, monkeypatch, capsys
 ):
     """All blocks of a page share one session."""
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)
     titled(name, tmp_path)
     session, printed = {}, None

@@ -1,4 +1,4 @@
-"""Clearance in joints that are declared without; the load takes it up."""
+"""Clearance in joints that are declared without clearance; the load takes it up."""
 
 from dataclasses import replace
 from functools import partial
@@ -44,7 +44,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Return the clearances; a joint fitted without clearance is left out."""
+    """Return the clearances without those that were fitted as zero."""
     return {key: size for key, size in values.items() if size > _NONE_BELOW}
 
 

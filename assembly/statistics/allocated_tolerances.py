@@ -1,4 +1,4 @@
-"""An allocation: tolerances, their cost and their proof, as values and as data set."""
+"""Result of an allocation: tolerances, cost and proof, as values and data set."""
 
 from dataclasses import dataclass, field
 from importlib.metadata import version
@@ -29,24 +29,25 @@ _SHARE_OF = {
 
 @dataclass(frozen=True, eq=False)
 class Allocation:
-    """Tolerances, their cost, and proven bounds of both.
+    """Tolerances and their cost, with proven bounds of both.
 
     Attributes:
         plan: costs and limits.
-        tolerances: (G,) [rad or m].
+        tolerances: (G,) [rad or m] tolerance of each class.
         price: cost of the tolerances.
-        uniformly_scaled: (G,) [rad or m] tolerances with the proportions of the convex
-            programme, scaled uniformly to meet all limits.
+        uniformly_scaled: (G,) [rad or m] tolerances in the proportions of the convex
+            programme, multiplied by one factor so that they meet all limits.
         price_uniformly_scaled: cost of ``uniformly_scaled``, at least ``price``.
         price_bound: lower bound of the cost of tolerances that always meet the convex
-            limits; NaN for a yield below 1, or where a limit is not convex.
-        cuts: planes in the convex programme.
-        worst: by limit and for yield 1: the worst corner found and the proven upper
-            bound, over all postures; NaN if not proven.
+            limits; NaN for a yield below 1, or if a limit is not convex.
+        cuts: number of cutting planes in the convex programme.
+        worst: for each limit, for yield 1: the quantity at the worst corner found, and
+            its proven upper bound over all postures; NaN if not proven.
         proven_scale: factor on the tolerances, 1 or less, at which the upper bounds
             meet the limits too; NaN if not proven.
-        verification: verification by fresh draws: yields with their intervals.
-        perfect_parts: by limit on a pose error, the pose error [rad or m] due to
+        verification: results of the verification by new random draws: yields with
+            intervals.
+        perfect_parts: for each limit on a pose error, the pose error [rad or m] due to
             clearances alone, and its posture.
     """
 
@@ -113,14 +114,15 @@ def allocation_of(allocation: Allocation) -> dict[str, Any]:
 
 
 def price_shares(allocation: Allocation) -> NDArray:
-    """Return the share of each class in the saving by looser tolerances.
+    """Return the share of each class in the saving by larger tolerances.
 
     At least cost, the saving for a relative change of a tolerance is the multiplier of
-    the limit times the change of the limited quantity.  This is cost / tolerance, or
-    the cost if the law is logarithmic.  It has no unit, so angles and lengths compare.
+    the limit times the change of the limited quantity.  This is cost / tolerance or,
+    for the logarithmic law, the cost.  It has no unit, so angles and lengths are
+    comparable.
 
     Args:
-        allocation: the tolerances.
+        allocation: result of the allocation.
 
     Returns:
         (G,) shares that add up to 1.
@@ -136,9 +138,10 @@ def price_shares(allocation: Allocation) -> NDArray:
 def _taken(
     allocation: Allocation, key: str, reached: float, at: str
 ) -> dict[str, float | str]:
-    """Return the part of a limit due to clearances, and the cost without it."""
+    """Return the part of a limit due to clearances, and the cost without clearances."""
     plan, limit = allocation.plan, allocation.plan.limits[key]
-    # pose errors by errors and by clearances nearly add up; tolerances scale with them
+    # pose errors due to errors and to clearances nearly add up, and scale with
+    # tolerances
     looser = limit / (limit - reached) if reached < limit else np.inf
     without = allocation.price / looser
     if plan.cost == "logarithm":
@@ -159,7 +162,7 @@ def _distribution(plan: Plan) -> dict[str, Any]:
 
 
 def _contact_length(plan: Plan) -> float | None:
-    """Return the [m] contact length of the contact model, None for the others."""
+    """Return the [m] contact length of the contact model; None for other models."""
     if not plan.limits_pose or plan.clearance != "contact":
         return None
     return plan.contact_length or contact_length_of(plan.sources.robot)
@@ -236,7 +239,7 @@ def _taken_text(key: str, one: dict[str, Any]) -> str:
 
 
 def _looks_text(check: dict[str, Any]) -> str:
-    """Return the number of verifications, and the confidence of each and of all."""
+    """Return a text on the verifications: number, confidence of each and of all."""
     left = check["yield"]["undecided"]
     undecided = f", {left} draws undecided" if left else ""
     return (
@@ -247,7 +250,7 @@ def _looks_text(check: dict[str, Any]) -> str:
 
 
 def _price_text(results: dict[str, Any]) -> str:
-    """Return the cost of the tolerances, and its lower bound or its reduction."""
+    """Return cost of the tolerances, with its lower bound or its reduction, as text."""
     price, alike, bound = (results[k] for k in ("price", "price_alike", "price_bound"))
     text = f"price {price:.5g}"
     if np.isfinite(bound):

@@ -1,10 +1,10 @@
-"""Exact slopes of the platform's screw with the errors, by groups of errors.
+"""Exact slopes of the platform's screw by groups of errors.
 
-A quotient of sampled deviations is no derivative, because it has the sample's noise.
-Where the same clearances are active the solution of (22) is linear in the errors, and
-its slopes are known exactly (:mod:`assembly.statistics.sensitivity`).  A group's gain
-is their root mean square: over the group's errors, weighted by variance, and over some
-draws.
+A quotient of sampled deviations is not a derivative, because it has the noise of the
+sample.  As long as the same clearances are active, the solution of (22) is linear in
+the errors, and its slopes are known exactly (:mod:`assembly.statistics.sensitivity`).
+The gain of a group is the root mean square of the slopes, over the group's errors
+weighted by variance, and over some draws.
 """
 
 import numpy as np
@@ -17,19 +17,19 @@ from assembly.statistics.importance import SaltelliDesign
 from assembly.statistics.linear_response import LinearResponse
 from assembly.statistics.sensitivity import solution_slopes
 
-DRAWS = 32  # number of draws whose slopes are averaged
+DRAWS = 32  # number of draws over which the slopes are averaged
 
 
 def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
-    """Return the gains of groups of errors: the platform's motion for a unit of error.
+    """Return the gains of groups of errors: motion of the platform per unit of error.
 
     Args:
         experiment: distributions and posture.
-        design: its first draws and its groups are used.
+        design: design, whose first draws and groups are used.
 
     Returns:
-        (2, d) rotation [rad] and translation [m] for each rad or m; NaN for a group of
-        angles and lengths, where none of the draws has a solution, and for robots with
+        (2, d) rotation [rad] and translation [m] per rad or m of error; NaN for a group
+        of angles and lengths, if none of the draws has a solution, and for robots with
         bolted joints, whose locked-in clearances depend on the errors too.
     """
     sources = experiment.sources
@@ -53,14 +53,14 @@ def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
 
 
 def platform_slopes(prepared: LinearResponse, draws: Assembly) -> NDArray:
-    """Return the slopes of the platform's screw with every geometric error.
+    """Return the slopes of the platform's screw by every geometric error.
 
     Args:
-        prepared: the posture.
-        draws: k of its draws, with their clearances in unit cones.
+        prepared: the prepared posture.
+        draws: solutions of k draws, with clearances relative to their bounds.
 
     Returns:
-        (6, k, n, 6) [rad or m for each rad or m].
+        (6, k, n, 6) [rad or m per rad or m] slopes.
     """
     count, frames = draws.errors.shape[:2]
     repeated = draws[np.tile(np.arange(count), 6)]

@@ -1,4 +1,4 @@
-"""Page of draws: yields, values of perfect parts, and the main contributors."""
+"""Page of draws: yields, values for perfect parts, and the main contributors."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     import xarray
 
 _BINS = 60
-_GOOD = 0.95  # a lower yield is shown as a warning
-_LISTED = 20  # errors in a table of shares
+_GOOD = 0.95  # a yield below this value is shown as a warning
+_LISTED = 20  # largest number of errors in a table of shares
 _ASSUMED = (
     "Small screws: the closures are linear in the errors of each draw.",
     "Yields count all draws; energies, forces, pose errors only those that assemble.",
@@ -36,11 +36,11 @@ def draws_page(
     """Return the page of an experiment.
 
     Args:
-        summary: summary of :func:`assembly.statistics.summary.summarise`, with
+        summary: result of :func:`assembly.statistics.summary.summarise`, with
             ``robot``.
         data: the draws.
-        provenance: command and files.
-        robot: HTML of :func:`assembly.statistics.scenes.drawn_robot`.
+        provenance: the command and the files.
+        robot: HTML from :func:`assembly.statistics.scenes.drawn_robot`.
 
     Returns:
         HTML, which needs no other file.
@@ -76,7 +76,7 @@ def draws_page(
 
 
 def _share(summary: Mapping[str, Any]) -> Mapping[str, float]:
-    """Return the yield: all limits met, or assembled if there are no limits."""
+    """Return the yield: all limits are met or, without limits, the draw assembles."""
     limits: Mapping[str, float] | None = summary.get("within_limits")
     forced: Mapping[str, float] = summary["assembles"]["forced"]
     return limits or forced
@@ -89,7 +89,7 @@ def _share_text(interval: Mapping[str, float]) -> str:
 
 
 def _draws_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles of yield, pose error, and the errors that matter."""
+    """Return tiles of the yield, the pose error, and the main errors."""
     share = _share(summary)
     low, high = (100 * share[end] for end in ("lower", "upper"))
     words = "all limits kept" if "within_limits" in summary else WORDS["forced"]
@@ -127,7 +127,7 @@ def _yields(summary: Mapping[str, Any]) -> str:
 
 
 def _perfect_parts(summary: Mapping[str, Any]) -> str:
-    """Return the values of perfect parts, with the part of each kind of clearance."""
+    """Return the values for perfect parts, with the part of each kind of clearance."""
     parts = {k: v for k, v in summary["perfect_parts"].items() if v["reached"]}
     if not parts:
         return ""
@@ -181,7 +181,7 @@ def _histograms(summary: Mapping[str, Any], data: "xarray.Dataset") -> str:
 
 
 def _histogram(name: str, one: Mapping[str, Any], values: NDArray) -> str:
-    """Return the counts of a quantity in bins of one width."""
+    """Return the number of draws in bins of equal width."""
     counts, edges = np.histogram(values, _BINS)
     traces: list[dict[str, Any]] = [{
         "type": "bar", "x": (edges[1:] + edges[:-1]) / 2, "y": counts,
@@ -211,7 +211,7 @@ def _capability(summary: Mapping[str, Any]) -> str:
 
 
 def _importance(summary: Mapping[str, Any]) -> str:
-    """Return the errors that cause the variance."""
+    """Return the section on the errors that cause the variance."""
     pieces = []
     for key, one in summary.get("importance", {}).get("quantities", {}).items():
         shares = ranked(summary, key)[:_LISTED]

@@ -28,14 +28,14 @@ _CAPTION = (
 
 
 def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
-    """Return the draw whose pose error is nearest to its 95 % quantile, assembled.
+    """Return the scene of the draw whose pose error is nearest to its 95 % quantile.
 
     Args:
         experiment: the experiment of the draws.
         data: the draws, numbered from 0.
 
     Returns:
-        HTML of a scene; empty if no draw assembles.
+        HTML of a scene with the assembled robot; empty if no draw assembles.
     """
     solved = data["status"].values == 0
     for key in ("translation", "energy"):
@@ -57,17 +57,17 @@ def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
 
 
 def tightest_robot(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
-    """Return the robot at its largest margin, assembled with its present errors.
+    """Return the scene of the robot at its largest margin, with its present errors.
 
     Args:
-        postures: the postures assessed.
+        postures: the assessed postures.
         present: result of :func:`assembly.statistics.tolerances.present_errors`.
 
     Returns:
-        HTML of a scene; empty if it cannot be assembled.
+        HTML of a scene with the assembled robot; empty if it cannot be assembled.
     """
     worst = postures[int(np.nanargmax(present["margins"]))]
-    why = "The posture of the largest margin, with the errors there are."
+    why = "The posture of the largest margin, with the present errors."
     return _forced_robot(worst, why=why)
 
 
@@ -87,10 +87,10 @@ def _forced_robot(
 
 
 def margin_map(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
-    """Return the margins over the postures of a grid.
+    """Return the map of the margins over the postures of a grid.
 
     Args:
-        postures: the postures assessed.
+        postures: the assessed postures.
         present: result of :func:`assembly.statistics.tolerances.present_errors`.
 
     Returns:

@@ -1,6 +1,6 @@
 """Tolerance files: classes of errors, their costs, and the limits to be met.
 
-See ``docs/tolerances.md``.
+The format is described in ``docs/tolerances.md``.
 """
 
 from collections.abc import Sequence
@@ -23,21 +23,22 @@ from assembly.steps.bolted import refuse_bolted
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from stiffness.screws import SCREW
 
-_LOOSEST = (0.1, 0.01)  # [rad, m] largest small screws
+# [rad, m] largest accepted tolerances, up to which screws are small
+_LOOSEST = (0.1, 0.01)
 
 
 def read_plan(path: Path | str, robot: Robot) -> Plan:
     """Return the plan of a tolerance file.
 
     Args:
-        path: TOML file.
-        robot: the robot with the frames named in the file.
+        path: path of the TOML file.
+        robot: robot with the frames that the file names.
 
     Returns:
         The plan.
 
     Raises:
-        BadInput: the file breaks a rule, or a joint of the robot is bolted at a pose.
+        BadInput: the file violates a rule, or a joint of the robot is bolted at a pose.
     """
     root = read_toml(path)
     refuse_bolted(robot, "allocation of tolerances")
@@ -48,7 +49,7 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
     draws = root.number("draws", "1", 1000.0, least=1.0, largest=1e7)
     seed = root.number("seed", "1", 1.0, least=0.0, largest=1e15)
     if draws != int(draws) or seed != int(seed):
-        raise root.bad("draws", "expected whole numbers as draws and seed")
+        raise root.bad("draws", "expected whole numbers for draws and seed")
     limits = _limits(root.table("limits")) if root.has("limits") else {}
     tables = root.tables("tolerance")
     root.finish()
@@ -116,7 +117,7 @@ def _with_callouts(
 
 
 class _Groups(NamedTuple):
-    """Tables ``[[tolerance]]``: groups of errors with a common tolerance."""
+    """Groups of errors with a common tolerance, from the tables ``[[tolerance]]``."""
 
     of: dict[tuple[int, int], int]  # by frame and component
     callouts: dict[int, int]  # by callout
@@ -198,7 +199,7 @@ def _limits(table: Table) -> dict[str, float]:
 
 
 def _places(table: Table, robot: Robot) -> tuple[list[tuple[int, int]], int]:
-    """Return frames and components with one tolerance; 0 for angles, 1 for lengths."""
+    """Return the frames and components of a table; 0 for angles, 1 for lengths."""
     names = table.require("frames", "a list of frame names")
     parts = table.require("components", 'a list such as ["TX"]')
     for key, value in (("frames", names), ("components", parts)):

@@ -50,8 +50,8 @@ def error(
     assumption: Annotated[
         list[str] | None,
         typer.Option(
-            help="Assumption on the clearances: frozen | free | budget. Default: all; "
-            "under a load frozen and free."
+            help="Assumption on the clearances: frozen | free | budget. Default: all "
+            "three; under a load frozen and free."
         ),
     ] = None,
     load: LoadOption = None,
@@ -59,13 +59,23 @@ def error(
     gravity: GravityOption = None,
     under: UnderOption = None,
     energy_budget: Annotated[
-        float, typer.Option(help="eta of the budget assumption: E <= (1 + eta) E*.")
+        float,
+        typer.Option(
+            help="Relative energy eta of the budget assumption: E <= (1 + eta) E*."
+        ),
     ] = 0.05,
     tolerance_rotation: Annotated[
-        float, typer.Option(help="[rad] Largest difference of upper and lower bound.")
+        float,
+        typer.Option(
+            help="[rad] Largest accepted difference between the bounds of the rotation."
+        ),
     ] = 1e-6,
     tolerance_translation: Annotated[
-        float, typer.Option(help="[m] Largest difference of upper and lower bound.")
+        float,
+        typer.Option(
+            help="[m] Largest accepted difference between the bounds "
+            "of the translation."
+        ),
     ] = 1e-6,
     at: AtOption = None,
     along: AlongOption = None,

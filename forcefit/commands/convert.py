@@ -1,4 +1,4 @@
-"""The command ``forcefit convert``: robots of other programs, in and out."""
+"""The command ``forcefit convert``: robots from and to other programs."""
 
 from pathlib import Path
 from typing import Annotated
@@ -35,8 +35,8 @@ def convert(
     loops: Annotated[
         Path | None,
         typer.Option(
-            help="Loops and drives of a URDF (YAML, closed_loop). Default: the YAML "
-            "file of the URDF's name, or robot.yaml, in its folder."
+            help="File with loops and drives of a URDF (YAML, closed_loop). Default: "
+            "a YAML file in the same folder, with the name of the URDF or robot.yaml."
         ),
     ] = None,
     overlay: Annotated[

@@ -14,8 +14,8 @@ class _Example(NamedTuple):
     """One example.
 
     Attributes:
-        about: its content, in a few words.
-        files: its files and folders, from the folder that has ``examples``.
+        about: short description of the example.
+        files: its files and folders, relative to the folder that has ``examples``.
         first: a command to begin with.
     """
 
@@ -73,7 +73,7 @@ EXAMPLES = {
         "forcefit stiffness library build examples/link_library.toml",
     ),
     "part_library": _Example(
-        "stiffness of parts by their surface",
+        "stiffness of parts given by their surfaces",
         ("examples/part_library.toml", _MESH, "meshes/l_bracket.stl"),
         "forcefit stiffness library build examples/part_library.toml",
     ),
@@ -96,9 +96,9 @@ EXAMPLES = {
             f"python examples/{name}/convert.py --help",
         )
         for name, about in (
-            ("hangprinter", "a cable-driven printer's motor forces"),
+            ("hangprinter", "a cable-driven printer, by its motor forces"),
             ("hilti", "a construction robot"),
-            ("ipa_ur10", "a UR10 by a tracker"),
+            ("ipa_ur10", "a UR10, by a tracker"),
             ("serial_robots", "a UR5 and a WAM"),
             ("voron", "a printer's gantry"),
         )
@@ -120,7 +120,7 @@ def example(
     """Write the files of examples, as in the repository.
 
     The commands of the README and of the documentation then work in that folder.  If a
-    file exists with another content, nothing is written.
+    file with different content exists, nothing is written.
     """
     if not names:
         for name, one in EXAMPLES.items():
@@ -167,7 +167,7 @@ def _files(root: Path, part: str) -> Iterator[Path]:
 
 
 def _is_absent(target: Path, source: Path) -> bool:
-    """Return whether an example's file is absent; refuse another content."""
+    """Return whether an example's file is absent; refuse other content in it."""
     if not target.exists():
         check_writable(next(p for p in target.parents if p.exists()) / target.name)
         return True

@@ -12,14 +12,15 @@ def schema(
     name: Annotated[
         list[str] | None,
         typer.Argument(
-            help="robot, campaign, steps, or a command, such as assembly solve; "
-            "without it all names are listed."
+            help="Name of the schema: robot, campaign, steps, or a command such as "
+            "assembly solve; without a name all names are listed."
         ),
     ] = None,
 ) -> None:
     """Print a JSON Schema: of robot files, campaigns or results.
 
-    Editors complete and check files with it: forcefit schema robot > robot.schema.json
+    Editors use it to complete and check files: forcefit schema robot >
+    robot.schema.json
     """
     from assembly.files.robot_schema import ROBOT_FILE
     from assembly.files.step_file import PLAN_FILE

@@ -53,7 +53,8 @@ ClearanceOption = Annotated[
 ContactLengthOption = Annotated[
     float | None,
     typer.Option(
-        help="[m] With --clearance contact: ratio of random moments to random forces. "
+        help="[m] With --clearance contact: length, the ratio of random moments to "
+        "forces. "
         "Default: the longest body."
     ),
 ]
@@ -79,14 +80,15 @@ def statistics(
         int, typer.Option(help="Number of draws of all errors.", min=2, max=10**9)
     ] = 10_000,
     seed: Annotated[
-        int, typer.Option(help="Seed of the draws.", min=0, max=2**63 - 1)
+        int, typer.Option(help="Seed of the random draws.", min=0, max=2**63 - 1)
     ] = 1,
     clearance: ClearanceOption = "worst",
     contact_length: ContactLengthOption = None,
     limit: Annotated[
         list[str] | None,
         typer.Option(
-            help="Limit in SI units, such as energy=5 or translation=2e-4; may be "
+            help="Limit of a result in SI units, such as energy=5 or "
+            "translation=2e-4; may be "
             "repeated."
         ),
     ] = None,
@@ -150,8 +152,8 @@ def statistics(
 ) -> None:
     """Draw random errors: yield, pose errors, importance.
 
-    With OUTPUT, finished draws are kept in OUTPUT.journal: after an interruption the
-    same command continues from there and ends in the same file.
+    With OUTPUT, finished draws are kept in OUTPUT.journal.  After an interruption the
+    same command continues from there and produces the same file.
     """
     from assembly.model.error_distributions import read_sources
     from assembly.report.first_order import posture_status
@@ -215,7 +217,7 @@ def statistics(
     options = None
     if importance is not None:
         options = ImportanceOptions(importance, by, confidence)
-    held = ExitStack()  # keeps the journal until all is written
+    held = ExitStack()  # keeps the journal until all files are written
     with _interruptible(output), progress_bars() as update:
         data = run_draws(
             experiment, draws, output, workers, lambda d, n: update("draws", d, n),
@@ -245,13 +247,13 @@ def statistics(
 
 
 def _check_word(option: str, word: str, valid: Sequence[str]) -> None:
-    """Refuse a word other than the valid ones."""
+    """Refuse a word that is not among the valid ones."""
     if word not in valid:
         raise BadInput(f'{option}: found "{word[:60]}"{nearest(word, valid)}')
 
 
 def _check_clearance_model(clearance: str, contact_length: float | None) -> None:
-    """Refuse an unknown model, and a length that it does not need or cannot use."""
+    """Refuse an unknown model, and a length that the model does not use."""
     from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 
     _check_word("--clearance", clearance, tuple(CLEARANCE_MODELS))
@@ -284,13 +286,15 @@ def tolerances(
     ],
     plan: Annotated[
         Path | None,
-        typer.Option(help="Costs of tolerances and limits of results (TOML)."),
+        typer.Option(
+            help="Plan with costs of tolerances and limits of results (TOML)."
+        ),
     ] = None,
     quantities: Annotated[
         str,
         typer.Option(
-            help="Margin of the present errors: margin_free (compliant joints free "
-            "about their own axis) | margin (rigid)."
+            help="Zone margin for the present errors: margin_free (compliant joints "
+            "free about their own axis) | margin (rigid)."
         ),
     ] = "margin_free",
     clearance: ClearanceOption = "worst",
@@ -315,8 +319,8 @@ def tolerances(
 
     Without --plan: the factor on the robot's errors at which it assembles at every
     posture, and the errors that govern its margin.  With OUTPUT, finished results are
-    kept in OUTPUT.journal: after an interruption the same command continues from there
-    and ends in the same file.
+    kept in OUTPUT.journal.  After an interruption the same command continues from there
+    and produces the same file.
     """
     from dataclasses import replace
 
@@ -373,7 +377,7 @@ def tolerances(
         if json != "-":
             print(texts[0])
         raise typer.Exit(1)
-    held = ExitStack()  # keeps the journal until all is written
+    held = ExitStack()  # keeps the journal until all files are written
     with _interruptible(output), progress_bars() as update:
         if machine.errors.any():
             results["present"] = present_errors(
@@ -415,7 +419,7 @@ def _save_allocation(
     allocation: "Allocation", output: Path | None, figure: Path | None,
     csv: Path | None,
 ) -> None:  # fmt: skip
-    """Save the tolerances as a data set, a figure and a table, where requested."""
+    """Save the tolerances as a data set, a figure and a table, if requested."""
     from assembly.statistics.allocated_tolerances import tolerance_dataset
     from assembly.statistics.plot import allocation_figure
     from assembly.sweeps.dataset import save_dataset

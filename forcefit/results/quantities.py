@@ -26,15 +26,15 @@ class Quantity:
     """One quantity of the results.
 
     Attributes:
-        words: its name in reports and text, without article.
-        unit: SI; ``"1"`` for a pure number, ``"rad, m"`` for the two halves of a screw,
-            empty where the result states its unit.
-        dims: its dimensions; those of :data:`LABELS` have a fixed length.
-        meaning: its definition, where the words are not enough.
-        symbol: its symbol in the paper, if any.
-        kind: of its values.
-        shown: display unit in text, if not SI.
-        digits: significant digits of text.
+        words: its name in reports and texts, without an article.
+        unit: SI unit; ``"1"`` for a number without unit, ``"rad, m"`` for the two
+            halves of a screw, empty if the result states its unit.
+        dims: its dimensions; dimensions in :data:`LABELS` have a fixed length.
+        meaning: its definition, if the words are not sufficient.
+        symbol: its symbol in the paper, empty if the paper has none.
+        kind: type of its values.
+        shown: display unit in texts, if it is not the SI unit.
+        digits: number of significant digits in texts.
     """
 
     words: str
@@ -48,12 +48,12 @@ class Quantity:
 
     @property
     def display_unit(self) -> str:
-        """Unit of its values in text."""
+        """Unit of the values in texts."""
         return self.shown or self.unit
 
     @property
     def attributes(self) -> dict[str, str]:
-        """Attributes of its variable in a NetCDF file."""
+        """Attributes of the NetCDF variable of this quantity."""
         return {"units": self.unit, "long_name": self.meaning or self.words}
 
 
@@ -522,12 +522,12 @@ QUANTITIES: Mapping[str, Quantity] = {
 
 
 def in_words(key: str) -> str:
-    """Return a key of the results in words; of a key not in the table, itself."""
+    """Return words for a key of the results; without an entry, the key itself."""
     return QUANTITIES[key].words if key in QUANTITIES else key.replace("_", " ")
 
 
 def unit_of(key: str) -> str:
-    """Return SI unit of a key's numbers; empty for pure, mixed and unknown ones."""
+    """Return SI unit of a key; empty for pure numbers, mixed units and unknown keys."""
     unit = QUANTITIES[key].unit if key in QUANTITIES else ""
     mixed = unit == "1" or "," in unit or ".." in unit or " or " in unit
     return "" if mixed else unit

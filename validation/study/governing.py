@@ -1,4 +1,4 @@
-"""Certified error bound with one part of the robot made perfect at a time."""
+"""Certified error bounds of a robot with one part made perfect at a time."""
 
 from dataclasses import replace
 from typing import Any
@@ -18,20 +18,20 @@ ERROR, CLEARANCE = "geometric error", "clearance"
 
 
 def governing(posture: Posture, assumption: str = "frozen") -> list[dict[str, Any]]:
-    """Return error bounds (27) without one frame's error or one joint's clearance.
+    """Return bounds (27) without one frame's error or one joint's clearance.
 
-    The robot's given errors are used.  Two of them may compensate each other; the bound
-    then increases when one is removed.
+    The robot's given errors are used.  Two of them may compensate each other; removing
+    one then increases the bound.
 
     Args:
         posture: configuration of a robot with errors or clearances.
         assumption: assumption of problem (27).
 
     Returns:
-        For each frame with errors and each joint with clearances: its name (``part``),
-        ``what`` is removed, and the upper bounds ``rotation`` [rad] and ``translation``
-        [m] without it.  The smallest translation is first; bounds are None without a
-        solution.
+        For each frame with errors and each joint with clearances a table: its name
+        (``part``), the removed imperfection (``what``), and the upper bounds
+        ``rotation`` [rad] and ``translation`` [m] without it.  The smallest translation
+        is first; bounds are None without a solution.
     """
     rows: list[dict[str, Any]] = []
     for part, what, robot in _improved(posture.robot):
@@ -50,14 +50,14 @@ def governing(posture: Posture, assumption: str = "frozen") -> list[dict[str, An
 
 
 def _by_translation(row: dict[str, Any]) -> tuple[float, float]:
-    """Return key that sorts the smallest bound first, missing bounds last."""
+    """Return the sort key: smallest bound first, missing bounds last."""
     if row["translation"] is None:
         return (np.inf, np.inf)
     return (row["translation"], row["rotation"])
 
 
 def _improved(robot: Robot) -> list[tuple[str, str, Robot]]:
-    """Return robots that each lack one of the robot's imperfections."""
+    """Yield robots that each lack one of the robot's imperfections."""
     cases = []
     declared = robot.declared_errors
     for i, frame in enumerate(robot.frames):

@@ -39,17 +39,17 @@ class Study:
         title: title of the report.
         robot: robot with its errors, before links are replaced.
         errors: sentence on the origin of the errors.
-        source: source of the links' stiffness, ``"beam"`` (as declared) or ``"fea"``.
-        meshes: mesh link by frame, for the comparison and for ``"fea"``.
+        source: source of the links' stiffness, ``"beam"`` (declared) or ``"fea"``.
+        meshes: meshed link by frame, for the comparison and for ``"fea"``.
         accuracy: required accuracy of the finite elements.
-        pose: nominal platform pose of the detailed checks.
-        grid: axes of the maps by pose component; empty for none.
-        scales: scales of the errors in the cross-check; empty for none.
+        pose: nominal platform pose for the detailed checks.
+        grid: axes of the maps by pose component; empty without maps.
+        scales: scales of the errors in the cross-check; empty without a cross-check.
         checks: names of the checks to run.
-        asked: checks that the file asks for by name, by a grid or by scales.
+        asked: checks that the file requests by name, by a grid or by scales.
         folder: folder of the report.
-        files: files that were read: the study's own, a robot's, a surface's.
-        service: results asked for on the robot under load; None for none.
+        files: files that were read: the study file, a robot file, surfaces.
+        service: results requested on the robot under load; None without a table.
     """
 
     title: str
@@ -78,10 +78,10 @@ def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
         folder: folder of the report, instead of the one in the file.
 
     Returns:
-        The study, with all its content checked.
+        The study; its whole content has been checked.
 
     Raises:
-        BadInput: the study file or the robot file breaks a rule.
+        BadInput: the study file or the robot file violates a rule.
     """
     path = Path(path)
     root = read_toml(path)
@@ -133,7 +133,7 @@ def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
 
 
 def _files(path: Path, root: Table, meshes: dict[str, MeshLink]) -> tuple[Path, ...]:
-    """Return the files of a study, each once."""
+    """Return the files of a study, each of them once."""
     robot = path.parent / root.text("robot")
     surfaces = (named_solid(mesh.surface)[0] for mesh in meshes.values())
     return tuple(
@@ -142,20 +142,20 @@ def _files(path: Path, root: Table, meshes: dict[str, MeshLink]) -> tuple[Path, 
 
 
 def _robot(root: Table, folder: Path) -> Robot:
-    """Return the robot, built in or from a file, with closures made to hold."""
+    """Return the robot, built in or from a file, with closures that hold."""
     name = root.text("robot", expected="a built-in robot or a robot file")
     if name in BUILT_IN:
         return _closed(root, name)
     if not os.path.isfile(folder / name):
         problem = (
-            f"found {quoted(name)}, neither a built-in robot nor a file beside this"
+            f"found {quoted(name)}, neither a built-in robot nor a file in this folder"
         )
         raise root.bad("robot", f"{problem}{nearest(name, BUILT_IN)}")
     return _closed(root, folder / name)
 
 
 def _closed(root: Table, name: Path | str) -> Robot:
-    """Return the robot with closures made to hold as the study's keys ask."""
+    """Return the robot with closures adjusted as the keys of the study request."""
     rest = root.text("rest") if root.has("rest") else None
     mismatch = root.choice("mismatch", ("spring",)) if root.has("mismatch") else None
     own_errors = not root.has("errors")
@@ -177,7 +177,7 @@ def _closed(root: Table, name: Path | str) -> Robot:
 
 
 def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
-    """Return the robot with the errors asked for, and a sentence on them."""
+    """Return the robot with the requested errors, and a sentence on them."""
     if not root.has("errors"):
         return robot, "geometric errors as in the robot file"
     closing = root.has("rest") or root.has("mismatch")
@@ -218,7 +218,7 @@ def _frames(table: Table, robot: Robot, default: list[str]) -> tuple[str, ...]:
 
 
 def _known(table: Table, key: str, robot: Robot, names: list[str]) -> tuple[str, ...]:
-    """Return full names of frames; the error for an unknown one has its place."""
+    """Return full names of frames; an unknown name is reported with its place."""
     try:
         return frames_named(robot, names)
     except BadInput as error:
@@ -226,7 +226,7 @@ def _known(table: Table, key: str, robot: Robot, names: list[str]) -> tuple[str,
 
 
 def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
-    """Return source of the links' stiffness, and meshes of the beams to compare."""
+    """Return the source of the links' stiffness, and meshes of beams to compare."""
     if not root.has("links"):
         return "beam", {}, 0.005
     table = root.table("links")
@@ -261,7 +261,7 @@ def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
 
 
 def _pose(root: Table) -> dict[str, float]:
-    """Return the pose of the detailed checks; home by default."""
+    """Return the pose for the detailed checks, by default the home pose."""
     if not root.has("pose"):
         return {}
     table = root.table("pose")
@@ -290,7 +290,7 @@ def _scales(root: Table) -> tuple[float, ...]:
 def _checks(
     root: Table, meshes: bool, grid: bool, scales: bool
 ) -> tuple[tuple[str, ...], set[str]]:
-    """Return the checks to run, by default all with input, and those asked for."""
+    """Return the checks to run: by default all with input, and the requested ones."""
     possible = {"stiffness": meshes, "maps": grid, "crosscheck": scales}
     if not root.has("checks"):
         return tuple(c for c in _CHECKS if possible.get(c, True)), set()
