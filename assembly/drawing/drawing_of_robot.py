@@ -37,6 +37,7 @@ _SAME = 1e-12  # [lengths, rad] error below which points and axes are the same
 _HELD = {
     "name", "parent", "translation", "rotation", "joint", "actuated", "position",
     "limits", "geometric_error", "tolerance", "clearance", "joint_stiffness", "link",
+    "locked_at",
     "mass", "centre_of_mass", "inertia", "pitch",
 }  # fmt: skip
 

@@ -139,6 +139,7 @@ def _frames_of(plan: _Plan, step: Step) -> list[PlacedFrame]:
                 part.name, carrier, joint=part.kind, **motion,
                 clearance=numbers.clearance, joint_stiffness=numbers.stiffness,
                 geometric_error=numbers.error, tolerance=numbers.tolerance,
+                locked_at=numbers.locked_at,
             )  # fmt: skip
             placed.append((frame, part.pose))
             carrier = part.name

@@ -18,6 +18,7 @@ from assembly.drawing.rigid_bodies import RigidBodies, connects
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
 from assembly.model.robot import Clearance, Frame, Robot
+from forcefit.inputs.table import BadInput, quoted
 
 _SAME = 1e-12  # [lengths, sine] error below which points and directions are the same
 _PARALLEL = 1e-2  # sine of the angle below which a universal joint is not made
@@ -123,8 +124,17 @@ def _single(posture: Posture, i: int) -> DrawnJoint:
 
 def _numbers(frame: Frame) -> JointNumbers:
     """Error, clearance and stiffness of a frame, in its axes."""
+    bolt, error = frame.locked_at, frame.geometric_error
+    if bolt is not None:  # the drawing is of the robot before it is bolted
+        if {"rx", "ry", "rz"} & set(bolt.pose):
+            raise BadInput(
+                f"frame {quoted(frame.name)}.locked_at: found a rotation of the "
+                "platform, whose axes a drawing turns; expected its translation, or "
+                "joints"
+            )
+        bolt, error = replace(bolt, screw=np.zeros(6)), error - bolt.screw
     return JointNumbers(
-        frame.clearance, frame.joint_stiffness, frame.geometric_error, frame.tolerance
+        frame.clearance, frame.joint_stiffness, error, frame.tolerance, locked_at=bolt
     )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.drawing.drawing import FREE_ROWS, DrawnJoint, JointNumbers, perpendicular
+from assembly.files.bolt_file import read_locked_at
 from assembly.files.drawn_clearance import read_drawn_clearance
 from assembly.files.joint_file import read_fit, read_joint_stiffness, read_pitch
 from assembly.files.written_units import SCREW, without_units
@@ -125,12 +126,14 @@ def _one(table: Table, kind: str, actuated: bool) -> JointNumbers:
     zero = np.zeros(6)
     error = table.array("geometric_error", (6,), "rad, m", zero, largest=LARGEST_LENGTH)
     clearance, contacts = read_drawn_clearance(table, kind)
+    clearance, bolt = read_locked_at(table, kind == "fixed", clearance)
     return JointNumbers(
         clearance=clearance,
         contacts=contacts,
         stiffness=_stiffness(table, kind, actuated),
         error=error,
         tolerance=_tolerance(table),
+        locked_at=bolt,
         fit=read_fit(table),
     )
 

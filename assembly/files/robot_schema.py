@@ -61,6 +61,11 @@ _LINK = record(
     pieces_=number("springs in series of a beam"),
     parts_=text("solids of other materials", "part"),
 )  # fmt: skip
+_LOCKED_AT = Either((
+    Words(("home",)),
+    record(pose_=Each(number("pose of the platform", "m, rad")),
+           joints_=Each(number("coordinate of a drive", "rad or m"))),
+))  # fmt: skip
 _CLEARANCE = record(
     radial_=number("radial clearance", "m"), axial_=number("axial clearance", "m"),
     tilt_=number("tilt clearance", "rad"), spin_=number("clearance about z", "rad"),
@@ -83,6 +88,7 @@ _FRAME = record(
     geometric_error_="geometric_error",
     tolerance_=number("standard deviations of the geometric error", "rad, m", "screw"),
     clearance_=_CLEARANCE,
+    locked_at_=_LOCKED_AT,
     joint_stiffness_=Either((
         number("diagonal stiffness", "N m/rad .. N/m", "screw"), _STIFFNESS,
     )),
@@ -177,6 +183,7 @@ _JOINT = record(
     actuated_=flag("actuated"), position_=number("coordinate at home", "rad or m"),
     limits_=number("least and largest coordinate", "rad or m", "bound"),
     drive_stiffness_=number("stiffness of the drive", "N m/rad or N/m"),
+    locked_at_=_LOCKED_AT,
 )  # fmt: skip
 _LEG = record(
     name=text("name"),

@@ -7,6 +7,7 @@ carries the children.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 
 import numpy as np
@@ -63,6 +64,27 @@ class Clearance:
 
 
 @dataclass(frozen=True, eq=False)
+class LockedAt:
+    """A fixed joint with clearance that is bolted at one pose and rigid afterwards.
+
+    Attributes:
+        clearance: before it is bolted.
+        pose: components ``tx .. rz`` [m, rad] of the platform at that pose.
+        joints: or coordinates [rad or m] of drives; home if both are empty.
+        screw: (6,) [rad, m] clearance that is locked in; it is part of the geometric
+            error.  Computed by :func:`assembly.steps.bolted.bolt_joints`.
+    """
+
+    clearance: Clearance
+    pose: Mapping[str, float] = field(default_factory=dict)
+    joints: Mapping[str, float] = field(default_factory=dict)
+    screw: NDArray = field(default_factory=lambda: np.zeros(6))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "screw", locked(self.screw, (6,), "locked_at: screw"))
+
+
+@dataclass(frozen=True, eq=False)
 class Frame:
     """One body and the joint at its far end; see the head of this module.
 
@@ -81,6 +103,8 @@ class Frame:
         tolerance: (6,) [rad, m] standard deviations of delta l about the given value, 0
             where it is exact; None if unknown.
         clearance: clearance of the joint; None if it has none.
+        locked_at: where the joint is bolted, with its clearance before; None if it is
+            not.
         joint_stiffness: (6, 6) K_B with ``inf`` on the diagonal where rigid, or None;
             0 along a passive joint's own motion (its row and column) leaves it free.
         drive_force: [N m or N] with which a drive pushes a passive joint along its
@@ -105,6 +129,7 @@ class Frame:
     geometric_error: NDArray = field(default_factory=lambda: np.zeros(6))
     tolerance: NDArray | None = None
     clearance: Clearance | None = None
+    locked_at: LockedAt | None = None
     joint_stiffness: NDArray | None = None
     drive_force: float = 0.0
     link: Link | None = None
@@ -121,6 +146,11 @@ class Frame:
             if value is not None:
                 value = locked(value, shape, f"frame '{self.name}': {name}")
                 object.__setattr__(self, name, value)
+        if self.locked_at is not None and (self.joint != "fixed" or self.clearance):
+            raise BadInput(
+                f"frame {quoted(self.name)}.locked_at: found a joint that moves or has "
+                'a clearance besides; expected joint = "fixed"'
+            )
         if (self.joint == "helical") != (self.pitch != 0.0):
             raise BadInput(
                 f"frame {quoted(self.name)}.pitch: found {self.pitch:g} on a "

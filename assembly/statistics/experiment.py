@@ -25,6 +25,7 @@ from assembly.statistics.posture_margins import PostureMargins, prepare_margins
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.stiffness_spread import draw_stiffnesses
 from assembly.statistics.worst_clearance import PRECISION, bound_worst_errors
+from assembly.steps.bolted import bolted_errors
 from forcefit.inputs.renamed import renamed_fields, warn_renamed
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
@@ -195,7 +196,7 @@ class Experiment:
         self, values: NDArray, draws: Sequence[int] | NDArray
     ) -> tuple[NDArray, NDArray, NDArray]:
         """Return records with the posture's clearances, wrenches, and their weights."""
-        errors = self.sources.errors(values)
+        errors = bolted_errors(self.posture.robot, self.sources.errors(values))
         solved = self.energies.solve(errors)
         rows = np.zeros(len(values), dtype=self.record_type)
         rows["energy"] = solved.energy

@@ -19,6 +19,7 @@ from assembly.files.drawing_file import is_drawing
 from assembly.files.robot_file import declared_robot, robot_of, robot_table
 from assembly.files.solved_links import solve_links
 from assembly.model.robot import Robot
+from assembly.steps.bolted import bolt_joints
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 
 _AXES = {3: ("x", "y", "z"), 6: ("rx", "ry", "rz", "tx", "ty", "tz")}
@@ -123,7 +124,7 @@ class Design:
         """
         robot = robot_of(Table(self.changed(values), self.file, ""), self.name)
         try:
-            return solve_links(robot)
+            return bolt_joints(solve_links(robot))
         except BadInput as error:
             raise BadInput(f"{self.file}: {error}") from None
 

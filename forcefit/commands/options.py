@@ -407,6 +407,14 @@ def note_massless(robot: Any, gravity: list[float] | None) -> None:
         print(f"forcefit: note: {robot.name}: {remark}", file=sys.stderr)
 
 
+def note_loose(robot: Any) -> None:
+    """Print a note to stderr if a fixed joint's clearance is loose at every pose."""
+    from assembly.steps.bolted import loose_over_poses
+
+    for remark in loose_over_poses(robot):
+        print(f"forcefit: note: {robot.name}: {remark}", file=sys.stderr)
+
+
 def note_closing(robot: Any, rest: str | None, mismatch: str | None) -> None:
     """Print to stderr how ``--rest`` or ``--mismatch`` closed the robot's loops."""
     asked = [option for option in (rest, mismatch) if option is not None]

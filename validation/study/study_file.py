@@ -19,6 +19,7 @@ from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_named
 from assembly.model.robot import BeamLink, MeshLink, Robot
 from assembly.robots import BUILT_IN
+from assembly.steps.bolted import bolt_joints, loose_over_poses
 from assembly.sweeps.targets import parse_grid
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from forcefit.results.display import html_table, short_repr
@@ -92,6 +93,7 @@ def read_study(
     robot, errors = _errors(root, robot)
     if root.has("rest") or root.has("mismatch"):
         errors = "; ".join([errors, *robot.remarks])
+    errors = "; ".join([errors, *loose_over_poses(robot)])
     source, meshes, accuracy = _links(root, robot)
     pose = _pose(root)
     grid = root.text("grid", " ").strip()
@@ -183,7 +185,7 @@ def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
     if not root.has("errors"):
         return robot, "geometric errors as in the robot file"
     closing = root.has("rest") or root.has("mismatch")
-    fixed = robot.errors if closing else np.zeros_like(robot.errors)
+    fixed = robot.declared_errors if closing else np.zeros_like(robot.errors)
     table = root.table("errors")
     if table.has("explicit"):
         rows = table.table("explicit")
@@ -193,7 +195,7 @@ def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
                 errors[robot.index(frame)] = rows.array(name, (6,), "rad, m")
         table.finish()
         given = "geometric errors given in the study file"
-        return robot.with_errors(fixed + errors), given
+        return bolt_joints(robot.with_errors(fixed + errors)), given
     draw = ErrorDraw(
         _frames(table, robot, [f.name for f in robot.frames]),
         tuple(table.array("least", (6,), "rad, m")),
@@ -208,7 +210,7 @@ def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
     table.finish()
     signs = "all positive" if draw.signs == "literal" else "random signs"
     sentence = f"geometric errors drawn with seed {draw.seed}, {signs}"
-    return robot.with_errors(fixed + draw_errors(robot, draw)), sentence
+    return bolt_joints(robot.with_errors(fixed + draw_errors(robot, draw))), sentence
 
 
 def _frames(table: Table, robot: Robot, default: list[str]) -> tuple[str, ...]:
