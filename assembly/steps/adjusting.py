@@ -42,7 +42,9 @@ def adjustment_of(machine: Machine, state: State, step: Adjust) -> NDArray:
         unit[:, i] = 1.0
         moved = settle(machine, with_adjustment(machine, state, step, unit))
         slopes[:, i] = (_to_vanish(machine, moved, step) - value)[0]
-    amount = -value @ np.linalg.pinv(slopes).T
+    # where many changes do alike, the least one, lengths in reference lengths
+    unit = 1 / machine.scale[rows_of(step.components)]
+    amount = -value @ np.linalg.pinv(slopes * unit).T * unit
     if step.increment:
         amount = step.increment * np.round(amount / step.increment)
     return amount
