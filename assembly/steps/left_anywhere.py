@@ -42,16 +42,26 @@ def positions_left_anywhere(
     # the mixture of a walk is judged by random combinations of all clearances
     judged = np.random.default_rng(0).normal(size=(6, u.shape[1]))
     for i, rng in enumerate(rngs):
-        free = ~loaded[i]
-        together = null_space(np.hstack([of_cones[:, free], of_motions]), rcond=_SAME)
-        U, S, _ = np.linalg.svd(together[: free.sum()], full_matrices=False)
-        own, starts = u[i, free].copy(), _starts(machine.joints.group[free])
-        sample_uniform_position(
-            np.ascontiguousarray(U[:, S > _SAME]), starts,
-            np.ascontiguousarray(judged[:, free]), own, rng,
-        )  # fmt: skip
-        u[i, free] = own
+        # near the least load that presses a clearance, forces are the solver's error:
+        # if the set has an interior with all clearances, none is loaded
+        for free in (np.ones_like(loaded[i]), ~loaded[i]):
+            Z = _directions(of_cones[:, free], of_motions)
+            own, starts = u[i, free].copy(), _starts(machine.joints.group[free])
+            sample_uniform_position(
+                Z, starts, np.ascontiguousarray(judged[:, free]), own, rng
+            )
+            moved = bool((own != u[i, free]).any())
+            u[i, free] = own
+            if moved or free.all() and not loaded[i].any():
+                break
     return u
+
+
+def _directions(of_cones: NDArray, of_motions: NDArray) -> NDArray:
+    """Return the orthonormal directions in which clearances move without strain."""
+    together = null_space(np.hstack([of_cones, of_motions]), rcond=_SAME)
+    U, S, _ = np.linalg.svd(together[: of_cones.shape[1]], full_matrices=False)
+    return np.ascontiguousarray(U[:, S > _SAME])
 
 
 def _loaded(machine: Machine, state: State, of_cones: NDArray) -> NDArray:
