@@ -69,7 +69,9 @@ def _remark(frame: Frame) -> str:
     """Return the position in which a joint is bolted."""
     assert frame.locked_at is not None
     screw = numbers(frame.locked_at.screw)
-    return f"joint {quoted(frame.name)} {_BOLTED} {screw} rad, m in its clearance"
+    drawn = ", drawn machines anywhere at least energy"
+    rule = drawn if frame.locked_at.left == "uniform" else ""
+    return f"joint {quoted(frame.name)} {_BOLTED} {screw} rad, m in its clearance{rule}"
 
 
 def bolt_generators(

@@ -180,3 +180,4 @@ def test_robot_that_is_not_drawn_is_bolted_at_the_least_sum_of_squares():
     frames = pin("slot", {"radial": 1e-3}, np.zeros(6), **UNIFORM)
     robot = bolt_joints(Robot("slot", "slot.end", frames, ()))
     assert not robot.frame("slot").locked_at.screw.any()
+    assert robot.remarks[-1].endswith("drawn machines anywhere at least energy")
