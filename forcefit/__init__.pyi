@@ -13,6 +13,7 @@ from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from assembly.platform_stiffness.deflection import deflection_curve
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.platform_stiffness.vibration import natural_modes
+from assembly.report.show import show
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.summary import summarise
@@ -75,6 +76,7 @@ __all__ = [
     "round_section",
     "run_draws",
     "run_study",
+    "show",
     "solve_assembly",
     "solve_exact",
     "summarise",

@@ -31,7 +31,7 @@ from assembly.model.link_kinds import (
     MeshLink,
 )
 from forcefit.inputs.table import BadInput, nearest, quoted
-from forcefit.results.display import Figures, html_table, largest, short_repr
+from forcefit.results.display import Figures, html_table, largest, short_repr, show
 from stiffness.screws import rotation_matrix, transform
 
 __all__ = [
@@ -83,6 +83,7 @@ class Robot:
     remarks: tuple[str, ...] = ()
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
+    show = show
 
     def _figures(self) -> Figures:
         """Return the summary that is printed."""
