@@ -6,7 +6,7 @@ poses to the certificate, with and without loads.  The reference
 answer's ``method`` says so.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any, overload
 
@@ -34,6 +34,7 @@ from assembly.linear.rounding import (
     stiffness_spread,
 )
 from assembly.linear.solution import with_known
+from assembly.model.given_load import Load, given_load
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
 from assembly.model.statuses import CANNOT_ASSEMBLE, NO_EQUILIBRIUM, OK, SOLVER_FAILED
@@ -58,14 +59,14 @@ _Rows = dict[str, NDArray]
 
 @overload
 def solve_assembly(
-    posture: Posture, load: ArrayLike | None = None, bodies: ArrayLike | None = None,
+    posture: Posture, load: Load | None = None, bodies: ArrayLike | None = None,
     gravity: ArrayLike | None = None, errors: None = None, method: Method = "compiled",
 ) -> Assembly[float]: ...  # fmt: skip
 
 
 @overload
 def solve_assembly(
-    posture: Sequence[Posture], load: ArrayLike | None = None,
+    posture: Sequence[Posture], load: Load | None = None,
     bodies: ArrayLike | None = None, gravity: ArrayLike | None = None,
     errors: ArrayLike | None = None, method: Method = "compiled",
 ) -> Assembly[NDArray]: ...  # fmt: skip
@@ -73,7 +74,7 @@ def solve_assembly(
 
 @overload
 def solve_assembly(
-    posture: Posture, load: ArrayLike | None = None, bodies: ArrayLike | None = None,
+    posture: Posture, load: Load | None = None, bodies: ArrayLike | None = None,
     gravity: ArrayLike | None = None, *, errors: ArrayLike,
     method: Method = "compiled",
 ) -> Assembly[NDArray]: ...  # fmt: skip
@@ -81,7 +82,7 @@ def solve_assembly(
 
 def solve_assembly(
     posture: Posture | Sequence[Posture],
-    load: ArrayLike | None = None,
+    load: Load | None = None,
     bodies: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     errors: ArrayLike | None = None,
@@ -92,8 +93,8 @@ def solve_assembly(
     Args:
         posture: the robot's configuration; its errors, clearances, links and joint
             springs are the robot's.  Or k postures of one robot.
-        load: (6,) or (k, 6) [N m, N] wrench on the platform at its origin, base axes;
-            energy minus its work is then minimised.
+        load: (6,) or (k, 6) [N m, N] wrench on the platform at its origin, base axes,
+            or by component, ``{"fz": -50}``; energy minus its work is then minimised.
         bodies: (n, 6) or (k, n, 6) [N m, N] wrenches on the bodies of all frames, each
             at its frame's origin, base axes.
         gravity: (3,) or (k, 3) [m/s^2] base axes; links with a density and bodies with
@@ -120,6 +121,8 @@ def solve_assembly(
     check_method(method)
     if not isinstance(posture, Posture):
         posture = together(posture)
+    if isinstance(load, Mapping):
+        load = given_load(load)
     loads = no_loads(posture.robot.errors.size)
     given = load is not None or bodies is not None or gravity is not None
     if given or driven(posture.robot):
