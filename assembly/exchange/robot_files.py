@@ -3,13 +3,19 @@
 import os
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Union
 
 from assembly.files.robot_file import Closing
 from assembly.files.robot_file import write_robot as write_robot_file
 from assembly.files.solved_links import solve_links
 from assembly.model.robot import Robot
 from assembly.robots import load_robot as load_declared
-from forcefit.inputs.table import BadInput, read_bytes
+from forcefit.inputs.errors import BadInput, describe
+from forcefit.inputs.table import read_bytes
+
+if TYPE_CHECKING:
+    import mujoco
 
 OTHERS = (".urdf", ".xml", ".sdf")
 _BLANKS = b"\xef\xbb\xbf \r\n\t"  # a byte order mark and blanks
@@ -18,13 +24,18 @@ _WEIGHTY = ("mimic:", "no platform", "no drive", "may carry load", "masses")
 
 
 def load_robot(
-    name: str | Path, close: Closing | None = None, *, links: bool = True
+    name: Union[str, Path, "mujoco.MjModel", "mujoco.MjSpec"],
+    close: Closing | None = None,
+    *,
+    links: bool = True,
 ) -> Robot:
-    """Return a built-in robot by its name, or the robot of a file of any kind.
+    """Return a built-in robot by its name, the robot of a file, or of a MuJoCo model.
 
     Args:
-        name: name such as ``"irsbot2"``, or the path of a robot file, a URDF (with its
-            loops next to it), MJCF or SDF file.
+        name: name such as ``"irsbot2"``; or the path of a robot file, a URDF (with its
+            loops next to it), MJCF or SDF file; or a ``mujoco.MjModel`` or
+            ``mujoco.MjSpec``, of which bodies, joints, equalities between them,
+            actuators and the key ``home`` are read.
         close: function that makes the closures of a declared robot hold, as
             :mod:`assembly.kinematics.closing` does; none if absent.
         links: whether links given by a mesh or a library are solved or read now, which
@@ -36,9 +47,11 @@ def load_robot(
         another program.
 
     Raises:
-        BadInput: neither a built-in name nor a file, the file breaks a rule, or a mesh
-            or library that it names is not usable.
+        BadInput: neither a built-in name nor a file nor a model, it breaks a rule, or a
+            mesh or library that it names is not usable.
     """
+    if not isinstance(name, str | Path):
+        return _robot_of_model(name, close)
     robot = _load_declared(name, close)
     try:
         return solve_links(robot) if links else robot
@@ -56,6 +69,11 @@ def _load_declared(name: str | Path, close: Closing | None) -> Robot:
                 "(MJCF) or .sdf"
             )
         return load_declared(name, close)
+    return _robot_of_foreign(path, path.name, close)
+
+
+def _robot_of_foreign(path: Path, title: str, close: Closing | None) -> Robot:
+    """Return the robot of another program's file; remarks begin with its title."""
     from assembly.exchange.foreign import robot_of_file
 
     conversion = robot_of_file(path, ask=False)[0]
@@ -65,9 +83,26 @@ def _load_declared(name: str | Path, close: Closing | None) -> Robot:
         for line in conversion.left_out
         if any(word in line for word in _WEIGHTY)
     ]
-    remarks = tuple(f"{path.name}: {line}" for line in said)
+    remarks = tuple(f"{title}: {line}" for line in said)
     robot = replace(conversion.robot, remarks=(*conversion.robot.remarks, *remarks))
     return robot if close is None else close(robot)
+
+
+def _robot_of_model(model: object, close: Closing | None) -> Robot:
+    """Return the robot of a model in memory."""
+    from assembly.exchange.mujoco_model import is_mujoco, mjcf_of_model
+
+    kind = type(model).__name__
+    if not is_mujoco(model):
+        expected = "expected a name, a path, an MjModel or an MjSpec"
+        raise BadInput(f"load_robot: found {describe(model)} ({kind}), {expected}")
+    with TemporaryDirectory() as folder:
+        path = Path(folder, f"{kind}.xml")
+        path.write_text(mjcf_of_model(model), encoding="utf-8")
+        try:
+            return _robot_of_foreign(path, kind, close)
+        except BadInput as error:
+            raise BadInput(str(error).replace(str(path), kind)) from None
 
 
 def write_robot(robot: Robot, path: str | Path) -> None:
