@@ -48,11 +48,9 @@ def forced_scene(
     """Return the numbers that :func:`robot_scene` draws; arguments as there."""
     posture = assembly.posture
     ends = posture.transforms[:, :3, 3]
-    return _spec(posture, displaced_bodies(assembly)) | {
-        "closing": [] if closing is None else closing[:, :, :3, 3] - ends,
-        "forces": _forces(assembly),
-        "body": None if body is None else _error_body(body, posture.platform[:3, 3]),
-    }
+    moved = [] if closing is None else closing[:, :, :3, 3] - ends
+    shape = None if body is None else _error_body(body, posture.platform[:3, 3])
+    return _spec(posture, displaced_bodies(assembly), moved, _forces(assembly), shape)
 
 
 def nominal_scene(posture: Posture) -> dict[str, Any]:
@@ -61,13 +59,13 @@ def nominal_scene(posture: Posture) -> dict[str, Any]:
     bodies = DisplacedBodies(
         body_starts(posture), posture.transforms[:, :3, 3], still, still, still[:, :3]
     )
-    return _spec(posture, bodies) | {
-        "closing": [], "forces": [], "body": None, "nominal": True,
-    }  # fmt: skip
+    return _spec(posture, bodies, [], [], None) | {"nominal": True}
 
 
-def _spec(posture: Posture, bodies: DisplacedBodies) -> dict[str, Any]:
-    """Return the bodies of a scene, its size, units and exaggeration."""
+def _spec(
+    posture: Posture, bodies: DisplacedBodies, closing: Any, forces: Any, body: Any
+) -> dict[str, Any]:
+    """Return the numbers of a scene, with its size, units and exaggeration."""
     ends = bodies.ends
     size = float(np.ptp(np.vstack([ends, np.zeros(3)]), axis=0).max()) or 1.0
     middle = (ends.max(axis=0) + ends.min(axis=0)) / 2
@@ -79,6 +77,9 @@ def _spec(posture: Posture, bodies: DisplacedBodies) -> dict[str, Any]:
             [posture.robot.index(name) for name in pair]
             for pair in posture.robot.closures
         ],
+        "closing": closing,
+        "forces": forces,
+        "body": body,
         "exaggeration": readable_factor(bodies, size),
         "box": np.stack([middle - half, middle + half], axis=1),
         "length": asdict(shown_in("m", size)),
