@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.model.equal_data import EqualData
 from assembly.model.frame import (
     BASE,
     JOINTS,
@@ -42,11 +43,11 @@ __all__ = [
 
 
 @dataclass(frozen=True, eq=False)
-class Robot:
+class Robot(EqualData):
     """A manipulator.
 
     Frames are stored parents first.  Rows of every array below are frames in that
-    order.
+    order.  Robots of equal data are equal, bit by bit.
 
     Attributes:
         name: name of the robot.
@@ -127,6 +128,10 @@ class Robot:
     def frame(self, name: str) -> Frame:
         """Return the frame of a name; see :meth:`index` for the error."""
         return self.frames[self.index(name)]
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((self.name, self.platform, self.frames))
 
     @cached_property
     def _rows(self) -> dict[str, int]:
