@@ -1,5 +1,6 @@
 """Import and export of robots in files of any kind, by their suffix."""
 
+import logging
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,7 @@ from forcefit.inputs.table import read_bytes
 if TYPE_CHECKING:
     import mujoco
 
+_LOG = logging.getLogger("forcefit.load")
 OTHERS = (".urdf", ".xml", ".sdf")
 _BLANKS = b"\xef\xbb\xbf \r\n\t"  # a byte order mark and blanks
 # words in a remark which say that an omission may change results
@@ -50,9 +52,10 @@ def load_robot(
         BadInput: neither a built-in name nor a file nor a model, it breaks a rule, or a
             mesh or library that it names is not usable.
     """
-    if not isinstance(name, str | Path):
-        return _robot_of_model(name, close)
-    robot = _load_declared(name, close)
+    declared = isinstance(name, str | Path)
+    robot = _load_declared(name, close) if declared else _robot_of_model(name, close)
+    for remark in robot.remarks:
+        _LOG.info("%s: %s", robot.name, remark)
     try:
         return solve_links(robot) if links else robot
     except BadInput as error:

@@ -39,7 +39,7 @@ from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
 from assembly.model.statuses import CANNOT_ASSEMBLE, NO_EQUILIBRIUM, OK, SOLVER_FAILED
 from assembly.solvers.conic import SolverFailed
-from assembly.solvers.method import Method, check_method
+from assembly.solvers.method import Method, check_method, log_reference
 
 __all__ = ["Assembly", "CannotAssemble", "solve_assembly"]
 
@@ -199,10 +199,9 @@ def _solve_one(
         rows = _compiled(joints, structure, T, robot.errors[None], off, acting)
         if rows["outcome"][0] < _LEFT:
             break
-        if not _bounds_matter(structure, rows["outcome"])[0]:
+        if bounded or not _bounds_matter(structure, rows["outcome"])[0]:
+            log_reference(robot.name, "least energy", 1, 1)
             return least_energy(posture, load, loads)
-    else:
-        return least_energy(posture, load, loads)
     multipliers, residual = rows["multipliers"], rows["residual"] + rounding
     drop_zeros(rows["energy"], rows["bound"], multipliers, residual, acting is not None)
     if acting is None and not np.count_nonzero(multipliers):
@@ -247,7 +246,10 @@ def _solve_many(
         posture = posture[0]
     own = None if errors is None else np.broadcast_to(sets, (count, *sets.shape[1:]))
     points = _of_rows(posture, joints, rows, load, loads, own)
-    for i in np.flatnonzero(rows["outcome"] >= _LEFT).tolist():
+    left = np.flatnonzero(rows["outcome"] >= _LEFT).tolist()
+    if left and method == "compiled":
+        log_reference(robot.name, "least energy", len(left), count)
+    for i in left:
         one = points[i]  # posture and loads of the point
         _record(rows, points.apart, i, _by_reference(one, own_axes_free))
     residual = rows["residual"] + closure_rounding(sets, joints, structure.size)

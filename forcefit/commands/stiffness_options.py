@@ -115,7 +115,7 @@ TimeLimit = Annotated[float, typer.Option(help="Time limit [s].")]
 
 def tell_progress() -> None:
     """Print the unknowns, error and expected time of each mesh to stderr."""
-    log = logging.getLogger("stiffness.fem.fea")
+    log = logging.getLogger("forcefit.finite_elements")
     log.setLevel(logging.INFO)
     log.handlers = [logging.StreamHandler()]
 
