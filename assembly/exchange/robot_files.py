@@ -7,6 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Union
 
+from assembly.exchange.other_readers import has_reader, read_by_other
 from assembly.files.robot_file import Closing
 from assembly.files.robot_file import write_robot as write_robot_file
 from assembly.files.solved_links import solve_links
@@ -66,6 +67,9 @@ def _load_declared(name: str | Path, close: Closing | None) -> Robot:
     """Return the robot of a name or of a file, with links as declared."""
     path = Path(name)
     if path.suffix.lower() not in OTHERS:
+        if _is_of_other(path):
+            robot = read_by_other(path)
+            return robot if close is None else close(robot)
         if os.path.isfile(path) and read_bytes(path).lstrip(_BLANKS)[:1] == b"<":
             raise BadInput(
                 f"{path}: found XML, expected a robot file, or the ending .urdf, .xml "
@@ -73,6 +77,16 @@ def _load_declared(name: str | Path, close: Closing | None) -> Robot:
             )
         return load_declared(name, close)
     return _robot_of_foreign(path, path.name, close)
+
+
+def is_robot_file(path: Path) -> bool:
+    """Return whether a file is a TOML of forcefit, not one of another program."""
+    return path.suffix.lower() not in OTHERS and not _is_of_other(path)
+
+
+def _is_of_other(path: Path) -> bool:
+    """Return whether a file has an ending that another distribution reads."""
+    return path.suffix not in {"", ".toml"} and path.is_file() and has_reader(path)
 
 
 def _robot_of_foreign(path: Path, title: str, close: Closing | None) -> Robot:
