@@ -3,4 +3,5 @@
 Begin with ``model/robot.py``, then ``kinematics/posture.py``, ``linear/energy.py``.
 """
 
-DISTRIBUTION = "forcefit"  # text by which ``import forcefit`` recognises the package
+# ``import forcefit`` searches this text to recognise the package as its own
+DISTRIBUTION = "forcefit"

@@ -134,6 +134,7 @@ parent = "two"
 translation = [0.8, 0, 0]
 """
 POSES = "id,q.crank\na,1\nb,1.1\nc,1.2\n"
+WAY = "id,time,q.crank\na,0,1\nb,0.1,1.1\nc,0.25,1.2\n"
 OBJECT = """
 v 0 0 0
 v 1 0 0
@@ -169,6 +170,10 @@ COMMANDS = [
     (3, "assembly tolerances bar.toml --grid tx=0.65 --plan plan.toml --fresh 20 "
         "-o new.nc --json -"),
     (2, "assembly tolerances bar.toml --grid tx=0.65:0.66:0.01 --quantities margin"),
+    (5, "assembly path bar.toml --path way.csv --gravity y=-9.81 --points 9 -o new.nc "
+        "--json -"),
+    (4, "assembly path bar.toml --path poses.csv --profile quintic --speed 0.5 "
+        "--acceleration 2 --points 9 --figure new.svg --report new.html"),
     (2, "assembly plot swept.nc --figure new.svg"),
     (1, "assembly plot draws.nc --figure new.png --kind histogram"),
     (5, "stiffness beam --length 0.4 --young 2.1e11 --poisson 0.3 --radius 0.02 "
@@ -212,7 +217,7 @@ def write_seeds(folder: Path) -> None:
     texts = {
         "bar.toml": BAR, "arm.toml": ARM + EFFECTS, "errors.toml": ERRORS,
         "plan.toml": PLAN, "study.toml": STUDY, "spec.toml": SPEC,
-        "curve.toml": CURVE, "poses.csv": POSES, "solid.obj": OBJECT,
+        "curve.toml": CURVE, "poses.csv": POSES, "solid.obj": OBJECT, "way.csv": WAY,
         "campaign/campaign.toml": CAMPAIGN, "campaign/robot.toml": MEASURED,
         "campaign/measurements.csv": _measurements(), "notes.txt": "mine\n",
         "links.toml": SPEC.replace('"built"', '"links"'),

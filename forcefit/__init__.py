@@ -19,8 +19,8 @@ _BESIDE = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
 def _refuse_namesakes() -> None:
     """Raise an error if one of the packages belongs to another distribution.
 
-    Other distributions use the same names of packages.  Python imports the first one on
-    the path; in one folder the last installation overwrites the first.
+    Other distributions use the same package names.  Python imports the first package on
+    the path; in one folder the last installation overwrites earlier ones.
 
     Raises:
         ImportError: names the file of the other distribution.
@@ -30,21 +30,21 @@ def _refuse_namesakes() -> None:
         if found != os.path.join(_BESIDE, name, "__init__.py") or not _is_ours(found):
             raise ImportError(
                 f"forcefit: found {found}, expected forcefit's own package {name!r} in "
-                f"{_BESIDE}; remove what has its name, or install forcefit in an "
-                "environment of its own",
+                f"{_BESIDE}; remove the package of this name, or install forcefit in "
+                "an environment of its own",
                 name=name, path=found,
             )  # fmt: skip
 
 
 def _place_of(name: str) -> str:
-    """Return first file of the package that Python would import, or ``"nothing"``.
+    """Return the first file of the package that Python would import, or ``"nothing"``.
 
     Args:
         name: name of the package.
 
     Returns:
-        The path; the import of ``importlib.util``, which has such a function, takes
-        long.
+        The path.  It is searched here because ``importlib.util``, which has such a
+        function, takes long to import.
     """
     for finder in sys.meta_path:
         spec = finder.find_spec(name, None)
@@ -54,14 +54,14 @@ def _place_of(name: str) -> str:
 
 
 def _is_ours(file: str) -> bool:
-    """Return whether a package's first file is of forcefit."""
+    """Return whether a package's first file belongs to forcefit."""
     with open(file, encoding="utf-8", errors="replace") as text:
         return _MARK in text.read()
 
 
 _refuse_namesakes()
 
-# module and public names that it defines: the whole interface
+# modules and the public names that they define: the whole interface
 _OWNERS = {
     "forcefit.inputs.errors": ("BadInput",),
     "stiffness.beam.beam": ("beam_compliance",),
@@ -78,13 +78,17 @@ _OWNERS = {
     "assembly.linear.pose_error": ("bound_pose_error",),
     "assembly.linear.zone": ("zone_margin",),
     "assembly.model.error_distributions": ("read_sources",),
+    "assembly.path.request": ("PathTimes", "errors_along_path"),
     "assembly.platform_stiffness.deflection": ("deflection_curve",),
     "assembly.platform_stiffness.platform_stiffness": ("platform_stiffness",),
     "assembly.platform_stiffness.vibration": ("natural_modes",),
     "assembly.model.robot": (
-        "BeamLink", "Clearance", "Frame", "MatrixLink", "Robot",
+        "BeamLink", "Clearance", "Frame", "LockedAt", "MatrixLink", "Robot",
     ),
     "assembly.report.show": ("show",),
+    "assembly.files.step_file": ("read_steps",),
+    "assembly.steps.bolted": ("bolt_joints",),
+    "assembly.steps.run": ("assemble_in_steps",),
     "assembly.statistics.experiment": ("Experiment",),
     "assembly.statistics.monte_carlo": ("run_draws",),
     "assembly.statistics.summary": ("summarise",),
@@ -103,8 +107,8 @@ _OWNERS = {
     "validation.study.study": ("run_study",),
     "validation.study.study_file": ("read_study",),
 }  # fmt: skip
-# old public names of the last release, still valid: the new public name, or the module
-# and the name of the object in it
+# old public names that are valid for one release; for each the new public name, or the
+# module and the name of the object in it
 _RENAMED = {
     "foretell": ("predict",), "load_deflection": ("deflection_curve",),
     "read_robot": ("load_robot",),
@@ -114,7 +118,7 @@ _RENAMED = {
     "run_sweep": ("sweep", "assembly.sweeps.sweep", "run_sweep"),
     "sweep_in_memory": ("sweep", "assembly.sweeps.sweep", "sweep_in_memory"),
 }  # fmt: skip
-# public names of the last release that are imported from their module now
+# public names of the last release that are now imported from their module
 _MOVED = {
     "stiffness.beam.sections": ("Section",),
     "stiffness.fem.fea": ("FemOptions",),
@@ -159,12 +163,12 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    """Return the public names and nothing else."""
+    """Return the public names only."""
     return __all__
 
 
 def _version() -> str:
-    """Return version of the installed package: last tag and the commits since."""
+    """Return the version of the package: the last tag, and the commits after it."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:

@@ -4,4 +4,5 @@ Begin with ``link.py``, which defines a link's stiffness; then ``beam/beam.py`` 
 ``fem/fea.py``, the two methods that compute it.
 """
 
-DISTRIBUTION = "forcefit"  # text by which ``import forcefit`` recognises the package
+# ``import forcefit`` searches this text to recognise the package as its own
+DISTRIBUTION = "forcefit"

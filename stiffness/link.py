@@ -1,4 +1,4 @@
-"""A link's stiffness, and how good it is."""
+"""A link's stiffness and its estimated error."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -17,23 +17,23 @@ _ROUNDING = 6 * np.finfo(float).eps
 
 @dataclass(frozen=True, eq=False)
 class LinkStiffness:
-    """An elastic link between two interfaces, seen from its tip.
+    """An elastic link between two interfaces, described at its tip.
 
-    The base is held, a wrench acts on the tip: ``screw = compliance @ wrench``, both
-    read at ``tip``, in the axes in which ``tip`` and ``base`` are given.
+    The base is held and a wrench acts on the tip: ``screw = compliance @ wrench``.
+    Both are read at ``tip``, in the axes in which ``tip`` and ``base`` are given.
 
     Attributes:
-        method: method by which it was computed, such as ``"Timoshenko beam"``.
+        method: method of the computation, such as ``"Timoshenko beam"``.
         compliance: (6, 6) [rad/(N m) .. m/N] symmetric positive definite.
-        tip: (3,) [m] the point where screws and wrenches are read.
-        base: (3,) [m] the centre of the held interface.
-        stiffness_error: (6, 6) [N m/rad .. N/m] estimated size of the difference of
-            ``stiffness`` and the exact one, symmetric; zero for a closed form.
-        mesh: counts, volume and quality of the mesh behind it; empty without one.
-        mass: [kg] of the link, 0 when no density was given.
-        center_of_mass: (3,) [m].
+        tip: (3,) [m] point at which screws and wrenches are read.
+        base: (3,) [m] centre of the held interface.
+        stiffness_error: (6, 6) [N m/rad .. N/m] estimated difference between
+            ``stiffness`` and the exact stiffness, symmetric; zero for a closed form.
+        mesh: counts, volume and quality of the mesh; empty without a mesh.
+        mass: [kg] mass of the link; 0 if no density was given.
+        center_of_mass: (3,) [m] centre of mass.
         inertia: (3, 3) [kg m^2] about the centre of mass.
-        stiffness: (6, 6) [N m/rad .. N/m] inverse of the compliance, filled in.
+        stiffness: (6, 6) [N m/rad .. N/m] inverse of the compliance; it is computed.
     """
 
     method: str
@@ -50,7 +50,7 @@ class LinkStiffness:
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
     def _figures(self) -> Figures:
-        """Return how stiff, and how well that is known."""
+        """Return lines on the stiffness and on its accuracy."""
         K = np.diag(self.stiffness)
         error = self.relative_error_estimate
         figures = {
@@ -87,30 +87,30 @@ class LinkStiffness:
         object.__setattr__(self, "mesh", MappingProxyType(dict(self.mesh)))
 
     def _store(self, name: str, array: NDArray) -> None:
-        """Keep a locked array under a name."""
+        """Store a read-only array under a name."""
         array.setflags(write=False)
         object.__setattr__(self, name, array)
 
     @property
     def relative_errors(self) -> NDArray:
-        """(6, 6) |error of K| entry by entry, divided by sqrt(K_ii K_jj)."""
+        """(6, 6) absolute error of each entry of K, divided by sqrt(K_ii K_jj)."""
         return np.abs(scaled(self.stiffness_error, self.stiffness))
 
     @property
     def relative_error_estimate(self) -> float:
-        """The largest of :attr:`relative_errors`; 0 for a closed form."""
+        """Largest entry of :attr:`relative_errors`; 0 for a closed form."""
         return float(self.relative_errors.max())
 
 
 def scaled(matrix: ArrayLike, stiffness: ArrayLike) -> NDArray:
-    """Return entries over sqrt(K_ii K_jj), to compare rotations with translations.
+    """Return entries over sqrt(K_ii K_jj), so that rotations compare with translations.
 
     Args:
-        matrix: (6, 6) a stiffness, or a difference of two.
-        stiffness: (6, 6) the one whose diagonal sets the scale.
+        matrix: (6, 6) stiffness, or difference of two stiffnesses.
+        stiffness: (6, 6) stiffness whose diagonal gives the scale.
 
     Returns:
-        (6, 6) [1].
+        (6, 6) [1] scaled entries.
     """
     diagonal = np.sqrt(np.diag(np.asarray(stiffness, dtype=float)))
     return np.asarray(matrix, dtype=float) / np.outer(diagonal, diagonal)
@@ -121,14 +121,14 @@ def check_definite(who: str, matrix: NDArray) -> None:
 
     Args:
         who: owner of the matrix, for the error message.
-        matrix: (6, 6).
+        matrix: (6, 6) matrix.
 
     Raises:
         BadInput: the matrix is not symmetric to 1e-6 of its scale, or not positive
-            definite by more than rounding.
+            definite beyond rounding.
     """
     if not np.all(np.diag(matrix) > 0):
-        raise BadInput(f"{who} is not positive definite: its diagonal has a value <= 0")
+        raise BadInput(f"{who} is not positive definite: a diagonal entry is <= 0")
     unit = scaled(matrix, matrix)
     row, column = np.unravel_index(np.argmax(np.abs(unit - unit.T)), unit.shape)
     if abs(unit[row, column] - unit[column, row]) > 1e-6:
@@ -148,10 +148,10 @@ def inverted(matrix: NDArray) -> NDArray:
     """Return the inverse of a symmetric positive definite matrix of mixed units.
 
     Args:
-        matrix: (6, 6) a stiffness or a compliance.
+        matrix: (6, 6) stiffness or compliance.
 
     Returns:
-        (6, 6) its inverse, exactly symmetric.
+        (6, 6) inverse, exactly symmetric.
     """
     size = np.sqrt(np.diag(matrix))
     unit = np.linalg.inv(matrix / np.outer(size, size))
@@ -163,10 +163,10 @@ def turn_link(link: LinkStiffness, rotation: ArrayLike) -> LinkStiffness:
 
     Args:
         link: the link.
-        rotation: (3, 3) old axes seen from the new ones, proper orthogonal.
+        rotation: (3, 3) old axes in the new axes, proper orthogonal.
 
     Returns:
-        The link with everything it has turned.
+        The link with all its vectors and matrices in the new axes.
 
     Raises:
         BadInput: the matrix is not a rotation.

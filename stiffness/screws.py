@@ -11,8 +11,8 @@ C       compliance             ``s = C @ w``                   rad/(N m) .. m/N
 K       stiffness              ``w = K @ s``                   N m/rad .. N/m
 ======  =====================  ==============================  ================
 
-Rotations are NumPy's own arithmetic: SciPy's class agrees to rounding (tests compare),
-but importing it takes a quarter of the time in which a posture is solved.
+Rotations are computed with NumPy.  SciPy's class agrees to rounding (tests compare
+them), but its import takes a quarter of the time in which a posture is solved.
 """
 
 import numpy as np
@@ -24,13 +24,13 @@ UNIT_VECTORS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)
 
 
 def skew(vector: ArrayLike) -> NDArray:
-    """Return the matrix of the cross product, ``skew(a) @ b == cross(a, b)``.
+    """Return the matrix of the cross product: ``skew(a) @ b == cross(a, b)``.
 
     Args:
-        vector: (..., 3) any unit.
+        vector: (..., 3) vectors in any unit.
 
     Returns:
-        (..., 3, 3) antisymmetric.
+        (..., 3, 3) antisymmetric matrices.
     """
     v = np.asarray(vector, dtype=float)
     S = np.zeros((*v.shape[:-1], 3, 3))
@@ -45,12 +45,14 @@ def screw_map(offset: ArrayLike, rotation: ArrayLike | None = None) -> NDArray:
     there.  The same motion, read at point ``p``, is ``screw_map(q - p, R) @ s``: the
     block ``[R 0; [q - p]x R, R]`` of the paper's eqs. (13)-(15), as corrected.
 
-    Wrenches go the other way: one read at ``p`` is ``screw_map(q - p, R).T @ w`` when
-    read at ``q`` in the frame's axes, so that power ``w @ s`` is the same at both.
+    Wrenches transform in the opposite direction: a wrench ``w`` read at ``p`` is
+    ``screw_map(q - p, R).T @ w`` when read at ``q`` in the frame's axes, so that the
+    power ``w @ s`` is the same at both points.
 
     Args:
-        offset: (..., 3) [m] from the new point to the old one, in the new axes.
-        rotation: (..., 3, 3) old axes seen from the new ones; the same axes if absent.
+        offset: (..., 3) [m] vector from the new point to the old point, in the new
+            axes.
+        rotation: (..., 3, 3) old axes in the new axes; identity if absent.
 
     Returns:
         (..., 6, 6) matrix A with ``new = A @ old``.
@@ -74,7 +76,7 @@ def rotation_matrix(rotation_vector: ArrayLike) -> NDArray:
     """
     vectors = np.asarray(rotation_vector, dtype=float)
     angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
-    # Rodrigues: 1 + sin a / a S + (1 - cos a) / a^2 S^2, both quotients as sinc
+    # Rodrigues' formula 1 + sin a / a S + (1 - cos a) / a^2 S^2, both quotients by sinc
     first, second = np.sinc(angle / np.pi), np.sinc(angle / (2 * np.pi)) ** 2 / 2
     S = skew(vectors)
     return np.eye(3) + first * S + second * (S @ S)
@@ -94,7 +96,7 @@ def rotation_vector(rotation: ArrayLike) -> NDArray:
     """
     R = np.asarray(rotation, dtype=float)
     trace = np.trace(R, axis1=-2, axis2=-1)[..., None]
-    # 4 q q^T of the unit quaternion q = [x y z w]; its largest row gives q best
+    # 4 q q^T of the unit quaternion q = [x y z w]; its largest row determines q best
     products = np.empty((*R.shape[:-2], 4, 4))
     products[..., :3, :3] = R + np.swapaxes(R, -1, -2)
     products[..., [0, 1, 2], [0, 1, 2]] += 1.0 - trace
@@ -103,7 +105,7 @@ def rotation_vector(rotation: ArrayLike) -> NDArray:
     products[..., 3, 3] = 1.0 + trace[..., 0]
     largest = np.diagonal(products, axis1=-2, axis2=-1).argmax(axis=-1)
     q = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
-    q = np.where(q[..., 3:] < 0, -q, q)  # by the shorter way
+    q = np.where(q[..., 3:] < 0, -q, q)  # the rotation by the smaller angle
     sine = np.linalg.norm(q[..., :3], axis=-1, keepdims=True)
     angle = 2.0 * np.arctan2(sine, q[..., 3:])
     return q[..., :3] * np.divide(angle, sine, out=np.zeros_like(sine), where=sine > 0)

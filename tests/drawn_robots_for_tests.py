@@ -7,14 +7,11 @@ import math
 
 import numpy as np
 
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import BASE, BeamLink, beam_axis
 from assembly.robots.delta import AZIMUTHS, DeltaParameters, drive_angle
 from assembly.robots.five_bar import FiveBarParameters
 from assembly.robots.hexapod import HexapodParameters, points
 from assembly.robots.planar import arm_angle
 from assembly.robots.three_rrr import ThreeRRRParameters
-from stiffness.beam.beam import section_axes
 from stiffness.screws import UNIT_VECTORS, rotation_matrix, transform
 
 
@@ -285,64 +282,3 @@ def _turn(axis, angle):
 
 def _shift(x):
     return transform([x, 0.0, 0.0], np.eye(3))
-
-
-def as_drawn(robot):
-    """Any robot of frames, its joints at home; a body after each, one for each link."""
-    home = home_posture(robot)
-    T, q = home.transforms, home.coordinates
-    text = head(
-        robot.name, f"{robot.platform}.on", T[robot.index(robot.platform)][:3, 3]
-    )
-    joints = ""
-    for i, frame in enumerate(robot.frames):
-        R, at = T[i][:3, :3], T[i][:3, 3]
-        before = BASE if frame.parent == BASE else f"{frame.parent}.on"
-        text += table("body", name=f"{frame.name}.on")
-        weight = {}
-        if frame.mass:
-            weight = {"mass": frame.mass, "centre": at + R @ frame.centre_of_mass}
-        if frame.link is not None or weight:
-            start = at
-            link = {}
-            if isinstance(frame.link, BeamLink):
-                length, axis = beam_axis(frame)
-                start = at - length * (R @ axis)
-                link = {"link": beam(frame.link, R @ _up(frame.link, axis))}
-            elif frame.link is not None:
-                start = at - [0.1, 0, 0]  # of no effect on a stiffness
-                rows = ", ".join(map(row, frame.link.stiffness))
-                link = {"link": f"{{ stiffness = [{rows}] }}"}
-            arm = f"{frame.name}.arm"
-            text += table("body", name=arm, **weight, **link)
-            joints += table("joint", name=f"{arm}.root", type="fixed",
-                            between=(before, arm), at=start)  # fmt: skip
-            before = arm
-        joints += table("joint", name=frame.name, type=frame.joint,
-                        between=(before, f"{frame.name}.on"), at=at, axis=R[:, 2],
-                        axis2=R[:, 0], **_joint_keys(frame, q[i]))  # fmt: skip
-    for k, (a, b) in enumerate(robot.closures):
-        joints += table("joint", name=f"closure{k}", type="fixed",
-                        between=(f"{a}.on", f"{b}.on"),
-                        at=T[robot.index(a)][:3, 3])  # fmt: skip
-    return text + joints
-
-
-def _up(link, axis):
-    return section_axes(axis, link.up)[:, 2]
-
-
-def _joint_keys(frame, position):
-    keys = {}
-    if frame.joint != "fixed":
-        keys = {"position": float(position), "actuated": frame.actuated}
-    if frame.limits is not None:
-        keys["limits"] = np.array(frame.limits)
-    if frame.clearance is not None:
-        keys["clearance"] = bounds(frame.clearance)
-    if frame.joint_stiffness is not None:
-        rows = ", ".join(map(row, frame.joint_stiffness))
-        keys["joint_stiffness"] = f"[{rows}]"
-    if frame.geometric_error.any():
-        keys["geometric_error"] = frame.geometric_error
-    return keys

@@ -67,7 +67,9 @@ def parsed(words):
     while hasattr(command, "commands"):
         name, *words = words
         command = command.commands[name]
-    return command.make_context(name, list(words))
+    # the first context decides the names of a command's help option, which are kept
+    own = app.info.context_settings
+    return command.make_context(name, list(words), **own)
 
 
 @pytest.mark.parametrize("name", sorted(PAGES))
@@ -284,6 +286,7 @@ def test_python_blocks_of_a_page_print_the_documented_output(
     name, tmp_path, monkeypatch, capsys
 ):
     """All blocks of a page share one session."""
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)
     titled(name, tmp_path)
     session, printed = {}, None

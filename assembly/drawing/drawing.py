@@ -9,7 +9,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import BeamLink, Clearance, Link, MeshLink
+from assembly.callouts.callout import Callout
+from assembly.drawing.contacts import Contact
+from assembly.model.robot import BeamLink, Clearance, Link, LockedAt, MeshLink
 
 # freedoms of each type: rows of the screw [RX RY RZ TX TY TZ] in the joint's axes; of a
 # universal joint its two turns have axes of their own
@@ -37,12 +39,18 @@ class JointNumbers:
             along free motions; or None.
         error: (6,) [rad, m] delta l.
         tolerance: (6,) [rad, m] standard deviations of it, or None.
+        fit: ISO 286 fit whose mean radial clearance is in ``clearance``, or empty.
+        contacts: further clearance, by the sizes of the contacts.
+        locked_at: where a fixed joint is bolted, with its clearance before; or None.
     """
 
     clearance: Clearance | None = None
     stiffness: NDArray | None = None
     error: NDArray = field(default_factory=lambda: np.zeros(6))
     tolerance: NDArray | None = None
+    fit: str = ""
+    contacts: tuple[Contact, ...] = ()
+    locked_at: LockedAt | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +117,21 @@ class DrawnBody:
 
 
 @dataclass(frozen=True, eq=False)
+class DrawnCallout:
+    """The callouts of a joint's feature on one of its two bodies.
+
+    Attributes:
+        body: name of the body, or ``"base"``.
+        callout: with names of joints in place of frames.
+        direction: (3,) in which the zones are, base axes at home; None for all.
+    """
+
+    body: str
+    callout: Callout
+    direction: Direction = None
+
+
+@dataclass(frozen=True, eq=False)
 class Drawing:
     """A robot of bodies and joints.
 
@@ -120,6 +143,7 @@ class Drawing:
         joints: likewise.
         description: one line.
         remarks: defaults of its file that are easily overlooked.
+        callouts: tolerances of features.
     """
 
     name: str
@@ -129,6 +153,7 @@ class Drawing:
     joints: tuple[DrawnJoint, ...]
     description: str = ""
     remarks: tuple[str, ...] = ()
+    callouts: tuple[DrawnCallout, ...] = ()
 
 
 def unit(vector: NDArray) -> NDArray:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.drawing.callouts import frame_callouts, frame_fits
 from assembly.drawing.drawing import Drawing, DrawnBody, DrawnJoint
 from assembly.drawing.links import link_at_tip
 from assembly.drawing.parts import joint_axes, parts_of
@@ -66,6 +67,7 @@ def robot_of_drawing(drawing: Drawing) -> Robot:
     return Robot(
         drawing.name, drawing.platform, place_frames(placed), tuple(closures),
         drawing.description, remarks=remarks,
+        callouts=frame_callouts(drawing, steps, placed), fits=frame_fits(steps),
     )  # fmt: skip
 
 
@@ -132,12 +134,12 @@ def _frames_of(plan: _Plan, step: Step) -> list[PlacedFrame]:
     if isinstance(item, DrawnJoint):
         for part in parts_of(item, step.reverse):
             numbers = part.numbers
+            motion = _motion(item, part.position) if part.kind != "fixed" else {}
             frame = Frame(
-                part.name, carrier, joint=part.kind, pitch=item.pitch,
-                actuated=item.actuated,
-                position=part.position, limits=item.limits,
+                part.name, carrier, joint=part.kind, **motion,
                 clearance=numbers.clearance, joint_stiffness=numbers.stiffness,
                 geometric_error=numbers.error, tolerance=numbers.tolerance,
+                locked_at=numbers.locked_at,
             )  # fmt: skip
             placed.append((frame, part.pose))
             carrier = part.name
@@ -152,6 +154,14 @@ def _frames_of(plan: _Plan, step: Step) -> list[PlacedFrame]:
     if not step.closes and step.end in plan.own and plan.own[step.end] != carrier:
         placed.append(_body_frame(plan, step.end, carrier))
     return placed
+
+
+def _motion(joint: DrawnJoint, position: float) -> dict:
+    """The keys of a frame for the motion of a joint."""
+    return {
+        "pitch": joint.pitch, "actuated": joint.actuated, "position": position,
+        "limits": joint.limits,
+    }  # fmt: skip
 
 
 def _mass(body: DrawnBody, pose: NDArray) -> dict:

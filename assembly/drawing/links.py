@@ -6,11 +6,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.drawing.drawing import DrawnBody, turned_link
-from assembly.model.robot import BeamLink, LibraryLink, Link, MatrixLink, MeshLink
+from assembly.model.frame import between_origins
+from assembly.model.robot import (
+    BeamLink,
+    Frame,
+    LibraryLink,
+    Link,
+    MatrixLink,
+    MeshLink,
+    beam_axis,
+)
 from forcefit.inputs.table import BadInput, quoted
+from stiffness.beam.beam import section_axes
 from stiffness.screws import screw_map
 
 _SAME_POINT = 1e-9  # [m] two points nearer than this are one
+_SAME_AXES = 1e-12  # difference below which two sets of axes are the same
 _PARALLEL = 1e-6  # sine of the angle below which an axis gives no direction across
 
 
@@ -73,3 +84,57 @@ def _reversed_matrix(link: MatrixLink, base: NDArray, tip: NDArray) -> MatrixLin
     M = screw_map(base[:3, :3].T @ (tip[:3, 3] - base[:3, 3]), turn)
     K = M.T @ link.stiffness @ M
     return MatrixLink((K + K.T) / 2)
+
+
+def beam_start(frame: Frame, T: NDArray) -> NDArray | None:
+    """Return the point at which the beam of a frame begins.
+
+    Args:
+        frame: of a robot.
+        T: (4, 4) the frame at home, seen from the base.
+
+    Returns:
+        (3,) [m] base axes; None for links that have no length.
+    """
+    if isinstance(frame.link, BeamLink):
+        length, axis = beam_axis(frame)
+        return T[:3, 3] - length * (T[:3, :3] @ axis)
+    return None
+
+
+def drawn_link(frame: Frame, T: NDArray, to: NDArray, spanned: bool) -> Link:
+    """Return the link of a frame as that of a drawn body.
+
+    Args:
+        frame: with a link.
+        T: (4, 4) the frame at home, seen from the base.
+        to: (4, 4) the joint at the link's end, likewise; at the frame's origin.
+        spanned: whether a beam is between its two joints.
+
+    Returns:
+        The link, its directions in base axes; a stiffness in the joint's axes.
+    """
+    link, R = frame.link, T[:3, :3]
+    if isinstance(link, MatrixLink):
+        turn = np.kron(np.eye(2), to[:3, :3].T @ R)
+        same = np.abs(turn - np.eye(6)).max() < _SAME_AXES
+        K = link.stiffness if same else turn @ link.stiffness @ turn.T
+        return MatrixLink((K + K.T) / 2)
+    if isinstance(link, BeamLink):
+        length, axis = beam_axis(frame)
+        x, y, z = axis.tolist()
+        up = tuple(section_axes(axis, link.up)[:, 2].tolist())
+        link = replace(link, length=length, axis=(x, y, z), up=up)
+        link = turned_link(link, R)
+        assert isinstance(link, BeamLink)
+        return replace(link, length=None, axis=None) if spanned else link
+    if isinstance(link, MeshLink):
+        return turned_link(replace(link, axis=_mesh_axis(frame, link)), R) or link
+    assert link is not None
+    return link
+
+
+def _mesh_axis(frame: Frame, link: MeshLink) -> tuple[float, float, float]:
+    """Direction of a mesh from base to tip, in the frame's axes."""
+    x, y, z = (link.axis or between_origins(frame))[:3]
+    return float(x), float(y), float(z)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.drawing.contacts import Contact
 from assembly.drawing.drawing import FREE_ROWS, DrawnJoint, JointNumbers
 from stiffness.screws import transform
 
@@ -40,13 +41,26 @@ def parts_of(joint: DrawnJoint, reverse: bool = False) -> list[Part]:
             coordinates, the errors and the springs are the same.
 
     Returns:
-        At least one; each error, clearance and spring is on one of them.
+        At least one; each error, bound and spring is on one of them.
     """
-    parts = [
-        _part(joint, *row, numbers)
-        for row, numbers in zip(_motions(joint), _shares(joint), strict=True)
-    ]
+    parts: list[Part] = []
+    for row, numbers in zip(_motions(joint), _shares(joint), strict=True):
+        part = _part(joint, *row, numbers)
+        contacts = [
+            _contact_part(joint, row[0], part.pose, c) for c in numbers.contacts
+        ]
+        # a pad belongs to the second body, a bore and a guide to the first
+        parts += [part, *contacts] if joint.kind == "planar" else [*contacts, part]
     return [_reversed(part) for part in reversed(parts)] if reverse else parts
+
+
+def _contact_part(
+    joint: DrawnJoint, suffix: str, pose: NDArray, contact: Contact
+) -> Part:
+    """One fixed frame, beside the frame of this suffix and pose."""
+    name = ".".join(filter(None, (joint.name, suffix, contact.suffix)))
+    numbers = JointNumbers(clearance=contact.clearance)
+    return Part(name, "fixed", pose @ contact.pose, 0.0, numbers)
 
 
 def joint_axes(joint: DrawnJoint) -> NDArray:
@@ -155,6 +169,8 @@ def _reversed(part: Part) -> Part:
         stiffness=None if K is None else _flipped(K),
         error=-_FLIP_SCREW * own.error,
         tolerance=own.tolerance,
+        locked_at=own.locked_at,
+        fit=own.fit,
     )
     pose = part.pose @ transform(np.zeros(3), _FLIP)
     return replace(part, pose=pose, numbers=numbers)

@@ -1,4 +1,4 @@
-"""Effects that a declared model may lack; each in its own file.
+"""Effects that a declared model may lack, each in a separate file.
 
 Begin at ``effect.py``, which defines an effect.  Effects are applied in the order of
 :data:`LIBRARY`.  Friction acts on a joint's spring, so drive compliance comes before
@@ -59,14 +59,14 @@ def apply_effects(conditions: Conditions, effects: Mapping[str, Values]) -> Cond
     """Return the conditions with effects added.
 
     Args:
-        conditions: conditions without them.
-        effects: parameters by their public names, by effect.
+        conditions: conditions without these effects.
+        effects: for each effect its parameters by public name.
 
     Returns:
-        Conditions with all of them.
+        The conditions with all of the effects.
 
     Raises:
-        KeyError: an effect that the library does not have.
+        KeyError: an effect is not in the library.
     """
     unknown = set(effects) - set(LIBRARY)
     if unknown:
@@ -85,7 +85,8 @@ def apply_known(conditions: Conditions, robot: Robot) -> Conditions:
         robot: robot with these effects.
 
     Returns:
-        Conditions with its effects, those of each session, and its functions.
+        The conditions with the robot's effects, those of each session, and its
+        functions.
     """
     recorded = conditions
     conditions = apply_effects(conditions, robot.effects)

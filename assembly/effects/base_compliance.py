@@ -18,13 +18,13 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 
 def on_foundation(conditions: Conditions) -> Conditions:
-    """Add a frame at the base that carries all others, if there is none yet.
+    """Return conditions with a frame at the base that carries all others.
 
     Args:
         conditions: R rows.
 
     Returns:
-        The conditions; the new frame is the first.
+        The conditions; the new frame is the first one, unless there was such a frame.
     """
     feet = [f for f in conditions.robot.frames if f.parent == BASE]
     foot = feet[0]
@@ -35,7 +35,7 @@ def on_foundation(conditions: Conditions) -> Conditions:
 
 
 def _standing(conditions: Conditions, robot: Robot) -> Conditions:
-    """Return the rows with an additional first frame, which does not move them."""
+    """Return the rows with an additional first frame that does not move them."""
     still = np.broadcast_to(np.eye(4), (len(conditions), 1, 4, 4))
     zero = np.zeros((len(conditions), 1, 6))
     rest = (
@@ -52,11 +52,12 @@ def _standing(conditions: Conditions, robot: Robot) -> Conditions:
 
 
 def with_foundation(robot: Robot, values: Values) -> Robot:
-    """Return a robot on an elastic foundation: one more frame between base and ground.
+    """Return a robot on an elastic foundation, a frame between base and ground.
 
     Args:
-        robot: any robot.
-        values: ``stiffness.rx`` .. ``stiffness.tz`` [N m/rad, N/m]; rigid if absent.
+        robot: robot on a rigid base.
+        values: ``stiffness.rx`` .. ``stiffness.tz`` [N m/rad, N/m]; absent ones are
+            rigid.
 
     Returns:
         The robot on its foundation.

@@ -17,7 +17,7 @@ from assembly.measurement.conditions import Conditions
 from assembly.model.robot import BeamLink, Frame, Robot
 
 _MOMENT = ("moment.x", "moment.y", "moment.z")
-_LEAST = 1e-9  # [kg] smallest mass that has a centre
+_LEAST = 1e-9  # [kg] smallest mass for which a centre is defined
 
 
 def heavy_bodies(robot: Robot) -> tuple[str, ...]:

@@ -1,8 +1,9 @@
-"""A declared effect of a robot's file combined with the difference found for it.
+"""Combination of a declared effect with the difference that a diagnosis found.
 
 Effects act in sequence: first the declared one, then the one that a diagnosis found.
-Both together are again one effect with other numbers: offsets and compliances add,
-factors multiply, eccentricities add as vectors, rotated frames are multiplied.
+Both together are a single effect with other parameters: offsets and compliances are
+added, factors multiplied, eccentricities added as vectors, rotations of frames
+composed.
 """
 
 import math
@@ -18,18 +19,18 @@ Effects = Mapping[str, Values]
 
 
 def combined(declared: Effects, found: Effects) -> dict[str, dict[str, float]]:
-    """Combine the effects of a robot's file with effects found in addition.
+    """Return the effects of a robot's file combined with effects found in addition.
 
     Args:
-        declared: parameters by their public names, by effect.
-        found: parameters of effects that act after the declared ones, likewise.
+        declared: for each effect of the file its parameters by public name.
+        found: the same for effects that act after the declared ones.
 
     Returns:
-        Parameters of every effect that are equivalent to both in sequence.
+        Parameters of every effect that is equivalent to both in sequence.
 
     Raises:
-        ValueError: no single effect is equivalent: two contact laws in one joint, or
-            two drifts of different time constants.
+        ValueError: no single effect is equivalent, as for two contact laws in one
+            joint, or two drifts with different time constants.
     """
     both = {name: dict(values) for name, values in declared.items()}
     for name, values in found.items():
@@ -60,7 +61,7 @@ def _product(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _load(declared: Values, found: Values) -> dict[str, float]:
-    """Return the load's gains: the found gain applied to the declared one's result."""
+    """Return the gains of the load: the found gain multiplies the declared result."""
     factor = found.get("factor", 1.0)
     offsets = {k: factor * v for k, v in declared.items() if k != "factor"}
     more = {k: v for k, v in found.items() if k != "factor"}
@@ -68,7 +69,7 @@ def _load(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _eccentricity(declared: Values, found: Values) -> dict[str, float]:
-    """Return the amplitude and phase of two sines of one angle."""
+    """Return amplitude and phase of the sum of two sines of one angle."""
     both = dict(declared)
     for key, amplitude in found.items():
         name, _, kind = key.rpartition(".")
@@ -92,7 +93,7 @@ def _registration(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _drift(declared: Values, found: Values) -> dict[str, float]:
-    """Return the amplitudes of one time constant."""
+    """Return the sums of amplitudes with one time constant."""
     constant = declared["time_constant"]
     if not math.isclose(found["time_constant"], constant, rel_tol=1e-9):
         raise ValueError(
@@ -102,7 +103,7 @@ def _drift(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _contact(declared: Values, found: Values) -> dict[str, float]:
-    """Return the contact laws of different joints."""
+    """Return the contact laws, which must be in different joints."""
     if set(declared) & set(found):
         raise ValueError(
             "two contact laws of one joint in series cannot be combined into one law"
@@ -111,7 +112,7 @@ def _contact(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _delayed(declared: Values, found: Values) -> dict[str, float]:
-    """Return the expansions of different bodies, or of one time constant."""
+    """Return the expansions, which must differ in body or have one time constant."""
     both = _sum(declared, found)
     for key in set(declared) & set(found):
         if key.endswith(".time_constant"):

@@ -1,8 +1,8 @@
 """Thermal expansion of a body that lags behind the recorded temperature.
 
-The body lengthens along its beam, or along the line between its joints, by coefficient
-x length x its temperature.  In the first row of a session this is the sensor's
-temperature; later it follows the sensor with a time constant.
+The body becomes longer along its beam, or along the line between its joints, by
+coefficient x length x its temperature.  In the first row of a session this is the
+temperature of the sensor; later it follows the sensor with a time constant.
 """
 
 import numpy as np
@@ -21,7 +21,8 @@ from assembly.measurement.variables import past
 from assembly.model.robot import Robot
 
 _SENSOR, _LATE = "cov.temperature", "time_constant"
-_SCAN = (0.03, 0.1, 0.3)  # time constants, in durations of the campaign
+# time constants in the search, relative to the campaign's duration
+_SCAN = (0.03, 0.1, 0.3)
 
 
 def _warmth(conditions: Conditions, time_constant: float) -> NDArray:

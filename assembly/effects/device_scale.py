@@ -1,6 +1,7 @@
-"""Scale of the measuring device: all measured lengths are a multiple of the true.
+"""Scale of the measuring device: measured lengths are a multiple of the true ones.
 
-Positions count from the device's origin: that of the registration, or else the base's.
+Positions are measured from the device's origin: that of the registration or, without
+one, the base's.
 """
 
 from dataclasses import replace

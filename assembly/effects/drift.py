@@ -11,12 +11,13 @@ from stiffness.screws import SCREW
 
 _AMPLITUDE = tuple(f"amplitude.{axis.lower()}" for axis in SCREW)
 
-_SCAN = (0.03, 0.1, 0.3, 1.0, 3.0)  # time constants, in durations of the campaign
+# time constants in the search, relative to the campaign's duration
+_SCAN = (0.03, 0.1, 0.3, 1.0, 3.0)
 
 
 def _apply(conditions: Conditions, values: Values) -> Conditions:
     amplitude = np.array([values.get(name, 0.0) for name in _AMPLITUDE])
-    with np.errstate(over="ignore"):  # of a time constant near zero: a step
+    with np.errstate(over="ignore"):  # a time constant near zero is a step
         settled = 1.0 - np.exp(-conditions.time / values["time_constant"])
     drift = settled[:, None] * amplitude
     return replace(conditions, reading=conditions.reading + drift)

@@ -1,4 +1,4 @@
-"""Effect: a property that a declared model lacks, as a change to conditions."""
+"""An effect: a property that a declared model lacks, as a change of conditions."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from assembly.measurement.conditions import Conditions
 from assembly.model.robot import Robot
 
 Values = Mapping[str, float]
-RIGID = 1e-12  # [rad/(N m), m/N] smaller fitted compliances count as rigid
+RIGID = 1e-12  # [rad/(N m), m/N] fitted compliance below which a part counts as rigid
 
 
 @dataclass(frozen=True)
@@ -15,15 +15,15 @@ class Unknown:
     """An unknown of the fit, in a form in which the model is nearly linear.
 
     Attributes:
-        name: name of a parameter, or of a part of one.  For an effect that acts at
-            frames it is appended to a frame's name (``""`` if the frame's name
-            suffices).
-        scale: plausible size, in the unit of the parameter or of the part.
+        name: name of a parameter, or of a part of a parameter.  For an effect that acts
+            at frames it is appended to the frame's name (``""`` if the frame's name is
+            sufficient).
+        scale: plausible size, in the unit of the parameter or of its part.
         lower: physical lower bound.
         upper: physical upper bound.
-        start: value without the effect, at which its first derivative is taken.
-        scan: start values of the search, where the model is far from linear.
-        scan_by: a covariate whose range multiplies ``scan``, if any.
+        start: value without the effect, at which the first derivative is taken.
+        scan: start values of the search, if the model is far from linear.
+        scan_by: name of a covariate whose range multiplies ``scan``, if any.
     """
 
     name: str
@@ -36,7 +36,7 @@ class Unknown:
 
 
 def _as_they_are(robot: Robot, values: Values) -> dict[str, float]:
-    """Return the unknowns unchanged: they are the parameters."""
+    """Return the unknowns unchanged, because they are the parameters."""
     return dict(values)
 
 
@@ -45,33 +45,35 @@ class Effect:
     """One effect of the library.
 
     Attributes:
-        name: name in the public format.
-        apply: from conditions without the effect and parameters by their public names
-            (``<frame>``, ``<frame>.<component>`` or plain) to conditions with it.
-        unit: unit of a parameter, from the robot and the parameter's public name.
-        frames: function of a robot that returns the frames at which it can act; None if
-            it acts at none.
+        name: name of the effect in the public format.
+        apply: function from conditions without the effect, and its parameters by public
+            name (``<frame>``, ``<frame>.<component>`` or plain), to conditions with it.
+        unit: function from the robot and a parameter's public name to the parameter's
+            unit.
+        frames: function from a robot to the frames at which the effect can act; None if
+            it does not act at frames.
         device_alone: whether it is an error of the measuring device.  A function with
-            the same effect belongs to the machine, and is more likely.
-        refines: the effect that it becomes in a limit, ``""`` for none.
-        tried: frames at which it is searched; all possible ones if absent.
-        components: public parameters at each frame (``""``: the frame's name itself),
-            or of the effect as a whole.
-        unknowns: unknowns of the fit: at each frame, or of the effect as a whole.
-        public: from unknowns by name (a frame's name, a dot, the unknown's name) to
-            parameters by their public names.
+            the same effect is attributed to the machine, and is more probable.
+        refines: name of the effect to which it reduces in a limit; ``""`` for none.
+        tried: function for the frames at which it is searched; all possible ones if
+            absent.
+        components: public parameters at each frame (``""`` for the frame's name
+            itself), or of the effect as a whole.
+        unknowns: unknowns of the fit, at each frame or for the effect as a whole.
+        public: function from unknowns by name (a frame's name, a dot, the unknown's
+            name) to parameters by public name.
         needs: covariates without which it can be neither applied nor identified.
         linear: whether the platform's deviation is linear in the unknowns, to first
             order in all small motions.
         by_row: whether it changes rows one by one, so that it can act in some of them
-            alone; otherwise it changes the robot.
+            only; otherwise it changes the robot.
         finite: whether it needs finite motions.
         clearance: whether it adds clearance to joints.
         device: unknowns that move the measuring frame as a whole.
         splits: whether each of its unknowns may act alone.
-        follows_load: whether its unknowns ``offset.<c>`` belong to components of the
-            load that a campaign records.
-        weighs: whether it acts by gravity alone.
+        follows_load: whether its unknowns ``offset.<c>`` correspond to the components
+            of the load that a campaign records.
+        weighs: whether it acts by gravity only.
     """
 
     name: str
@@ -96,5 +98,5 @@ class Effect:
 
 
 def at(frame: str, kind: str) -> str:
-    """Return the name of an unknown or parameter that belongs to a frame."""
+    """Return the name of an unknown or a parameter that belongs to a frame."""
     return f"{frame}.{kind}" if kind else frame

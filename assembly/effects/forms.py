@@ -1,8 +1,8 @@
 """Forms of a function of one or two variables.
 
-A form is linear in most of its numbers: each of those multiplies one column, so that a
-fit finds them all together.  The others, its *shapes* (a time constant, a period),
-enter the columns nonlinearly.
+A form is linear in most of its coefficients: each of them multiplies one column, so
+that a fit finds them all together.  The other parameters, its *shapes* (a time
+constant, a period), change the columns nonlinearly.
 
 ========== ============================== =====================================
 form       numbers of the columns         columns that they multiply
@@ -47,24 +47,23 @@ from numpy.typing import NDArray
 Shapes = Mapping[str, float]
 Inputs = Sequence[NDArray]
 _MOST = 999  # largest number of powers, waves and knots
-_INDEX = re.compile("0|-?[1-9][0-9]{0,8}")  # a whole number, as written
+_INDEX = re.compile("0|-?[1-9][0-9]{0,8}")  # text of an integer in a column's name
 
 
 @dataclass(frozen=True)
 class Form:
-    """One form.
+    """One form of a function.
 
     Attributes:
-        name: name in robot files.
-        summary: one line of description.
+        name: name of the form in robot files.
+        summary: description in one line.
         most: largest number of variables.
-        shapes: names of numbers in which it is not linear, and whether each is
+        shapes: names of the parameters in which it is not linear, and whether each is
             required.
-        indices: least and largest whole numbers at the beginning of a column's name;
-            None if it has none.
-        words: possible ends of a column's name, ``""`` for none.
-        basis: function that returns (R, p) columns, from their names, the inputs (R,)
-            each, and the shapes.
+        indices: smallest and largest integer at the beginning of a column's name; None
+            if the name has none.
+        words: possible ends of a column's name; ``""`` for no end.
+        basis: function from column names, inputs (R,) and shapes to (R, p) columns.
         remembers: whether the past of its first variable matters.
         least: smallest number of variables.
     """
@@ -80,7 +79,7 @@ class Form:
     least: int = 1
 
     def is_column(self, name: str, variables: int) -> bool:
-        """Return whether a name is a column's in a form of so many variables."""
+        """Return whether a name is a column of the form with so many variables."""
         head, word = name, ""
         if self.words != ("",):
             head, _, word = name.rpartition(".")
@@ -97,7 +96,7 @@ class Form:
 
 
 def column_indices(name: str) -> list[int]:
-    """Return the whole numbers at the beginning of a column's name."""
+    """Return the integers at the beginning of a column's name."""
     return [int(part) for part in name.split(".") if _INDEX.fullmatch(part)]
 
 
@@ -139,7 +138,7 @@ _ENDS = ("first", "last")
 
 
 def natural_spline(knots: NDArray, x: NDArray) -> NDArray:
-    """Return (R, n) natural cubic splines, each 1 at one of n knots, else 0."""
+    """Return (R, n) natural cubic splines; each is 1 at one of n knots, 0 at others."""
     from scipy.interpolate import CubicSpline
 
     if len(knots) < 2:
@@ -150,14 +149,14 @@ def natural_spline(knots: NDArray, x: NDArray) -> NDArray:
 
 
 def roughness(count: int) -> NDArray:
-    """Return integral of the squared curvature of a natural spline over n even knots.
+    """Return the integral of the squared curvature of a spline over n even knots.
 
     Args:
-        count: n of knots.
+        count: number n of knots.
 
     Returns:
-        (n, n) [1/steps^3] R with integral = v R v for the values v at the knots; the
-        distance of two knots is 1.
+        (n, n) [1/steps^3] matrix R with integral = v R v for the values v at the knots;
+        the distance between two knots is 1.
 
     Sources:
         Green, Silverman, Nonparametric Regression, section 2.1.2 (R = Q B^-1 Q').
@@ -171,7 +170,7 @@ def roughness(count: int) -> NDArray:
 
 
 def _remembered(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return columns from the lagged variable and the decaying state at time 0."""
+    """Return columns from the lagged variable and from the decaying initial state."""
     return np.column_stack([inputs[name == "start"] for name in names])
 
 
@@ -188,12 +187,12 @@ def _reversal(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
 
 
 def _scaled_waves(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return waves of an angle, times the second input."""
+    """Return waves of an angle, multiplied by the second input."""
     return _waves(names, inputs[:1], shapes) * inputs[1][:, None]
 
 
 def _reversal_waves(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return waves of an angle, times a direction."""
+    """Return waves of an angle, multiplied by a direction."""
     return _waves(names, inputs[1:], shapes) * inputs[0][:, None]
 
 
@@ -203,14 +202,14 @@ def _slip(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
 
 
 def _knee(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return the parts of a load up to the knee and beyond, in both directions."""
+    """Return the parts of a load up to the knee and beyond it, in both directions."""
     first = np.clip(inputs[0], -shapes["at"], shapes["at"])
     parts = {"below": first, "above": inputs[0] - first, "size": first / shapes["at"]}
     return _stacked([parts[name] for name in names], inputs)
 
 
 def _stacked(columns: Sequence[NDArray], inputs: Inputs) -> NDArray:
-    """Return the (R, p) columns, each as long as the inputs."""
+    """Return the (R, p) columns, each of which is as long as the inputs."""
     rows = len(inputs[0])
     if not columns:
         return np.zeros((rows, 0))

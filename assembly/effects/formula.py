@@ -2,7 +2,8 @@
 
 It has numbers, names, ``+ - * / **``, brackets, ``pi`` and the functions below.  Units
 are checked: the terms of a sum must have equal units, and the argument of a function
-must be a number (rad counts as one).  The units of the parameters follow from this.
+must be a pure number (rad counts as one).  The units of the parameters follow from
+this.
 
 Sources:
     Kennedy, Relational Parametricity and Units of Measure, POPL 1997 (units of
@@ -27,9 +28,9 @@ _OPERATIONS: dict[type, Callable[[NDArray, NDArray], NDArray]] = {
     ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply,
     ast.Div: np.divide, ast.Pow: np.power,
 }  # fmt: skip
-_LONGEST = 500  # largest number of characters
-_DEEPEST = 50  # deepest nesting of brackets and operations
-_SAME = 1e-9  # exponents of units that differ by less are equal
+_LONGEST = 500  # largest number of characters of a formula
+_DEEPEST = 50  # largest depth of nested brackets and operations
+_SAME = 1e-9  # difference below which two exponents of units are equal
 Unit = Mapping[str, float]  # exponents of m, N, s, K ..; rad has none
 
 
@@ -37,13 +38,13 @@ def parse_formula(text: str) -> ast.expr:
     """Return the tree of a formula.
 
     Args:
-        text: text such as ``"a*sin(3*q) + b"``.
+        text: formula such as ``"a*sin(3*q) + b"``.
 
     Returns:
-        The expression, of the grammar's nodes alone.
+        The expression; it contains only nodes of the grammar.
 
     Raises:
-        BadInput: the text is no formula; the message names the error.
+        BadInput: the text is not a formula; the message names the error.
     """
     if len(text) > _LONGEST:
         raise BadInput(
@@ -61,13 +62,13 @@ def parse_formula(text: str) -> ast.expr:
 
 
 def _check(node: ast.AST, depth: int) -> None:
-    """Reject parts that are not in the grammar."""
+    """Reject parts of a formula that are not in the grammar."""
     match node:
         case _ if depth > _DEEPEST:
             raise BadInput(f"found a formula nested deeper than {_DEEPEST}")
         case ast.Constant(value=int() | float() as x) if not isinstance(x, bool):
             if not abs(x) < 1e100:
-                raise BadInput("found a number beyond 1e100 in the formula")
+                raise BadInput("found a number above 1e100 in the formula")
         case ast.Name():
             pass
         case ast.UnaryOp(op=ast.UAdd() | ast.USub(), operand=inner):
@@ -78,7 +79,9 @@ def _check(node: ast.AST, depth: int) -> None:
         case ast.Call(func=ast.Name(id=name), args=[inner], keywords=[]):
             if name not in FUNCTIONS:
                 hint = nearest(name, FUNCTIONS)
-                raise BadInput(f"found {quoted(name)}, which is no function{hint}")
+                raise BadInput(
+                    f"found {quoted(name)}, expected the name of a function{hint}"
+                )
             _check(inner, depth + 1)
         case _:
             part = quoted(ast.unparse(node))
@@ -100,10 +103,10 @@ def evaluate(tree: ast.expr, known: Mapping[str, NDArray]) -> NDArray:
 
     Args:
         tree: tree of the formula.
-        known: numbers or arrays (R,) by name.
+        known: numbers, or arrays (R,), by name.
 
     Returns:
-        (R,), or a number; inf or NaN where the formula has no value.
+        (R,) values, or a number; inf or NaN where the formula has no value.
     """
     with np.errstate(all="ignore"):
         return _value(tree, known)
@@ -129,15 +132,16 @@ def _value(node: ast.AST, known: Mapping[str, NDArray]) -> NDArray:
 def parameter_units(
     tree: ast.expr, variables: Mapping[str, Unit], result: Unit
 ) -> dict[str, Unit]:
-    """Return the units of a formula's parameters that make its units consistent.
+    """Return the units of a formula's parameters that make all its units consistent.
 
     Args:
         tree: tree of the formula.
         variables: units of its variables by name.
-        result: unit that the formula must have; a bare number counts as SI.
+        result: unit that the formula must have; a pure number counts as a value in SI.
 
     Returns:
-        Exponents by parameter; a parameter that any unit fits counts as a number.
+        Exponents by parameter; a parameter that may have any unit counts as a pure
+        number.
 
     Raises:
         BadInput: no units are consistent; the message names the conflict.
@@ -152,13 +156,13 @@ def parameter_units(
 
 @dataclass
 class _Units:
-    """Equations between units; a unit has exponents of m, N .. and of ``?name``."""
+    """Equations between units, which have exponents of m, N .. and of ``?name``."""
 
     variables: Mapping[str, Unit]
     known: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def of(self, node: ast.AST) -> dict[str, float]:
-        """Return the unit of a part of a formula; refuse conflicts within it."""
+        """Return the unit of a part of a formula; refuse conflicts within the part."""
         match node:
             case ast.Name(id=name) if name in self.variables:
                 return dict(self.variables[name])
@@ -200,7 +204,7 @@ class _Units:
     def equal(
         self, one: Mapping[str, float], other: Mapping[str, float], where: str
     ) -> None:
-        """Equate two units, and keep the consequence for a parameter."""
+        """Equate two units, and store the consequence for a parameter."""
         left = self.reduced(_added(one, other, -1.0))
         free = next((name for name in left if name.startswith("?")), None)
         if free is not None:
@@ -214,7 +218,7 @@ class _Units:
             )
 
     def of_parameters(self, names: list[str]) -> dict[str, Unit]:
-        """Return the units of parameters; an undetermined one is a number."""
+        """Return the units of parameters; an undetermined one is a pure number."""
         reduced = {name: self.reduced({f"?{name}": 1.0}) for name in names}
         return {
             name: {k: v for k, v in unit.items() if not k.startswith("?")}
@@ -223,7 +227,7 @@ class _Units:
 
 
 def _number(node: ast.AST) -> float | None:
-    """Return the value of a part without names, None if it has names."""
+    """Return the value of a part without names; None if it has names."""
     if any(isinstance(n, ast.Name) and n.id != "pi" for n in ast.walk(node)):
         return None
     return float(_value(node, {}))
@@ -232,13 +236,13 @@ def _number(node: ast.AST) -> float | None:
 def _added(
     one: Mapping[str, float], other: Mapping[str, float], factor: float
 ) -> dict[str, float]:
-    """Return the exponents of a product of two units, the second to a power."""
+    """Return the exponents of the product of one unit and a power of another."""
     names = dict.fromkeys([*one, *other])
     return {name: one.get(name, 0.0) + factor * other.get(name, 0.0) for name in names}
 
 
 def unit_text(unit: Unit) -> str:
-    """Return a unit as text, such as ``rad/N^2`` without its rad; ``1`` for none."""
+    """Return a unit as text, such as ``1/N^2`` for rad/N^2; ``1`` without a unit."""
 
     def powers(sign: float) -> list[str]:
         parts = [(name, sign * k) for name, k in unit.items() if sign * k > _SAME]

@@ -8,7 +8,7 @@ from assembly.model.robot import Frame, Robot
 
 
 def elastic_joints(robot: Robot) -> tuple[str, ...]:
-    """Return joints with a spring along their z: elastic drives, compliant joints."""
+    """Return joints with a spring about z: elastic drives, compliant joints."""
     softened = robot.effects.get("drive_compliance", {})
     return tuple(
         f.name

@@ -2,7 +2,7 @@
 
 A function changes the stress-free screws at a frame, the base, the reading or the load.
 A function that depends on a wrench, as every compliance does, makes its place
-compliant: it is solved together with the equilibrium
+compliant.  It is solved together with the equilibrium
 (:mod:`assembly.measurement.yields`).
 """
 
@@ -37,15 +37,16 @@ def is_loaded(function: Function) -> bool:
 
 
 def covariates_of(robot: Robot, sessions: Iterable[str]) -> dict[str, str]:
-    """Return the covariates of a robot's functions, each with the title of one.
+    """Return the covariates on which a robot's functions depend, with a title each.
 
     Args:
         robot: robot with its functions.
-        sessions: sessions that are considered.
+        sessions: sessions to consider.
 
     Returns:
-        Names without ``cov.``; ``time`` if a form depends on it; ``approach`` if a
-        direction has no earlier row to follow from.
+        For each name without ``cov.`` the title of a function that depends on it;
+        ``time`` if a form depends on it; ``approach`` if the first rows have no earlier
+        direction.
     """
     owners: dict[str, str] = {}
     for function in robot.functions:
@@ -70,7 +71,7 @@ def components_of(where: str) -> tuple[str, ...]:
 
 
 def parameters_of(function: Function, component: str) -> dict[str, float]:
-    """Return a function's numbers for one component, without its prefix."""
+    """Return the parameters of a function for one component, without its prefix."""
     own: dict[str, float] = {}
     for name, value in function.parameters.items():
         whose, _, rest = name.partition(".")
@@ -82,7 +83,7 @@ def parameters_of(function: Function, component: str) -> dict[str, float]:
 
 
 def columns_of(function: Function, component: str) -> list[str]:
-    """Return the names of a function's linear numbers, without prefix."""
+    """Return the names of the linear coefficients of a function, without prefix."""
     if function.form == FORMULA:
         return []
     shapes = shape_names(FORMS[function.form], len(function.variables))
@@ -90,16 +91,16 @@ def columns_of(function: Function, component: str) -> list[str]:
 
 
 def basis(conditions: Conditions, function: Function, names: Sequence[str]) -> NDArray:
-    """Return the column of each linear number of a function.
+    """Return the column of each linear coefficient of a function.
 
     Args:
         conditions: R rows.
-        function: with a form, not a formula, and without wrenches among its variables;
-            only the shapes of its parameters are used.
+        function: function with a form, not a formula, and without wrenches among its
+            variables; of its parameters only the shapes are used.
         names: p names of columns, such as ``"1.sine"``.
 
     Returns:
-        (R, p) in the units of the variables; NaN where a variable is not known.
+        (R, p) columns in the units of the variables; NaN where a variable is unknown.
     """
     shapes = parameters_of(function, function.components[0])
     inputs = inputs_of(conditions, function)
@@ -107,15 +108,15 @@ def basis(conditions: Conditions, function: Function, names: Sequence[str]) -> N
 
 
 def inputs_of(conditions: Conditions, function: Function) -> NDArray:
-    """Return the inputs of a function, computed from its variables and their past.
+    """Return the inputs of a function, which follow from its variables and their past.
 
     Args:
         conditions: R rows.
-        function: any function.
+        function: the function.
 
     Returns:
-        (R, k): its variables, NaN for wrenches; for a form with memory, the first
-        variable is replaced by its state.
+        (R, k) inputs: the variables, NaN for wrenches; for a form with memory the state
+        replaces the first variable.
     """
     first, *further = function.variables
     inputs = [_now(conditions, name) for name in further]
@@ -130,7 +131,7 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
         angle = inputs[0] if inputs else _now(conditions, first)
         return np.column_stack([history.direction(first)[row], angle])
     if form.name == "reversal":
-        # friction grows with the size of the load, in both directions
+        # friction increases with the magnitude of the load, in both directions
         sizes = [
             np.abs(x) if name.startswith("load.") else x
             for name, x in zip(further, inputs, strict=True)
@@ -145,7 +146,7 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
 
 
 def _now(conditions: Conditions, name: str) -> NDArray:
-    """Return a variable (R,), from the recorded rows if there are any."""
+    """Return the (R,) values of a variable, from recorded rows if there are any."""
     if name.startswith("wrench."):
         return np.full(len(conditions), np.nan)
     if conditions.history is not None and conditions.row is not None:
@@ -157,12 +158,12 @@ def value_of(function: Function, component: str, inputs: Sequence[NDArray]) -> N
     """Return a function's value.
 
     Args:
-        function: any function.
-        component: one of its components.
-        inputs: (R,) each, from :func:`inputs_of`.
+        function: the function.
+        component: one of the function's components.
+        inputs: (R,) values of each input, from :func:`inputs_of`.
 
     Returns:
-        (R,) [rad, m, N m, N], or per wrench for a compliance.
+        (R,) values [rad, m, N m, N], or per wrench for a compliance.
     """
     numbers = parameters_of(function, component)
     if function.form == FORMULA:
@@ -177,14 +178,14 @@ def value_of(function: Function, component: str, inputs: Sequence[NDArray]) -> N
 
 
 def variable_names(variables: Sequence[str]) -> dict[str, int]:
-    """Return the names by which a formula may refer to its variables.
+    """Return the names by which a formula can refer to its variables.
 
     Args:
-        variables: public names.
+        variables: public names of the variables.
 
     Returns:
-        Index of the variable by name: the last part, the first part if it is unique,
-        and the whole name with ``_`` for dots.
+        Index of the variable by name; names are the last part, the first part if it is
+        unique, and the whole name with ``_`` for dots.
     """
     indices: dict[str, list[int]] = {}
     for k, name in enumerate(variables):
@@ -203,11 +204,11 @@ def apply_functions(
 
     Args:
         conditions: R rows.
-        functions: any number.
-        recorded: the conditions before other effects, which functions see.
+        functions: the functions.
+        recorded: conditions before other effects, on which the functions depend.
 
     Returns:
-        Conditions with all of them.
+        The conditions with all of them.
 
     Raises:
         BadInput: a function has no finite value in some row.
@@ -222,7 +223,7 @@ def apply_functions(
 
 
 def in_session(conditions: Conditions, session: str | None) -> NDArray:
-    """Return the (R,) bool: the rows of a session; all where it is None."""
+    """Return (R,) bool: rows of a session; all rows for None."""
     if session is None:
         return np.ones(len(conditions), dtype=bool)
     if conditions.session is None:
@@ -233,7 +234,7 @@ def in_session(conditions: Conditions, session: str | None) -> NDArray:
 def _with_function(
     conditions: Conditions, function: Function, inputs: NDArray, acts: NDArray
 ) -> Conditions:
-    """Add one more function, in the rows where it acts."""
+    """Return conditions with one more function, in the rows where it acts."""
     where = function.where
     named = [name.split(".")[1] for name in function.variables if "wrench" in name]
     if BASE in (where, *named):
@@ -255,7 +256,7 @@ def _with_function(
 
 
 def _check_finite(function: Function, values: NDArray, inputs: NDArray) -> None:
-    """Reject a function without a finite value in a row where it acts."""
+    """Reject a function that has no finite value in a row where it acts."""
     for row in np.flatnonzero(~np.isfinite(values))[:1]:
         known = zip(function.variables, inputs[row], strict=False)
         where = ", ".join(f"{name} = {x:g}" for name, x in known)
@@ -272,7 +273,7 @@ def _yielding(
     inputs: NDArray,
     acts: NDArray,
 ) -> Conditions:
-    """Add a place that is compliant under the wrench through it."""
+    """Return conditions with a place that is compliant under the wrench through it."""
     slots: dict[int, int] = {}  # of the inputs, by the index of the wrench
     through: list[tuple[str, int]] = []
     for k, name in enumerate(function.variables):
@@ -307,12 +308,12 @@ def _yielding(
 def in_session_alone(
     conditions: Conditions, changed: Conditions, session: str
 ) -> Conditions:
-    """Return the conditions changed in the rows of one session alone.
+    """Return the conditions changed in the rows of one session only.
 
     Args:
         conditions: R rows.
         changed: the same conditions with effects that change them row by row.
-        session: the session in which these act.
+        session: name of the session in which the effects act.
 
     Returns:
         Changed conditions in these rows, unchanged ones in the others.

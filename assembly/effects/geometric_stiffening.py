@@ -1,4 +1,4 @@
-"""Stiffness change by preload and finite rotations: the exact model is used."""
+"""Change of stiffness by preload and finite rotations, with the exact model."""
 
 from dataclasses import replace
 

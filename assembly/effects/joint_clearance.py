@@ -1,4 +1,4 @@
-"""Clearance in joints that are declared without; the load takes it up."""
+"""Clearance in joints that are declared without clearance; the load takes it up."""
 
 from dataclasses import replace
 from functools import partial
@@ -20,7 +20,9 @@ def moving_joints(robot: Robot) -> tuple[str, ...]:
 
 
 def _is_tight(clearance: Clearance | None) -> bool:
-    return clearance is None or not any(getattr(clearance, kind) for kind in _KINDS)
+    if clearance is None:
+        return True
+    return clearance.ball is None and not any(getattr(clearance, k) for k in _KINDS)
 
 
 def _with_clearance(frame: Frame, bound: dict[str, float]) -> Frame:
@@ -42,7 +44,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Return the clearances; a joint fitted without clearance is left out."""
+    """Return the clearances without those that were fitted as zero."""
     return {key: size for key, size in values.items() if size > _NONE_BELOW}
 
 

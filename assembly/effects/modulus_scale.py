@@ -10,7 +10,7 @@ from assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
 
 
 def links(robot: Robot) -> tuple[str, ...]:
-    """Return frames with an elastic body of its own constants, not from a library."""
+    """Return frames with an elastic body that has its own constants."""
     own = BeamLink | MeshLink | MatrixLink
     return tuple(f.name for f in robot.frames if isinstance(f.link, own))
 

@@ -24,12 +24,12 @@ def turning_drives(robot: Robot) -> tuple[str, ...]:
 
 
 def beams(robot: Robot) -> tuple[str, ...]:
-    """Return frames whose body is a beam, which has an axis."""
+    """Return frames whose bodies are beams, which have an axis."""
     return tuple(f.name for f in robot.frames if isinstance(f.link, BeamLink))
 
 
 def bodies(robot: Robot) -> tuple[str, ...]:
-    """Return frames whose body has a length: beams, and others between two origins."""
+    """Return frames whose bodies have a length: beams, bodies between two origins."""
     return tuple(
         f.name
         for f in robot.frames
@@ -49,8 +49,9 @@ def body_axis(frame: Frame) -> tuple[float, NDArray]:
         frame: the frame of the body.
 
     Returns:
-        [m] length, and (3,) unit vector in the frame's axes: those of its beam; without
-        a beam, those of the line from its parent's origin to its own.
+        Length [m], and (3,) unit vector in the frame's axes: those of the beam or,
+        without a beam, those of the line from the parent's origin to the frame's
+        origin.
     """
     if isinstance(frame.link, BeamLink):
         return beam_axis(frame)
@@ -60,15 +61,15 @@ def body_axis(frame: Frame) -> tuple[float, NDArray]:
 
 
 def with_screws(conditions: Conditions, frame: str, screws: NDArray) -> Conditions:
-    """Return the conditions with more stress-free screws at a frame.
+    """Return the conditions with additional stress-free screws at a frame.
 
     Args:
         conditions: conditions of R rows.
         frame: name of the frame.
-        screws: (R, 6) or (6,) [rad, m] in the frame's axes.
+        screws: (R, 6) or (6,) [rad, m] screws in the frame's axes.
 
     Returns:
-        The conditions changed.
+        The changed conditions.
     """
     errors = conditions.errors.copy()
     errors[:, conditions.robot.index(frame)] += screws

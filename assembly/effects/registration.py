@@ -1,4 +1,4 @@
-"""Registration: rotation and shift of the measuring frame and of the point."""
+"""Registration: rotation and translation of the measuring frame and of the point."""
 
 from dataclasses import replace
 

@@ -22,10 +22,11 @@ class AppliedEffects:
 
     Attributes:
         posture: posture of the robot with the errors, springs, clearances and
-            foundation that the effects give it.
+            foundation that result from the effects.
         load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes, None without weight.
-        conditions: one row with all of these, and the errors of the measuring device.
+        gravity: (3,) [m/s^2] base axes; None without weight.
+        conditions: one row with all of these, and with the errors of the measuring
+            device.
     """
 
     posture: Posture
@@ -51,19 +52,19 @@ def apply_robot_effects(
     """Apply the effects of a robot's file at one posture.
 
     Args:
-        posture: posture of the robot as declared.
+        posture: posture of the declared robot.
         load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes, added to that of the effects.
-        covariates: ``temperature`` [K] above calibration, ``time`` [s], ``approach``,
-            others on which functions depend, and ``session``, by name.
+        gravity: (3,) [m/s^2] base axes, added to the gravity of the effects.
+        covariates: values by name: ``temperature`` [K] above calibration, ``time`` [s],
+            ``approach``, other variables of functions, and ``session``.
         finite: whether the exact model is used.
 
     Returns:
-        Posture, loads and conditions with the effects; without effects, unchanged.
+        Posture, loads and conditions with the effects; unchanged without effects.
 
     Raises:
-        BadInput: an effect needs a covariate that is not given, or needs finite
-            motions, which only ``exact`` has.
+        BadInput: an effect needs a covariate that is not given, or needs finite motions
+            while ``finite`` is False.
     """
     given = dict(covariates or {})
     robot = posture.robot
@@ -91,16 +92,16 @@ def apply_robot_effects(
 def check_covariates(
     robot: Robot, given: Mapping[str, float | str], *, finite: bool = False
 ) -> None:
-    """Reject effects that cannot be applied under the covariates given.
+    """Reject effects that cannot be applied with the given covariates.
 
     Args:
         robot: robot with the effects of its file.
-        given: covariates by name.
+        given: values of the covariates by name.
         finite: whether the exact model is used.
 
     Raises:
-        BadInput: an unknown covariate, a missing one that an effect needs, or an effect
-            that needs finite motions.
+        BadInput: a covariate is unknown, an effect needs a covariate that is missing,
+            or an effect needs finite motions.
     """
     session = given.get("session")
     needed = covariates_of(robot, [str(session)])

@@ -1,6 +1,6 @@
-"""Thermal expansion: a body lengthens by coefficient x length x temperature.
+"""Thermal expansion: a body becomes longer by coefficient x length x temperature.
 
-It lengthens along its beam, or along the line between its joints.
+The length changes along its beam, or along the line between its joints.
 """
 
 from assembly.effects.effect import Effect, Unknown, Values

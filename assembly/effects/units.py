@@ -11,11 +11,11 @@ _ANGLE: Unit = {}  # rad counts as a number
 
 
 def variable_unit(robot: Robot, name: str) -> Unit:
-    """Return the exponents of m, N, s, K of a variable; of a covariate, its name.
+    """Return the exponents of m, N, s, K of a variable; for a covariate, its name.
 
     Args:
-        robot: the robot of the variable.
-        name: public name.
+        robot: robot that has the variable.
+        name: public name of the variable.
 
     Returns:
         The unit; empty for angles and signs.
@@ -35,7 +35,7 @@ def variable_unit(robot: Robot, name: str) -> Unit:
 
 
 def result_unit(function: Function, component: str) -> Unit:
-    """Return the unit of a function's result in one component."""
+    """Return the unit of one component of a function's result."""
     turns = component.startswith(("r", "m"))
     if function.where == "load":
         return {"N": 1, "m": 1} if turns else {"N": 1}
@@ -48,14 +48,14 @@ def result_unit(function: Function, component: str) -> Unit:
 
 
 def units_of(robot: Robot, function: Function) -> dict[str, str]:
-    """Return the units of a function's parameters, as they are written.
+    """Return the units of a function's parameters, in which they are written.
 
     Args:
         robot: the robot on which it acts.
-        function: any function.
+        function: the function.
 
     Returns:
-        By parameter, such as ``"rad/K"``.
+        Unit by parameter, such as ``"rad/K"``.
     """
     units: dict[str, str] = {}
     for component in function.components:
@@ -69,7 +69,7 @@ def units_of(robot: Robot, function: Function) -> dict[str, str]:
 def _parameter_unit(
     robot: Robot, function: Function, component: str, name: str
 ) -> str:  # fmt: skip
-    """Return the unit of one parameter of one component."""
+    """Return the unit of a parameter in one component."""
     given = [variable_unit(robot, variable) for variable in function.variables]
     whole = result_unit(function, component)
     angle = component.startswith("r") and function.where != "load"
@@ -113,5 +113,5 @@ def turning_variables(function: Function) -> tuple[str, ...]:
 
 
 def whole_unit(unit: Unit) -> str:
-    """Return a variable's unit as text; ``rad`` if it has none."""
+    """Return the unit of a variable as text; ``rad`` if it has none."""
     return unit_text(unit) if unit else "rad"

@@ -1,4 +1,4 @@
-r"""Quadratic energies in the clearances, convex or not, within their cones.
+r"""Quadratic energies of the clearances, convex or not, within their cones.
 
 A step of the exact equilibrium needs the change v of the clearances u that minimises
 
@@ -6,10 +6,9 @@ A step of the exact equilibrium needs the change v of the clearances u that mini
 
     where S has directions of negative curvature: normal to the active constraint
     boundaries, which is harmless, and sometimes elsewhere.  Far from the solution S is
-    made convex and :mod:`assembly.solvers.conic` solves the problem.  Near it Newton's
-    method on the active boundaries is exact to rounding; the conic solver has half as
-    many digits.
-active boundaries is exact to rounding; the conic solver stops at half of the digits.
+    made convex, and :mod:`assembly.solvers.conic` solves the problem.  Near the
+    solution Newton's method on the active boundaries is exact to rounding, while the
+    conic solver stops at half of the digits.
 
 ======  ===========  =========  =====================================================
 symbol  code         shape      meaning
@@ -37,10 +36,11 @@ from assembly.solvers.method import Method
 
 AT_BOUNDARY = 1e-5  # [-] distance from size 1 within which a cone may be active
 _STEPS = 15  # largest number of Newton steps on the active boundaries
-_STILL = 1e-6  # [-] largest last step of a solution, in sizes of the cones
-# relative to the largest: above minus this a cone stays active
+# [-] size of the last step of a solution, relative to the size of the cones
+_STILL = 1e-6
+# relative to the largest multiplier: a cone with a smaller negative one stays active
 _ZERO_MULTIPLIER = 1e-11
-_LONGEST = 0.3  # [-] longest step along a boundary, which is curved
+_LONGEST = 0.3  # [-] longest step along a boundary, because it is curved
 _SHIFTS = (
     0.0,
     1e-9,
@@ -48,22 +48,22 @@ _SHIFTS = (
     1e-7,
     1e-6,
     1e-5,
-)  # of the largest curvature: tried
-# relative to the largest curvature: smaller ones are replaced by it
+)  # shifts that are tried, relative to the largest curvature
+# relative to the largest curvature: smaller curvatures are replaced by this value
 _LEAST_CURVATURE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class ClearanceProblem:
-    """The quadratic problem of a step; see the module's docstring.
+    """The quadratic problem of a step; symbols as in the module's docstring.
 
     Attributes:
-        S: (nu, nu) symmetric.
-        s: (nu,).
-        start: (nu,) within the cones.
+        S: (nu, nu) symmetric curvature of the energy.
+        s: (nu,) gradient of the energy.
+        start: (nu,) clearances, within the cones.
         group: (nu,) cone of each clearance.
-        rows: (p, nu) independent.
-        right: (p,).
+        rows: (p, nu) independent rows of the closures.
+        right: (p,) right side of the closures.
     """
 
     S: NDArray
@@ -75,9 +75,9 @@ class ClearanceProblem:
 
     @cached_property
     def multipliers(self) -> tuple[NDArray, NDArray]:
-        """(cones,) [J] multipliers of cones at the start, 0 if inactive.
+        """(cones,) [J] multipliers of the cones at the start, 0 if inactive.
 
-        (p,) those of ``rows``.
+        Also the (p,) multipliers of ``rows``.
         """
         touching = cone_sizes(self.start, self.group) >= 1.0 - AT_BOUNDARY
         normals = boundary_normals(self.start, touching, self.group)
@@ -98,7 +98,7 @@ def cone_multipliers(u: NDArray, gradient: NDArray, group: NDArray) -> NDArray:
 
 
 def boundary_normals(u: NDArray, active: NDArray, group: NDArray) -> NDArray:
-    """Return the (nu, active) normals of the boundaries of the cones marked."""
+    """Return the (nu, active) normals of the boundaries of the marked cones."""
     return np.where(group[:, None] == np.flatnonzero(active), u[:, None], 0.0)
 
 
@@ -109,12 +109,12 @@ def clearance_step(
 
     Args:
         problem: the quadratic problem.
-        near: whether the solution is near enough to try Newton's method.
+        near: whether the solution is near enough for Newton's method.
         method: method of :func:`assembly.solvers.conic.minimise_energy`.
 
     Returns:
         The change (nu,) and the multipliers (p,) of ``rows``; None if no clearances
-        within the cones satisfy them.
+        within the cones satisfy the closures.
     """
     step = _newton(problem) if near else None
     return step or _convex(problem, method)
@@ -127,8 +127,8 @@ def _convex(p: ClearanceProblem, method: Method) -> tuple[NDArray, NDArray] | No
     active = force[p.group]
     if least >= 0.0 or not active.any():
         return _conic(p, p.S, p.s, method)
-    # f (|u_k|^2 - 1) / 2 vanishes at the boundary, and its normal does not move to
-    # first order: adding it makes S convex where needed and keeps the minimum
+    # f (|u_k|^2 - 1) / 2 vanishes at the boundary, and its normal does not change to
+    # first order; adding it makes S convex where needed and keeps the minimum
     normals = boundary_normals(p.start, force > 0.0, p.group)
     held = 0.99 * active
     convex = p.S + np.diag(held) - 10.0 * least * normals @ normals.T
@@ -143,7 +143,7 @@ def _convex(p: ClearanceProblem, method: Method) -> tuple[NDArray, NDArray] | No
 def _conic(
     p: ClearanceProblem, S: NDArray, s: NDArray, method: Method
 ) -> tuple[NDArray, NDArray] | None:
-    """Return the conic solver's step; a small curvature replaces negative ones."""
+    """Return the step of the conic solver; a small curvature replaces negative ones."""
     values, vectors = np.linalg.eigh(S)
     floor = _LEAST_CURVATURE * max(float(np.abs(values).max(initial=0.0)), 1e-150)
     G = np.sqrt(np.maximum(values, floor))[:, None] * vectors.T
@@ -180,7 +180,7 @@ def _newton(p: ClearanceProblem) -> tuple[NDArray, NDArray] | None:
 def _active_step(
     p: ClearanceProblem, S: NDArray, gradient: NDArray, u: NDArray, active: NDArray
 ) -> tuple[NDArray, NDArray, NDArray] | None:
-    """Change and multipliers of cones and rows; None where there is no minimum."""
+    """Return change, and multipliers of cones and rows; None without a minimum."""
     C = np.hstack([boundary_normals(u, active, p.group), p.rows.T])
     count, boundaries = C.shape[1], int(active.sum())
     if count > len(u):

@@ -1,17 +1,17 @@
 r"""Dead loads on finite motions: constant forces at points fixed to moving bodies.
 
-A dead load's work is linear in the pose of its body, <G, T - T_nominal>, where T is the
-first three rows of the body's transform.  For a force f at the point a of the body, in
-its axes, G is f [a, 1]^T.  A couple m is two opposite forces, [m]x R_nominal / 2, whose
-work is m . (axis sin angle).  A beam's weight W acts at the middle of the cubic between
-its clamped ends, (p1 + p2) / 2 + (t1 - t2) / 12, with t the end tangents times the
-length.
+The work of a dead load is linear in the pose of its body, <G, T - T_nominal>, where T
+is the first three rows of the body's transform.  For a force f at the point a of the
+body, in its axes, G is f [a, 1]^T.  A couple m is two opposite forces, [m]x R_nominal /
+2, whose work is m . (axis sin angle).  The weight W of a beam acts at the middle of the
+cubic between its clamped ends, (p1 + p2) / 2 + (t1 - t2) / 12, with t the end tangents
+times the length.
 
 ======  =============  ==========  ==================================================
 symbol  code           shape       meaning
 ======  =============  ==========  ==================================================
 G       ``bodies`` ..  (n, 3, 4)   load on the body that reaches to each frame, before
-                                   its joint, and on what its joint carries
+        its joint, and on all that its joint carries
 w       ``load``       (6,)        on the platform, see :mod:`assembly.exact.exact`
 M       --             (3, 3)      sum of the points times their forces
 ======  =============  ==========  ==================================================
@@ -43,8 +43,8 @@ class DeadLoads:
     Attributes:
         load: (6,) [N m, N] on the platform at its origin, base axes.
         bodies: (n, 3, 4) [N m, N] on the body of each frame.
-        carried: (n, 3, 4) [N m, N] on what each frame's joint carries.
-        distributed: (n, 3, 4) [N m, N] the part of ``bodies`` that acts along beams, or
+        carried: (n, 3, 4) [N m, N] loads on all that each frame's joint carries.
+        distributed: (n, 3, 4) [N m, N] part of ``bodies`` that acts along beams, or
             zero.
         drives: (n, 6) [N m, N] of drives along the joints' motions, in frames' axes.
     """
@@ -68,17 +68,18 @@ def dead_loads(
     gravity: ArrayLike | None = None,
     point: ArrayLike = (0.0, 0.0, 0.0),
 ) -> DeadLoads:
-    """Return the loads as dead loads.
+    """Return loads as dead loads.
 
     Args:
         posture: the robot's configuration, of n frames.
         load: (6,) [N m, N] on the platform at a point, base axes.
-        bodies: (n, 6) [N m, N] on each frame's body, at its origin, base axes.
+        bodies: (n, 6) [N m, N] loads on each frame's body, at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
-        point: (3,) [m] where the load acts, platform axes; the force moves with it.
+        point: (3,) [m] point at which the load acts, platform axes; the force moves
+            with it.
 
     Returns:
-        The loads; all zero if no load is given.
+        The dead loads; all zero if no load is given.
     """
     count = len(posture.robot.frames)
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
@@ -101,14 +102,14 @@ def dead_loads(
 def dead_loads_of_rows(
     postures: Posture, errors: NDArray, load: NDArray, gravity: NDArray, point: NDArray
 ) -> DeadLoads:
-    """Return the dead loads under many conditions together.
+    """Return the dead loads under many conditions.
 
     Args:
-        postures: R of them, in one.
+        postures: R postures in one object.
         errors: (R, n, 6) [rad, m] screws of the bodies in their unstressed shape.
         load: (R, 6) [N m, N] on the platform at a point, base axes.
         gravity: (R, 3) [m/s^2] base axes.
-        point: (3,) [m] where the load acts, platform axes.
+        point: (3,) [m] point at which the load acts, platform axes.
 
     Returns:
         Loads whose arrays have R rows.
@@ -128,7 +129,7 @@ def dead_loads_of_rows(
 def _add_weights(
     posture: Posture, errors: NDArray, g: NDArray, on_bodies: NDArray, carried: NDArray
 ) -> NDArray:
-    """Add weights of bodies and links; return those along links, at their tips."""
+    """Add the weights of bodies and links; return those along links, at their tips."""
     robot, nominal = posture.robot, nominally_carried(posture)
     distributed = np.zeros_like(on_bodies)
     for i, frame in enumerate(robot.frames):
@@ -145,8 +146,8 @@ def _add_weights(
         on_bodies[..., i, :, :] += at_tip
         parent = robot.parents[i]
         if parent >= 0:  # otherwise the base carries it
-            # the beam's start and tangent, seen from the parent's frame after its
-            # joint: the beam is straight up to the tip with its geometric error
+            # the beam's start and tangent in the parent's frame after its joint; the
+            # beam is straight up to the tip with its geometric error
             error = errors[..., i, :]
             off = transform(error[..., 3:], rotation_matrix(error[..., :3]))
             T = np.linalg.inv(nominal[..., parent, :, :])
@@ -177,7 +178,7 @@ def work_of(place: Placement, loads: DeadLoads) -> float:
 
 
 def work_gradient(place: Placement, loads: DeadLoads) -> NDArray:
-    """Return the (N,) [J] derivative of the work by each unknown."""
+    """Return the (N,) [J] derivatives of the work by the unknowns."""
     gradient = place.platform_rows.T @ loads.load
     if loads.beyond_platform:
         wrenches, _ = _on_unknowns(place, loads)
@@ -192,11 +193,11 @@ def curvature_of(place: Placement, multipliers: NDArray, loads: DeadLoads) -> ND
 
     Args:
         place: the robot's placement.
-        multipliers: (6 K,) of the scaled residual.
-        loads: on the robot.
+        multipliers: (6 K,) multipliers of the scaled residual.
+        loads: loads on the robot.
 
     Returns:
-        (N, N) symmetric, as exact as
+        (N, N) symmetric matrix, as exact as
         :meth:`assembly.exact.placement.Placement.curvature`.
     """
     H = place.curvature(multipliers, loads.load)
@@ -213,7 +214,7 @@ def curvature_of(place: Placement, multipliers: NDArray, loads: DeadLoads) -> ND
 
 
 def load_magnitudes(place: Placement, loads: DeadLoads) -> NDArray:
-    """Return the (N,) [J] loads on the unknowns, summed as absolute values."""
+    """Return the (N,) [J] loads on the unknowns, as sums of absolute values."""
     sizes = np.abs(place.platform_rows).T @ np.abs(loads.load)
     if loads.beyond_platform:
         wrenches, _ = _on_unknowns(place, loads)
@@ -241,18 +242,18 @@ def wrenches_on_frames(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDA
 
     Args:
         place: the robot's placement.
-        loads: on the robot.
+        loads: loads on the robot.
 
     Returns:
-        (n, 6) [N m, N] on all that each frame's body carries, itself included, and (n,
-        6) on all that its joint carries.
+        (n, 6) [N m, N] wrenches on all that each frame's body carries, including the
+        body, and (n, 6) wrenches on all that its joint carries.
     """
     robot = place.model.posture.robot
     body, joint, *_ = _on_frames(place, loads)
     if loads.drives.any():
         joint = joint + drive_wrenches(place.model.posture, loads, place.carried)
     if loads.load.any():
-        # the platform's load acts on its body
+        # the load on the platform acts on its body
         last = robot.index(robot.platform)
         on_path = robot.on_path[last][:, None] * place.load_wrench(loads.load)
         body, joint = body + on_path, joint + on_path
@@ -261,7 +262,7 @@ def wrenches_on_frames(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDA
 
 
 def distributed_at_tips(place: Placement, loads: DeadLoads) -> NDArray:
-    """Return the (n, 6) [N m, N] links' weights as they act at their tips."""
+    """Return the (n, 6) [N m, N] weights of links as they act at the tips."""
     T = place.body_ends
     G = np.broadcast_to(loads.distributed, (len(T), 3, 4))
     moment, force, _ = _read(G, T, T[:, :3, 3])
@@ -296,7 +297,7 @@ def drive_wrenches(posture: Posture, loads: DeadLoads, carried: NDArray) -> NDAr
 
 
 def _on_unknowns(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
-    """Return the (N, 6) dead loads on all that each unknown moves, and their M's."""
+    """Return the (N, 6) dead loads on all that each unknown moves, with their M."""
     model = place.model
     body, joint, M_body, M_joint = _on_frames(place, loads)
     link = (model.motion == LINK)[:, None]
@@ -308,7 +309,7 @@ def _on_unknowns(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
 def _on_frames(
     place: Placement, loads: DeadLoads
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return the dead loads' wrenches on all that bodies and joints carry, with M's."""
+    """Return the dead wrenches on all that bodies and joints carry, with their M."""
     posture = place.model.posture
     return resultants(posture, loads, place.body_ends, place.carried)
 
@@ -316,19 +317,19 @@ def _on_frames(
 def resultants(
     posture: Posture, loads: DeadLoads, body_ends: NDArray, carried: NDArray
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return the dead loads summed over what each frame carries.
+    """Return the sums of the dead loads over all that each frame carries.
 
     The wrenches are read at the platform's nominal origin.
 
     Args:
-        posture: nominal; all arrays may have leading dimensions, as its own.
-        loads: on the robot.
-        body_ends: (..., n, 4, 4) seen from the base.
-        carried: (..., n, 4, 4) frames after their joint's coordinate.
+        posture: nominal posture; all arrays may have leading dimensions, like its own.
+        loads: loads on the robot.
+        body_ends: (..., n, 4, 4) ends of the bodies in the base frame.
+        carried: (..., n, 4, 4) frames after the coordinate of their joint.
 
     Returns:
         (..., n, 6) [N m, N] wrenches on all that bodies carry and that joints carry,
-        base axes, and (..., n, 3, 3) [N m] their M's.
+        base axes, and (..., n, 3, 3) [N m] their matrices M.
     """
     robot, origin = posture.robot, posture.platform[..., None, :3, 3]
     below = (robot.on_path & ~np.eye(len(robot.frames), dtype=bool)).T
@@ -346,7 +347,7 @@ def resultants(
 
 
 def _read(G: NDArray, T: NDArray, origin: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Return moments and forces (..., n, 3) at the origin, and M's (..., n, 9)."""
+    """Return moments and forces (..., n, 3) at the origin, and M (..., n, 9)."""
     points = T[..., :3, :].copy()
     points[..., 3] -= origin
     moments = np.cross(points, G, axis=-2).sum(axis=-1)

@@ -4,13 +4,14 @@ Near a placement x the closures are linearised and the Lagrangian
 
     L = |y|^2 / 2 - W(x) - lambda . r(x)
 
-is expanded to second order, with its true Hessian.  The closures' curvature times the
-wrenches they carry outweighs soft springs; without it Gauss-Newton stalls.  Springs and
-free motions are eliminated, and :mod:`assembly.exact.contact_qp` solves the problem in
-the clearances.  A restoration (retraction) brings the step back onto the closures.  The
-step is accepted if it lowers energy plus a penalty on the residual.  Otherwise a
-proximal term damps it, as in the method of Levenberg and Marquardt, measured in radians
-and reference lengths of every screw.
+is expanded to second order, with its true Hessian.  The curvature of the closures times
+the wrenches that they carry exceeds compliant springs; without this term Gauss-Newton
+steps stall.  Springs and free motions are eliminated, and
+:mod:`assembly.exact.contact_qp` solves the problem in the clearances.  A restoration
+(retraction) brings the step back onto the closures.  The step is accepted if it reduces
+the energy plus a penalty on the residual.  Otherwise a proximal term damps it, as in
+the method of Levenberg and Marquardt, measured in radians and reference lengths of
+every screw.
 
 ======  =============  =============  ===============================================
 symbol  code           shape          meaning
@@ -48,22 +49,23 @@ from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method
 from forcefit.results.display import numbers
 
-CLOSED = 1e-12  # [rad, reference lengths] residual of a solution
-LONGEST_STEP = 1.0  # [rad, reference lengths] largest change of a step
-_SMALL_RESIDUAL = 1e-9  # [rad, reference lengths] its wrenches are small
-_LEAST_DAMPING = 1e-9  # relative to the largest closure wrench: least damping
-# relative to the largest closure wrench: first damping of a refused step
+CLOSED = 1e-12  # [rad, reference lengths] largest residual of a solution
+LONGEST_STEP = 1.0  # [rad, reference lengths] largest change in a step
+# [rad, reference lengths] residual whose wrenches count as small
+_SMALL_RESIDUAL = 1e-9
+_LEAST_DAMPING = 1e-9  # relative to the largest closure wrench: smallest damping
+# relative to the largest closure wrench: first damping of a rejected step
 _FIRST_DAMPING = 1e-8
-_ATTEMPTS = 40  # largest number of attempts at a step, each damped eight times as much
-_RESTORATIONS = 4  # corrections of a step back onto the closures
+_ATTEMPTS = 40  # largest number of attempts at a step; each has eight times the damping
+_RESTORATIONS = 4  # number of corrections that bring a step back onto the closures
 
 
 class NotConverged(SolverFailed):
-    """No equilibrium with finite motions was found near the linear one.
+    """Error: no equilibrium with finite motions was found near the linear one.
 
     Attributes:
         problem: name of the problem.
-        status: distance from equilibrium, in words.
+        status: description of the distance from equilibrium.
     """
 
     def __init__(self, problem: str, status: str) -> None:
@@ -76,17 +78,17 @@ class Expansion:
     """The problem expanded at a placement.
 
     Attributes:
-        placement: the point of expansion.
-        loads: on the robot.
-        gradient: (N,) [J] of energy minus work.
-        hessian: (N, N) [J] of the Lagrangian.
-        multipliers: (6 K,) of the closures.
-        unbounded: (N,) bool, unknowns without cones.
-        inverse: (nw, 6 K) pseudoinverse of their closure columns.
-        basis: (N, nu + nv) B of the module's docstring.
-        rigid_rows: (p, nu) closures without springs and free motions.
-        rigid_right: (p,) their right side.
-        rigid_basis: (6 K, p) their combination of the closures' rows.
+        placement: placement at which the problem is expanded.
+        loads: loads on the robot.
+        gradient: (N,) [J] gradient of energy minus work.
+        hessian: (N, N) [J] second derivative of the Lagrangian.
+        multipliers: (6 K,) multipliers of the closures.
+        unbounded: (N,) bool, True for unknowns without cones.
+        inverse: (nw, 6 K) pseudoinverse of the closure columns of these unknowns.
+        basis: (N, nu + nv) matrix B of the module's docstring.
+        rigid_rows: (p, nu) closure rows without springs and free motions.
+        rigid_right: (p,) right side of these rows.
+        rigid_basis: (6 K, p) combinations of the closures' rows that give these rows.
     """
 
     placement: Placement
@@ -103,14 +105,14 @@ class Expansion:
 
     @property
     def small_wrench(self) -> float:
-        """[N m] scaled wrench of a residual of 1e-9 in the stiffest spring."""
+        """[N m] scaled wrench that a residual of 1e-9 causes in the stiffest spring."""
         model = self.placement.model
         softness = np.diag(model.metric)[model.springs]  # [rad^2/J]
         return _SMALL_RESIDUAL / float(softness.min(initial=1.0))
 
     @property
     def small_energy(self) -> float:
-        """[J] energy of a residual of 1e-9."""
+        """[J] energy that a residual of 1e-9 causes."""
         return _SMALL_RESIDUAL * self.small_wrench / 2
 
 
@@ -119,12 +121,13 @@ class Step:
     """An accepted step.
 
     Attributes:
-        placement: after the step.
-        gain: [J] decrease of the expansion, with the cost of closing.
-        decrement: [J] decrease of the energy without that cost: the possible gain.
-        length: [rad, reference lengths] of the change.
+        placement: placement after the step.
+        gain: [J] decrease of the expansion, including the cost of closing.
+        decrement: [J] decrease of the energy without that cost, which is the possible
+            gain.
+        length: [rad, reference lengths] size of the change.
         rigid: (6 K,) multipliers of closures in clearances alone.
-        damping: [J/rad^2] for the next step; 0 if this one was not damped.
+        damping: [J/rad^2] damping of the next step; 0 if this step was not damped.
     """
 
     placement: Placement
@@ -136,13 +139,13 @@ class Step:
 
 
 def expand(at: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
-    """Expand the closures to first and the Lagrangian to second order.
+    """Return the closures expanded to first and the Lagrangian to second order.
 
     Args:
-        at: a placement.
-        loads: on the robot.
-        rigid: (6 K,) guess of the multipliers of closures in clearances alone; the
-            others are those that balance springs and free motions best.
+        at: placement at which the problem is expanded.
+        loads: loads on the robot.
+        rigid: (6 K,) estimate of the multipliers of closures in clearances alone; the
+            other multipliers are those that balance springs and free motions best.
 
     Returns:
         The expansion.
@@ -156,8 +159,8 @@ def expand(at: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
     U, S, Vt = svd(A[:, unbounded] * unit, full_matrices=True)
     tolerance = rank_tolerance(model.posture.mismatch)
     rank = int(np.sum(S > tolerance * S.max(initial=0.0)))
-    # left singular vectors of the range over their values; those of the rest; right
-    # singular vectors in the unknowns' units
+    # left singular vectors of the range over their singular values, and those of the
+    # complement; right singular vectors in the units of the unknowns
     range_, rigid_space, V = U[:, :rank] / S[:rank], U[:, rank:], unit[:, None] * Vt.T
     inverse = V[:, :rank] @ range_.T
     multipliers = inverse.T @ gradient[unbounded]
@@ -206,7 +209,7 @@ def energy_of(at: Placement) -> float:
 
 
 def potential(at: Placement, loads: DeadLoads) -> float:
-    """Return the [J] elastic energy minus the loads' work."""
+    """Return the [J] elastic energy minus the work of the loads."""
     return energy_of(at) - work_of(at, loads)
 
 
@@ -214,12 +217,12 @@ def advance(
     local: Expansion, penalty: float, damping: float, near: bool,
     method: Method = "compiled",
 ) -> Step:  # fmt: skip
-    """Return a step that lowers energy plus penalty.
+    """Return a step that reduces energy plus penalty.
 
     Args:
         local: the expanded problem.
-        penalty: [N m] on the norm of the scaled residual; above the multipliers'.
-        damping: [J/rad^2] of the last step.
+        penalty: [N m] factor on the norm of the scaled residual, above the multipliers.
+        damping: [J/rad^2] damping of the last step.
         near: whether Newton's method is tried for the clearances.
         method: method of :func:`assembly.exact.contact_qp.clearance_step`.
 
@@ -227,7 +230,7 @@ def advance(
         The step.
 
     Raises:
-        NotConverged: no step, however short, lowers them.
+        NotConverged: no step reduces the sum, however short.
     """
     start = local.placement
     penalised = penalty * float(np.linalg.norm(start.residual))
@@ -236,10 +239,10 @@ def advance(
     least = max(least, pull)
     before = potential(start, local.loads) + penalised
     noise = 1e-13 * (abs(before) + abs(energy_of(start)))
-    # rounding errors of angles and positions, times the forces on them
+    # rounding errors of angles and positions, multiplied by the forces on them
     noise += 1e-14 * (penalty + pull)
     for attempt in range(_ATTEMPTS):
-        # a refused Newton step is repeated by the conic solver before the step is
+        # a rejected Newton step is repeated by the conic solver before the step is
         # damped
         newton = near and attempt != 1
         step = _solve(local, damping + _LEAST_DAMPING * least, newton, method)
@@ -262,13 +265,13 @@ def advance(
 
 
 def problem_name(at: Placement, loads: DeadLoads) -> str:
-    """Return the name of the problem, for messages."""
+    """Return the name of the problem for messages."""
     under = f" under {numbers(loads.load)} N m, N" if loads.load.any() else ""
     return f"exact equilibrium of {at.model.posture.robot.name}{under}"
 
 
 def _solve(local: Expansion, damping: float, near: bool, method: Method) -> Step | None:
-    """Return the step to the expansion's minimum; None if there is none."""
+    """Return the step to the minimum of the expansion; None if there is none."""
     at, model = local.placement, local.placement.model
     normal = np.zeros(len(at.x))
     normal[local.unbounded] = -local.inverse @ at.residual
@@ -311,7 +314,7 @@ def _solve(local: Expansion, damping: float, near: bool, method: Method) -> Step
 
 
 def _restored(local: Expansion, change: NDArray) -> Placement:
-    """Return the placement after a step and its restoration onto the closures."""
+    """Return the placement after a step that is restored onto the closures."""
     model = local.placement.model
     x = local.placement.x + change
     x[model.bounded] = into_cones(x[model.bounded], model.joints.group)

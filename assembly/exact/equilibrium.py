@@ -1,6 +1,7 @@
 """Properties of an equilibrium: imbalance, stability, active clearances.
 
-All are computed from the expansion there, :func:`assembly.exact.descent.expand`.
+All are computed from the expansion at the equilibrium,
+:func:`assembly.exact.descent.expand`.
 """
 
 import numpy as np
@@ -12,29 +13,29 @@ from assembly.exact.dead_load import load_magnitudes
 from assembly.exact.descent import Expansion
 from assembly.solvers.cones import cone_sizes
 
-_ANGLE_ROUNDING = 1e-5  # relative to a small residual: rounding of an angle
+_ANGLE_ROUNDING = 1e-5  # relative to a small residual: rounding error of an angle
 
 
 def imbalance(local: Expansion) -> float:
-    """Return how far a placement is from equilibrium.
+    """Return the distance of a placement from equilibrium.
 
     Args:
-        local: the expansion there.
+        local: expansion at the placement.
 
     Returns:
-        [-] largest unbalanced generalised force on an unknown, relative to the sum of
-        the forces on it, or to those of a residual of 1e-9 in closures or in the
-        unknown itself.
+        [-] largest unbalanced generalised force on an unknown.  It is relative to the
+        sum of the forces on the unknown, or to the forces due to a residual of 1e-9 in
+        closures or in the unknown itself.
     """
     at, A, model = local.placement, local.placement.rows, local.placement.model
     unbalanced = local.gradient - A.T @ local.multipliers
     wrench = float(np.linalg.norm(local.multipliers)) + local.small_wrench
     loads = load_magnitudes(at, local.loads)
     acting = np.linalg.norm(A, axis=0) * wrench + np.abs(local.gradient) + loads
-    # parts of an open chain without load carry forces of rounding alone
+    # unloaded parts of an open chain have forces that are rounding only
     unit = np.sqrt(np.diag(model.metric))
     acting = np.maximum(acting, local.small_wrench * unit)
-    # inside a cone the force is zero; at its boundary it is normal to it
+    # inside a cone the force is zero; at its boundary it is normal to the boundary
     u, group = at.x[model.bounded], model.joints.group
     force = cone_multipliers(u, unbalanced[model.bounded], group)
     unbalanced[model.bounded] += force[group] * u
@@ -48,12 +49,13 @@ def least_curvature(local: Expansion) -> float:
     """Return the least curvature of the potential, which shows stability.
 
     Args:
-        local: the expansion there.
+        local: expansion at the equilibrium.
 
     Returns:
-        [J/rad^2] least second derivative of the potential along the motions that keep
-        closures and active constraints, per squared rad and reference length of all
-        screws; positive at a strict minimum, inf if no motion is possible.
+        [J/rad^2] smallest second derivative of the potential along the motions that
+        keep closures and active constraints, per squared rad and reference length of
+        all screws. It is positive at a strict minimum, and inf if no motion is
+        possible.
     """
     D, H = tangent_space(local)
     if not D.shape[1]:
@@ -65,16 +67,16 @@ def least_curvature(local: Expansion) -> float:
 def tangent_space(
     local: Expansion, hold_touching: bool = False
 ) -> tuple[NDArray, NDArray]:
-    """Return the motions near an equilibrium that keep closures and active clearances.
+    """Return the motions at an equilibrium that keep closures and active clearances.
 
     Args:
-        local: the expansion there.
-        hold_touching: whether clearances at their bound without a force are kept at it
-            too.
+        local: expansion at the equilibrium.
+        hold_touching: whether clearances that touch their bound without a force are
+            held there too.
 
     Returns:
-        (N, k) a basis of the motions, and (k, k) [J] the potential's second derivative
-        in it.
+        (N, k) basis of the motions, and (k, k) [J] second derivative of the potential
+        in this basis.
     """
     at, model = local.placement, local.placement.model
     u, group = at.x[model.bounded], model.joints.group
@@ -95,11 +97,11 @@ def curvature_modes(D: NDArray, H: NDArray, units: NDArray) -> tuple[NDArray, ND
 
     Args:
         D: (N, k) basis of motions.
-        H: (k, k) [J] the potential's second derivative in it.
+        H: (k, k) [J] second derivative of the potential in this basis.
         units: (N,) scale of the unknowns in which the modes are orthonormal.
 
     Returns:
-        (k,) [J] second derivatives, lowest first, and (N, k) the motions.
+        (k,) [J] second derivatives, smallest first, and (N, k) motions.
     """
     Q, R = np.linalg.qr(D / units[:, None])
     back = np.linalg.inv(R)
@@ -112,7 +114,7 @@ def active_clearances(local: Expansion) -> tuple[NDArray, NDArray]:
     """Return the clearances that carry a force at an equilibrium.
 
     Args:
-        local: the expansion there.
+        local: expansion at the equilibrium.
 
     Returns:
         (cones,) bool, and (cones,) [J] the force on each bound times the bound.

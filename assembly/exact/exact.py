@@ -1,9 +1,9 @@
 r"""The forced assembly at least energy with finite motions: closures hold on SE(3).
 
 Springs, clearance cones and geometric errors are those of the linear virtual-joint
-model (:mod:`assembly.linear.energy`).  Only the closures differ: finite motions compose
-as in :mod:`assembly.exact.finite_robot`.  The springs' energy minus the work of the
-loads is minimised,
+model (:mod:`assembly.linear.energy`).  Only the closures differ, because finite motions
+are composed as in :mod:`assembly.exact.finite_robot`.  The springs' energy minus the
+work of the loads is minimised,
 
     minimise  |y|^2 / 2 - w . x_p(y, u, q) - W(y, u, q)
     subject to  r(y, u, q) = 0,   |u_k| <= 1 for each cone k,
@@ -79,13 +79,15 @@ if TYPE_CHECKING:
     import xarray
 
 _STEPS = 160  # largest number of steps; 3 to 5 are usual, metres of travel take 80
-_NEAR = 1e-2  # relative energy still to gain below which Newton's method is tried
-_DECREMENT = 1e-14  # relative energy still to gain at the last step
-# steps after which a balanced state counts, though clearances still move
+# relative energy that can still be gained, below which Newton's method is tried
+_NEAR = 1e-2
+_DECREMENT = 1e-14  # relative energy that can still be gained at the last step
+# number of steps after which a balanced state is accepted although clearances move
 _RESTLESS = 100
 _STILL = 1e-9  # [rad, reference lengths] size of a last step without damping
 _STATIONARY = 1e-7  # largest relative imbalance of a solution; 1e-12 is usual
-_ROUNDING = 1e-30  # [J] below it energies are rounding, some 1e-48 J without errors
+# [J] energies below this are rounding; without errors they are about 1e-48 J
+_ROUNDING = 1e-30
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,10 +95,10 @@ class LinearisationError:
     """Error of the linear model: linear minus exact.
 
     Attributes:
-        rotation: (3,) [rad] of the platform.
-        translation: (3,) [m] of its origin.
-        energy: [J] absolute.
-        relative_energy: [-] relative to the exact energy.
+        rotation: (3,) [rad] difference of the platform's rotation.
+        translation: (3,) [m] difference of its origin's displacement.
+        energy: [J] difference of the energy.
+        relative_energy: [-] difference relative to the exact energy.
     """
 
     rotation: NDArray
@@ -109,20 +111,20 @@ class LinearisationError:
 class ExactAssembly:
     """A manipulator assembled with finite motions; exists only if converged.
 
-    It is an equilibrium: stationary, closed and within the cones as reported.
-    ``least_curvature`` tells whether it is a local minimum.  A lower minimum is not
+    It is an equilibrium: stationary, closed and within the cones as reported.  The sign
+    of ``least_curvature`` shows whether it is a local minimum.  A lower minimum is not
     excluded.
 
     Attributes:
         whole: the robot's nominal configuration, with uncut beams.
         cut: the robot with beams cut into pieces, and the map to its frames.
-        linear: the linear model's solution, the start of the steps.
+        linear: solution of the linear model, from which the iteration starts.
         expansion: expansion of the problem at the solution, with the multipliers of the
             scaled closures.
         stationarity: [-] largest relative imbalance of an unknown.
         iterations: number of steps.
-        method: method of all cone programmes: ``"compiled"``, with Clarabel in doubt;
-            or ``"reference"``, numpy and Clarabel alone.
+        method: method of all cone programmes: ``"compiled"``, with Clarabel if in
+            doubt; or ``"reference"``, with numpy and Clarabel only.
     """
 
     whole: Posture
@@ -173,12 +175,12 @@ class ExactAssembly:
 
     @property
     def multipliers(self) -> NDArray:
-        """(6 closures,) of the scaled closures."""
+        """(6 closures,) multipliers of the scaled closures."""
         return self.expansion.multipliers
 
     @cached_property
     def least_curvature(self) -> float:
-        """[J/rad^2] least second derivative of the potential; positive if stable."""
+        """[J/rad^2] smallest second derivative of the potential; positive if stable."""
         return least_curvature(self.expansion)
 
     @property
@@ -188,7 +190,7 @@ class ExactAssembly:
 
     @cached_property
     def energy(self) -> float:
-        """[J] elastic energy; 0 where the closures' residual may explain it."""
+        """[J] elastic energy; 0 if the residual of the closures may explain it."""
         energy, residual = energy_of(self.placement), self.closure_residual()
         differs = differs_from_zero(energy, 0.0, self.multipliers, residual)
         return energy if differs else 0.0
@@ -205,14 +207,14 @@ class ExactAssembly:
 
     @property
     def transforms(self) -> NDArray:
-        """(n, 4, 4) frames seen from the base, before their joint's coordinate."""
+        """(n, 4, 4) frames in the base frame, before the coordinate of their joint."""
         return self.placement.transforms[self.cut.last]
 
     @cached_property
     def link_screws(self) -> NDArray:
-        """(n, 6) [rad, m] deformations of the bodies, logarithms.
+        """(n, 6) [rad, m] deformations of the bodies, as logarithms.
 
-        A beam in pieces has the screw of its end relative to its base.
+        For a beam in pieces it is the screw of its end relative to its base.
         """
         screws = self.placement.screws[LINK, self.cut.last]
         pieces = np.bincount(self.cut.owner)
@@ -230,7 +232,7 @@ class ExactAssembly:
 
     @property
     def joint_screws(self) -> NDArray:
-        """(n, 6) [rad, m] deformations of the joints, logarithms."""
+        """(n, 6) [rad, m] deformations of the joints, as logarithms."""
         return self.placement.screws[SPRING, self.cut.last]
 
     @cached_property
@@ -244,7 +246,7 @@ class ExactAssembly:
     def closure_wrenches(self) -> NDArray:
         """(closures, 6) [N m, N] wrench of each closure's second chain on its first.
 
-        At the platform's nominal origin, base axes.
+        It is read at the platform's nominal origin, in base axes.
         """
         return self.multipliers.reshape(-1, 6) * self.placement.model.scale
 
@@ -252,7 +254,7 @@ class ExactAssembly:
     def wrenches(self) -> NDArray:
         """(n, 6) [N m, N] wrench of each link's spring: K_E times its deformation.
 
-        At the displaced frame's origin, in its axes.
+        It is read at the displaced frame's origin, in its axes.
         """
         return self._through[0]
 
@@ -266,13 +268,13 @@ class ExactAssembly:
     def joint_wrenches(self) -> NDArray:
         """(n, 6) [N m, N] wrench through each joint.
 
-        They differ from :attr:`tip_wrenches` by loads on the body at the frame.
+        It differs from :attr:`tip_wrenches` by loads on the body at the frame.
         """
         return self._through[1]
 
     @cached_property
     def _through(self) -> NDArray:
-        """(2, n, 6) [N m, N] through bodies and joints."""
+        """(2, n, 6) [N m, N] wrenches through bodies and joints."""
         robot, T = self.cut.robot, self.placement.transforms
         closing = closure_signs(robot).T @ self.closure_wrenches
         of_loads = wrenches_on_frames(self.placement, self.loads)
@@ -285,12 +287,12 @@ class ExactAssembly:
         """Linear minus exact platform screw and energy."""
         screw = self.linear.platform_screw - self.platform_screw
         energy = self.linear.energy - self.energy
-        # inside an assembly zone both are zero up to rounding
+        # inside an assembly zone both are zero except for rounding
         scale = max(self.energy, 1e-6 * self.linear.energy_without_clearance, _ROUNDING)
         return LinearisationError(screw[:3], screw[3:], energy, energy / scale)
 
     def closure_residual(self) -> float:
-        """Return largest of abs(rad), abs(m) / reference length open in a closure."""
+        """Return the largest closure residual: abs(rad), abs(m) / reference length."""
         return float(np.abs(self.placement.residual).max(initial=0.0))
 
     def clearance_excess(self) -> float:
@@ -314,30 +316,30 @@ def solve_exact(
     """Close a manipulator at least energy with finite motions, from the linear model.
 
     Args:
-        posture: the robot's configuration; its errors, clearances, links and joint
-            springs are the robot's.
+        posture: configuration of the robot, with its errors, clearances, links and
+            joint springs.
         load: (6,) [N m, N] on the platform at ``point``, base axes, or by component,
-            ``{"fz": -50}``.  The force is dead; the moment's work is its product with
-            the rotation vector.
+            ``{"fz": -50}``.  The force is dead; the work of the moment is its product
+            with the rotation vector.
         start: the linear solution for this posture and these loads, if known.
         bodies: (n, 6) [N m, N] dead loads on the bodies of all frames, each at its
             frame's origin, base axes; moments are couples of dead forces.
         gravity: (3,) [m/s^2] base axes; see :mod:`assembly.exact.dead_load` for links.
-        point: (3,) [m] of the platform, in its axes; the force moves with it.
-        near: an equilibrium of the same posture under another load, used as the start.
-        progress: function called with the steps taken and their largest number.
+        point: (3,) [m] point of the platform, in its axes; the force moves with it.
+        near: equilibrium of the same posture under another load, used as the start.
+        progress: function called with the number of steps and the largest number.
         method: method of the linear solution and of every step: ``"compiled"``, with
-            Clarabel in doubt; or ``"reference"``, numpy and Clarabel alone.
+            Clarabel if in doubt; or ``"reference"``, with numpy and Clarabel only.
 
     Returns:
         The assembled manipulator: closed, stationary, within its cones.
 
     Raises:
         CannotAssemble: the linear model has no solution to start from.
-        FreeMotion: a load drives a motion that nothing resists.
+        FreeMotion: a load acts along a motion without stiffness.
         NotConverged: there is no equilibrium nearby; a :class:`SolverFailed`.
-        ValueError: ``start`` belongs to another posture or other loads; the method is
-            unknown, or is ``"reference"`` while ``start`` or ``near`` is not.
+        ValueError: ``start`` belongs to another posture or other loads; or the method
+            is unknown, or is ``"reference"`` while ``start`` or ``near`` is compiled.
     """
     check_method(method)
     if method == "reference":
@@ -370,13 +372,13 @@ def solve_exact(
 
     assembly = search(start.joints)
     if assembly.clearance_excess() > 1e-9 and has_bounded_motion(posture.robot):
-        # the bound of a passive joint's own motion was left out, but it is active
+        # a bound of a passive joint was left out, but it is active
         assembly = search(virtual_joints(cut.robot, bounded_motion=True))
     return assembly
 
 
 def _refuse_compiled(*starts: Assembly | ExactAssembly | None) -> None:
-    """Reject to start the reference's steps from a compiled solution."""
+    """Reject a compiled solution as the start of the reference method."""
     if any(start is not None and start.method != "reference" for start in starts):
         raise ValueError(
             "solve_exact: start or near: found a solution of the compiled "
@@ -422,7 +424,7 @@ def _search(
 
 
 def _first_guess(model: FiniteRobot, linear: Assembly) -> NDArray:
-    """Return (N,) linear solution as first guess, clearances projected on the cones."""
+    """Return the (N,) linear solution, with clearances projected onto the cones."""
     motions = np.hstack([model.joints.cones, model.joints.free])
     screws = clearance_components(linear.posture.robot, linear.clearance_screws)
     moved = motions.T @ screws.ravel() / np.sum(motions**2, axis=0)
@@ -434,7 +436,7 @@ def _first_guess(model: FiniteRobot, linear: Assembly) -> NDArray:
 
 
 def _energy_scale(at: Placement, linear: Assembly, loads: DeadLoads) -> float:
-    """Return the scale [J] of the problem's energies."""
+    """Return the [J] scale of the problem's energies."""
     return max(
         energy_of(at), abs(work_of(at, loads)), 1e-3 * linear.energy_without_clearance
     )

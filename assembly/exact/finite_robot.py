@@ -1,12 +1,12 @@
 r"""A robot at a posture, with unknowns that move its frames by finite screws.
 
-At a frame, in its axes, motions follow each other, each a screw's exponential:
+At a frame, in its axes, motions follow each other, each the exponential of a screw:
 
     T_i = T_parent  F_i  exp(dl)^  exp(de)  exp(dc)  exp(db),   then the joint's own,
 
 where F_i is the nominal body, exp(dl)^ the geometric error (rotation vector and
-translation, both in the frame's axes) and the joint's own motion a turn about z, or a
-slide along it, by its coordinate plus the motion of a passive joint.
+translation, both in the frame's axes).  The joint's own motion is a rotation about z,
+or a translation along z, by its coordinate plus the motion of a passive joint.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from assembly.model.links import own_screws
 from assembly.model.robot import Robot
 from stiffness.screws import rotation_matrix, transform
 
-# the motions at a frame, in their order
+# the motions at a frame, in this order
 LINK, CLEARANCE, SPRING, OWN = range(4)
 
 
@@ -33,9 +33,9 @@ class FiniteRobot:
     """A robot at a posture, prepared for finite screws.
 
     Attributes:
-        posture: its nominal configuration.
-        joints: its virtual joints; their columns are the unknowns y, u, q in this
-            order.
+        posture: nominal posture of the robot.
+        joints: virtual joints of the robot; their columns are the unknowns y, u, q in
+            this order.
     """
 
     posture: Posture
@@ -43,19 +43,19 @@ class FiniteRobot:
 
     @cached_property
     def _blocks(self) -> NDArray:
-        """(n, 6, N) all columns, by frame and component."""
+        """(n, 6, N) all columns by frame and component."""
         j = self.joints
         every = np.hstack([j.elastic, j.cones, j.free])
         return every.reshape(len(self.posture.robot.frames), 6, every.shape[1])
 
     @cached_property
     def frame(self) -> NDArray:
-        """(N,) row of the frame each unknown acts at."""
+        """(N,) row of the frame at which each unknown acts."""
         return np.argmax(np.abs(self._blocks).max(axis=1), axis=0)
 
     @cached_property
     def columns(self) -> NDArray:
-        """(N, 6) screw of each unknown, in its frame's axes."""
+        """(N, 6) screw of each unknown, in the axes of its frame."""
         return self._blocks[self.frame, :, np.arange(len(self.frame))]
 
     @cached_property
@@ -73,7 +73,7 @@ class FiniteRobot:
 
     @property
     def _free(self) -> int:
-        """Number of motions without bound."""
+        """Number of motions without a bound."""
         return self.joints.free.shape[1]
 
     @property
@@ -102,19 +102,19 @@ class FiniteRobot:
 
     @cached_property
     def scale(self) -> NDArray:
-        """(6,) factors of a screw: translations divided by the reference length."""
+        """(6,) factors on a screw: translations are divided by the reference length."""
         return np.array([1.0, 1.0, 1.0, *[1 / self.size] * 3])
 
     @cached_property
     def metric(self) -> NDArray:
-        """(N, N) squared size of the screws that unknowns make, rad and lengths."""
+        """(N, N) squared size of the screws of the unknowns, in rad and lengths."""
         together = self.same_motion & (self.frame[:, None] == self.frame)
         scaled = self.columns * self.scale
         return (scaled @ scaled.T) * together
 
     @cached_property
     def same_motion(self) -> NDArray:
-        """(N, N) bool, whether two unknowns are parts of one screw."""
+        """(N, N) bool, True if two unknowns are parts of one screw."""
         return self._order[:, None] == self._order
 
     @cached_property
@@ -129,7 +129,7 @@ class FiniteRobot:
 
     @cached_property
     def chains(self) -> tuple[NDArray, NDArray]:
-        """(K, N) bool, twice: unknowns on a closure's first and second chain."""
+        """(K, N) bool for each of the two chains: unknowns on the closure's chain."""
         robot = self.posture.robot
         ends = self.closed_frames
         first, second = (robot.on_path[ends[:, k]][:, self.frame] for k in (0, 1))
@@ -150,22 +150,22 @@ class FiniteRobot:
 
     @cached_property
     def precedence(self) -> NDArray:
-        """(K, N, N) +1 where the second unknown acts later round the loop, else -1.
+        """(K, N, N) +1 where the second unknown acts later around the loop, else -1.
 
-        Round a loop means out along the first chain and back along the second.
+        The order is outward along the first chain and back along the second chain.
         """
         along = np.where(self.signs > 0, self._order, 1e6 - self._order)
         return np.sign(along[:, None, :] - along[:, :, None])
 
     @cached_property
     def comes_before(self) -> NDArray:
-        """(N, N) 1 where the first unknown moves the second, 1/2 in one motion."""
+        """(N, N) 1 where the first unknown moves the second, 1/2 within one motion."""
         above = self.posture.robot.on_path[self.frame][:, self.frame].T
         return above * (1.0 - np.sign(self._order[:, None] - self._order)) / 2
 
     @cached_property
     def erring_bodies(self) -> NDArray:
-        """(n, 4, 4) bodies with geometric errors, seen from their parent frame."""
+        """(n, 4, 4) bodies with geometric errors, in the frame of the parent."""
         robot = self.posture.robot
         errors = robot.errors
         off = transform(errors[:, 3:], rotation_matrix(errors[:, :3]))
@@ -173,7 +173,7 @@ class FiniteRobot:
 
     @cached_property
     def nominal_closures(self) -> NDArray:
-        """(K, 4, 4) a closure's second frame seen from its first, nominally."""
+        """(K, 4, 4) nominal second frame of each closure relative to the first."""
         first, second = self.posture.transforms[self.closed_frames.T]
         return inverse(first) @ second  # not exactly 1 for rounded files
 
@@ -184,5 +184,5 @@ def along_own(robot: Robot, coordinates: NDArray) -> NDArray:
 
 
 def nominally_carried(posture: Posture) -> NDArray:
-    """Return the (..., n, 4, 4) nominal frames after their joint's coordinate."""
+    """Return the (..., n, 4, 4) nominal frames after the coordinate of their joint."""
     return posture.transforms @ along_own(posture.robot, posture.coordinates)

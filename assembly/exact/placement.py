@@ -1,18 +1,19 @@
-r"""A robot moved by finite screws: its closures and their first two derivatives.
+r"""A robot moved by finite screws, with first and second derivatives of its closures.
 
 ======  =================  ==========  =============================================
 symbol  code               shape       meaning
 ======  =================  ==========  =============================================
 x       ``x``              (N,)        unknowns: springs y, clearances u, motions q
-r       ``residual``       (6 K,)      logarithms of the open closures, scaled
+r       ``residual``       (6 K,)      scaled logarithms of the open closures
 A       ``rows``           (6 K, N)    derivative of r
 P       ``platform_rows``  (6, N)      derivative of the platform screw
 V       ``moves``          (6, N)      small motion that each unknown makes
 ======  =================  ==========  =============================================
 
-The logarithm of a product of motions exp(V_1 h_1) exp(V_2 h_2) ... is, to second
-order, the sum of V_i h_i plus half of the brackets [V_i h_i, V_j h_j] of each pair in
-its order.  The second derivative is that, plus the curvature of each exponential.
+The logarithm of a product of motions exp(V_1 h_1) exp(V_2 h_2) ... is, to second order,
+the sum of V_i h_i plus half of the brackets [V_i h_i, V_j h_j] of each pair in its
+order.  The second derivative consists of these brackets and the curvature of each
+exponential.
 
 Sources:
     Selig (2005), Geometric Fundamentals of Robotics, chapter 4 (brackets of screws,
@@ -40,11 +41,11 @@ from stiffness.screws import rotation_vector, screw_map, skew
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """A robot moved by finite screws; closures may be open.
+    """A robot moved by finite screws; its closures may be open.
 
     Attributes:
-        model: the robot.
-        x: (N,) the unknowns.
+        model: the prepared robot.
+        x: (N,) values of the unknowns.
     """
 
     model: FiniteRobot
@@ -60,7 +61,7 @@ class Placement:
 
     @cached_property
     def own(self) -> NDArray:
-        """(n,) [rad or m] motion of passive joints beyond their coordinate."""
+        """(n,) [rad or m] motion of passive joints in addition to their coordinate."""
         m = self.model
         rows = m.motion == OWN
         axes = np.array([frame.own_axis for frame in m.posture.robot.frames])
@@ -71,7 +72,7 @@ class Placement:
 
     @cached_property
     def _poses(self) -> NDArray:
-        """(5, n, 4, 4) poses before each motion of a frame, and after small ones."""
+        """(5, n, 4, 4) poses before each motion of a frame, and after the last one."""
         robot = self.model.posture.robot
         link, clearance, spring = exponential(self.screws)
         local = [
@@ -90,18 +91,18 @@ class Placement:
 
     @property
     def body_ends(self) -> NDArray:
-        """(n, 4, 4) ends of the bodies, before their joint's clearance and springs."""
+        """(n, 4, 4) ends of the bodies, before clearance and springs of the joint."""
         return self._poses[1]
 
     @cached_property
     def carried(self) -> NDArray:
-        """(n, 4, 4) frames after their joint's coordinate."""
+        """(n, 4, 4) frames after the coordinate of their joint."""
         posture = self.model.posture
         return self.transforms @ along_own(posture.robot, posture.coordinates)
 
     @property
     def transforms(self) -> NDArray:
-        """(n, 4, 4) frames seen from the base, before their joint's coordinate."""
+        """(n, 4, 4) frames in the base frame, before the coordinate of their joint."""
         return self._poses[4]
 
     @property
@@ -133,7 +134,7 @@ class Placement:
 
     @cached_property
     def residual(self) -> NDArray:
-        """(6 K,) of the closures: [rad], translations per reference length."""
+        """(6 K,) residual of the closures: [rad], translations per reference length."""
         return (self._open_screws * self.model.scale).ravel()
 
     @cached_property
@@ -143,7 +144,7 @@ class Placement:
 
     @cached_property
     def _readings(self) -> NDArray:
-        """(N, 6, 6) maps of each unknown's screw to the platform's origin."""
+        """(N, 6, 6) maps from each unknown's screw to the platform's origin."""
         m = self.model
         before = self._poses[m.motion, m.frame]
         offset = before[:, :3, 3] - m.posture.platform[:3, 3]
@@ -190,14 +191,15 @@ class Placement:
     def curvature(self, multipliers: NDArray, load: NDArray) -> NDArray:
         """Return second derivative of multipliers . residual + load . platform screw.
 
-        Exact where the closures hold; elsewhere off by the order of the residual.
+        It is exact if the closures hold; otherwise its error is of the order of the
+        residual.
 
         Args:
-            multipliers: (6 K,) of the scaled residual.
+            multipliers: (6 K,) multipliers of the scaled residual.
             load: (6,) [N m, N] on the platform at its origin, base axes.
 
         Returns:
-            (N, N) symmetric.
+            (N, N) symmetric matrix.
         """
         m = self.model
         wrenches = multipliers.reshape(-1, 6) * m.scale
@@ -213,14 +215,14 @@ class Placement:
         return H + self.exponential_curvature(through)
 
     def exponential_curvature(self, through: NDArray) -> NDArray:
-        """Return the part of the curvature from each single exponential.
+        """Return the part of the curvature that is due to each single exponential.
 
         Args:
-            through: (N, 6) wrench on what each unknown moves, at the platform's nominal
-                origin, base axes.
+            through: (N, 6) wrench on all that each unknown moves, at the platform's
+                nominal origin, base axes.
 
         Returns:
-            (N, N) symmetric.
+            (N, N) symmetric matrix.
         """
         m = self.model
         local = np.einsum("nji,nj->ni", self._readings, through)
@@ -232,22 +234,23 @@ class Placement:
         return (rows @ m.columns.T) * m.same_motion
 
     def load_wrench(self, load: NDArray) -> NDArray:
-        """Return the (6,) wrench at the nominal origin that does the load's work."""
+        """Return (6,) wrench at the nominal origin that does the work of the load."""
         moment = np.linalg.solve(turn_jacobian(self.platform_screw[:3]).T, load[:3])
         arm = self.platform_screw[3:]
         return np.concatenate([moment + np.cross(arm, load[3:]), load[3:]])
 
     def _load_curvature(self, load: NDArray) -> NDArray:
-        """Return the load's curvature without that of its wrench's brackets."""
+        """Return the load's curvature without the part of its wrench's brackets."""
         W, turn = self._at_origin, self.platform_screw[:3]
         order = self.model._order
         V = self.moves * self.model.on_platform
         later = np.sign(order - order[:, None])
         H = (V.T @ bracket_form(self.load_wrench(load)) @ V) * later / 2
-        # a rotation by w moves the origin, which moves by v itself, by w x v / 2
+        # a rotation by w moves the origin, whose translation is v, by w x v / 2
         of_force = -W[:3].T @ skew(load[3:]) @ W[3:]
         H += (of_force + of_force.T) / 2
-        # exp(turn + h) = exp(J h + D(h, h) / 2) exp(turn): h for a given turn before it
+        # exp(turn + h) = exp(J h + D(h, h) / 2) exp(turn), for a given rotation before
+        # h
         along, zero = np.linalg.solve(turn_jacobian(turn), W[:3]), np.zeros(3)
         moment = np.linalg.solve(turn_jacobian(turn).T, load[:3])
         form = second_form(np.append(turn, zero), np.append(moment, zero))
@@ -258,10 +261,10 @@ def place(model: FiniteRobot, x: NDArray) -> Placement:
     """Return the robot moved by finite screws.
 
     Args:
-        model: the robot.
-        x: (N,) the unknowns.
+        model: the prepared robot.
+        x: (N,) values of the unknowns.
 
     Returns:
-        The positions of all frames.
+        The placement, with positions of all frames.
     """
     return Placement(model, np.array(x, dtype=float))

@@ -10,16 +10,22 @@ kind          read                                                        writte
 ============  ==========================================================  ==========
 """
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from assembly.drawing.drawing_of_robot import drawing_of_robot
 from assembly.exchange.as_robot import RobotAndMechanism, mechanism_of_robot
 from assembly.exchange.calibrated import not_rigid, with_calibration
 from assembly.exchange.comparison import compare
 from assembly.exchange.conversion import Conversion
-from assembly.exchange.fidelity import FAITHFUL, largest_difference
+from assembly.exchange.fidelity import (
+    FAITHFUL,
+    drawn_difference,
+    largest_difference,
+)
 from assembly.exchange.foreign import READERS, robot_of_file
 from assembly.exchange.home_pose import CLOSED, loop_residual, nearest_closed
 from assembly.exchange.loops_file import LoopsFile, loops_text, read_loops
@@ -29,6 +35,7 @@ from assembly.exchange.mjcf_writing import mjcf_text
 from assembly.exchange.overlay import lay_over
 from assembly.exchange.urdf import read_urdf
 from assembly.exchange.urdf_writing import XML_MARK, loops_of, urdf_text
+from assembly.files.drawing_writing import drawing_text
 from assembly.files.robot_file import (
     Closing,
     read_robot,
@@ -40,6 +47,7 @@ from assembly.kinematics.posture import home_posture
 from assembly.model.robot import Robot
 from assembly.robots import load_robot
 from forcefit.inputs.errors import BadInput, quoted
+from forcefit.inputs.table import Table
 from forcefit.inputs.writing import ROBOT, Kind, check_writable, write_text
 
 _BEGINS = (XML_MARK.lower().encode(),)
@@ -60,6 +68,7 @@ def convert(
     overlay: Path | str | None = None,
     points: Sequence[str] | None = None,
     close: Closing | None = None,
+    version: int = 1,
 ) -> Conversion:
     """Convert a robot between a robot file and the files of other programs.
 
@@ -75,6 +84,8 @@ def convert(
             become points, and the result reports it.
         close: for a robot file or built-in robot, as
             :func:`assembly.kinematics.closing.closing_of`; none if absent.
+        version: format of a robot file that is written: 1 for frames and closures, 2
+            for bodies and joints.
 
     Returns:
         The files written, and their difference from the source.
@@ -85,6 +96,11 @@ def convert(
     """
     source, target = Path(source), Path(target)
     check_target(target)
+    if version == 2 and target.suffix.lower() != ".toml":
+        raise BadInput(
+            f"--format 2: found together with the file {target}, expected a robot file "
+            "(.toml)"
+        )
     if source.suffix.lower() in READERS:
         if close is not None:
             raise BadInput(
@@ -93,7 +109,7 @@ def convert(
                 "conversion computes a home pose that closes"
             )
         conversion, placed = robot_of_file(source, loops, overlay, points)
-        return _written(conversion, placed, target)
+        return _written(conversion, placed, target, version)
     for option, given in (("--points", points), ("--loops", loops)):
         if given:
             raise BadInput(
@@ -104,7 +120,7 @@ def convert(
     if overlay is not None:
         content = robot_table(robot, Path(overlay).parent)
         robot = robot_of(lay_over(content, overlay), robot.name)
-    return write_converted(robot, target)
+    return write_converted(robot, target, version)
 
 
 def check_target(target: Path) -> None:
@@ -126,12 +142,13 @@ def check_target(target: Path) -> None:
         check_writable(target.with_suffix(".yaml"), _LOOPS)
 
 
-def write_converted(robot: Robot, target: Path) -> Conversion:
+def write_converted(robot: Robot, target: Path, version: int = 1) -> Conversion:
     """Write a robot to a robot file, a URDF or an MJCF file, and read it back.
 
     Args:
         robot: any robot.
         target: a ``.toml``, ``.urdf`` or ``.xml`` file.
+        version: format of a robot file, see :func:`convert`.
 
     Returns:
         The files written, and their difference from the robot.
@@ -149,23 +166,32 @@ def write_converted(robot: Robot, target: Path) -> Conversion:
         difference=0.0,
         left_out=(),
     )
-    return _written(conversion, None, target)
+    return _written(conversion, None, target, version)
 
 
 def _written(
-    conversion: Conversion, placed: RobotAndMechanism | None, target: Path
-) -> Conversion:
+    conversion: Conversion, placed: RobotAndMechanism | None, target: Path,
+    version: int = 1,
+) -> Conversion:  # fmt: skip
     """Write, read back and compare in a temporary folder, then move to the target."""
     ending, robot = target.suffix.lower(), conversion.robot
+    texts: dict[Path, str] = {}
     with TemporaryDirectory() as folder:
         trial = Path(folder) / target.name
-        if ending == ".toml":
+        if version == 2:
+            drawn = drawing_of_robot(robot)
+            text = drawing_text(robot, drawn.drawing, target.parent)
+            texts = {target: text}
+            root = Table(tomllib.loads(text), str(target), "")
+            difference = drawn_difference(robot, robot_of(root, ""), drawn.frames)
+            lost = (*conversion.left_out, *drawn.left_out)
+            conversion = replace(conversion, left_out=lost)
+        elif ending == ".toml":
             write_robot(robot, trial)
             if placed is None:
                 home = home_posture(robot).coordinates
                 placed = mechanism_of_robot(robot, home)
             difference = largest_difference(replace(placed, robot=read_robot(trial)))
-            texts: dict[Path, str] = {}
         else:
             conversion, built = _built_in(conversion)
             texts = _texts(built.mechanism, target)

@@ -1,12 +1,16 @@
 """Accuracy of a written robot: comparison in random postures."""
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from assembly.exchange.as_robot import RobotAndMechanism
 from assembly.exchange.mechanism import body_poses
 from assembly.exchange.tree import place_frames
 from assembly.kinematics.nominal import KINDS
-from assembly.model.robot import BASE
+from assembly.kinematics.posture import home_posture
+from assembly.model.robot import BASE, Robot
 from forcefit.inputs.errors import BadInput
 
 FAITHFUL = 1e-12  # [rad, lengths] largest difference of a body's pose
@@ -52,3 +56,59 @@ def largest_difference(placed: RobotAndMechanism) -> float:
             gap = (poses[name] - frames[frame] @ at)[:3] * scale
             worst = max(worst, float(np.abs(gap).max()))
     return worst
+
+
+def drawn_difference(robot: Robot, back: Robot, frames: Mapping[str, str]) -> float:
+    """Return the largest difference of a robot from that of its drawing.
+
+    Joints that both trees pass in the same order are moved at random, as in
+    :func:`largest_difference`; ball, cylindrical and planar joints stay at home.
+
+    Args:
+        robot: that was written.
+        back: the robot of the drawing.
+        frames: names of the frames of joints in it, by their names in the robot.
+
+    Returns:
+        Largest difference of a joint's point, over the largest distance from the base
+        if that is above 1 m, and of its axis; of the platform's point likewise.
+    """
+    homes = home_posture(robot).coordinates, home_posture(back).coordinates
+    rows = [(robot.index(a), back.index(b)) for a, b in frames.items()]
+    pairs = [(i, k) for i, k in rows if robot.frames[i].joint != "fixed"]
+    same = [(i, k) for i, k in rows if _passes(robot, i, pairs, 0) ==
+            _passes(back, k, pairs, 1)]  # fmt: skip
+    ends = robot.index(robot.platform), back.index(back.platform)
+    reached = _passes(robot, ends[0], pairs, 0) == _passes(back, ends[1], pairs, 1)
+    random, worst = np.random.default_rng(0), 0.0
+    for _ in range(_POSTURES):
+        q, p = (home.copy() for home in homes)
+        for i, k in pairs:
+            step = random.uniform(-1, 1)
+            q[i] += step
+            p[k] += step
+        T, U = _placed(robot, q), _placed(back, p)
+        reach = max(1.0, float(np.abs(T[:, :3, 3]).max()))
+        for i, k in [*same, *([ends] if reached else [])]:
+            gap = np.abs(T[i, :3, 3] - U[k, :3, 3]).max() / reach
+            z = T[i, :3, 2], U[k, :3, 2]
+            turned = 0.0 if (i, k) == ends else np.abs(np.cross(*z)).max()
+            worst = max(worst, float(gap), float(turned))
+    return worst
+
+
+def _passes(
+    robot: Robot, row: int, pairs: Sequence[tuple[int, int]], which: int
+) -> tuple[object, ...]:
+    """Return the joints before a frame: numbers of pairs, other joints by name."""
+    numbers = {pair[which]: k for k, pair in enumerate(pairs)}
+    passed = np.flatnonzero(robot.on_path[row]).tolist()
+    moving = [i for i in passed if i != row and robot.frames[i].joint != "fixed"]
+    return tuple(numbers[i] for i in moving if i in numbers)
+
+
+def _placed(robot: Robot, q: NDArray) -> NDArray:
+    """Return (n, 4, 4) frames before their joints' motions."""
+    kinds = np.array([KINDS[f.joint] for f in robot.frames])
+    leads = np.array([f.lead for f in robot.frames])
+    return place_frames(robot.parents, kinds, robot.fixed_transforms, q, leads)[0]

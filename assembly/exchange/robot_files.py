@@ -13,6 +13,7 @@ from assembly.files.robot_file import write_robot as write_robot_file
 from assembly.files.solved_links import solve_links
 from assembly.model.robot import Robot
 from assembly.robots import load_robot as load_declared
+from assembly.steps.bolted import bolt_joints
 from forcefit.inputs.errors import BadInput, describe
 from forcefit.inputs.table import read_bytes
 
@@ -43,7 +44,8 @@ def load_robot(
             :mod:`assembly.kinematics.closing` does; none if absent.
         links: whether links given by a mesh or a library are solved or read now, which
             solvers need.  Without them a robot can be placed, written and converted,
-            and its assembly zone can be computed.
+            and its assembly zone can be computed.  A robot with joints that are bolted
+            at a pose needs them always.
 
     Returns:
         The robot; its remarks include the assumptions and omissions for a file of
@@ -58,7 +60,9 @@ def load_robot(
     for remark in robot.remarks:
         _LOG.info("%s: %s", robot.name, remark)
     try:
-        return solve_links(robot) if links else robot
+        if links or any(frame.locked_at for frame in robot.frames):
+            robot = bolt_joints(solve_links(robot))
+        return robot
     except BadInput as error:
         raise BadInput(f"{name}: {error}") from None
 

@@ -13,6 +13,7 @@ from assembly.drawing.drawing import (
     DrawnJoint,
     turned_joint,
 )
+from assembly.files.callout_file import read_drawn_callouts
 from assembly.files.drawn_body import (
     LONGEST_NAME,
     Copy,
@@ -73,9 +74,14 @@ def read_drawing(root: Table, name: str, description: str) -> Drawing:
         for body, copied in found
     ]
     remarks = link_remarks(bodies, joints, copies)
+    callouts = [
+        callout for copied in copies
+        for callout in read_drawn_callouts(copied, bodies, joints)
+    ]  # fmt: skip
     return Drawing(
-        name, platform, at, tuple(bodies), tuple(joints), description, remarks
-    )
+        name, platform, at, tuple(bodies), tuple(joints), description, remarks,
+        tuple(callouts),
+    )  # fmt: skip
 
 
 def _copies(root: Table) -> Iterator[Copy]:

@@ -58,6 +58,7 @@ def read_bodies(copied: Copy) -> Iterator[DrawnBody]:
         for key in ("from", "to"):
             if table.has(key) and link is None:
                 raise table.bad(key, 'found one without "link", expected both')
+        table.tables("tolerance")  # read when all joints are known
         table.finish()
         yield turned_body(body, copied.T)
 

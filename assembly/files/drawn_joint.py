@@ -6,20 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.drawing.drawing import FREE_ROWS, DrawnJoint, JointNumbers, perpendicular
-from assembly.files.joint_file import (
-    read_clearance,
-    read_joint_stiffness,
-    read_pitch,
-)
+from assembly.files.bolt_file import read_locked_at
+from assembly.files.drawn_clearance import read_drawn_clearance
+from assembly.files.joint_file import read_fit, read_joint_stiffness, read_pitch
 from assembly.files.written_units import SCREW, without_units
 from assembly.model.largest import LARGEST, LARGEST_LENGTH
-from assembly.model.robot import Clearance
 from forcefit.inputs.table import Table
 
 ONE_FREEDOM = ("revolute", "prismatic", "helical")
 _PARALLEL = 1e-3  # sine of the angle between two axes below which they are parallel
 _KEYS = ("clearance", "joint_stiffness", "geometric_error", "tolerance")
-_BOUNDS = {"tilt": (0, 1), "spin": (2,), "radial": (3, 4), "axial": (5,)}
 _ROWS = ("RX", "RY", "RZ", "TX", "TY", "TZ")
 
 
@@ -129,11 +125,16 @@ def _one(table: Table, kind: str, actuated: bool) -> JointNumbers:
         without_units(table, key, SCREW)
     zero = np.zeros(6)
     error = table.array("geometric_error", (6,), "rad, m", zero, largest=LARGEST_LENGTH)
+    clearance, contacts = read_drawn_clearance(table, kind)
+    clearance, bolt = read_locked_at(table, kind == "fixed", clearance)
     return JointNumbers(
-        clearance=_clearance(table, kind),
+        clearance=clearance,
+        contacts=contacts,
         stiffness=_stiffness(table, kind, actuated),
         error=error,
         tolerance=_tolerance(table),
+        locked_at=bolt,
+        fit=read_fit(table),
     )
 
 
@@ -146,24 +147,6 @@ def _tolerance(table: Table) -> NDArray | None:
         fault = f"found {sigma.min():g} in it, expected 6 numbers >= 0 [rad, m]"
         raise table.bad("tolerance", fault)
     return sigma
-
-
-def _clearance(table: Table, kind: str) -> Clearance | None:
-    """The bounds; none along the free motions of a joint of several freedoms."""
-    content = table.content.get("clearance")
-    if isinstance(content, dict):
-        inner = Table(content, table.file, f"{table.place}.clearance")
-        for key in _BOUNDS:
-            angle = key in {"tilt", "spin"}
-            without_units(inner, key, "angle" if angle else "length")
-    found = read_clearance(table, kind)
-    free = FREE_ROWS[kind]
-    for key, rows in _BOUNDS.items():
-        if len(free) > 1 and found and getattr(found, key) is not None:
-            if set(rows) & set(free):
-                fault = f"found a bound of a free motion of a {kind} joint"
-                raise table.bad(f"clearance.{key}", f"{fault}, expected none")
-    return found
 
 
 def _stiffness(table: Table, kind: str, actuated: bool) -> NDArray | None:

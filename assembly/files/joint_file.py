@@ -3,16 +3,18 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.callouts.fits import Fit, clearance_fit
+from assembly.model.frame import ONE_OF_BALL, SLIDING_BALL
 from assembly.model.largest import LARGEST, LARGEST_LENGTH
 from assembly.model.robot import LOCKED, NO_SPIN, Clearance
 from forcefit.inputs.number_arrays import find_fault, number_array
-from forcefit.inputs.table import Table
+from forcefit.inputs.table import BadInput, Table
 
 # [rad, m] smaller values are refused, because their square is 0
 _LEAST_CLEARANCE = 1e-30
 _LEAST_PITCH = 1e-9  # [m] smaller pitches are refused
 _LARGEST_PITCH = 1.0  # [m] larger pitches are refused
-_CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad"}
+_CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad", "ball": "m"}
 
 
 def read_pitch(table: Table, joint: str) -> float:
@@ -51,25 +53,70 @@ def read_clearance(table: Table, joint: str) -> Clearance | None:
         The given bounds.
 
     Raises:
-        BadInput: an unknown key, a value that is not a finite number >= 0, or one so
-            small that its square is 0.
+        BadInput: an unknown key, or a bound that :func:`read_bounds` refuses.
     """
     if not table.has("clearance"):
         return None
     inner = table.table("clearance")
+    bounds = read_bounds(inner, joint)
+    inner.finish()
+    return bounds
+
+
+def read_bounds(table: Table, joint: str) -> Clearance:
+    """Return the bounds of a ``clearance`` table, which may have other keys too.
+
+    Args:
+        table: the table.
+        joint: type of the joint.
+
+    Returns:
+        The given bounds.
+
+    Raises:
+        BadInput: a value is not a finite number >= 0, or so small that its square is 0;
+            or ``ball`` is given with another bound of the same motion.
+    """
     bounds = {
-        key: inner.number(key, unit, least=0.0, largest=LARGEST_LENGTH)
+        key: table.number(key, unit, least=0.0, largest=LARGEST_LENGTH)
         for key, unit in _CLEARANCE.items()
-        if inner.has(key)
+        if table.has(key)
     }
     if joint == "helical" and "spin" in bounds:
-        raise inner.bad("spin", f"found one on a helical joint, {NO_SPIN}")
+        raise table.bad("spin", f"found one on a helical joint, {NO_SPIN}")
     for key, bound in bounds.items():
         if 0.0 < bound < _LEAST_CLEARANCE:
             expected = f"expected 0 or at least {_LEAST_CLEARANCE:g}"
-            raise inner.bad(key, f"found {bound:g}, {expected}")
-    inner.finish()
+            raise table.bad(key, f"found {bound:g}, {expected}")
+    if fit := _fit(table):
+        bounds["radial"] = fit.mean_radial
+    if "ball" in bounds:
+        if joint in {"prismatic", "helical"}:
+            raise table.bad("ball", SLIDING_BALL)
+        for key in ("radial", "axial"):
+            if key in bounds:
+                raise table.bad(key, ONE_OF_BALL)
     return Clearance(**bounds)
+
+
+def read_fit(table: Table) -> str:
+    """Return the ISO 286 fit of the ``clearance`` table, empty if it has none."""
+    content = table.content.get("clearance")
+    fit = content.get("fit") if isinstance(content, dict) else None
+    return fit.strip() if isinstance(fit, str) else ""
+
+
+def _fit(inner: Table) -> Fit | None:
+    """Return the fit of a clearance, None if it has none."""
+    if not inner.has("fit"):
+        return None
+    if inner.has("radial"):
+        raise inner.bad("radial", 'found it together with "fit", expected one of them')
+    text = inner.text("fit", expected='a fit such as "12 H7/g6"')
+    try:
+        return clearance_fit(text)
+    except BadInput as error:
+        raise inner.bad("fit", str(error)) from None
 
 
 def read_joint_stiffness(table: Table, free: int | None = None) -> NDArray | None:

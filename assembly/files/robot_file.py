@@ -1,7 +1,7 @@
 """Robot files read and written (``docs/robot_files.md``), with all rules checked."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,16 +9,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.callouts.fits import parse_fit
 from assembly.drawing.frames import robot_of_drawing
+from assembly.files.bolt_file import bolt_table, read_locked_at
+from assembly.files.callout_file import callout_table, read_frame_callouts
 from assembly.files.drawing_file import is_drawing, read_drawing
 from assembly.files.effect_file import effect_tables, with_effects
 from assembly.files.inertia_file import read_inertia
 from assembly.files.joint_file import (
     read_clearance,
+    read_fit,
     read_joint_stiffness,
     read_pitch,
 )
 from assembly.files.link_file import link_table, read_link
+from assembly.files.toml_text import file_text
+from assembly.kinematics.callout_maps import place_callouts
 from assembly.kinematics.posture import home_posture
 from assembly.model.frame import FORCE_CONTROL
 from assembly.model.inertia import six_moments
@@ -41,7 +47,6 @@ from forcefit.inputs.table import (
 )
 from forcefit.inputs.writing import (
     ROBOT,
-    ROBOT_MARK,
     check_writable,
     path_from,
     write_text,
@@ -88,7 +93,9 @@ def robot_of(root: Table, name: str, close: Closing | None = None) -> Robot:
     robot = declared_robot(root, name)
     try:
         robot = robot if close is None else close(robot)
-        return with_spans(robot, home_posture(robot).coordinates)
+        home = home_posture(robot)
+        place_callouts(home)  # whether they fit the geometry
+        return with_spans(robot, home.coordinates)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
 
@@ -119,8 +126,9 @@ def declared_robot(root: Table, name: str) -> Robot:
     effects = root.tables("effect")
     robot = (_drawn if is_drawing(root) else _framed)(root, name, description)
     robot = replace(
-        robot, learned_range=ranges, reference_point=point, diagnosis=diagnosis
-    )
+        robot, learned_range=ranges, reference_point=point, diagnosis=diagnosis,
+        remarks=(*robot.remarks, *_fit_remarks(robot)),
+    )  # fmt: skip
     return with_effects(robot, effects)
 
 
@@ -142,6 +150,7 @@ def _framed(root: Table, name: str, description: str) -> Robot:
     """Return the robot of a file of frames and closures."""
     platform = root.text("platform", expected="the name of a frame")
     tables = root.tables("frame"), root.tables("closure")
+    root.tables("tolerance")  # read when all frames are known
     root.finish()
     if not 0 < len(tables[0]) <= MOST_FRAMES:
         fault = f"found {len(tables[0])}" if tables[0] else "missing"
@@ -149,11 +158,14 @@ def _framed(root: Table, name: str, description: str) -> Robot:
     frames = tuple(_frame(table) for table in tables[0])
     names = [frame.name for frame in frames]
     closures = tuple(_closure(table, names) for table in tables[1])
+    callouts = read_frame_callouts(root, names)
     _check_known(root, "platform", platform, names)
     try:
         robot = Robot(
-            name, platform, frames, closures, description, remarks=_remarks(tables[0])
-        )
+            name, platform, frames, closures, description,
+            remarks=_remarks(tables[0]), callouts=callouts,
+            fits={t.content["name"]: fit for t in tables[0] if (fit := read_fit(t))},
+        )  # fmt: skip
         _check_meeting_frames(robot)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
@@ -226,6 +238,18 @@ def _remarks(tables: list[Table]) -> tuple[str, ...]:
     return (f"dh without alpha, taken as 0: {', '.join(without_alpha)}",)
 
 
+def _fit_remarks(robot: Robot) -> tuple[str, ...]:
+    """Return a remark on the fits, of which one clearance is used."""
+    texts = []
+    for name, text in robot.fits.items():
+        fit = parse_fit(text)
+        mean, (least, most) = 1e6 * fit.mean_radial, (1e6 * r for r in fit.radial)
+        texts.append(
+            f"{quoted(name)} {text}, {mean:.4g} um of {least:.4g} to {most:.4g}"
+        )
+    return (f"mean radial clearance of fits: {'; '.join(texts)}",) if texts else ()
+
+
 def _frame(table: Table) -> Frame:
     """Return one ``[[frame]]``."""
     name = table.text("name", longest=_LONGEST_NAME)
@@ -240,6 +264,9 @@ def _frame(table: Table) -> Frame:
     translation, rotation = _placement(table)
     passive = joint != "fixed" and not actuated
     own = (5 if joint == "prismatic" else 2) if passive else None
+    clearance, bolt = read_locked_at(
+        table, joint == "fixed", read_clearance(table, joint)
+    )
     frame = Frame(
         name=name,
         parent=table.text("parent", expected='the name of a frame, or "base"'),
@@ -252,7 +279,8 @@ def _frame(table: Table) -> Frame:
         limits=_limits(table),
         geometric_error=_numbers(table, "geometric_error", 6, "rad, m"),
         tolerance=_tolerance(table),
-        clearance=read_clearance(table, joint),
+        clearance=clearance,
+        locked_at=bolt,
         joint_stiffness=read_joint_stiffness(table, own),
         drive_force=_drive_force(table, passive),
         link=read_link(table),
@@ -364,7 +392,7 @@ def _check_meeting_frames(robot: Robot) -> None:
     for place, names in meeting.items():
         for name in names:
             frame = robot.frame(name)
-            keys = ("clearance", "joint_stiffness")
+            keys = ("clearance", "locked_at", "joint_stiffness")
             has = [key for key in keys if getattr(frame, key) is not None]
             if frame.joint != "fixed" or has:
                 fault = has[0] if has else f"a {frame.joint} joint"
@@ -389,17 +417,12 @@ def write_robot(robot: Robot, path: Path | str) -> None:
     check_writable(path, ROBOT)
     table = robot_table(robot, Path(path).parent)
     frames, closures = table.pop("frame"), table.pop("closure", [])
+    callouts = table.pop("tolerance", [])
     effects, diagnosis = table.pop("effect", []), table.pop("diagnosis", {})
-    lines = [ROBOT_MARK, *(f"{k} = {_toml(v)}" for k, v in table.items())]
-    if diagnosis:
-        lines += ["", "[diagnosis]"]
-        lines += [f"{k} = {_toml(v)}" for k, v in diagnosis.items()]
-    kinds = {"frame": frames, "closure": closures, "effect": effects}
-    for kind, tables in kinds.items():
-        for inner in tables:
-            pairs = (f"{k} = {_toml(v)}" for k, v in inner.items())
-            lines += ["", f"[[{kind}]]", *pairs]
-    write_text("\n".join(lines) + "\n", path)
+    kinds = {
+        "frame": frames, "closure": closures, "tolerance": callouts, "effect": effects
+    }  # fmt: skip
+    write_text(file_text(table, kinds, diagnosis), path)
 
 
 def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
@@ -411,6 +434,31 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
 
     Returns:
         Plain values; :func:`robot_of` reads them back to the same robot.
+    """
+    table = root_table(robot, folder)
+    table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
+    for frame in table["frame"]:
+        if frame["name"] in robot.fits:
+            del frame["clearance"]["radial"]
+            frame["clearance"]["fit"] = robot.fits[frame["name"]]
+    if robot.closures:
+        table["closure"] = [{"frames": list(pair)} for pair in robot.closures]
+    if robot.callouts:
+        table["tolerance"] = [callout_table(callout) for callout in robot.callouts]
+    if robot.has_effects:
+        table["effect"] = effect_tables(robot)
+    return table
+
+
+def root_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
+    """Return the content of a robot file without its frames and closures.
+
+    Args:
+        robot: any robot.
+        folder: folder of the file to be written, to which paths are made relative.
+
+    Returns:
+        Plain values.
     """
     table: dict[str, Any] = {"name": robot.name}
     if robot.description:
@@ -425,11 +473,6 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
         path = table["diagnosis"].get("covariance")
         if path and folder is not None:
             table["diagnosis"]["covariance"] = path_from(folder.resolve(), path)
-    table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
-    if robot.closures:
-        table["closure"] = [{"frames": list(pair)} for pair in robot.closures]
-    if robot.has_effects:
-        table["effect"] = effect_tables(robot)
     return table
 
 
@@ -454,13 +497,19 @@ def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
             table["actuated"] = True
         if frame.limits is not None:
             table["limits"] = list(frame.limits)
-    if np.any(frame.geometric_error):
-        table["geometric_error"] = frame.geometric_error.tolist()
+    bolt, error = frame.locked_at, frame.geometric_error
+    if bolt is not None:
+        error = error - bolt.screw
+    if np.any(error):
+        table["geometric_error"] = error.tolist()
     if frame.tolerance is not None:
         table["tolerance"] = frame.tolerance.tolist()
-    if frame.clearance is not None:
-        given = vars(frame.clearance).items()
+    clearance = frame.clearance if bolt is None else bolt.clearance
+    if clearance is not None:
+        given = vars(clearance).items()
         table["clearance"] = {k: v for k, v in given if v is not None}
+    if bolt is not None:
+        table["locked_at"] = bolt_table(bolt)
     if frame.joint_stiffness is not None:
         K = frame.joint_stiffness
         diagonal = np.array_equal(K, np.diag(np.diag(K)))
@@ -476,29 +525,3 @@ def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
     if np.any(frame.inertia):
         table["inertia"] = six_moments(frame.inertia)
     return table
-
-
-def _toml(value: Any) -> str:
-    """Return a value in TOML, arrays and tables inline, floats with all digits."""
-    # tomli-w writes every number of an array on its own line
-    if isinstance(value, bool | np.bool_):
-        return str(value).lower()
-    if isinstance(value, str):
-        return f'"{"".join(map(_escaped, value))}"'
-    if isinstance(value, Mapping):
-        inner = ", ".join(f"{_key(k)} = {_toml(v)}" for k, v in value.items())
-        return "{ " + inner + " }"
-    if isinstance(value, Iterable):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    return repr(value) if isinstance(value, int) else repr(float(value))
-
-
-def _key(name: str) -> str:
-    """Return a key, in quotes if it would otherwise be read differently."""
-    bare = name and all(c.isascii() and (c.isalnum() or c in "-_") for c in name)
-    return name if bare else _toml(name)
-
-
-def _escaped(c: str) -> str:
-    """Return a character as written in double quotes."""
-    return f"\\u{ord(c):04x}" if c < " " or c in '"\\\x7f' else c

@@ -1,5 +1,7 @@
 """What a robot file holds, for editors: the keys that its reader knows."""
 
+from assembly.callouts.callout import HELD, LOCATIONS, ORIENTATIONS, SHAPES
+from assembly.callouts.zone import DISTRIBUTIONS
 from assembly.drawing.drawing import FREE_ROWS
 from assembly.effects import LIBRARY
 from assembly.effects.forms import FORMS
@@ -59,6 +61,17 @@ _LINK = record(
     pieces_=number("springs in series of a beam"),
     parts_=text("solids of other materials", "part"),
 )  # fmt: skip
+_LOCKED_AT = Either((
+    Words(("home",)),
+    record(pose_=Each(number("pose of the platform", "m, rad")),
+           joints_=Each(number("coordinate of a drive", "rad or m"))),
+))  # fmt: skip
+_CLEARANCE = record(
+    radial_=number("radial clearance", "m"), axial_=number("axial clearance", "m"),
+    tilt_=number("tilt clearance", "rad"), spin_=number("clearance about z", "rad"),
+    ball_=number("clearance of a ball in its socket", "m"),
+    fit_=text('fit of ISO 286 in place of radial, such as "12 H7/g6"'),
+)  # fmt: skip
 _FRAME = record(
     name=text("name"), parent=text('name of a frame, or "base"'),
     translation_=number("translation from the parent", "m", "axis"),
@@ -74,10 +87,8 @@ _FRAME = record(
     limits_=number("least and largest coordinate", "rad or m", "bound"),
     geometric_error_="geometric_error",
     tolerance_=number("standard deviations of the geometric error", "rad, m", "screw"),
-    clearance_=record(
-        radial_=number("radial clearance", "m"), axial_=number("axial clearance", "m"),
-        tilt_=number("tilt clearance", "rad"), spin_=number("clearance about z", "rad"),
-    ),
+    clearance_=_CLEARANCE,
+    locked_at_=_LOCKED_AT,
     joint_stiffness_=Either((
         number("diagonal stiffness", "N m/rad .. N/m", "screw"), _STIFFNESS,
     )),
@@ -85,6 +96,26 @@ _FRAME = record(
     link_=_LINK, up_=_DIRECTION, mass_=number("mass", "kg"),
     centre_of_mass_=number("centre of mass", "m", "axis"), inertia_=_INERTIA,
 )  # fmt: skip
+_WIDTH = Either((number("width", "m"), text('width, such as "0.05 mm"')))
+_CALLOUT = record(
+    feature=text("frame, or joint of the body"), name_=text("name in tables"),
+    **{f"{word}_": _WIDTH for word in (*LOCATIONS, *ORIENTATIONS)},
+    extent_=Either((_WIDTH, Listed(_WIDTH))),
+    hole_=text('size of a hole with (M), such as "12 H7"'),
+    direction_=_DIRECTION, length_=text('length, such as "452 +- 0.1 mm"'),
+    general_=text('"ISO 2768-mK"'), distribution_=Words((*DISTRIBUTIONS,)),
+    cp_=number("capability of a normal distribution"),
+)  # fmt: skip
+_OF_FRAME_FEATURE = record(
+    "", _CALLOUT, after_=flag("feature after the joint"), shape_=Words((*SHAPES,)),
+    axis_=_DIRECTION, at_=_POINT,
+    datums=Listed(Either((
+        text("frame"),
+        record(frame=text("frame"), shape_=Words((*HELD,)), axis_=_DIRECTION,
+               at_=_POINT),
+    ))),
+)  # fmt: skip
+_OF_BODY_FEATURE = record("", _CALLOUT, datums=text("joints, A first", "joint"))
 _NUMBERS = Each(number("parameter", ""))
 _EFFECT = record(
     name=Words((*LIBRARY, FUNCTION)), parameters_=_NUMBERS, session_=text("session"),
@@ -104,11 +135,30 @@ _OF_FRAMES = record(
     "", _COMMON, format_=Words((1,)), platform=text("name of the platform's frame"),
     frame=Listed(_FRAME),
     closure_=Listed(record(frames=text("two frames that meet", "frame"))),
+    tolerance_=Listed(_OF_FRAME_FEATURE),
+)  # fmt: skip
+_GAP = number("gap from the middle to one side", "m")
+_CONTACTS = record(
+    "", _CLEARANCE, length_=number("length of the bore", "m"),
+    bearings_=Listed(record(z=number("height", "m"), radial=_GAP)),
+    guide_=record(
+        gap=Either((_GAP, number("gaps along x and y", "m", "axis"))),
+        length=number("length along the axis", "m"),
+        width=number("width along x", "m"), height=number("height along y", "m"),
+    ),
+    pad_=record(
+        gap=_GAP, length=number("length along x", "m"),
+        width=number("width along y", "m"),
+    ),
 )  # fmt: skip
 # of a universal joint one for each of its two bearings
 _OF_JOINT = record(**{
-    f"{key}_": Either((_FRAME.content[key], Listed(_FRAME.content[key])))
-    for key in ("clearance", "joint_stiffness", "geometric_error", "tolerance")
+    f"{key}_": Either((one, Listed(one)))
+    for key, one in (
+        ("clearance", _CONTACTS),
+        *((k, _FRAME.content[k]) for k in ("joint_stiffness", "geometric_error",
+                                           "tolerance")),
+    )
 })  # fmt: skip
 _PIECE = record(
     end_=_POINT, center_=_POINT,
@@ -124,6 +174,7 @@ _BODY = record(
     ),
     up_=_DIRECTION, from_=text("joint at which the link begins"),
     to_=text("joint at which the link ends"),
+    tolerance_=Listed(_OF_BODY_FEATURE),
 )  # fmt: skip
 _JOINT = record(
     "", _OF_JOINT, name=text("name"), type=Words((*FREE_ROWS,)),
@@ -132,6 +183,7 @@ _JOINT = record(
     actuated_=flag("actuated"), position_=number("coordinate at home", "rad or m"),
     limits_=number("least and largest coordinate", "rad or m", "bound"),
     drive_stiffness_=number("stiffness of the drive", "N m/rad or N/m"),
+    locked_at_=_LOCKED_AT,
 )  # fmt: skip
 _LEG = record(
     name=text("name"),
@@ -141,5 +193,6 @@ _LEG = record(
 _OF_BODIES = record(
     "", _COMMON, format_=Words((2,)), platform=text("name of the platform's body"),
     platform_at_=_POINT, body_=Listed(_BODY), leg_=Listed(_LEG), joint_=Listed(_JOINT),
+    tolerance_=Listed(_OF_BODY_FEATURE),
 )  # fmt: skip
 ROBOT_FILE = Either((_OF_FRAMES, WithUnits(_OF_BODIES)))

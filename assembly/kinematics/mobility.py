@@ -1,18 +1,32 @@
-"""Mobility and redundant constraints of the perfect robot: ranks of its closures."""
+"""Mobility and redundant constraints of the perfect robot: ranks of its closures.
+
+:func:`mobility` counts at one posture, :func:`platform_screws` returns the platform's
+free motions there, and :func:`mobility_near` counts again at postures close to it.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.kinematics.ball_joints import with_balls
 from assembly.kinematics.closure_rates import closure_signs
+from assembly.kinematics.near_postures import near_postures
 from assembly.kinematics.nominal import mobile, motion_screws, size_of
 from assembly.kinematics.posture import Posture
-from assembly.kinematics.ranks import rank_of
+from assembly.kinematics.ranks import MISMATCH_FACTOR, rank_of
 
-# [rad, lengths] of the platform for unit joint rates: less is none, the null space of
-# closures known to the tolerance above
+# relative size of singular values that count as zero: those of files rounded at 6
+# digits, and of singular postures, which closures to 1e-10 determine to its root
+ZERO = 1e-5
+# [rad, lengths] least motion of the platform for unit joint rates
 _PLATFORM_RANK = 1e-6
+_ERROR = 10.0  # error of free motions, over the ratio of singular values
+_NOISE = 1e-14  # relative rounding of singular values
+_DISTANCE = 0.05  # [rad or lengths] distance of nearby postures
+_NEIGHBOURS = 2  # number of nearby postures
+_CLOSED = 1e-6  # [rad, m] largest closure error of a nearby posture
+_BACK = 0.1  # share of the distance: a posture nearer than this has returned
 
 
 @dataclass(frozen=True)
@@ -33,6 +47,12 @@ class Mobility:
         overconstraint: number of closure equations that the others imply, drives free.
         smallest_singular_value: [-] least nonzero one of the constraint matrix,
             lengths divided by the robot's size: near zero is near a singularity.
+        local_freedoms: ``freedoms`` minus ``platform_freedoms``.
+        actuation_redundancy: number of drives that the others hold at their commands:
+            drives minus freedoms that they lock.
+        singular_value_gap: [-] least singular value that counts, over the largest that
+            does not, or over rounding; the lesser of drives free and locked.  Below
+            about 100 the counts are not certain.
     """
 
     freedoms: int
@@ -44,14 +64,32 @@ class Mobility:
     locked_freedoms: int
     overconstraint: int
     smallest_singular_value: float
+    local_freedoms: int
+    actuation_redundancy: int
+    singular_value_gap: float
 
 
-def mobility(posture: Posture, tolerance: float = 1e-8) -> Mobility:
+@dataclass(frozen=True)
+class NearMobility:
+    """Mobility at postures close to one.
+
+    Attributes:
+        freedoms: the least number there; 0 where no motion leaves the posture, since
+            its freedoms are infinitesimal only.
+        there: the counts at a posture with that number, None where there is none.
+    """
+
+    freedoms: int
+    there: Mobility | None
+
+
+def mobility(posture: Posture, tolerance: float = ZERO) -> Mobility:
     """Return the mobility and redundant constraints at a posture.
 
     Args:
         posture: the robot's configuration.
-        tolerance: relative size below which a singular value counts as zero.
+        tolerance: relative size below which a singular value counts as zero; raised
+            to 30 times the nominal closure error, the rounding of the robot's file.
 
     Returns:
         The numbers.
@@ -60,44 +98,160 @@ def mobility(posture: Posture, tolerance: float = 1e-8) -> Mobility:
         Zlatanov, Bonev, Gosselin (2002), Constraint singularities of parallel
         mechanisms: freedoms as the null space of the joint screws of all closures.
     """
-    robot = posture.robot
-    size = size_of(robot)
-    screws = motion_screws(robot, posture.transforms) / ([1.0] * 3 + [size] * 3)
-    blocks = closure_signs(robot)[:, :, None] * screws
-    A = np.swapaxes(blocks, 1, 2).reshape(6 * len(robot.closures), len(robot.frames))
-    P = (screws * robot.on_path[robot.index(robot.platform)][:, None]).T
-    moves = mobile(robot)
-    driven = np.array([f.actuated for f in robot.frames])
+    A, P = _rates(posture)
+    moves = mobile(posture.robot)
+    driven = np.array([f.actuated for f in posture.robot.frames])
     passive = moves & ~driven
-    values = np.linalg.svd(A[:, moves], compute_uv=False)
-    least = tolerance * float(values.max(initial=0.0))
-    rank = rank_of(values, tolerance)
-    free, locked = (_motions(A[:, k], P[:, k], least) for k in (moves, passive))
+    tolerance = _tolerance(posture, tolerance)
+    free = _motions(A[:, moves], P[:, moves], tolerance)
+    locked = _motions(A[:, passive], P[:, passive], 0.0, tolerance * free.largest)
+    freedoms, held = len(free.joints), len(locked.joints)
+    drives, rank = int(driven.sum()), int(moves.sum()) - freedoms
     return Mobility(
-        freedoms=free[0],
-        platform_freedoms=free[1],
-        freedoms_drives_locked=locked[0],
-        platform_freedoms_drives_locked=locked[1],
-        redundant_constraints=len(A) - int(passive.sum()) + locked[0],
-        drives=int(driven.sum()),
-        locked_freedoms=locked[0],
+        freedoms=freedoms,
+        platform_freedoms=free.independent,
+        freedoms_drives_locked=held,
+        platform_freedoms_drives_locked=locked.independent,
+        redundant_constraints=len(A) - int(passive.sum()) + held,
+        drives=drives,
+        locked_freedoms=held,
         overconstraint=len(A) - rank,
-        smallest_singular_value=float(values[rank - 1]) if rank else 0.0,
+        smallest_singular_value=float(free.values[rank - 1]) if rank else 0.0,
+        local_freedoms=freedoms - free.independent,
+        actuation_redundancy=drives - freedoms + held,
+        singular_value_gap=min(free.gap, locked.gap),
     )
 
 
-def _motions(A: NDArray, P: NDArray, least: float) -> tuple[int, int]:
-    """Dimensions of the joint motions that close, and of the platform's among them.
+def platform_screws(posture: Posture) -> tuple[NDArray, float]:
+    """Return independent motions of the platform, drives free.
+
+    Args:
+        posture: the robot's configuration.
+
+    Returns:
+        (k, 6) [rad, m] k ``platform_freedoms``, read at the platform's origin in base
+        axes; orthonormal where lengths are divided by the robot's size.  And [rad,
+        lengths] their error.
+    """
+    A, P = _rates(posture)
+    moves = mobile(posture.robot)
+    found = _motions(A[:, moves], P[:, moves], _tolerance(posture))
+    U = np.linalg.svd(found.platform, full_matrices=False)[0]
+    size = size_of(posture.robot)
+    screws = U[:, : found.independent].T * ([1.0] * 3 + [size] * 3)
+    return screws, found.error
+
+
+def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
+    """Return the mobility at postures near one, where it may be less than there.
+
+    Args:
+        posture: the robot's configuration.
+        here: its mobility.
+
+    Returns:
+        The number of freedoms, and the counts at a nearby posture that has it.
+    """
+    robot, q = posture.robot, posture.coordinates
+    if here.freedoms == 0 or _certainly_least(posture, here):
+        return NearMobility(here.freedoms, here)
+    scale = np.where([f.joint == "prismatic" for f in robot.frames], size_of(robot), 1)
+    found: list[Mobility] = []
+    returned = 0
+    for track in near_postures(robot, q, posture.transforms, _DISTANCE, _NEIGHBOURS):
+        to, open_by = track.coordinates[0], float(track.mismatch[0])
+        if np.linalg.norm((to - q) / scale) < _BACK * _DISTANCE:
+            returned += 1
+        elif open_by < _CLOSED:
+            found.append(mobility(Posture(robot, to, track.transforms[0], open_by)))
+    if not found:
+        # where the correction did not converge, none is known to be less
+        return NearMobility(0 if returned == _NEIGHBOURS else here.freedoms, None)
+    least = min(found, key=lambda m: (m.freedoms, m.freedoms_drives_locked))
+    return NearMobility(min(least.freedoms, here.freedoms), least)
+
+
+def _certainly_least(posture: Posture, here: Mobility) -> bool:
+    """Whether no posture has fewer freedoms: all closures independent, drives hold."""
+    return here.overconstraint == 0 and here.freedoms_drives_locked == 0
+
+
+def _tolerance(posture: Posture, least: float = ZERO) -> float:
+    """Relative size of singular values that count as zero, rounded files included."""
+    return max(least, MISMATCH_FACTOR * float(posture.mismatch))
+
+
+def _rates(posture: Posture) -> tuple[NDArray, NDArray]:
+    """Closures and platform for unit joint rates, lengths over the robot's size.
+
+    Returns:
+        (6 closures, n) at the base's origin, (6, n) at the platform's.
+    """
+    robot = posture.robot
+    size, i = size_of(robot), robot.index(robot.platform)
+    T = posture.transforms
+    screws = with_balls(robot, T, motion_screws(robot, T))
+    scale = np.array([1.0] * 3 + [size] * 3)
+    blocks = closure_signs(robot)[:, :, None] * (screws / scale)
+    A = np.swapaxes(blocks, 1, 2).reshape(6 * len(robot.closures), len(robot.frames))
+    screws[:, 3:] += np.cross(screws[:, :3], T[i, :3, 3])
+    return A, (screws / scale * robot.on_path[i][:, None]).T
+
+
+@dataclass(frozen=True, eq=False)
+class _Motions:
+    """Joint motions that close, and those of the platform among them.
+
+    Attributes:
+        values: singular values of the closures, the largest first.
+        joints: (k, joints) orthonormal joint rates.
+        platform: (6, k) the platform's, lengths over the robot's size.
+    """
+
+    values: NDArray
+    joints: NDArray
+    platform: NDArray
+
+    @property
+    def largest(self) -> float:
+        """Largest singular value; 0 without closures."""
+        return float(self.values.max(initial=0.0))
+
+    @property
+    def independent(self) -> int:
+        """Number of independent motions of the platform."""
+        moved = np.linalg.svd(self.platform, compute_uv=False)
+        return int(np.sum(moved > self.error))
+
+    @property
+    def error(self) -> float:
+        """[rad, lengths] motions of the platform that count as none."""
+        return max(_PLATFORM_RANK, _ERROR / self.gap)
+
+    @property
+    def gap(self) -> float:
+        """Least singular value that counts, over the largest other or rounding."""
+        rank = self.joints.shape[1] - len(self.joints)
+        if not rank:
+            return np.inf
+        dropped = self.values[rank : rank + 1]
+        noise = _NOISE * float(self.values[0])
+        return float(self.values[rank - 1] / max(noise, *dropped, 1e-300))
+
+
+def _motions(A: NDArray, P: NDArray, tolerance: float, least: float = 0.0) -> _Motions:
+    """Joint motions that close, and those of the platform among them.
 
     Args:
         A: (6 closures, joints) closures for unit rates of the joints.
         P: (6, joints) the platform likewise.
-        least: size below which a singular value of A counts as zero.
+        tolerance: relative size below which a singular value of A counts as zero.
+        least: size, likewise.
 
     Returns:
-        The two.
+        The two, and the singular values of A.
     """
     _, values, V = np.linalg.svd(A)
-    rank = int(np.sum(values > least))
-    moved = np.linalg.svd(P @ V[rank:].T, compute_uv=False)
-    return len(V) - rank, int(np.sum(moved > _PLATFORM_RANK))
+    free = V[rank_of(values, tolerance, least) :]
+    return _Motions(values, free, P @ free.T)

@@ -10,16 +10,14 @@ Operation modes meet there (Zlatanov, Bonev, Gosselin 2002).
 Begin with :func:`is_singular`.
 """
 
+from itertools import chain
+
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.closure_rates import (
-    SINGULAR,
-    closure_matrices,
-    locked_closures,
-    locked_ranks,
-)
-from assembly.kinematics.nominal import Target, follow, mobile, size_of
+from assembly.kinematics.closure_rates import locked_closures, locked_ranks
+from assembly.kinematics.near_postures import near_postures
+from assembly.kinematics.nominal import Target, follow
 from assembly.model.robot import Robot
 
 _ASIDE = 0.02  # [rad or lengths] distance of nearby postures
@@ -58,9 +56,9 @@ def rank_near(robot: Robot, q: NDArray, T: NDArray) -> int:
         The rank.
     """
     free = Target(coordinates=np.full((1, len(q)), np.nan))
+    here = follow(robot, q, free, guess=True)
     best = 0
-    for step in [np.zeros(len(q)), *_steps_aside(robot, T)]:
-        there = follow(robot, q + step, free, guess=True)
+    for there in chain([here], near_postures(robot, q, T, _ASIDE, _NEIGHBOURS)):
         left_open = float(there.mismatch[0])
         if left_open < _CLOSED:
             locked = locked_closures(robot, there.transforms)[0]
@@ -68,16 +66,3 @@ def rank_near(robot: Robot, q: NDArray, T: NDArray) -> int:
             least = max(_APART, _NOISE * left_open)
             best = max(best, int((values > least * values[:1]).sum()))
     return best
-
-
-def _steps_aside(robot: Robot, T: NDArray) -> NDArray:
-    """Return (count, n) joint steps that keep the closures at first order."""
-    A = closure_matrices(robot, T[None])[0][0]
-    _, values, Vt = np.linalg.svd(A)
-    rank = int((values > SINGULAR * values[:1]).sum())
-    ways = np.random.default_rng(1).normal(size=(_NEIGHBOURS, len(Vt) - rank))
-    steps = np.zeros((_NEIGHBOURS, len(T)))
-    steps[:, mobile(robot)] = ways @ Vt[rank:]
-    steps *= _ASIDE / np.linalg.norm(steps, axis=1, keepdims=True).clip(1e-300)
-    slides = np.array([f.joint == "prismatic" for f in robot.frames])
-    return steps * np.where(slides, size_of(robot), 1.0)

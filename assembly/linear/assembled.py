@@ -371,6 +371,7 @@ def all_loads(
     load: ArrayLike | None,
     bodies: ArrayLike | None,
     gravity: ArrayLike | None,
+    carried: ArrayLike | None = None,
 ) -> FrameLoads:
     """Return the loads on all small screws, from the arguments of ``solve_assembly``.
 
@@ -379,13 +380,14 @@ def all_loads(
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
         bodies: (n, 6) [N m, N] wrenches on the bodies of all frames.
         gravity: (3,) [m/s^2] base axes.
+        carried: (n, 6) [N m, N] wrenches on the parts that the frames' joints carry.
 
     Returns:
         The loads.
     """
-    carried = None
     if gravity is not None:
-        body_weights, carried = weights(posture, gravity)
-        bodies = body_weights if bodies is None else body_weights + np.asarray(bodies)
+        on_bodies, on_parts = weights(posture, gravity)
+        bodies = on_bodies if bodies is None else on_bodies + np.asarray(bodies)
+        carried = on_parts if carried is None else on_parts + np.asarray(carried)
     loads = loads_on_frames(posture, load, bodies, carried)
     return loads if gravity is None else with_distributed(loads, posture, gravity)

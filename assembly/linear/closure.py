@@ -13,7 +13,7 @@ k is the wrench its second chain exerts on its first, read there.
 symbol  code           shape       meaning
 ======  =============  ==========  ================================================
 y       ``elastic``    (6n, ny)    links and joint springs, scaled: energy = y.y / 2
-u       ``cones``      (6n, nu)    clearances, scaled: discs and intervals of size 1
+u       ``cones``      (6n, nu)    clearances, scaled: discs, intervals, balls, size 1
 q       ``free``       (6n, nq)    motions without bound, in units of their screws
 ======  =============  ==========  ================================================
 """
@@ -53,7 +53,7 @@ class VirtualJoints:
         elastic: (6n, ny) columns of links and joint springs.
         links: (ny,) bool, columns that belong to links; the others are joints'.
         cones: (6n, nu) columns of bounded clearances, each the size of its bound.
-        group: (nu,) cone of each column: two columns for a disc.
+        group: (nu,) cone of each column: two columns for a disc, three for a ball.
         scaled: (nu,) bool, whether the margin's factor scales the column's cone.
         free: (6n, nq) unit columns of unbounded motions.
         bounded_motion: frames whose passive joint's own motion keeps its bound.

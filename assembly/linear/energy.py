@@ -61,6 +61,7 @@ _Rows = dict[str, NDArray]
 def solve_assembly(
     posture: Posture, load: Load | None = None, bodies: ArrayLike | None = None,
     gravity: ArrayLike | None = None, errors: None = None, method: Method = "compiled",
+    carried: ArrayLike | None = None,
 ) -> Assembly[float]: ...  # fmt: skip
 
 
@@ -69,6 +70,7 @@ def solve_assembly(
     posture: Sequence[Posture], load: Load | None = None,
     bodies: ArrayLike | None = None, gravity: ArrayLike | None = None,
     errors: ArrayLike | None = None, method: Method = "compiled",
+    carried: ArrayLike | None = None,
 ) -> Assembly[NDArray]: ...  # fmt: skip
 
 
@@ -76,7 +78,7 @@ def solve_assembly(
 def solve_assembly(
     posture: Posture, load: Load | None = None, bodies: ArrayLike | None = None,
     gravity: ArrayLike | None = None, *, errors: ArrayLike,
-    method: Method = "compiled",
+    method: Method = "compiled", carried: ArrayLike | None = None,
 ) -> Assembly[NDArray]: ...  # fmt: skip
 
 
@@ -87,6 +89,7 @@ def solve_assembly(
     gravity: ArrayLike | None = None,
     errors: ArrayLike | None = None,
     method: Method = "compiled",
+    carried: ArrayLike | None = None,
 ) -> Assembly:
     """Close a manipulator at least energy, problem (22), under optional loads.
 
@@ -104,6 +107,8 @@ def solve_assembly(
         method: ``"compiled"``, with the reference for points whose answer it does not
             prove; or ``"reference"``, numpy and Clarabel alone.  The answer's
             ``method`` says which of them solved each point.
+        carried: (n, 6) or (k, n, 6) [N m, N] wrenches on the parts that the joints of
+            all frames carry, each at its frame's origin, base axes.
 
     Returns:
         The assembled manipulator; :func:`assembly.linear.certificate.unproved` says
@@ -124,9 +129,9 @@ def solve_assembly(
     if isinstance(load, Mapping):
         load = given_load(load)
     loads = no_loads(posture.robot.errors.size)
-    given = load is not None or bodies is not None or gravity is not None
+    given = any(one is not None for one in (load, bodies, gravity, carried))
     if given or driven(posture.robot):
-        loads = all_loads(posture, load, bodies, gravity)
+        loads = all_loads(posture, load, bodies, gravity, carried)
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     if posture.transforms.ndim == 3 and errors is None and loads.body.ndim == 1:
         return _solve_one(posture, wrench, loads, method)

@@ -2,7 +2,8 @@
 
 An *effect* (:mod:`assembly.effects`) is a property that the model of a robot lacks.  It
 changes one or more of the fields below and nothing else.  So any number of effects can
-be combined, and :func:`assembly.measurement.predict.predict` needs to know none.
+be combined, and :func:`assembly.measurement.predict.predict` does not depend on the
+effects.
 
 ======  ====================  =========  =============================================
 symbol  code                  shape      meaning
@@ -30,14 +31,14 @@ COVARIATES = ("temperature", "time", "approach")
 
 @dataclass(frozen=True)
 class ContactLaw:
-    """A spring in series with a joint, of the law load = coefficient |deflection|^n.
+    """A spring in series with a joint, with the law load = coefficient |deflection|^n.
 
-    Along (about) the joint's own z, equally stiff in both directions.
+    It acts along or about the joint's z axis, equally in both directions.
 
     Attributes:
-        frame: the joint's name.
-        coefficient: [N/m^n or N m/rad^n] > 0.
-        exponent: [-] n > 1; 1.5 is Hertz's for two spheres.
+        frame: name of the joint.
+        coefficient: [N/m^n or N m/rad^n] coefficient, > 0.
+        exponent: [-] exponent n > 1; 1.5 is Hertz's exponent for two spheres.
     """
 
     frame: str
@@ -47,16 +48,16 @@ class ContactLaw:
 
 @dataclass(frozen=True, eq=False)
 class Yield:
-    """A compliant place: a deflection that follows from wrenches by a given law.
+    """A compliant place, whose deflection follows from wrenches by a given law.
 
     Attributes:
         frame: name of the frame.
-        component: row of the frame's screw that it changes, in the frame's axes.
-        through: frames and rows of the wrenches in its law.
-        inputs: (R, k) other inputs of the law, row by row.
-        law: [rad or m] function of the inputs (R, k) and wrenches (R, s); by row,
-            smooth.
-        linear: whether it is a spring: a compliance times one wrench, at its place.
+        component: row of the screw at the frame that it changes, in the frame's axes.
+        through: frames and rows of the wrenches on which the law depends.
+        inputs: (R, k) other inputs of the law in each row.
+        law: smooth function [rad or m] of the inputs (R, k) and wrenches (R, s).
+        linear: whether it is a spring, that is a compliance times one wrench at its
+            place.
     """
 
     frame: str
@@ -69,40 +70,39 @@ class Yield:
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """R rows of conditions of one robot; without effects, as its file declares it.
+    """R rows of conditions of one robot; without effects they are the declared ones.
 
     Attributes:
-        robot: robot of n frames; its links, springs and clearances are those of all
+        robot: robot of n frames; its links, springs and clearances are the same in all
             rows.
-        coordinates: (R, n) [rad or m] commanded, of every joint.
-        transforms: (R, n, 4, 4) frames seen from the base, without imperfections.
-        mismatch: (R,) [rad, m] nominal closure error left.
+        coordinates: (R, n) [rad or m] commanded coordinates of all joints.
+        transforms: (R, n, 4, 4) frames in the base frame, without imperfections.
+        mismatch: (R,) [rad, m] remaining nominal closure error.
         errors: (R, n, 6) [rad, m] stress-free screws.
-        point: (3,) [m] reference point: loaded, platform axes.
+        point: (3,) [m] reference point at which the load acts, platform axes.
         load: (R, 6) [N m, N] on the platform at the reference point, base axes.
         gravity: (R, 3) [m/s^2] base axes.
-        temperature: (R,) [K] above that of calibration; NaN where not known.
-        time: (R,) [s] since the first measurement; NaN where not known.
-        approach: (R,) -1 or 1; NaN where not known.
-        covariates: (R,) each, further ones by name.
-        session: (R,) names of the sessions; None where not known.
-        history: rows of a campaign in the order of measurement, including these; None
-            without a past.
+        temperature: (R,) [K] temperature above calibration; NaN if unknown.
+        time: (R,) [s] time since the first measurement; NaN if unknown.
+        approach: (R,) side of approach, -1 or 1; NaN if unknown.
+        covariates: (R,) values of further covariates by name.
+        session: (R,) names of the sessions; None if unknown.
+        history: rows of a campaign in the order of measurement, including these rows;
+            None without a history.
         row: (R,) indices of these rows in the history.
-        target: (R, 3) [m] the point measured, platform axes; None for the reference
-            point.
+        target: (R, 3) [m] measured point, platform axes; None for the reference point.
         laws: contact springs in series with joints.
-        yields: compliant places with laws of their own.
-        exact: finite motions instead of the linear model.
+        yields: compliant places with laws.
+        exact: whether finite motions are used instead of the linear model.
         second_order: (R, 6) [rad, m] exact minus linear platform screw without load;
             see :func:`assembly.measurement.predict.with_second_order`.
-        rest: (R, n, 6) rest positions of the clearances, in units of their bounds; None
-            where they follow from the least energy.
-        base: (6,) or (R, 6) [rad, m] rotation and shift of the measuring frame, acting
-            on the left.
-        tool: (3,) or (R, 3) [m] from the reference point to the one measured, platform
-            axes.
-        reading: (R, 6) [rad, m] to be added to the reading.
+        rest: (R, n, 6) rest positions of the clearances relative to their bounds; None
+            if they follow from the least energy.
+        base: (6,) or (R, 6) [rad, m] rotation and translation of the measuring frame,
+            which act on the left.
+        tool: (3,) or (R, 3) [m] vector from the reference point to the measured point,
+            platform axes.
+        reading: (R, 6) [rad, m] values that are added to the reading.
     """
 
     robot: Robot
@@ -142,11 +142,11 @@ class Conditions:
 
     @property
     def postures(self) -> Posture:
-        """All nominal postures as one object, its arrays with R rows."""
+        """All nominal postures as one object, whose arrays have R rows."""
         return Posture(self.robot, self.coordinates, self.transforms, self.mismatch)
 
     def posture(self, row: int) -> Posture:
-        """Return the posture of one row, of the robot with that row's errors."""
+        """Return the posture of one row, for the robot with the errors of that row."""
         return Posture(
             self.robot.with_errors(self.errors[row]), self.coordinates[row],
             self.transforms[row], float(self.mismatch[row]),
@@ -154,13 +154,13 @@ class Conditions:
 
     @property
     def measured_points(self) -> NDArray:
-        """(R, 3) [m] nominal positions of the points measured, base axes."""
+        """(R, 3) [m] nominal positions of the measured points, base axes."""
         T = self.postures.platform
         return T[:, :3, 3] + self.measured_arms
 
     @property
     def measured_arms(self) -> NDArray:
-        """(R, 3) [m] from the platform's nominal origin to the points measured."""
+        """(R, 3) [m] vectors from the platform's origin to the measured points."""
         at = self.point if self.target is None else self.target
         if not at.any():
             return np.zeros((len(self), 3))
@@ -175,13 +175,13 @@ class Conditions:
         return moved
 
     def take(self, rows: ArrayLike) -> "Conditions":
-        """Return a selection of the rows.
+        """Return the conditions of selected rows.
 
         Args:
             rows: indices or a mask.
 
         Returns:
-            The conditions of those rows only.
+            The conditions of these rows only.
         """
         index = np.asarray(rows)
         kept = {name: getattr(self, name)[index] for name in _BY_ROW}
@@ -216,19 +216,19 @@ def as_declared(
     """Return the conditions of a robot as its file declares it.
 
     Args:
-        postures: one, or many with arrays of R rows.
+        postures: one posture, or many with arrays of R rows.
         load: (6,) or (R, 6) [N m, N] at the reference point, base axes; none if absent.
-        mismatch: (R,) [rad, m] nominal closure error left.
-        point: (3,) [m] the reference point, platform axes.
+        mismatch: (R,) [rad, m] remaining nominal closure error.
+        point: (3,) [m] reference point, platform axes.
         gravity: (3,) or (R, 3) [m/s^2] base axes.
-        covariates: (R,) or one number for all rows, by name: ``temperature`` [K],
-            ``time`` [s], ``approach`` -1 or 1, NaN if absent; any others; and
-            ``session``, its name or (R,) names.
-        target: (3,) or (R, 3) [m] the point measured, platform axes; the reference
-            point if absent.
+        covariates: (R,) values, or one value for all rows, by name: ``temperature``
+            [K], ``time`` [s], ``approach`` -1 or 1, NaN if absent; any other names; and
+            ``session``, a name or (R,) names.
+        target: (3,) or (R, 3) [m] measured point, platform axes; by default the
+            reference point.
 
     Returns:
-        R rows.
+        R rows of conditions.
     """
     given = dict.fromkeys(COVARIATES, np.nan) | dict(covariates or {})
     session = given.pop("session", None)

@@ -18,7 +18,7 @@ CONVERGED = 1e-11  # relative change of a contact's deflection at convergence
 def softened(
     posture: Posture, laws: tuple[ContactLaw, ...], compliances: NDArray
 ) -> Posture:
-    """Return the posture with springs of the laws' secant compliance in series."""
+    """Return the posture with springs of the laws' secant compliances in series."""
     if not compliances.any():
         return posture
     frames = list(posture.robot.frames)
@@ -33,7 +33,7 @@ def softened(
 def secants(
     assembly: Assembly | ExactAssembly, laws: tuple[ContactLaw, ...]
 ) -> NDArray:
-    """Return the secant compliance [rad/(N m), m/N] of every law at its load."""
+    """Return the secant compliance [rad/(N m), m/N] of each law at its load."""
     robot = assembly.posture.robot
     compliances = []
     for law in laws:
@@ -49,7 +49,7 @@ def _deflection(law: ContactLaw, load: float) -> float:
 
 
 def wrenches_through(assembly: Assembly | ExactAssembly) -> NDArray:
-    """Return the (n, 6) [N m, N] through every joint, in the frames' axes."""
+    """Return the (n, 6) [N m, N] wrenches through all joints, in the frames' axes."""
     return assembly.joint_wrenches
 
 
@@ -65,13 +65,13 @@ def contact_columns(conditions: Conditions) -> NDArray:
 def contact_deflections(
     laws: tuple[ContactLaw, ...], w: NDArray, A: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the deflections d of contacts, c |d|^n sign(d) = w + A d.
+    """Return the deflections d of contacts with c |d|^n sign(d) = w + A d.
 
-    They minimise a strictly convex function (A is negative semidefinite): Newton's
-    method, each step halved until the gradient decreases.
+    They minimise a strictly convex function, because A is negative semidefinite.
+    Newton's method is used; each step is halved until the gradient decreases.
 
     Returns:
-        (R, s) deflections, and (R,) whether they converged.
+        (R, s) deflections, and (R,) bool, True if they converged.
     """
     c = np.array([law.coefficient for law in laws])
     n = np.array([law.exponent for law in laws])

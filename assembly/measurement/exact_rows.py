@@ -1,14 +1,14 @@
 r"""The exact equilibrium of a robot without clearances, for many rows together.
 
 The equations are those of :mod:`assembly.exact.exact`: closures hold on SE(3), every
-body and spring deforms by its compliance times its wrench, free motions carry no load.
-All rows are iterated together with the inverse of the linear model at the nominal
-posture (:mod:`assembly.measurement.without_clearance`).  The first iterate is the
-linear solution.  Each further one reduces the error by a factor of the size of the
-motions (a chord method).  Rows that do not converge are left to
+body and spring deforms by its compliance times its wrench, and free motions carry no
+load.  All rows are iterated together with the inverse of the linear model at the
+nominal posture (:mod:`assembly.measurement.without_clearance`).  The first iterate is
+the linear solution.  Each further iteration reduces the error by a factor of the size
+of the motions (a chord method).  Rows that do not converge are solved by
 :func:`assembly.exact.exact.solve_exact`.
 
-The rows and their iterate are in :mod:`assembly.measurement.row_state`.
+The rows and the iterate are defined in :mod:`assembly.measurement.row_state`.
 
 Sources:
     Ortega, Rheinboldt, Iterative Solution of Nonlinear Equations in Several Variables,
@@ -28,12 +28,15 @@ from assembly.model.links import own_screws
 from assembly.model.robot import Robot
 
 _MOST_ITERATIONS = 60  # largest number of iterations; 5 to 12 are usual
-_CONVERGED = 1e-12  # [rad, reference lengths] largest change of a screw at the end
+# [rad, reference lengths] largest change of a screw in the last iteration
+_CONVERGED = 1e-12
 _CLOSURE_TOLERANCE = 1e-11  # [rad, reference lengths] largest closure residual
 _FREE_FORCE = 1e-5  # relative to the largest wrench: largest force along a free motion
-_ZERO_LOAD = 1e-9  # [rad, reference lengths] of deformation: zero wrench below
-_CONTRACTION = 0.8  # largest ratio of two successive changes, after the first few
-_TRANSIENT = 3  # iterations in which changes may grow
+# [rad, reference lengths] deformation below which a wrench counts as zero
+_ZERO_LOAD = 1e-9
+# largest ratio of two successive changes, after the first iterations
+_CONTRACTION = 0.8
+_TRANSIENT = 3  # number of first iterations in which changes may increase
 _BATCH = 100  # number of rows solved together, which limits the memory
 
 
@@ -43,12 +46,14 @@ def solve_rows(
     """Return the platform screws of finite motions under every row's loads.
 
     Args:
-        conditions: R rows of a robot without clearances, solved as if ``exact``.
-        linear_deflections: (R, s) [rad or m] of the s contacts in the linear model.
+        conditions: R rows of a robot without clearances; finite motions are used in
+            all.
+        linear_deflections: (R, s) [rad or m] deflections of s contacts in the linear
+            model.
 
     Returns:
-        (R, 6) [rad, m] rotation vector of R R_nominal^T and shift of the origin, base
-        axes, and (R,) whether they converged; other rows are invalid.
+        (R, 6) [rad, m] rotation vector of R R_nominal^T and translation of the origin,
+        base axes; and (R,) bool, True for rows that converged; other rows are invalid.
     """
     conditions = _in_pieces(conditions)
     screws, converged = (
@@ -79,7 +84,7 @@ def _of_passive_joints(free: NDArray, robot: Robot) -> bool:
 
 
 def _solve(rows: Rows) -> tuple[NDArray, NDArray]:
-    """Return the (R, 6) platform screws, and (R,) whether they converged."""
+    """Return the (R, 6) platform screws, and (R,) bool: rows that converged."""
     flexible, count = rows.flexible, len(rows.conditions)
     n, K = len(rows.conditions.robot.frames), 6 * len(rows.conditions.robot.closures)
     q = flexible.free.shape[1]
@@ -110,7 +115,8 @@ def _solve(rows: Rows) -> tuple[NDArray, NDArray]:
     converged &= np.abs(state.residual).max(axis=1, initial=0.0) <= _CLOSURE_TOLERANCE
     converged &= np.all(np.abs(state.motions) <= flexible.limit, axis=1)
     _, free_forces, _ = state.imbalance()
-    zero_load = _ZERO_LOAD / flexible.softness  # without load wrenches are rounding
+    # without load, wrenches are due to rounding
+    zero_load = _ZERO_LOAD / flexible.softness
     largest = np.abs(state.total_wrenches / rows.scale).max(
         axis=(0, 2, 3), initial=zero_load
     )
@@ -128,7 +134,7 @@ def _lever_arms(rows: Rows) -> NDArray:
 
 
 def _correction(state: RowState, first: bool) -> tuple[NDArray, NDArray, NDArray]:
-    """Return changes of the unknowns by the linear model's inverse."""
+    """Return the changes of the unknowns by the inverse of the linear model."""
     rows, flexible = state.rows, state.rows.flexible
     screw_residual, free, w = state.imbalance()
     count, shape = len(rows.conditions), (len(rows.conditions), -1, 6)
@@ -156,7 +162,7 @@ def _correction(state: RowState, first: bool) -> tuple[NDArray, NDArray, NDArray
 
 
 def _in_pieces(conditions: Conditions) -> Conditions:
-    """Return the same conditions with a frame for every piece of a beam."""
+    """Return the conditions with a frame for every piece of a beam."""
     cut = cut_beams(conditions.robot)
     if cut.robot is conditions.robot:
         return conditions

@@ -1,9 +1,9 @@
 """History of a machine: the rows of a campaign in the order of measurement.
 
 Some effects have memory: slow warming lags behind the temperature, and clearance is
-taken up on the side from which a joint came.  They depend on the earlier rows,
-including those that a fit sets aside.  The value of a row is taken to hold since the
-row before, or since time 0.
+taken up on the side from which a joint came.  They depend on earlier rows, including
+rows that a fit leaves out.  The value of a row is assumed to apply since the row before
+it, or since time 0.
 
 Sources:
     Ljung, System Identification, section 2 (sampling of a first-order lag).
@@ -21,11 +21,11 @@ STILL = 1e-9  # [rad, m] smaller changes of a command count as no motion
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """H rows, session after session, each in the order of measurement.
+    """H rows in the order of measurement, one session after the other.
 
     Attributes:
-        values: (H,) each, by the public name of a variable; NaN where not known.
-        first: (H,) bool, where a session begins.
+        values: (H,) values by public name of the variable; NaN if unknown.
+        first: (H,) bool, True for the first row of a session.
     """
 
     values: Mapping[str, NDArray]
@@ -35,11 +35,11 @@ class History:
         """Return the side from which a variable came: -1, 1, or 0 if unknown.
 
         Args:
-            name: name of the variable; ``"approach"`` is that column itself.
+            name: name of the variable; ``"approach"`` is the column of this name.
 
         Returns:
             (H,) signs.  A variable at rest keeps its last direction.  Before its first
-            motion the column ``approach`` is used, if there is one.
+            motion, the column ``approach`` is used if there is one.
         """
         given = np.nan_to_num(self.values["approach"])
         if name == "approach":
@@ -57,12 +57,12 @@ class History:
 
         Args:
             name: name of the variable.
-            depth: > 0 change of the variable, from the middle to an end.
+            depth: change of the variable from the middle to an end, > 0.
 
         Returns:
-            (H,) from -1 to 1: it follows the variable until it reaches an end, and
-            stays there until the variable reverses.  A session begins at the end given
-            by ``approach``, or in the middle.
+            (H,) positions from -1 to 1.  The element follows the variable until it
+            reaches an end, and stays there until the variable reverses.  A session
+            begins at the end given by ``approach``, or in the middle.
 
         Sources:
             Krasnosel'skii, Pokrovskii, Systems with Hysteresis, section 2 (stop).
@@ -81,9 +81,9 @@ class History:
 
         Args:
             name: name of the variable.
-            time_constant: [s] > 0.
-            held: whether a value applies from the time of the row before, like a
-                load's; otherwise it changes linearly between rows, like a temperature.
+            time_constant: [s] time constant, > 0.
+            held: whether a value applies from the time of the row before it, as for a
+                load; otherwise it changes linearly between rows, as for a temperature.
 
         Returns:
             (H,) in the unit of the variable.
@@ -91,7 +91,7 @@ class History:
         u, state = self.values[name], 0.0
         past = self._elapsed / time_constant
         decay = np.exp(-past)
-        # share of the change that lags: (1 - e^-r) / r, 1 if no time passed
+        # lagging share of the change: (1 - e^-r) / r, or 1 if no time passed
         share = np.where(
             past > 0, -np.expm1(-past) / np.where(past > 0, past, 1.0), 1.0
         )
@@ -101,7 +101,7 @@ class History:
             if self.first[i]:
                 state = 0.0
             before = float(u[i - 1]) if even[i] else value
-            # exact for u linear from ``before`` to ``value``
+            # exact if u is linear from ``before`` to ``value``
             late = (value - before) * share[i]
             state = value - late + (state - before) * decay[i]
             response[i] = state
@@ -113,7 +113,7 @@ class History:
 
     @cached_property
     def _elapsed(self) -> NDArray:
-        """(H,) [s] since the row before, or since time 0."""
+        """(H,) [s] time since the row before, or since time 0."""
         time = self.values["time"]
         return np.where(self.first, time, np.diff(time, prepend=0.0))
 
@@ -121,12 +121,12 @@ class History:
 def in_order(
     values: Mapping[str, NDArray], session: NDArray | None
 ) -> tuple[History, NDArray]:
-    """Return the rows of a table in the order measured.
+    """Return the rows of a table in the order of measurement.
 
     Args:
-        values: (H,) each, by the public name of a variable, including ``time``; rows
-            without a time keep the given order.
-        session: (H,) names; None if there is only one.
+        values: (H,) values by public name of the variable, including ``time``; rows
+            without a time keep their order.
+        session: (H,) names; None if there is one session.
 
     Returns:
         The history, and (H,) the index of each given row in it.
@@ -134,7 +134,7 @@ def in_order(
     time = np.nan_to_num(values["time"])
     names = np.zeros(len(time)) if session is None else session
     _, begins, number = np.unique(names, return_index=True, return_inverse=True)
-    order = np.lexsort((time, begins[number]))  # stable
+    order = np.lexsort((time, begins[number]))  # stable sort
     first = np.diff(number[order], prepend=-1) != 0
     row = np.empty_like(order)
     row[order] = np.arange(len(order))

@@ -1,10 +1,10 @@
-"""Predicted readings: the platform's deviation under each row of the conditions.
+"""Predicted readings: deviation of the platform under the conditions of each row.
 
-Robots without clearances are solved together
-(:mod:`assembly.measurement.without_clearance`, with finite motions
-:mod:`assembly.measurement.exact_rows`).  Rows with clearances, or whose closures have a
-numerically ambiguous rank, are solved one by one by
-:mod:`assembly.linear.energy` and :mod:`assembly.exact.exact`.
+Robots without clearances are solved together by
+:mod:`assembly.measurement.without_clearance`, with finite motions by
+:mod:`assembly.measurement.exact_rows`.  Rows with clearances, or with closures of
+ambiguous numerical rank, are solved one by one by :mod:`assembly.linear.energy` and
+:mod:`assembly.exact.exact`.
 
 Sources:
     Public format, campaigns: rotation vector of R_actual R_nominal^T and difference of
@@ -48,8 +48,10 @@ from assembly.measurement.yields import Yields, settle_yields, with_springs
 from assembly.solvers.conic import SolverFailed
 from stiffness.screws import rotation_matrix, rotation_vector
 
-_MOST_ONE_BY_ONE = 40  # configurations corrected to second order one by one, at most
-_CONVERGED_FINITE = 1e-5  # as CONVERGED, for a start at the linear model's solution
+# largest number of configurations that are corrected to second order one by one
+_MOST_ONE_BY_ONE = 40
+# convergence criterion like CONVERGED, if the start is the linear model's solution
+_CONVERGED_FINITE = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +60,10 @@ class Prediction:
 
     Attributes:
         deviation: (R, 6) [rad, m] rx ry rz tx ty tz, base axes; NaN without a solution.
-        reason: (R,) reason without a solution, else empty.
-        undetermined: (R,) bool, whether clearances leave the pose undetermined.  In a
+        reason: (R,) reason why there is no solution, or empty.
+        undetermined: (R,) bool, True if clearances leave the pose undetermined.  In a
             closed chain the given pose is then the one nearest to nominal, in an open
-            chain that of centred clearances.
+            chain the one with centred clearances.
     """
 
     deviation: NDArray
@@ -76,15 +78,15 @@ def predict(conditions: Conditions) -> Prediction:
         conditions: R rows.
 
     Returns:
-        The readings.
+        The predicted readings.
     """
     has_clearance = bool(virtual_joints(conditions.robot).cones.shape[1])
     undetermined = np.zeros(len(conditions), dtype=bool)
     one_by_one = None
     if has_clearance and conditions.rest is not None:
         conditions = with_clearances_at_rest(conditions)
-        # clearances held at rest that finite motions cannot close have no solution in
-        # either model
+        # if finite motions cannot close clearances held at rest, neither model has a
+        # solution
         one_by_one = 0 if conditions.exact else None
     elif has_clearance and not conditions.robot.closures and not conditions.exact:
         conditions, undetermined = with_clearances_taken_up(conditions)
@@ -104,11 +106,11 @@ def predict(conditions: Conditions) -> Prediction:
 def _platform_screws(
     conditions: Conditions, one_by_one: int | None = None
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the platform screws, some rows one by one.
+    """Return the platform screws; some rows are solved one by one.
 
     Returns:
-        (R, 6) screws, (R,) reasons without a solution, (R,) whether clearances leave
-        the screw undetermined.
+        (R, 6) screws, (R,) reasons why there is no solution, and (R,) bool, True if
+        clearances leave the screw undetermined.
     """
     screws, undetermined = (
         np.full((len(conditions), 6), np.nan),
@@ -135,9 +137,9 @@ def _platform_screws(
 def _nearest_assembly(
     conditions: Conditions, row: int
 ) -> tuple[Assembly | ExactAssembly, bool]:
-    """Return one row's assembly, with the possible pose nearest to nominal.
+    """Return assembly of one row, with the possible pose that is nearest to nominal.
 
-    With finite motions this holds for the linear solution from which they start.
+    With finite motions, this refers to the linear solution from which they start.
 
     Returns:
         The assembly, and whether clearances leave its pose undetermined.
@@ -160,21 +162,21 @@ def _nearest_assembly(
 
 
 def with_second_order(conditions: Conditions) -> Conditions:
-    """Return the conditions with the second-order part of the declared errors added.
+    """Return the conditions with the second-order effect of the declared errors added.
 
-    Near a singularity a robot's own geometric errors move it far.  The linear model's
-    error then exceeds a device's noise, whatever the load.  The difference of the exact
-    and the linear platform screw without load is computed once for each configuration;
-    effects of load stay linear.
+    Near a singularity, a robot's geometric errors move it far.  The error of the linear
+    model then exceeds the noise of a device, whatever the load.  The difference between
+    the exact and the linear platform screw without load is computed once for each
+    configuration; effects of the load remain linear.
 
     Args:
         conditions: R rows, as declared.
 
     Returns:
-        The same, with ``second_order``.
+        The conditions, with ``second_order``.
     """
     if virtual_joints(conditions.robot).cones.shape[1]:
-        return conditions  # the rest position without load is undetermined
+        return conditions  # the rest position without a load is undetermined
     zero = np.zeros_like(conditions.load)
     _, which = conditions.postures.distinct
     _, first = np.unique(which, return_index=True)
@@ -186,24 +188,24 @@ def with_second_order(conditions: Conditions) -> Conditions:
 
 
 def with_finite_motions(conditions: Conditions) -> Conditions:
-    """Return the conditions with the changes of the linear model by finite motions.
+    """Return the conditions with the changes that finite motions cause.
 
-    As :func:`with_second_order`, but row by row and under each row's loads.  The
-    declared model is then exact, and effects are added to first order.
+    As in :func:`with_second_order`, but for each row under its loads.  The declared
+    model is then exact, and effects are added to first order.
 
     Args:
         conditions: R rows, as declared.
 
     Returns:
-        The same, with ``second_order``, and no longer ``exact``.
+        The conditions, with ``second_order`` and without ``exact``.
     """
     return replace(conditions, exact=False, second_order=_finite_part(conditions))
 
 
 def _finite_part(conditions: Conditions, one_by_one: int | None = None) -> NDArray:
-    """Return (R, 6) exact minus linear platform screws; zero without both solutions.
+    """Return (R, 6) exact minus linear platform screws; zero if a solution is missing.
 
-    Compliant places with laws of their own are solved by the linear model.
+    Compliant places with laws are solved by the linear model.
 
     Returns:
         The difference.
@@ -220,13 +222,14 @@ def with_rest_positions(conditions: Conditions) -> Conditions:
     """Return the conditions with the rest positions of clearances at least energy.
 
     Effects can then be tried at the cost of a robot without clearances.  This is
-    correct to first order as long as the contact points stay the same.
+    correct to first order as long as the contact points are the same.
 
     Args:
         conditions: R rows.
 
     Returns:
-        The same, with ``rest``; centred in rows without a solution.
+        The conditions, with ``rest``; clearances are centred in rows without a
+        solution.
     """
     rest = np.zeros_like(conditions.errors)
     for row in range(len(conditions)):
@@ -243,11 +246,11 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
 
     Args:
         conditions: R rows.
-        screws: (R, 6) [rad, m] rotation vector of R R_nominal^T and shift of the
+        screws: (R, 6) [rad, m] rotation vector of R R_nominal^T and translation of the
             platform's origin, base axes.
 
     Returns:
-        (R, 6) [rad, m] the deviation read at the points measured.
+        (R, 6) [rad, m] deviation that is read at the measured points.
     """
     platform = conditions.postures.platform
     R, p = platform[:, :3, :3], platform[:, :3, 3]
@@ -257,7 +260,7 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
     lever = _turned(turn - np.eye(3), arm + tool)
     shift = screws[:, 3:] + lever + tool
     base = rotation_matrix(conditions.base[..., :3])
-    # the device's rotation acts on the position itself; without one there is no
+    # the device's rotation acts on the position itself; without a rotation there is no
     # rounding
     translation = _turned(base - np.eye(3), p + arm) + _turned(base, shift)
     translation += conditions.base[..., 3:]
@@ -267,25 +270,25 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
 
 
 def _turned(R: NDArray, vectors: NDArray) -> NDArray:
-    """Return the (R, 3) vectors rotated by one matrix, or each by its own."""
+    """Return the (R, 3) vectors rotated by one matrix, or by one matrix each."""
     if R.ndim == 2:
         return vectors @ R.T
     return np.einsum("rij,...j->ri" if vectors.ndim == 1 else "rij,rj->ri", R, vectors)
 
 
 def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
-    """Solve one row completely: every screw and wrench of the robot.
+    """Solve one row completely, with every screw and wrench of the robot.
 
     Args:
         conditions: conditions of all rows.
         row: index of the row.
 
     Returns:
-        The linear or the exact assembly, according to the conditions.
+        The linear or the exact assembly, depending on the conditions.
 
     Raises:
         CannotAssemble: a closure cannot be closed.
-        FreeMotion: a load drives a motion that nothing resists.
+        FreeMotion: a load acts along a motion without stiffness.
         SolverFailed: the solver failed, or contacts did not converge.
     """
     if conditions.yields:
@@ -294,7 +297,8 @@ def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
     load = conditions.load_at_origin()[row]
     gravity = conditions.gravity[row] if conditions.gravity[row].any() else None
     compliances = np.zeros(len(conditions.laws))
-    if conditions.exact and conditions.laws:  # nearly converged by the linear model
+    # the linear model gives nearly converged contacts
+    if conditions.exact and conditions.laws:
         linear = assemble_row(replace(conditions, exact=False), row)
         compliances = secants(linear, conditions.laws)
     assembly: Assembly | ExactAssembly
@@ -314,7 +318,7 @@ def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
 
 
 def _assemble_yielding(row: Conditions) -> Assembly | ExactAssembly:
-    """Solve one row with compliant places of laws of their own."""
+    """Solve one row with compliant places that have laws."""
 
     def solve(held: Conditions) -> tuple[Assembly | ExactAssembly, NDArray]:
         assembly = assemble_row(held, 0)
@@ -337,7 +341,7 @@ def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
         np.zeros(len(conditions), dtype=bool),
     )
     if conditions.exact:
-        return unsolved  # one by one, under the wrenches of finite motions
+        return unsolved  # solved one by one, under the wrenches of finite motions
     distinct, which = conditions.postures.distinct
 
     def solve(held: Conditions) -> tuple[tuple[NDArray, NDArray], NDArray]:
@@ -359,7 +363,7 @@ def _linear(conditions: Conditions) -> tuple[NDArray, NDArray, NDArray]:
 
     Returns:
         (R, 6) platform screws, (R, 6n) joint wrenches of the linear model, and (R,)
-        whether solved.
+        bool, True for solved rows.
     """
     distinct, which = conditions.postures.distinct
     flexible = flexibility(distinct)
@@ -379,7 +383,7 @@ def _linear(conditions: Conditions) -> tuple[NDArray, NDArray, NDArray]:
         )
         deflections, settled = contact_deflections(conditions.laws, w, own[which])
         screws = screws + times(platform, deflections)
-        if flexible.system.size:  # an open chain's wrenches are those of the loads
+        if flexible.system.size:  # the wrenches of an open chain follow from the loads
             wrenches = wrenches + times(everywhere, deflections)
         solved = solved & settled
     if conditions.exact:

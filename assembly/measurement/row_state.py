@@ -42,18 +42,19 @@ from assembly.measurement.without_clearance import (
 from assembly.model.links import own_screw
 from stiffness.screws import rotation_matrix, rotation_vector, transform
 
-_LINEAR_BELOW = 1e-9  # [rad or m] below it the law of a contact is linear
+_LINEAR_BELOW = 1e-9  # [rad or m] deflection below which the law of a contact is linear
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Rows to be solved, and the quantities that are constant during the iteration.
+    """Rows to be solved, and the quantities that stay constant during the iteration.
 
     Attributes:
         conditions: R rows.
-        flexible: the linear model at the distinct postures.
+        flexible: linear model at the distinct postures.
         posture_of_row: (R,) index of each row's posture among the distinct ones.
-        linear_deflections: (R, s) [rad or m] of contacts in the linear model.
+        linear_deflections: (R, s) [rad or m] deflections of contacts in the linear
+            model.
     """
 
     conditions: Conditions
@@ -63,7 +64,7 @@ class Rows:
 
     @cached_property
     def loads(self) -> DeadLoads:
-        """Loads and weights."""
+        """Loads and weights as dead loads."""
         c = self.conditions
         return dead_loads_of_rows(c.postures, c.errors, c.load, c.gravity, c.point)
 
@@ -97,7 +98,7 @@ class Rows:
 
     @cached_property
     def law_constants(self) -> tuple[NDArray, NDArray]:
-        """(s,) coefficients and exponents of contacts."""
+        """(s,) coefficients, and (s,) exponents of the contacts."""
         laws = self.conditions.laws
         return (
             np.array([law.coefficient for law in laws]),
@@ -106,7 +107,7 @@ class Rows:
 
     @cached_property
     def contact_compliance(self) -> NDArray:
-        """(R, s) [rad/(N m), m/N] tangent compliance of contacts."""
+        """(R, s) [rad/(N m), m/N] tangent compliances of the contacts."""
         c, n = self.law_constants
         size = np.abs(self.linear_deflections)
         return (
@@ -134,7 +135,7 @@ class Rows:
 
     @cached_property
     def times(self) -> Callable[[NDArray, NDArray], NDArray]:
-        """Function that multiplies the postures' matrices with the rows' vectors."""
+        """Function that multiplies matrices of postures with vectors of rows."""
         return at_postures(self.posture_of_row)
 
     def corrected(self, right_side: NDArray) -> NDArray:
@@ -145,7 +146,7 @@ class Rows:
 
     @cached_property
     def _with_contacts(self) -> NDArray:
-        """(R, m, m) inverse of the scaled system, contacts as tangent springs."""
+        """(R, m, m) inverse of the scaled system, with contacts as tangent springs."""
         flexible = self.flexible
         contact_rows = np.einsum("cki,is->cks", flexible.rows, self.contacts)[
             self.posture_of_row
@@ -160,31 +161,31 @@ class Rows:
 
     @cached_property
     def bodies(self) -> NDArray:
-        """(R, n, 4, 4) bodies with their errors, seen from their parent frame."""
+        """(R, n, 4, 4) bodies with their errors, in the parent's frame."""
         errors = self.conditions.errors
         error_motion = transform(errors[..., 3:], rotation_matrix(errors[..., :3]))
         return self.conditions.robot.fixed_transforms @ error_motion
 
     @cached_property
     def commanded(self) -> NDArray:
-        """(R, n, 4, 4) motions of the joints as commanded."""
+        """(R, n, 4, 4) commanded motions of the joints."""
         return along_own(self.conditions.robot, self.conditions.coordinates)
 
     @cached_property
     def scale(self) -> NDArray:
-        """(6,) factors on a screw: translations over the reference length."""
+        """(6,) factors on a screw; translations are divided by the reference length."""
         return np.array([1.0, 1.0, 1.0, *[1 / size_of(self.conditions.robot)] * 3])
 
     @cached_property
     def closure_frames(self) -> NDArray:
-        """(2, K) frames that closures connect."""
+        """(2, K) frames that the closures connect."""
         robot = self.conditions.robot
         pairs = [[robot.index(a), robot.index(b)] for a, b in robot.closures]
         return np.array(pairs, dtype=int).reshape(-1, 2).T
 
     @cached_property
     def nominal_closures(self) -> NDArray:
-        """(R, K, 4, 4) a closure's second frame seen from its first, nominally."""
+        """(R, K, 4, 4) nominal second frame of each closure relative to the first."""
         first, second = self.closure_frames
         T = self.conditions.transforms
         return inverse(T[:, first]) @ T[:, second]
@@ -195,10 +196,10 @@ class RowState:
     """The current iterate of R rows.
 
     Attributes:
-        rows: their constants.
+        rows: constant quantities of the rows.
         screws: (2, R, n, 6) deformations of bodies and of joints.
         motions: (R, q) free motions.
-        multipliers: (R, 6K) of the scaled closures.
+        multipliers: (R, 6K) multipliers of the scaled closures.
     """
 
     rows: Rows
@@ -242,7 +243,7 @@ class RowState:
 
     @cached_property
     def platform_screw(self) -> NDArray:
-        """(R, 6) rotation vector of R R_nominal^T and shift of the origin."""
+        """(R, 6) rotation vector of R R_nominal^T and translation of the origin."""
         nominal = self.rows.conditions.postures.platform
         back = np.swapaxes(nominal[:, :3, :3], 1, 2)
         turn = rotation_vector(self.platform[:, :3, :3] @ back)
@@ -250,7 +251,7 @@ class RowState:
 
     @cached_property
     def residual(self) -> NDArray:
-        """(R, 6K) closure residuals: [rad], translations per reference length."""
+        """(R, 6K) closure residuals: [rad], and translations per reference length."""
         first, second = self.rows.closure_frames
         T, origin = (
             self.poses[3],
@@ -265,7 +266,7 @@ class RowState:
     def total_wrenches(self) -> NDArray:
         """(2, R, n, 6) wrenches through bodies and through joints, base axes.
 
-        Read at the platform's nominal origin.
+        They are read at the platform's nominal origin.
         """
         conditions, loads = self.rows.conditions, self.rows.loads
         posture, robot = conditions.postures, conditions.robot
@@ -289,7 +290,7 @@ class RowState:
         return total
 
     def wrenches(self, total: NDArray, poses: NDArray, frames: NDArray) -> NDArray:
-        """Return (R, k, 6) wrenches at the platform's origin, read at frames' poses."""
+        """Return (R, k, 6) wrenches at the platform's origin, transformed to frames."""
         origin = self.rows.conditions.postures.platform[:, None, :3, 3]
         T, w = poses[:, frames], total[:, frames]
         moment = w[..., :3] - np.cross(T[..., :3, 3] - origin, w[..., 3:])
@@ -300,8 +301,8 @@ class RowState:
         """Return the residuals of the constitutive laws and of the equilibrium.
 
         Returns:
-            (2, R, n, 6) screws by the compliances less those of the iterate, (R, q)
-            forces along free motions, (R, s) loads of contacts.
+            (2, R, n, 6) screws due to compliances minus screws of the iterate, (R, q)
+            forces along free motions, and (R, s) loads of contacts.
         """
         rows, flexible = self.rows, self.rows.flexible
         screw_residual = -self.screws

@@ -1,9 +1,9 @@
-"""Clearances taken up by the load: each joint rests in contact, at its bound.
+"""Clearances taken up by the load: each joint rests in contact at its bound.
 
-A joint that transmits the wrench w rests at the point of its clearance cones farthest
-along w.  In a robot without closures the wrenches follow from the loads alone, and this
-is the exact minimum of (22).  With closures it is the limit for small clearances, by
-the envelope theorem: dE/d(bound) = -|w| in the cone's directions.
+A joint that transmits the wrench w rests at the point of its clearance cones that is
+farthest along w.  In a robot without closures the wrenches follow from the loads alone,
+and this is the exact minimum of (22).  With closures it is the limit for small
+clearances, by the envelope theorem: dE/d(bound) = -|w| in the cone's directions.
 """
 
 from dataclasses import replace
@@ -23,7 +23,7 @@ from assembly.model.clearance import (
 )
 from assembly.model.robot import Clearance, Frame, Robot
 
-# relative to the largest wrench of its kind: smaller ones count as zero
+# relative to the largest wrench of the same kind; smaller wrenches count as zero
 _UNLOADED = 1e-9
 
 
@@ -34,9 +34,9 @@ def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArra
         conditions: R rows of a robot with clearances.
 
     Returns:
-        The same rows of the robot without clearances, their screws added to its errors.
-        And (R,) whether a joint with clearance transmits no load, so that its rest
-        position is undetermined; it is then centred.
+        The same rows for a robot without clearances, whose errors include these screws.
+        And (R,) bool, True if a joint with clearance transmits no load, so that its
+        rest position is undetermined; it is then centred.
     """
     tight = replace(conditions, robot=without_joint_clearances(conditions.robot))
     distinct, posture_of_row = tight.postures.distinct
@@ -56,10 +56,10 @@ def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArra
         size = np.linalg.norm(parts, axis=2)
         rests = size > _UNLOADED * size.max(initial=0.0)
         unit = parts / np.where(rests, size, 1.0)[:, :, None]
-        clearance_screws[:, :, list(rows)] = (
-            unit * (rests * bounds[:, cone])[:, :, None]
-        )
-        undetermined |= np.any(~rests & (bounds[:, cone] > 0.0), axis=1)
+        # a joint with a ball has neither radial nor axial clearance, and conversely
+        bound = np.where(np.isnan(bounds[:, cone]), 0.0, bounds[:, cone])
+        clearance_screws[:, :, list(rows)] += unit * (rests * bound)[:, :, None]
+        undetermined |= np.any(~rests & (bound > 0.0), axis=1)
     return replace(tight, errors=conditions.errors + clearance_screws), undetermined
 
 
@@ -70,10 +70,10 @@ def with_clearances_at_rest(conditions: Conditions) -> Conditions:
         conditions: R rows of a robot with clearances, and with ``rest``.
 
     Returns:
-        The same rows of the robot without clearances, their screws added to its errors.
+        The same rows for a robot without clearances, whose errors include these screws.
 
     Raises:
-        ValueError: no ``rest`` is given.
+        ValueError: ``rest`` is not given.
     """
     if conditions.rest is None:
         raise ValueError(
@@ -93,14 +93,14 @@ def _component_bounds(robot: Robot) -> NDArray:
 
 
 def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
-    """Return the clearance screws in units of their bounds.
+    """Return the clearance screws relative to their bounds.
 
     Args:
         robot: robot of n frames.
-        clearance_screws: (n, 6) [rad, m].
+        clearance_screws: (n, 6) [rad, m] clearance screws.
 
     Returns:
-        (n, 6) [-], 0 where there is no clearance.
+        (n, 6) [-] ratios, 0 where there is no clearance.
     """
     bounds = _component_bounds(robot)
     finite = np.isfinite(bounds) & (bounds > 0)
@@ -109,13 +109,13 @@ def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
 
 
 def without_joint_clearances(robot: Robot) -> Robot:
-    """Return the robot without clearance; bounds of passive joints' motion stay.
+    """Return the robot without clearances; bounds of passive joints' motion remain.
 
     Args:
-        robot: any robot.
+        robot: robot with or without clearances.
 
     Returns:
-        A robot without clearance cones.
+        The robot without clearance cones.
     """
     return replace(robot, frames=tuple(_tight(f) for f in robot.frames))
 

@@ -1,6 +1,6 @@
 """Variables of effects, by public name: ``q.drive``, ``load.fz``, ``time`` ..
 
-Wrenches (``wrench.drive.mz``) are not among them: only the equilibrium has them.
+Wrenches (``wrench.drive.mz``) are not included, because only the equilibrium has them.
 """
 
 from collections.abc import Iterable
@@ -13,19 +13,19 @@ from assembly.measurement.conditions import COVARIATES, Conditions
 from assembly.measurement.history import History, in_order
 from stiffness.screws import WRENCH
 
-FORCE = "load.force"  # the size of the force
+FORCE = "load.force"  # magnitude of the force
 LOADS = tuple(name.lower() for name in WRENCH)
 
 
 def variable(conditions: Conditions, name: str) -> NDArray:
-    """Return a variable in every row.
+    """Return the values of a variable in all rows.
 
     Args:
         conditions: R rows.
-        name: public name, except of a wrench.
+        name: public name of the variable, which must not be a wrench.
 
     Returns:
-        (R,), NaN where not known.
+        (R,) values, NaN if unknown.
     """
     kind, _, rest = name.partition(".")
     if kind == "q":
@@ -48,11 +48,11 @@ def past(conditions: Conditions, names: Iterable[str]) -> tuple[History, NDArray
 
     Args:
         conditions: R rows.
-        names: names of the variables needed.
+        names: names of the required variables.
 
     Returns:
-        Their history, and (R,) the rows' indices in it; rows without a past are the
-        first rows of separate sessions.
+        The history, and (R,) the indices of the rows in it; rows without a history are
+        the first rows of separate sessions.
     """
     if conditions.history is not None and conditions.row is not None:
         return conditions.history, conditions.row
@@ -70,7 +70,7 @@ def with_history(conditions: Conditions) -> Conditions:
         conditions: R rows, as declared.
 
     Returns:
-        The same; selections by :meth:`Conditions.take` keep the whole history.
+        The conditions; selections by :meth:`Conditions.take` keep the whole history.
     """
     names = [f"q.{frame.name}" for frame in conditions.robot.frames]
     names += [f"load.{name}" for name in LOADS]

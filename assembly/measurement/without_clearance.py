@@ -1,21 +1,21 @@
 """Least energy (22) of a robot without clearances, at many postures and loads.
 
 Without clearances no unknown of (22) has a bound.  Its conditions are a linear system
-in the closures' multipliers and the free motions,
+in the multipliers of the closures and the free motions,
 
     [ J C J'   J F ] [lambda]      [ J (dl + C f) ]
     [ F' J'     0  ] [  q   ]  = - [    F' f      ]
 
-with C the compliances of bodies and joints, f the loads on them, J the closures.  One
-factorisation serves all rows at a posture.
+with C the compliances of bodies and joints, f the loads on them, and J the closures.
+One factorisation is used for all rows at a posture.
 
 ======  ====================  ===========  ===========================================
 symbol  code                  shape        meaning
 ======  ====================  ===========  ===========================================
 J       ``rows``              (c,6K,6n)    closures at c postures, scaled
 P       ``platform``          (c,6,6n)     screws to the platform screw, eq. (8)
-lambda  ``multipliers``       (R,6K)       of the scaled closures
-w       ``joint_wrenches``    (R,6n)       through every joint
+lambda  ``multipliers``       (R,6K)       multipliers of the scaled closures
+w       ``joint_wrenches``    (R,6n)       wrenches through all joints
 ======  ====================  ===========  ===========================================
 """
 
@@ -38,9 +38,11 @@ from assembly.linear.load import FrameLoads
 from assembly.model.clearance import clearance_bounds, component_bounds
 from assembly.model.links import joint_compliances, link_compliances, own_screws
 
-# relative size below which an eigenvalue is rounding; up to RANK the rank is ambiguous
+# relative size below which an eigenvalue is rounding; between this and RANK the rank is
+# ambiguous
 _ROUNDING = 1e-13
-_PADDING = 4  # largest padding, in numbers of rows; beyond it one by one
+# largest padding relative to the number of rows; with more, rows are solved one by one
+_PADDING = 4
 _CLOSED = 1e-9  # relative residual of a solved system
 _CLOSED_ABSOLUTE = 1e-12  # [rad, reference lengths] residual that counts as rounding
 
@@ -50,16 +52,16 @@ class Flexibility:
     """A robot without clearances at c postures, prepared for any errors and loads.
 
     Attributes:
-        rows: (c, 6K, 6n) scaled closures.
-        platform: (c, 6, 6n) screws to the platform screw.
-        body_compliances: (n, 6, 6) in the frames' axes.
-        joint_compliances: (n, 6, 6) in the frames' axes.
+        rows: (c, 6K, 6n) scaled closure rows.
+        platform: (c, 6, 6n) map from small screws to the platform screw.
+        body_compliances: (n, 6, 6) compliances in the frames' axes.
+        joint_compliances: (n, 6, 6) compliances in the frames' axes.
         free: (6n, q) unit columns of the free motions.
-        limit: (q,) [rad, m] bounds of the free motions, inf where there are none.
-        inverse: (c, m, m) of the scaled system, m = 6K + q.
+        limit: (q,) [rad, m] bounds of the free motions, inf without a bound.
+        inverse: (c, m, m) inverse of the scaled system, m = 6K + q.
         system: (c, m, m) the scaled system.
-        softness: divisor of the compliances that makes the system of order one.
-        ambiguous: (c,) bool, whether its numerical rank is ambiguous.
+        softness: divisor of the compliances with which the system is of order one.
+        ambiguous: (c,) bool, True if the numerical rank is ambiguous.
     """
 
     rows: NDArray
@@ -75,7 +77,7 @@ class Flexibility:
 
     @cached_property
     def compliance(self) -> NDArray:
-        """(n, 6, 6) of body and joint together."""
+        """(n, 6, 6) compliances of body and joint together."""
         return self.body_compliances + self.joint_compliances
 
     def solve(
@@ -86,11 +88,11 @@ class Flexibility:
         Args:
             posture: (R,) index of each row's posture.
             errors: (R, 6n) [rad, m] stress-free screws.
-            loads: on every small screw, (R, 6n).
+            loads: (R, 6n) loads on every small screw.
 
         Returns:
-            The assemblies; invalid in rows where :attr:`FlexibleAssembly.solved` is
-            false.
+            The assemblies; rows in which :attr:`FlexibleAssembly.solved` is False are
+            invalid.
         """
         under_load = _under_load(self, loads)
         unclosed = errors if under_load is None else errors + under_load
@@ -122,15 +124,15 @@ class Flexibility:
         )
 
     def self_stress(self, columns: NDArray, read: NDArray | None = None) -> NDArray:
-        """Return the forces by which the closed structure resists stress-free screws.
+        """Return the forces with which the closed structure resists stress-free screws.
 
         Args:
             columns: (6n, s) screws at the frames.
-            read: (6n, t) screws along which the forces are read; the same if absent.
+            read: (6n, t) screws along which forces are read; by default ``columns``.
 
         Returns:
-            (c, t, s) generalised force along each per unit of each; for the same
-            screws, negative semidefinite.
+            (c, t, s) generalised force along each read screw per unit of each column;
+            negative semidefinite if both are the same.
         """
         through = self.rows @ columns
         met = through if read is None else self.rows @ read
@@ -145,7 +147,7 @@ class Flexibility:
             columns: (6n, s) screws at the frames.
 
         Returns:
-            (c, 6, s) [rad, m] platform screw per unit of each.
+            (c, 6, s) [rad, m] platform screw per unit of each column.
         """
         count = self.rows.shape[1]
         if not count:
@@ -165,13 +167,13 @@ def responses_to(
     """Return the responses to stress-free screws at the frames, cached.
 
     Args:
-        flexible: at c postures.
-        columns: columns of (6n, s) screws, as bytes.
-        shape: (6n, s).
+        flexible: the prepared robot at c postures.
+        columns: bytes of the columns of (6n, s) screws.
+        shape: the shape (6n, s).
 
     Returns:
-        (c, 6, s) platform screws, (c, s, s) generalised reaction forces along each, and
-        (c, 6n, s) wrenches at every joint, per unit of each.
+        (c, 6, s) platform screws, (c, s, s) generalised reaction forces, and (c, 6n, s)
+        wrenches at every joint, per unit of each screw.
     """
     screws = np.frombuffer(columns).reshape(shape)
     everywhere = flexible.self_stress(screws, np.eye(shape[0]))
@@ -184,9 +186,10 @@ class FlexibleAssembly:
 
     Attributes:
         platform_screw: (R, 6) [rad, m] at the platform's origin, base axes.
-        joint_wrenches: (R, 6n) [N m, N] through every joint, in the frames' axes.
-        multipliers: (R, 6K) of the scaled closures.
-        solved: (R,) bool; rows where it is False are invalid.
+        joint_wrenches: (R, 6n) [N m, N] wrenches through all joints, in the frames'
+            axes.
+        multipliers: (R, 6K) multipliers of the scaled closures.
+        solved: (R,) bool; rows with False are invalid.
     """
 
     platform_screw: NDArray
@@ -197,8 +200,8 @@ class FlexibleAssembly:
 
 @lru_cache(maxsize=4)
 def _under_load(flexible: Flexibility, loads: FrameLoads) -> NDArray | None:
-    """Return (R, 6n) screws of bodies and joints under loads alone, closures open."""
-    # the same for all conditions that differ in errors alone
+    """Return (R, 6n) screws of bodies and joints due to loads, with open closures."""
+    # equal for all conditions that differ only in errors
     if not loads:
         return None
     screws = _each(flexible.body_compliances, loads.body)
@@ -207,9 +210,9 @@ def _under_load(flexible: Flexibility, loads: FrameLoads) -> NDArray | None:
 
 
 def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
-    """Return a product of the postures' matrices with the rows' vectors.
+    """Return a function that multiplies matrices of postures with vectors of rows.
 
-    Rows at one posture are multiplied together: no matrix is copied for every row.
+    Rows at one posture are multiplied together, so no matrix is copied for every row.
 
     Args:
         posture: (R,) index of each row's posture.
@@ -222,7 +225,7 @@ def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
 
 @lru_cache(maxsize=8)
 def _at_postures(unchanged: Unchanged) -> Callable[[NDArray, NDArray], NDArray]:
-    """Return the function of :func:`at_postures`, cached."""
+    """Return the function of :func:`at_postures`, from a cache."""
     posture = unchanged.numbers
     names, own, count = np.unique(posture, return_inverse=True, return_counts=True)
     order = np.argsort(own, kind="stable")
@@ -249,7 +252,7 @@ def flexibility(postures: Posture) -> Flexibility:
     """Factorise the closures of a robot without clearances.
 
     Args:
-        postures: c of them, transforms (c, n, 4, 4).
+        postures: c postures with transforms (c, n, 4, 4).
 
     Returns:
         The factorised model at these postures.

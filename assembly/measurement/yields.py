@@ -1,4 +1,4 @@
-"""Compliant places whose deflection follows from wrenches by laws of their own.
+"""Compliant places, whose deflections follow from wrenches by given laws.
 
 Their deflections e are stress-free screws that depend on the wrenches w, which depend
 on e in turn: e = g(w), w = w0 + A e with A the self-stress.  Newton's method solves e -
@@ -9,7 +9,7 @@ iterate is exact.
 symbol  code         shape        meaning
 ======  ===========  ===========  ====================================================
 e       ``give``     (R, m)       deflections of the m yields
-w       ``through``  (R, t)       the wrenches that laws read
+w       ``through``  (R, t)       wrenches on which the laws depend
 G       ``slope``    (R, m, t)    derivative of the laws
 ======  ===========  ===========  ====================================================
 """
@@ -27,14 +27,14 @@ from assembly.model.links import in_series
 from assembly.solvers.conic import SolverFailed
 
 T = TypeVar("T")
-_STEP = 1e-6  # relative to a wrench's size: step for the slope of a law
+_STEP = 1e-6  # relative to a wrench: step for the derivative of a law
 _SETTLED = 1e-10  # relative to the largest deflection: accepted residual
 _STEPS = 40
 
 
 @dataclass(frozen=True, eq=False)
 class Yields:
-    """The compliant places of conditions, as columns of small screws.
+    """Compliant places of conditions, as columns of small screws.
 
     Attributes:
         conditions: R rows of a robot of n frames.
@@ -44,12 +44,12 @@ class Yields:
 
     @cached_property
     def places(self) -> NDArray:
-        """(6n, m) unit screws that the places change."""
+        """(6n, m) unit screws along which the places deflect."""
         return self._units([(y.frame, y.component) for y in self.conditions.yields])
 
     @cached_property
     def read(self) -> NDArray:
-        """(6n, t) unit screws whose wrenches the laws read."""
+        """(6n, t) unit screws of the wrenches on which the laws depend."""
         return self._units(self._pairs)
 
     @cached_property
@@ -72,7 +72,7 @@ class Yields:
         return np.column_stack(columns)
 
     def slope(self, through: NDArray) -> NDArray:
-        """Return (R, m, t) derivative of the deflections, by central differences."""
+        """Return (R, m, t) derivatives of the deflections, by central differences."""
         slopes = np.zeros((len(through), len(self.conditions.yields), through.shape[1]))
         for k in range(through.shape[1]):
             step = _STEP * max(float(np.abs(through[:, k]).max(initial=0.0)), 1e-9)
@@ -92,10 +92,10 @@ class Yields:
             A: (R, t, m) derivative of the wrenches by the deflections.
 
         Returns:
-            (R, m) to be added; zero in converged rows.
+            (R, m) correction to be added; zero in converged rows.
 
         Raises:
-            SolverFailed: the deflections are without bound.
+            SolverFailed: the deflections are unbounded.
         """
         lack = self.deflections(through) - give
         size = np.abs(give).max(axis=1, initial=0.0) + np.abs(lack).max(axis=1)
@@ -114,15 +114,15 @@ class Yields:
 def with_deflections(
     conditions: Conditions, places: NDArray, give: NDArray
 ) -> Conditions:
-    """Return conditions with deflections held as stress-free screws, without laws.
+    """Return conditions with given deflections as stress-free screws, without laws.
 
     Args:
         conditions: R rows.
         places: (6n, m) unit screws of the compliant places.
-        give: (R, m) [rad or m].
+        give: (R, m) [rad or m] deflections.
 
     Returns:
-        The same, without compliant places.
+        The conditions without compliant places.
     """
     screws = (give @ places.T).reshape(conditions.errors.shape)
     return replace(conditions, errors=conditions.errors + screws, yields=())
@@ -138,8 +138,7 @@ def settle_yields(
     Args:
         conditions: R rows.
         solve: function that returns solutions and (R, 6n) joint wrenches without laws.
-        A: (R, t, m) derivative of the laws' wrenches by the deflections, to first
-            order.
+        A: (R, t, m) first-order derivative of the laws' wrenches by the deflections.
 
     Returns:
         The solutions.
@@ -160,14 +159,14 @@ def settle_yields(
 
 
 def with_springs(conditions: Conditions, row: int) -> Conditions:
-    """Return one row with its linear compliant places in series with their joints.
+    """Return one row with its linear compliant places in series with the joints.
 
     Args:
         conditions: conditions of all rows.
-        row: its index.
+        row: index of the row.
 
     Returns:
-        The row; places that are no springs, or have no positive compliance, stay.
+        The row; places that are not springs or have no positive compliance remain.
     """
     one, left = conditions.take([row]), []
     frames = list(conditions.robot.frames)

@@ -3,8 +3,11 @@
 ======  ====================  =======  ==========================================
 symbol  code                  shape    meaning
 ======  ====================  =======  ==========================================
-c-bar   ``clearance_bounds``  (n, 4)   [RXY RZ TXY TZ], 0 rigid, inf free
+c-bar   ``clearance_bounds``  (n, 5)   [RXY RZ TXY TZ TXYZ], 0 rigid, inf free
 ======  ====================  =======  ==========================================
+
+Four of them are the paper's.  The last one, for (TX, TY, TZ), is a ball in its socket:
+it takes the place of TXY and TZ.  A bound that a joint does not have is NaN.
 
 The free motion of a passive joint is one of these directions without a bound, or with
 the bound in the file.  So a joint's own motion needs no separate treatment.
@@ -15,9 +18,11 @@ from numpy.typing import NDArray
 
 from assembly.model.robot import Clearance, Frame, Robot
 
-CONES = ((0, 1), (2,), (3, 4), (5,))  # components of the screw that each bound limits
-BOUND_OF_COMPONENT = (0, 0, 1, 2, 2, 3)  # the bound that limits each component
-_KEYS = ("tilt", "spin", "radial", "axial")
+# components of the screw that each bound limits
+CONES = ((0, 1), (2,), (3, 4), (5,), (3, 4, 5))
+BOUNDS = ("tilt", "spin", "radial", "axial", "ball")  # keys of the bounds, by cone
+_BALL = BOUNDS.index("ball")
+_BOUND_OF_COMPONENT = (0, 0, 1, 2, 2, 3)  # without a ball
 
 
 def clearance_bounds(robot: Robot, own_axes_free: bool = False) -> NDArray:
@@ -30,15 +35,17 @@ def clearance_bounds(robot: Robot, own_axes_free: bool = False) -> NDArray:
             clearance in series).
 
     Returns:
-        (n, 4) [rad, rad, m, m] for [RXY RZ TXY TZ]: 0 is rigid, inf is free.
+        (n, 5) [rad, rad, m, m, m] for [RXY RZ TXY TZ TXYZ]: 0 is rigid, inf is free,
+        NaN is no bound of this joint.
     """
-    bounds = np.zeros((len(robot.frames), 4))
+    bounds = np.zeros((len(robot.frames), len(BOUNDS)))
     for i, frame in enumerate(robot.frames):
         clearance = frame.clearance or Clearance()
-        bounds[i] = [getattr(clearance, key) or 0.0 for key in _KEYS]
+        bounds[i] = [getattr(clearance, key) or 0.0 for key in BOUNDS]
+        bounds[i, [_BALL] if clearance.ball is None else [2, 3]] = np.nan
         own = own_cone(frame)
         if own is not None:
-            given = getattr(clearance, _KEYS[own])
+            given = getattr(clearance, BOUNDS[own])
             bounds[i, own] = np.inf if given is None else given
         elif frame.compliant and own_axes_free:
             bounds[i, 3 if frame.joint == "prismatic" else 1] = np.inf
@@ -46,8 +53,23 @@ def clearance_bounds(robot: Robot, own_axes_free: bool = False) -> NDArray:
 
 
 def component_bounds(bounds: NDArray) -> NDArray:
-    """Return the (n, 6) bound of each component of a screw, from bounds (n, 4)."""
-    return bounds[:, list(BOUND_OF_COMPONENT)]
+    """Return the (n, 6) bound of each component of a screw, from bounds (n, 5)."""
+    components = bounds[:, list(_BOUND_OF_COMPONENT)]
+    return np.where(np.isnan(components), bounds[:, [_BALL]], components)
+
+
+def bound_name(columns: NDArray) -> str:
+    """Return the key of the bound of a cone, such as ``"tilt"``.
+
+    Args:
+        columns: (6n, 1 to 3) columns of the cone, see
+            :class:`assembly.linear.closure.VirtualJoints`.
+
+    Returns:
+        One of :data:`BOUNDS`.
+    """
+    rows = np.flatnonzero(columns.any(axis=1)) % 6
+    return BOUNDS[CONES.index(tuple(rows.tolist()))]
 
 
 def own_cone(frame: Frame) -> int | None:
@@ -58,8 +80,8 @@ def own_cone(frame: Frame) -> int | None:
 
 
 def scales_with_margin(robot: Robot) -> NDArray:
-    """Return (n, 4) bool: bounds of clearances, not the range of a passive joint."""
-    scaled = np.ones((len(robot.frames), 4), dtype=bool)
+    """Return (n, 5) bool: bounds of clearances, not the range of a passive joint."""
+    scaled = np.ones((len(robot.frames), len(BOUNDS)), dtype=bool)
     for i, frame in enumerate(robot.frames):
         own = own_cone(frame)
         if own is not None:
@@ -99,7 +121,7 @@ def clearance_excess(screws: NDArray, bounds: NDArray) -> NDArray:
 
     Args:
         screws: (..., n, 6) [rad, m].
-        bounds: (n, 4) [rad, rad, m, m].
+        bounds: (n, 5) [rad, rad, m, m, m], see :func:`clearance_bounds`.
 
     Returns:
         (...) [-] largest of size / bound - 1 over the bounds that are positive and

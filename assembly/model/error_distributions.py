@@ -143,6 +143,24 @@ class ErrorSources:
         normal = np.where(self.kind == 2, 1.0 - 2.0 * cut * density / inside, 1.0)
         return self.scale**2 * np.where(self.kind == 0, uniform, normal)
 
+    def of_numbers(self, slopes: NDArray) -> NDArray:
+        """Return slopes (..., n, 6) with the errors as slopes (..., m)."""
+        return np.asarray(slopes[..., self.frame, self.component])
+
+    @property
+    def units(self) -> list[str]:
+        """Unit of each source."""
+        return ["rad" if c < 3 else "m" for c in self.component.tolist()]
+
+    @property
+    def identity(self) -> list[NDArray]:
+        """Arrays that are equal if the draws are."""
+        return [
+            self.frame, self.component, self.kind, self.centre, self.scale,
+            self.least, self.limit, self.signed,
+            *([] if self.fixed is None else [self.fixed]),
+        ]  # fmt: skip
+
     def scaled(self, scale: NDArray) -> "ErrorSources":
         """Return the same sources with other scales (m,) [rad or m]."""
         return replace(self, scale=np.asarray(scale, dtype=float))

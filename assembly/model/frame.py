@@ -7,6 +7,7 @@ carries the children.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 
@@ -26,6 +27,8 @@ LOCKED = (
     "found inf along the own motion of a passive joint, which would lock it; expected "
     '0 (free, as a bearing), a number > 0 (a spring), or joint = "fixed"'
 )
+SLIDING_BALL = "found one on a joint that slides, expected radial"
+ONE_OF_BALL = 'found together with "ball", expected one of them'
 NO_SPIN = "expected none: its motion along the thread has no clearance bound"
 
 FORCE_CONTROL = (
@@ -46,12 +49,41 @@ class Clearance:
         axial: [m] bound of abs(TZ), eq. (3).
         tilt: [rad] radius of the disc for (RX, RY), eq. (4).
         spin: [rad] bound of abs(RZ), eq. (5).
+        ball: [m] radius of the ball for (TX, TY, TZ), in place of ``radial`` and
+            ``axial``: a ball in its socket.
     """
 
     radial: float | None = None
     axial: float | None = None
     tilt: float | None = None
     spin: float | None = None
+    ball: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.ball is not None and (self.radial, self.axial) != (None, None):
+            key = "axial" if self.radial is None else "radial"
+            raise BadInput(f"clearance.{key}: {ONE_OF_BALL}")
+
+
+@dataclass(frozen=True, eq=False)
+class LockedAt:
+    """A fixed joint with clearance that is bolted at one pose and rigid afterwards.
+
+    Attributes:
+        clearance: before it is bolted.
+        pose: components ``tx .. rz`` [m, rad] of the platform at that pose.
+        joints: or coordinates [rad or m] of drives; home if both are empty.
+        screw: (6,) [rad, m] clearance that is locked in; it is part of the geometric
+            error.  Computed by :func:`assembly.steps.bolted.bolt_joints`.
+    """
+
+    clearance: Clearance
+    pose: Mapping[str, float] = field(default_factory=dict)
+    joints: Mapping[str, float] = field(default_factory=dict)
+    screw: NDArray = field(default_factory=lambda: np.zeros(6))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "screw", locked(self.screw, (6,), "locked_at: screw"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +105,8 @@ class Frame(EqualData):
         tolerance: (6,) [rad, m] standard deviations of delta l about the given value, 0
             where it is exact; None if unknown.
         clearance: clearance of the joint; None if it has none.
+        locked_at: where the joint is bolted, with its clearance before; None if it is
+            not.
         joint_stiffness: (6, 6) K_B with ``inf`` on the diagonal where rigid, or None;
             0 along a passive joint's own motion (its row and column) leaves it free.
         drive_force: [N m or N] with which a drive pushes a passive joint along its
@@ -97,6 +131,7 @@ class Frame(EqualData):
     geometric_error: NDArray = field(default_factory=lambda: np.zeros(6))
     tolerance: NDArray | None = None
     clearance: Clearance | None = None
+    locked_at: LockedAt | None = None
     joint_stiffness: NDArray | None = None
     drive_force: float = 0.0
     link: Link | None = None
@@ -113,6 +148,11 @@ class Frame(EqualData):
             if value is not None:
                 value = locked(value, shape, f"frame '{self.name}': {name}")
                 object.__setattr__(self, name, value)
+        if self.locked_at is not None and (self.joint != "fixed" or self.clearance):
+            raise BadInput(
+                f"frame {quoted(self.name)}.locked_at: found a joint that moves or has "
+                'a clearance besides; expected joint = "fixed"'
+            )
         if (self.joint == "helical") != (self.pitch != 0.0):
             raise BadInput(
                 f"frame {quoted(self.name)}.pitch: found {self.pitch:g} on a "
@@ -122,6 +162,9 @@ class Frame(EqualData):
         if self.pitch and self.clearance and self.clearance.spin is not None:
             place = f"frame {quoted(self.name)}.clearance.spin"
             raise BadInput(f"{place}: found one on a helical joint, {NO_SPIN}")
+        ball = self.clearance is not None and self.clearance.ball is not None
+        if ball and self.joint in {"prismatic", "helical"}:
+            raise BadInput(f"frame {quoted(self.name)}.clearance.ball: {SLIDING_BALL}")
         own = self.own_stiffness
         if self.passive and own is not None and np.isinf(own):
             raise BadInput(f"frame {quoted(self.name)}.joint_stiffness: {LOCKED}")

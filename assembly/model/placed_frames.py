@@ -28,11 +28,11 @@ def place_frames(placed: Iterable[PlacedFrame]) -> tuple[Frame, ...]:
         step = np.linalg.inv(after[frame.parent]) @ T
         turn = rotation_vector(step[:3, :3])
         frames.append(replace(frame, translation=step[:3, 3], rotation=turn))
-        after[frame.name] = T @ _own_motion(frame)
+        after[frame.name] = T @ own_motion(frame)
     return tuple(frames)
 
 
-def _own_motion(frame: Frame) -> NDArray:
+def own_motion(frame: Frame) -> NDArray:
     """Return (4, 4) motion of the joint at its home position, about or along z."""
     along = np.array([0.0, 0.0, frame.position])
     if frame.joint == "prismatic":

@@ -26,6 +26,7 @@ from assembly.linear.closure import VirtualJoints
 from assembly.linear.energy import Assembly, solve_assembly
 from assembly.linear.load import driven
 from assembly.linear.nearest_pose import nearest_pose
+from assembly.model.clearance import bound_name
 from assembly.model.given_load import Load, one_load
 from assembly.platform_stiffness.active_set import contacts
 from assembly.platform_stiffness.exact_tangent import exact_tangent
@@ -50,14 +51,6 @@ _CHANGES = 8
 _STAYS = 1e-6
 _STILL = 1e-12  # [characteristic lengths] size below which motions are rounding
 _JUMP = 5.0  # times the motion predicted by the tangents on both sides
-_BOUNDS = (
-    "tilt",
-    "tilt",
-    "spin",
-    "radial",
-    "radial",
-    "axial",
-)  # by row of a screw
 # relative to the largest load: below it clearances may leave the pose open
 _NO_LOAD = 1e-9
 
@@ -276,9 +269,9 @@ def clearance_names(joints: VirtualJoints, marked: NDArray) -> frozenset[str]:
     """
     names = set()
     for k in np.flatnonzero(marked):
-        column = int(np.flatnonzero(joints.group == k)[0])
-        row = int(np.abs(joints.cones[:, column]).argmax())
-        names.add(f"{joints.robot.frames[row // 6].name} {_BOUNDS[row % 6]}")
+        columns = joints.cones[:, joints.group == k]
+        frame = joints.robot.frames[int(columns.any(axis=1).argmax()) // 6]
+        names.add(f"{frame.name} {bound_name(columns)}")
     return frozenset(names)
 
 

@@ -89,8 +89,9 @@ def active_tangent(assembly: Assembly, side: Side = "holding") -> PlatformStiffn
         columns = joints.cones[:, rows]
         if not is_held:
             free.append(columns / np.linalg.norm(columns, axis=0))
-        elif len(rows) == 2:
-            along = columns @ (np.array([-u[rows[1]], u[rows[0]]]))
+            continue
+        for tangent in _tangents(u[rows]):
+            along = columns @ tangent
             if pressed[k]:
                 springs.append(along[:, None] / np.sqrt(force[k]))
                 names.append(Part(_frame(joints, rows[0]), "clearance"))
@@ -98,6 +99,13 @@ def active_tangent(assembly: Assembly, side: Side = "holding") -> PlatformStiffn
                 free.append(along[:, None] / np.linalg.norm(along))
     return _stiffness(assembly.linearisation, "contact", np.hstack(springs), names,
                       np.hstack(free), assembly.method)  # fmt: skip
+
+
+def _tangents(u: NDArray) -> NDArray:
+    """Return (d - 1, d) directions along the boundary of a cone at its point (d,) u."""
+    if len(u) == 2:
+        return np.array([[-u[1], u[0]]])
+    return np.asarray(np.linalg.svd(u[None])[2][1:])
 
 
 def _frame(joints: VirtualJoints, column: int) -> str:

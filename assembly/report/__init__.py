@@ -1,4 +1,4 @@
-"""Results as text, JSON, tables and plots.
+"""Results of assemblies as text, JSON, tables and figures.
 
 Begin at ``results.py``.
 """

@@ -1,24 +1,25 @@
-"""Remarks on an exact equilibrium that the linear model does not predict."""
+"""Remarks on exact equilibria that the linear model does not predict."""
 
 import numpy as np
 
 from assembly.exact.exact import ExactAssembly
 
 # relative difference from the linear model, of the platform's motion and of the energy
-# or potential; links that turn by 0.1 rad differ by less
+# or potential; it is smaller even for links that rotate by 0.1 rad
 _FAR = 0.3
 
 
 def far_from_linear(assembly: ExactAssembly) -> list[str]:
     """Return a remark on a loaded robot that may be beyond a critical load.
 
-    Its equilibrium may be stable, like that of a buckled column, and does not show it.
+    Such an equilibrium may be stable, like that of a buckled column, so stability does
+    not show it.
 
     Args:
-        assembly: with finite motions.
+        assembly: assembly with finite motions.
 
     Returns:
-        One sentence, or none.
+        One sentence, or nothing.
     """
     loads = assembly.loads
     if not (loads.load.any() or loads.beyond_platform or loads.drives.any()):

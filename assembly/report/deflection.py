@@ -1,4 +1,4 @@
-"""A load-deflection curve as plain values and as text."""
+"""A load-deflection curve as plain values, as text and as a figure."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
@@ -24,7 +24,7 @@ from stiffness.screws import SCREW, WRENCH
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_ROWS = 25  # largest number of rows in the text
+_ROWS = 25  # largest number of rows of the table in the text
 
 
 def deflection_of(
@@ -40,18 +40,20 @@ def deflection_of(
     """Return the results of ``assembly deflection`` as plain values.
 
     Args:
-        posture: of the robot.
-        component: of the load, 0 to 5.
-        loads: [N m or N] its values in the order in which they act.
-        load: (6,) [N m, N] the constant part of the load.
+        posture: posture of the robot.
+        component: component of the load that varies, 0 to 5.
+        loads: [N m or N] values of this component in the order in which they act.
+        load: (6,) [N m, N] constant part of the load.
         gravity: (3,) [m/s^2] base axes.
         state: ``"exact"`` with finite motions.
-        follow: whether past limit points, by arc length, from the first to the last
-            load; finite motions, clearances held at zero.
-        progress: called with the kind of step, steps done, and steps at most.
+        follow: whether the path is followed by arc length past limit points, from the
+            first to the last load; this requires finite motions, and clearances are
+            held at zero.
+        progress: called with the kind of step, the number of finished steps, and the
+            largest number of steps.
 
     Returns:
-        Curve and events; ``status`` is ``"ok"``, or says why there is none.
+        Curve and events; ``status`` is ``"ok"``, or the reason why there is no curve.
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
@@ -88,7 +90,7 @@ def _curve_values(curve: DeflectionCurve) -> dict[str, Any]:
 
 
 def deflection_text(results: dict[str, Any]) -> str:
-    """Return a curve as text: a table and its events."""
+    """Return a curve as text: a table, and the events."""
     head = listing(results["robot"], lines_of(results, "pose status reason state"))
     if "loads" not in results:
         return head
@@ -117,10 +119,10 @@ def deflection_text(results: dict[str, Any]) -> str:
 
 
 def plot_deflection(results: dict[str, Any]) -> "Figure":
-    """Plot load over deflection, with events marked.
+    """Return a figure of load over deflection, with events marked.
 
     Args:
-        results: of :func:`deflection_of`.
+        results: result of :func:`deflection_of`.
 
     Returns:
         The figure.

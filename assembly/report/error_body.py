@@ -1,7 +1,7 @@
 """Convex set of the possible pose errors of the platform.
 
-It is approximated from inside by support points in many directions, and from outside by
-the support function in these directions.
+The set is approximated from inside by support points in many directions, and from
+outside by the support function in these directions.
 """
 
 from dataclasses import dataclass
@@ -24,10 +24,11 @@ class ErrorBody:
 
     Attributes:
         part: ``"rotation"`` or ``"translation"``.
-        points: (k, 3) [rad or m] of the set, base axes; vertices of the inner polytope.
-        faces: (m, 3) rows of ``points``; none where the set is flat.
+        points: (k, 3) [rad or m] points of the set, base axes; vertices of the inner
+            polytope.
+        faces: (m, 3) rows of ``points`` for each face; empty if the set is flat.
         directions: (k, 3) unit vectors.
-        heights: (k,) [rad or m] certified largest component along each.
+        heights: (k,) [rad or m] certified largest component along each direction.
     """
 
     part: str
@@ -40,7 +41,7 @@ class ErrorBody:
 
     @property
     def slack(self) -> float:
-        """[rad or m] largest distance of the outer polytope from the inner."""
+        """[rad or m] largest distance between the outer and the inner polytope."""
         inner = (self.points @ self.directions.T).max(axis=0)
         return float(np.max(self.heights - inner))
 
@@ -78,18 +79,19 @@ def possible_errors(assembly: Assembly, part: str, assumption: str) -> ErrorBody
 
 
 def error_body(reachable: ReachableSet, part: str, count: int = 200) -> ErrorBody:
-    """Return the set of errors, from its support functions.
+    """Return the set of possible errors, from its support function.
 
     Args:
-        reachable: of :func:`assembly.linear.reference.pose_error.reachable_screws`.
+        reachable: result of
+            :func:`assembly.linear.reference.pose_error.reachable_screws`.
         part: ``"rotation"`` or ``"translation"``.
-        count: number of directions, evenly spread.
+        count: number of directions, evenly distributed.
 
     Returns:
-        The set between its inner and outer approximation.
+        The set, between its inner and outer approximation.
 
     Raises:
-        ValueError: the part is neither, or has no bound.
+        ValueError: the part is unknown or has no bound.
         SolverFailed: the cone solver failed.
     """
     if part not in PARTS:
@@ -105,7 +107,7 @@ def error_body(reachable: ReachableSet, part: str, count: int = 200) -> ErrorBod
 
 
 def _faces(points: NDArray) -> NDArray:
-    """Return the triangles of the convex hull; none where the points lie in a plane."""
+    """Return the triangles of the convex hull; none if the points are in a plane."""
     try:
         return ConvexHull(points).simplices
     except QhullError:
@@ -113,10 +115,10 @@ def _faces(points: NDArray) -> NDArray:
 
 
 def even_directions(count: int) -> NDArray:
-    """Return the unit vectors spread evenly over the sphere, along a golden spiral.
+    """Return unit vectors distributed evenly over the sphere, along a golden spiral.
 
     Args:
-        count: how many.
+        count: number of vectors.
 
     Returns:
         (count, 3) unit vectors.

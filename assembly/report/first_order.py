@@ -1,4 +1,4 @@
-"""Validity of first order at a posture, and the solution of finite motions."""
+"""Validity of the first-order analysis at a posture; solution with finite motions."""
 
 from typing import Any
 
@@ -15,10 +15,10 @@ from assembly.model.statuses import BEYOND_LIMITS, SINGULAR
 from assembly.solvers.conic import SolverFailed
 from forcefit.results.display import rounded, screw_text
 
-# relative change of the energy by finite motions above which first order is invalid
+# relative change of the energy by finite motions from which on first order is invalid
 MOST_ENERGY = 0.5
-# [rad or lengths] joint motion above which first order is invalid; at this size the
-# linear closures are wrong by a tenth
+# [rad or lengths] joint motion from which on first order is invalid; the linear
+# closures then have an error of a tenth
 _LARGE = 0.3
 
 
@@ -36,11 +36,11 @@ def linearisation_of(
 def first_order_status(
     assembly: Assembly, linearisation: dict[str, Any], finite: str
 ) -> dict[str, str]:
-    """Return status and reason where first order is invalid; else nothing.
+    """Return status and reason if the first-order analysis is invalid; else nothing.
 
     Args:
-        assembly: of first order.
-        linearisation: of :func:`linearisation_of`.
+        assembly: assembly by the first-order analysis.
+        linearisation: difference from :func:`linearisation_of`.
         finite: text of the exact solution.
 
     Returns:
@@ -66,15 +66,15 @@ def first_order_status(
 def posture_status(
     posture: Posture, load: ArrayLike | None = None, gravity: ArrayLike | None = None
 ) -> dict[str, str]:
-    """Return the status and reason of a posture beyond the joints' limits, or singular.
+    """Return status and reason for a posture that is singular or beyond joint limits.
 
     Args:
-        posture: of the robot.
+        posture: posture of the robot.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
 
     Returns:
-        Keys of the public format; empty at any other posture.
+        Keys of the public format; empty for any other posture.
     """
     if passed := limits_passed(posture.robot, posture.coordinates):
         return {"status": BEYOND_LIMITS, "reason": passed}
@@ -84,15 +84,15 @@ def posture_status(
 def singular_status(
     posture: Posture, load: ArrayLike | None = None, gravity: ArrayLike | None = None
 ) -> dict[str, str]:
-    """Return status and reason at a singular posture, with the exact solution.
+    """Return status and reason for a singular posture, with the exact solution.
 
     Args:
-        posture: of the robot.
+        posture: posture of the robot.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
 
     Returns:
-        Keys of the public format; empty at any other posture.
+        Keys of the public format; empty for any other posture.
     """
     if not _singular(posture):
         return {}
@@ -104,7 +104,7 @@ def singular_status(
 
 
 def off_by(change: float) -> str:
-    """Return the reason where first order is wrong by a share of the energy."""
+    """Return the reason if the first-order energy is wrong by a given share."""
     return (
         "the first-order analysis is not valid here: its energy is wrong by "
         f"{100 * abs(change):.3g} %"
@@ -117,7 +117,7 @@ def _singular(posture: Posture) -> bool:
 
 
 def _words(exact: ExactAssembly) -> str:
-    """Return the text of energy and pose error with finite motions."""
+    """Return energy and pose error of the solution with finite motions, as text."""
     return (
         f"{rounded(exact.energy):.6g} J, platform error "
         f"{screw_text(exact.platform_screw)}"

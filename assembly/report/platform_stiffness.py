@@ -26,9 +26,10 @@ from forcefit.results.text import lines_of, table_lines, value_text
 from stiffness.screws import SCREW, WRENCH
 
 DIRECTIONS = tuple(name.lower() for name in SCREW)
-_SIDES = {"holding": "loading", "letting go": "unloading"}  # of a contact
+# words for the two sides of a change of contact
+_SIDES = {"holding": "loading", "letting go": "unloading"}
 _KINDS = {"link": "links", "joint": "joints", "clearance": "clearances"}
-_SHOWN = 12  # parts in the table and the chart; the others share one row
+_SHOWN = 12  # number of parts in the table and the chart; other parts share one row
 
 
 def stiffness_of(
@@ -43,18 +44,20 @@ def stiffness_of(
     """Return the results of ``assembly stiffness`` as plain values.
 
     Args:
-        posture: of the robot.
+        posture: posture of the robot.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
-        at: (3,) [m] of the platform, in its axes, where screws and wrenches are read.
-        state: ``"nominal"``, ``"contact"`` or ``"exact"``; with the first also the
-            tangent of problem (22) if the robot has clearances.
-        length: [m] by which rotations are multiplied; the longest body if absent.
-        direction: (6,) unit, base axes: stiffness and shares along it.
+        at: (3,) [m] point of the platform, in platform axes, at which screws and
+            wrenches are read.
+        state: ``"nominal"``, ``"contact"`` or ``"exact"``; the nominal state includes
+            the tangent of problem (22) if the robot has clearances.
+        length: [m] factor on rotations; the longest body if absent.
+        direction: (6,) unit screw, base axes, along which stiffness and shares are
+            computed.
 
     Returns:
-        The keys of the public format; ``status`` is ``"ok"``, ``"free motion"``, or
-        ``"unstable"``, or says why there is no equilibrium.
+        The keys of the public format; ``status`` is ``"ok"``, ``"free motion"``,
+        ``"unstable"``, or the reason why there is no equilibrium.
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
@@ -84,7 +87,7 @@ def stiffness_of(
 def _tangents(
     posture: Posture, load: Any, gravity: Any, state: State
 ) -> tuple[NDArray, list[PlatformStiffness], list[str] | None]:
-    """Return the platform's pose, tangents of one or both sides, and remarks."""
+    """Return the platform's pose, the tangents of one or both sides, and remarks."""
     if state == "nominal":
         return posture.platform, [without_clearance(posture)], None
     if state == "contact":
@@ -102,7 +105,7 @@ def _tangents(
 
 
 def _along(answer: PlatformStiffness, direction: ArrayLike) -> dict[str, Any]:
-    """Return the stiffness and shares along a rotation or translation."""
+    """Return stiffness and shares along a rotation or translation."""
     way = np.asarray(direction, dtype=float)
     free, blocked = answer.along(way)
     return {
@@ -119,7 +122,7 @@ def virtual_clearances(posture: Posture) -> bool:
 def _in_contact(
     posture: Posture, load: Any, gravity: Any, point: NDArray, length: float | None
 ) -> list[dict[str, Any]]:
-    """Return tangent of (22): one, or two where a clearance just touches its bound."""
+    """Return the tangent of (22), or two if a clearance just touches its bound."""
     assembly = solve_assembly(posture, load, gravity=gravity)
     pressed, touching = contacts(assembly)
     sides: list[Side] = ["holding"]
@@ -142,15 +145,15 @@ def _status(stiffness: PlatformStiffness) -> str:
 def stiffness_values(
     platform: PlatformStiffness, point: NDArray, length: float | None = None
 ) -> dict[str, Any]:
-    """Return one stiffness as plain values, NaN or infinite where undefined.
+    """Return one stiffness as plain values, NaN or infinite where it is undefined.
 
     Args:
-        platform: of a posture.
-        point: (3,) [m] at which it is read, base axes.
-        length: [m] by which rotations are multiplied.
+        platform: stiffness of the platform at a posture.
+        point: (3,) [m] point at which it is read, base axes.
+        length: [m] factor on rotations.
 
     Returns:
-        Matrices, free motions, eigenscrews, shares by direction.
+        Matrices, free motions, eigenscrews, and shares by direction.
     """
     platform = platform.at(point, length)
     eigen = platform.eigen
@@ -182,7 +185,7 @@ def stiffness_values(
 
 
 def _share_values(stiffness: PlatformStiffness, axis: NDArray) -> dict[str, Any]:
-    """Return the shares along an axis by kind and frame."""
+    """Return the shares along an axis by kind of part and frame."""
     table: dict[str, Any] = {"links": {}, "joints": {}}
     for part, share in stiffness.shares(axis).items():
         if part.kind in _KINDS:
@@ -196,10 +199,10 @@ def share_rows(shares: dict[str, dict[str, Any]]) -> dict[str, list[float]]:
     """Return the shares of every part in the six directions, largest first.
 
     Args:
-        shares: of :func:`stiffness_values`.
+        shares: shares from :func:`stiffness_values`.
 
     Returns:
-        Six numbers by the part's name, such as ``"leg1.distal link"``.
+        Six shares for each part's name, such as ``"leg1.distal link"``.
     """
     rows: dict[str, list[float]] = {}
     for k, name in enumerate(DIRECTIONS):
@@ -234,7 +237,7 @@ def stiffness_text(results: dict[str, Any]) -> str:
 
 
 def _state_lines(values: dict[str, Any]) -> list[str]:
-    """Return lines of one state: K, free motions, eigenstiffnesses, centre."""
+    """Return lines on one state: K, free motions, eigenstiffnesses, centre."""
     K = np.asarray(values["stiffness"])
     size = np.sqrt(np.abs(np.nan_to_num(np.diag(K))))
     K = np.where(np.abs(K) < 1e-10 * np.outer(size, size), 0.0, K)
@@ -260,7 +263,7 @@ def _state_lines(values: dict[str, Any]) -> list[str]:
 
 
 def _share_lines(shares: dict[str, dict[str, Any]]) -> list[str]:
-    """Return the parts' shares in the compliance, in per cent."""
+    """Return lines on the parts' shares in the compliance, in per cent."""
     rows = {
         name: [rounded(100 * value) for value in row]
         for name, row in largest_rows(share_rows(shares)).items()
@@ -270,7 +273,7 @@ def _share_lines(shares: dict[str, dict[str, Any]]) -> list[str]:
 
 
 def _direction_lines(along: dict[str, Any]) -> list[str]:
-    """Return the stiffness along a direction, and the parts that deform most."""
+    """Return lines on the stiffness along a direction and the most compliant parts."""
     parts = sorted(
         (-share, f"{frame} {kind}")
         for kind, word in _KINDS.items()
@@ -285,13 +288,13 @@ def _direction_lines(along: dict[str, Any]) -> list[str]:
 
 
 def largest_rows(rows: dict[str, list[float]]) -> dict[str, list[float]]:
-    """Return the first rows of shares, and the sum of all others.
+    """Return the first rows of shares, and the sum of the other rows.
 
     Args:
-        rows: of :func:`share_rows`, the largest first.
+        rows: result of :func:`share_rows`, largest first.
 
     Returns:
-        All of them, where there are few.
+        All rows if there are few.
     """
     names = list(rows)
     if len(names) <= _SHOWN + 1:

@@ -1,6 +1,6 @@
 """Plots of the deformed robot, and of the set of its possible platform errors.
 
-Functions take a result and return a plotter; none shows or saves.
+Each function takes a result and returns a plotter.
 """
 
 from dataclasses import dataclass
@@ -22,21 +22,21 @@ def plot_assembly(
     assumption: str = "budget",
     off_screen: bool = True,
 ) -> Any:
-    """Plot an assembled robot and, if requested, the possible platform errors.
+    """Return a plot of an assembled robot, optionally with possible platform errors.
 
     Args:
-        assembly: of the robot.
-        exaggeration: factor on all displacements; chosen if absent.
-        errors: ``"translation"`` or ``"rotation"``, or None for no body.
-        assumption: of problem (27), for the body.
-        off_screen: False opens a window when the plotter is shown.
+        assembly: assembly of the robot.
+        exaggeration: factor on all displacements; by default a readable one.
+        errors: ``"translation"`` or ``"rotation"``; None for no set of errors.
+        assumption: assumption of problem (27) for the set of errors.
+        off_screen: whether no window is opened when the plotter is shown.
 
     Returns:
         A pyvista plotter.
 
     Raises:
         BadInput: the platform moves freely, so its errors have no bound.
-        SolverFailed: the cone solver failed for the errors.
+        SolverFailed: the cone solver failed for the set of errors.
     """
     plotter = robot_plotter(assembly, exaggeration, off_screen)
     if errors is not None:
@@ -52,14 +52,14 @@ def plot_assembly(
 def robot_plotter(
     assembly: Assembly, exaggeration: float | None = None, off_screen: bool = True
 ) -> Any:
-    """Plot the nominal robot (grey) and the deformed one (coloured), exaggerated.
+    """Return a plot of the nominal robot (grey) and the deformed one (coloured).
 
     Args:
-        assembly: of the robot.
-        exaggeration: factor on all displacements, written in the plot; if absent, such
-            that the largest is a tenth of the robot's size and no rotation more than
-            0.5 rad.
-        off_screen: False for a window.
+        assembly: assembly of the robot.
+        exaggeration: factor on all displacements, which the plot states.  By default
+            the largest displacement is a tenth of the robot's size, and no rotation
+            exceeds 0.5 rad.
+        off_screen: whether no window is opened.
 
     Returns:
         A pyvista plotter; the caller shows it or takes a screenshot.
@@ -67,7 +67,7 @@ def robot_plotter(
     import pyvista
     from vtkmodules.vtkCommonCore import vtkLogger
 
-    # without a display VTK tries other back ends, and reports it on stderr
+    # without a display VTK tries other back ends, and reports this on stderr
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     bodies = displaced_bodies(assembly)
     size = float(np.ptp(bodies.ends, axis=0).max()) or 1.0
@@ -108,8 +108,9 @@ def _add_joint_axes(plotter: Any, posture: Posture, size: float) -> None:
 
 
 def _fill_window(plotter: Any) -> None:
-    """Point the camera at the middle of the scene, which fills the window."""
-    camera, share = plotter.camera, 0.85  # of the window; captions are above and below
+    """Point the camera at the middle of the scene, which then fills the window."""
+    # share of the window; captions are above and below
+    camera, share = plotter.camera, 0.85
     low, high = np.reshape(plotter.bounds, (3, 2)).T
     corners = np.array([[(low, high)[b][c] for c, b in enumerate(bits)]
                         for bits in np.ndindex(2, 2, 2)])  # fmt: skip
@@ -124,14 +125,14 @@ def _fill_window(plotter: Any) -> None:
 def add_error_body(
     plotter: Any, body: ErrorBody, origin: NDArray, size: float, assumption: str
 ) -> None:
-    """Add a body of translation or rotation errors to a plot, magnified.
+    """Add the set of translation or rotation errors to a plot, magnified.
 
     Args:
-        plotter: of :func:`robot_plotter`.
-        body: of the errors.
-        origin: (3,) [m] of zero error, the platform's nominal origin.
-        size: [m] of the largest error in the plot.
-        assumption: of problem (27), stated in the caption with the largest error.
+        plotter: result of :func:`robot_plotter`.
+        body: set of errors.
+        origin: (3,) [m] position of zero error: the platform's nominal origin.
+        size: [m] size of the largest error in the plot.
+        assumption: assumption of problem (27), which the caption states.
     """
     import pyvista
 
@@ -156,10 +157,10 @@ class DisplacedBodies:
 
     Attributes:
         starts: (n, 3) [m] nominal start of each frame's body, base axes.
-        ends: (n, 3) [m] nominal end.
-        start_screws: (n, 6) [rad, m] small screw of the start, read there.
-        end_screws: (n, 6) [rad, m] small screw of the end, read there.
-        bends: (n, 3) [rad] elastic rotation of the end against the start.
+        ends: (n, 3) [m] nominal end of each frame's body, base axes.
+        start_screws: (n, 6) [rad, m] small screw of the start, read at the start.
+        end_screws: (n, 6) [rad, m] small screw of the end, read at the end.
+        bends: (n, 3) [rad] elastic rotation of the end relative to the start.
     """
 
     starts: NDArray
@@ -170,13 +171,13 @@ class DisplacedBodies:
 
 
 def displaced_bodies(assembly: Assembly) -> DisplacedBodies:
-    """Return the displacements of all bodies, by the small screws along the tree.
+    """Return the displacements of all bodies by the small screws along the tree.
 
     Args:
-        assembly: of a robot of n frames.
+        assembly: assembly of a robot of n frames.
 
     Returns:
-        All bodies, in the robot's order of frames.
+        The bodies in the robot's order of frames.
     """
     posture = assembly.posture
     turned = screw_map(np.zeros(3), posture.transforms[:, :3, :3])
@@ -200,14 +201,15 @@ def body_starts(posture: Posture) -> NDArray:
 
 
 def readable_factor(bodies: DisplacedBodies, size: float) -> float:
-    """Return the largest of 1, 2, 5 times a power of ten that keeps a plot readable.
+    """Return the largest of 1, 2, 5 times a power of ten with which a plot is readable.
 
     Args:
-        bodies: with their displacements.
-        size: [m] of the robot.
+        bodies: bodies with their displacements.
+        size: [m] size of the robot.
 
     Returns:
-        The exaggeration: no shift more than a tenth of the size, no turn over 0.5 rad.
+        The exaggeration: no translation exceeds a tenth of the size, no rotation 0.5
+        rad.
     """
     shift = float(np.abs(bodies.end_screws[:, 3:]).max())
     turn = float(np.abs(bodies.end_screws[:, :3]).max())
@@ -219,14 +221,14 @@ def readable_factor(bodies: DisplacedBodies, size: float) -> float:
 
 
 def _shape(bodies: DisplacedBodies, i: int, factor: float) -> NDArray:
-    """Return (20, 3) points of a displaced body: a cubic, the deflection of a beam."""
+    """Return (20, 3) points of a displaced body, whose deflection is a cubic."""
     a = bodies.starts[i] + factor * bodies.start_screws[i, 3:]
     b = bodies.ends[i] + factor * bodies.end_screws[i, 3:]
     if not np.any(bodies.bends[i]):
         return np.linspace(a, b, 20)
     bend = rotation_matrix(factor * bodies.bends[i])
     chord = b - a
-    # end slopes halfway between the chord and the chord turned by the bending
+    # the end slopes are halfway between the chord and the chord rotated by the bending
     slope_a, slope_b = bend.T @ chord, bend @ chord
     slope_a, slope_b = (chord + slope_a) / 2, (chord + slope_b) / 2
     s = np.linspace(0, 1, 20)[:, None]

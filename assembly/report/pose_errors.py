@@ -37,20 +37,20 @@ def pose_error_of(
     """Return the results of ``assembly error`` as plain values.
 
     Args:
-        posture: of the robot.
-        assumptions: of problem (27); all that are defined if absent, under a load not
-            ``budget``.
-        point: (3,) [m] whose translation is bounded, platform axes.
-        direction: (6,) along which the largest error is bounded too.
+        posture: posture of the robot.
+        assumptions: assumptions of problem (27); by default all, under a load all
+            except ``budget``.
+        point: (3,) [m] point whose translation is bounded, platform axes.
+        direction: (6,) direction along which the largest error is bounded too.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
-        options: of :func:`assembly.linear.pose_error.bound_pose_error`.
+        options: options of :func:`assembly.linear.pose_error.bound_pose_error`.
 
     Returns:
         The keys of the public format; ``status`` as in :func:`solution_of`.
 
     Raises:
-        BadInput: assumption ``budget`` with a load.
+        BadInput: the assumption ``budget`` is requested with a load.
     """
     loaded = bool(np.any(load) or np.any(gravity) or driven(posture.robot))
     if loaded and "budget" in (assumptions or ()):
@@ -81,7 +81,7 @@ def pose_error_of(
         for name in assumptions:
             try:
                 bound = bound_pose_error(assembly, name, offset=offset, **options)
-            except FreeMotion as error:  # compliant joints without their own springs
+            except FreeMotion as error:  # compliant joints may have no other springs
                 no_bounds = dict.fromkeys(("rotation", "translation"))
                 table[name] = no_bounds | {"reason": str(error)}
                 continue
@@ -100,7 +100,7 @@ def pose_error_of(
 
 
 def _bounds(bound: PoseError) -> dict[str, Any]:
-    """Return the bounds of an assumption."""
+    """Return the bounds under one assumption."""
     return {
         "rotation": _bracket(bound.rotation_error, bound.rotation_screw),
         "translation": _bracket(bound.translation_error, bound.translation_screw),
@@ -113,7 +113,7 @@ def _support(
     assembly: Assembly, assumption: str, offset: NDArray, direction: ArrayLike,
     energy_budget: float = 0.05, **_: float,
 ) -> dict[str, Any]:  # fmt: skip
-    """Return bounds of the largest error along a direction, and its screw."""
+    """Return bounds of the largest error along a direction, with its screw."""
     reach = reachable_screws(assembly, assumption, energy_budget).at_point(offset)
     support = reach.support(direction)
     if support.height == np.inf:
@@ -123,12 +123,12 @@ def _support(
 
 
 def _bracket(bounds: Sequence[float] | NDArray, screw: NDArray) -> dict[str, Any]:
-    """Return two bounds, and the platform screw that attains the lower."""
+    """Return two bounds, and the platform screw that attains the lower one."""
     return {"lower": bounds[0], "upper": bounds[1], "platform_screw": screw}
 
 
 def pose_error_text(results: dict[str, Any]) -> str:
-    """Return the bounds as text, a line for each assumption."""
+    """Return the bounds as text, with one line for each assumption."""
     lines = lines_of(results, "pose status reason")
     for assumption, bounds in (results["error"] or {}).items():
         if "reason" in bounds:
@@ -148,6 +148,6 @@ def pose_error_text(results: dict[str, Any]) -> str:
 
 
 def _bounds_text(part: str, bounds: dict[str, Any]) -> str:
-    """Return two bounds of a rotation or translation."""
+    """Return two bounds of a rotation or translation as text."""
     low, high = bounds["lower"], bounds["upper"]
     return value_text(f"{part}_error", (low, high) if np.isfinite(high) else high)

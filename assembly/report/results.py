@@ -1,13 +1,12 @@
-"""Results of assemblies as plain values (the keys of the public format) and as text."""
+"""Results of assemblies as plain values (keys of the public format) and as text."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from assembly.exact.exact import ExactAssembly, solve_exact
-from assembly.kinematics.mobility import mobility
 from assembly.kinematics.posture import Posture
 from assembly.kinematics.verdict import posture_remarks
 from assembly.linear.certificate import (
@@ -30,16 +29,17 @@ from assembly.model.statuses import NOT_PROVED, UNSTABLE
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.report.beyond_linear import far_from_linear
 from assembly.report.first_order import first_order_status, linearisation_of
+from assembly.report.mobility import mobility_lines, mobility_of
 from assembly.report.wrench_table import wrench_lines
 from assembly.solvers.conic import SolverFailed
 from forcefit.results.display import listing
 from forcefit.results.text import lines_of, value_text
 
-# numbers of a certificate, relative ones and the gap in J
+# numbers of a certificate: relative ones, and the gap in J
 _PROOF = (
     "closure_residual clearance_excess duality_gap relative_gap stationarity iterations"
 )
-# up to 1 of a margin the clearances alone suffice
+# quantities of the margins; up to a margin of 1 the clearances are sufficient
 _ZONE = (
     "zone.assemblable zone.margin zone.assemblable_free zone.margin_free zone.status "
     "zone.reason"
@@ -51,7 +51,7 @@ _UNSTABLE = (
 
 
 def zone_of(posture: Posture) -> dict[str, Any]:
-    """Return the margins of (21), compliant joints rigid and free, as plain values."""
+    """Return margins of (21), with compliant joints rigid and free, as plain values."""
     rigid, free = zone_margin(posture, "rigid"), zone_margin(posture, "free")
     unproved_parts = "; ".join(filter(None, (rigid.unproved, free.unproved)))
     return {
@@ -66,7 +66,7 @@ def zone_of(posture: Posture) -> dict[str, Any]:
 
 
 def _finite(value: float) -> float | None:
-    """Return None where no factor assembles the robot."""
+    """Return a margin, or None if no factor assembles the robot."""
     return None if np.isinf(value) else value
 
 
@@ -74,7 +74,7 @@ def zone_text(results: dict[str, Any]) -> str:
     """Return the margins as text.
 
     Args:
-        results: ``robot``, ``pose`` and ``zone``, of :func:`zone_of`.
+        results: table with ``robot``, ``pose`` and ``zone`` from :func:`zone_of`.
     """
     return listing(results["robot"], lines_of(results, f"pose {_ZONE}"))
 
@@ -87,16 +87,15 @@ def solution_of(
     """Return the results of ``assembly solve`` as plain values.
 
     Args:
-        posture: of the robot.
+        posture: posture of the robot.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
 
     Returns:
-        The keys of the public format.  ``status`` is ``"ok"``; or ``"not proved"``,
-        with the solution and the gap of its certificate as ``reason``; or
-        ``"singular"``, with the solution at first order, which is invalid there, and
-        that of finite motions in ``reason``; or the kind of failure, and the solution
-        is then null.
+        The keys of the public format.  ``status`` is ``"ok"``; ``"not proved"``, with
+        the solution and the gap of its certificate as ``reason``; ``"singular"``, with
+        the invalid first-order solution, and with the solution for finite motions in
+        ``reason``; or the kind of failure, without a solution.
     """
     robot = posture.robot
     names = [f.name for f in robot.frames]
@@ -106,7 +105,7 @@ def solution_of(
         "pose": posture.pose(),
         "joints": dict(zip(names, posture.coordinates.tolist(), strict=True)),
         "nominal_mismatch": posture.mismatch,
-        "mobility": vars(mobility(posture)),
+        "mobility": mobility_of(posture),
         "remarks": [
             *robot.remarks,
             *posture_remarks(posture),
@@ -140,7 +139,7 @@ def solution_of(
 
 
 def proof_status(reason: str) -> dict[str, str]:
-    """Return status and reason of a solution with an incomplete proof, else nothing."""
+    """Return status and reason of a solution with an incomplete proof; else nothing."""
     return {"status": NOT_PROVED, "reason": reason} if reason else {}
 
 
@@ -162,7 +161,7 @@ def _assembly_results(assembly: Assembly, bound: ScrewBound) -> dict[str, Any]:
 
 
 def _screws_and_wrenches(assembly: Assembly | ExactAssembly) -> dict[str, Any]:
-    """Return the energy, pose error, screws and wrenches of every frame and closure."""
+    """Return energy, pose error, and screws and wrenches of all frames and closures."""
     robot = assembly.posture.robot
     frames = {
         f.name: {
@@ -200,17 +199,18 @@ def exact_of(
     """Return the results of ``assembly solve --state exact`` as plain values.
 
     Args:
-        posture: of the robot.
+        posture: posture of the robot.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
-        progress: of :func:`assembly.exact.exact.solve_exact`.
+        progress: argument of :func:`assembly.exact.exact.solve_exact`.
 
     Returns:
-        The keys of ``assembly solve`` for finite motions; ``status`` as there, or
-        ``"unstable"`` where the potential decreases along a motion.
+        The keys of ``assembly solve`` for finite motions; ``status`` has the same
+        values, or is ``"unstable"`` if the potential decreases along a motion.
     """
     results: dict[str, Any] = {
-        "robot": posture.robot.name, "status": "ok", "pose": posture.pose()
+        "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
+        "mobility": mobility_of(posture),
     }  # fmt: skip
     try:
         assembly = solve_exact(posture, load, gravity=gravity, progress=progress)
@@ -243,7 +243,9 @@ def exact_text(results: dict[str, Any]) -> str:
     """Return an exact solution as text."""
     return listing(
         results["robot"],
-        lines_of(results, "pose status reason energy platform_screw")
+        lines_of(results, "pose")
+        | mobility_lines(results["mobility"])
+        | lines_of(results, "status reason energy platform_screw")
         | _linearisation_lines(results)
         | lines_of(results.get("certificate", {}), _PROOF),
         results.get("remarks", ()),
@@ -254,13 +256,14 @@ def solution_text(results: dict[str, Any]) -> str:
     """Return a solution as text.
 
     Args:
-        results: of :func:`solution_of`.
+        results: result of :func:`solution_of`.
 
     Returns:
         Text without colours.
     """
     solved = results["energy"] is not None
-    lines = lines_of(results, f"pose {_ZONE} status reason")
+    lines = lines_of(results, "pose") | mobility_lines(results["mobility"])
+    lines |= lines_of(results, f"{_ZONE} status reason")
     if solved:
         lines |= lines_of(results, "energy platform_screw reading")
         lines |= _linearisation_lines(results) | _bound_lines(results)
@@ -272,7 +275,7 @@ def solution_text(results: dict[str, Any]) -> str:
 
 
 def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:
-    """Return the linearisation error, linear minus exact, as lines of text."""
+    """Return lines of text on the linearisation error, linear minus exact."""
     error = results.get("linearisation_error", {})
     if "rotation" not in error:
         words = "linearisation error"
@@ -281,7 +284,8 @@ def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:
         f"linearisation_{part}": float(np.linalg.norm(error[part]))
         for part in ("rotation", "translation")
     } | {"linearisation_energy": error["relative_energy"]}
-    # rounding of equal solutions is zero: 1e-12 rad, 1e-15 m, 1e-11 of the energy
+    # differences of equal solutions are rounding: 1e-12 rad, 1e-15 m, 1e-11 of the
+    # energy
     least = (1e-12, 1e-15, 1e-11)
     for name, small in zip(sizes, least, strict=True):
         sizes[name] = sizes[name] if abs(sizes[name]) >= small else 0.0
@@ -289,7 +293,7 @@ def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:
 
 
 def _bound_lines(results: dict[str, Any]) -> dict[str, str]:
-    """Return lines on the screw's certified error and undetermined motion."""
+    """Return lines on the certified error and the undetermined motion of the screw."""
     bound, largest = results["certificate"], results["worst_error"]
     lines = lines_of(bound, "screw_rotation_error screw_translation_error")
     if (
@@ -311,11 +315,6 @@ def status_line(results: dict[str, Any]) -> str:
     return reason if reason.startswith(status) else f"{status}: {reason}"
 
 
-def remark_lines(remarks: Sequence[str]) -> list[str]:
-    """Return the remarks on defaults of a robot's file, a line each."""
-    return [f"note: {remark}" for remark in remarks]
-
-
 def worst(assembly: Assembly) -> dict[str, Any] | None:
     """Return certified bounds of the largest pose error, assumption ``frozen`` of (27).
 
@@ -323,8 +322,8 @@ def worst(assembly: Assembly) -> dict[str, Any] | None:
         assembly: the least-energy solution.
 
     Returns:
-        Upper bounds ``rotation`` [rad] and ``translation`` [m]; None where nothing is
-        proved.
+        Upper bounds ``rotation`` [rad] and ``translation`` [m]; None if there is no
+        proof.
     """
     try:
         bound = bound_pose_error(assembly, "frozen")

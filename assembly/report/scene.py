@@ -1,4 +1,4 @@
-"""The robot as a scene of a page: turned, exaggerated and closed by the reader."""
+"""The robot as a scene of a page, which the reader rotates, exaggerates and closes."""
 
 from dataclasses import asdict
 from typing import Any
@@ -20,7 +20,8 @@ from forcefit.page.charts import scene
 from forcefit.results.units import shown_in
 from stiffness.screws import skew
 
-_SAMPLES = 9  # points along a body, enough for the cubic of a bent beam
+# number of points along a body, which is sufficient for the cubic of a bent beam
+_SAMPLES = 9
 
 
 def robot_scene(
@@ -31,13 +32,13 @@ def robot_scene(
     Displacements are small screws, linear in the exaggeration; a bent link is a cubic.
 
     Args:
-        assembly: of a robot of n frames.
-        closing: (k, n, 4, 4) frames of a simulated closing, None without.
-        body: possible platform errors, None without.
+        assembly: assembly of a robot of n frames.
+        closing: (k, n, 4, 4) frames of a simulated closing; None without it.
+        body: set of possible platform errors; None without it.
         caption: text below the figure.
 
     Returns:
-        A figure of a page.
+        HTML of a figure.
     """
     return scene(forced_scene(assembly, closing, body), caption)
 
@@ -107,7 +108,7 @@ def _moved(bodies: DisplacedBodies, i: int, s: NDArray) -> NDArray:
     a, b = bodies.start_screws[i, 3:], bodies.end_screws[i, 3:]
     if not np.any(bodies.bends[i]):
         return a + s * (b - a)
-    # exact for a cantilever loaded at its end: its deflection is a cubic
+    # exact for a cantilever loaded at its end, whose deflection is a cubic
     turn = bodies.start_screws[i, :3]
     slope_a, slope_b = skew(turn) @ chord, skew(turn + bodies.bends[i]) @ chord
     return (
@@ -131,7 +132,7 @@ def _forces(assembly: Assembly) -> list[dict[str, Any]]:
 
 
 def _error_body(body: ErrorBody, origin: NDArray) -> dict[str, Any]:
-    """Return the possible platform errors, around its origin."""
+    """Return the set of possible platform errors as plain values, with its origin."""
     sizes = np.linalg.norm(body.points, axis=1)
     shown = shown_in("m", float(sizes.max(initial=0.0)))
     text = f"possible platform errors, up to {sizes.max() * shown.factor:.4g}"

@@ -32,18 +32,18 @@ def vibration_of(
     """Return the results of ``assembly frequencies`` as plain values.
 
     Args:
-        posture: of the robot.
-        count: modes at most.
+        posture: posture of the robot.
+        count: largest number of modes.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
-        state: ``"exact"`` around the equilibrium with errors, clearances and loads.
+        state: ``"exact"`` for the equilibrium with errors, clearances and loads.
 
     Returns:
-        Frequencies and modes; ``status`` is ``"ok"``, ``"free motion"`` or
-        ``"unstable"``, or says why there is no equilibrium.
+        Frequencies and modes; ``status`` is ``"ok"``, ``"free motion"``,
+        ``"unstable"``, or the reason why there is no equilibrium.
 
     Raises:
-        BadInput: nothing that moves has a mass.
+        BadInput: no part that moves has a mass.
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
@@ -88,7 +88,7 @@ def vibration_text(results: dict[str, Any]) -> str:
 
 
 def _free(mode: dict[str, Any]) -> str:
-    """Return the text of a free motion, a platform screw of 1 rad or 1 m."""
+    """Return a free motion as text: a platform screw of 1 rad or 1 m."""
     screw = np.asarray(mode["platform_screw"])
     turn, shift = np.linalg.norm(screw[:3]), np.linalg.norm(screw[3:])
     unit = screw / (turn if turn > 1e-6 * shift else shift or 1.0)

@@ -16,11 +16,11 @@ def wrench_lines(frames: Mapping[str, Any], closures: Sequence[Any]) -> list[str
     """Return the wrenches through all frames and closures as text.
 
     Args:
-        frames: by name, of :func:`assembly.report.results.solution_of`.
-        closures: likewise.
+        frames: wrenches by frame, from :func:`assembly.report.results.solution_of`.
+        closures: wrenches of the closures from the same function.
 
     Returns:
-        Lines of one table for each.
+        Lines of one table for each kind of wrench.
     """
     starts = {k: f["start_wrench"] for k, f in frames.items() if "start_wrench" in f}
     tables = {

@@ -1,6 +1,6 @@
-"""Built-in robots; each file is a table of one robot's numbers.
+"""Built-in robots; each file is a table of one robot's parameters.
 
-Begin with ``five_bar.py``, a short one; ``placing.py`` makes frames of home poses.
+Begin with ``five_bar.py``, a short one; ``placing.py`` makes frames from home poses.
 """
 
 import os
@@ -44,7 +44,7 @@ def load_robot(name: str | Path, close: Closing | None = None) -> Robot:
         :func:`assembly.exchange.robot_files.load_robot`.
 
     Raises:
-        BadInput: the name is neither a built-in one nor a file, or the file breaks a
+        BadInput: the name is neither a built-in name nor a file, or the file violates a
             rule.
     """
     if str(name) in BUILT_IN:

@@ -33,7 +33,7 @@ JOINTS = (
     (0.0, 0.0, -math.pi / 2, 0.34, 3e3),
     (0.0, 0.0, 0.0, 0.09, 2e3),
 )
-HOME = (0.0, math.pi / 4, math.pi, 0.0, math.pi / 4, 0.0)  # [rad]
+HOME = (0.0, math.pi / 4, math.pi, 0.0, math.pi / 4, 0.0)  # [rad] joint angles at home
 
 
 @dataclass(frozen=True)

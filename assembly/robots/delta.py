@@ -29,12 +29,12 @@ AZIMUTHS = (-math.pi / 2, math.pi / 6, 5 * math.pi / 6)  # [rad] directions of t
 class DeltaParameters:
     """Parameters of the robot [m, N m/rad]; the rods are carbon fibre tubes."""
 
-    # side of the triangle with the drives at the middles of its sides
+    # side of the triangle whose sides have the drives at their middles
     base_side: float = 0.567
     platform_side: float = 0.076  # side of the triangle with the rods at its corners
     arm: float = 0.524
     rod: float = 1.244
-    rod_distance: float = 0.131  # between the two rods of a leg
+    rod_distance: float = 0.131  # distance of the two rods of a leg
     home: float = -0.9  # height of the platform
     drive: float = 2e4
     arm_link: BeamLink = BeamLink(
@@ -150,7 +150,7 @@ def _rod(
     across: NDArray,
     P: DeltaParameters,
 ) -> list[PlacedFrame]:
-    """Return a rod between ball joints, whose axes let it spin about itself."""
+    """Return a rod between ball joints, which can spin about its own axis."""
     along = (far - near) / np.linalg.norm(far - near)
     third = np.cross(along, across)
     high = ball_joint(f"{name}_high", parent, near, across, third, P.ball)

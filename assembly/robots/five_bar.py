@@ -20,7 +20,7 @@ from assembly.robots.planar import PlanarLeg, arm_angle, in_plane, two_arms
 class FiveBarParameters:
     """Parameters of the robot [m]; aluminium arms and small ball bearings."""
 
-    base: float = 0.120  # distance of the drives, on the x axis
+    base: float = 0.120  # distance between the drives, which are on the x axis
     home: tuple[float, float] = (0.0, 0.140)
     leg: PlanarLeg = PlanarLeg(
         near=0.090,

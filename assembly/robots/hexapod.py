@@ -71,7 +71,7 @@ def points() -> tuple[NDArray, NDArray]:
 
 
 def _leg(name: str, a: NDArray, b: NDArray, P: HexapodParameters) -> list[PlacedFrame]:
-    """Return a strut from a to b, with the ball joint to the platform at b."""
+    """Return a strut from a to b, with its ball joint to the platform at b."""
     length = float(np.linalg.norm(b - a))
     along = (b - a) / length
     first = np.cross([0.0, 0.0, 1.0], along)
@@ -93,6 +93,6 @@ def _leg(name: str, a: NDArray, b: NDArray, P: HexapodParameters) -> list[Placed
 
 
 def _in_axes(T: NDArray, vector: NDArray) -> tuple[float, float, float]:
-    """Return a direction, given in base axes, in a frame's axes."""
+    """Return a direction in the axes of a frame; it is given in base axes."""
     x, y, z = (T[:3, :3].T @ vector).tolist()
     return x, y, z

@@ -1,10 +1,11 @@
 """The IRSBot-2 of the paper's section IV, reconstructed.
 
-The two legs are on the x axis; leg 2 is leg 1 turned by pi about z0.  In each leg a
-parallelogram (proximal module) carries an elbow body of constant orientation. Two
-parallel links between universal joints (distal module) carry the platform.  The figures
-that define the axes of the universal joints are not public.  The axes used here give
-the paper's mobility everywhere in the workspace; other axes that were tried do not.
+The two legs are in the direction of the x axis; leg 2 is leg 1 rotated by pi about z0.
+In each leg a parallelogram (proximal module) carries an elbow body of constant
+orientation. Two parallel links between universal joints (distal module) carry the
+platform.  The paper's figures that define the axes of the universal joints are not
+public.  The axes used here give the paper's mobility everywhere in the workspace; other
+axes that were tried do not.
 
 Frames have names; the paper's index is their position in :data:`NAMES`, from 1.
 Errors act at the paper's frames :data:`ERROR_FRAMES`.
@@ -41,8 +42,10 @@ NAMES = (
     "loop1_elbow", "loop1_idler", "loop2_platform", "loop2_link", "tip",
 )  # fmt: skip
 ERROR_FRAMES = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
-ERROR_LEAST = (1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6)  # [rad, m]
-ERROR_MOST = (2e-2, 2e-2, 2e-2, 2e-4, 2e-4, 2e-4)  # [rad, m]
+# [rad, m] smallest errors of the paper
+ERROR_LEAST = (1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6)
+# [rad, m] largest errors of the paper
+ERROR_MOST = (2e-2, 2e-2, 2e-2, 2e-4, 2e-4, 2e-4)
 
 _PARENTS = {
     "drive": "base", "elbow": "drive", "idler": "base", "idler_end": "idler",

@@ -35,7 +35,8 @@ class OrthoglideParameters:
 
     leg: float = 0.310
     width: float = 0.080  # width of the parallelograms
-    platform: float = 0.030  # from the platform's centre to the legs' ends
+    # distance from the platform's centre to the ends of the legs
+    platform: float = 0.030
     drive: float = 5e7
     link: BeamLink = BeamLink(
         {"radius": 0.012, "inner_radius": 0.009}, 70e9, 0.33, density=2700.0

@@ -1,8 +1,8 @@
 """Frames given by their home poses in base axes.
 
-A robot's table is easiest to check in base axes; a tree of frames needs each frame
-relative to its parent, after the parent's joint.  Joints of several degrees of freedom
-are coincident revolute joints: two for a cardan joint, three for a ball joint.
+A robot's table is easiest to check in base axes, while a tree of frames needs each
+frame relative to its parent, after the parent's joint.  Joints of several degrees of
+freedom are coincident revolute joints: two for a cardan joint, three for a ball joint.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ def at(
     Args:
         origin: (3,) [m] origin of the frame.
         z: (3,) direction of the z axis, of any length.
-        x: (3,) direction of the x axis; its part along z is removed.
+        x: (3,) direction of the x axis; its component along z is removed.
 
     Returns:
         (4, 4) transform.
@@ -70,7 +70,7 @@ def ball_joint(
 ) -> list[PlacedFrame]:  # fmt: skip
     """Return a ball joint: three revolute joints at one point, perpendicular at home.
 
-    The joint is singular if the second revolute joint has turned by a right angle.
+    The joint is singular if the second revolute joint is rotated by a right angle.
 
     Args:
         name: name of the joint; its frames are ``name_1`` to ``name_3``.
@@ -94,14 +94,14 @@ def ball_joint(
 
 
 def drive_stiffness(stiffness: float, joint: str = "revolute") -> NDArray:
-    """Return the joint stiffness of a drive that is elastic only along its own motion.
+    """Return the joint stiffness of a drive that is elastic only along its motion.
 
     Args:
         stiffness: [N m/rad or N/m] stiffness of the drive.
         joint: ``"revolute"`` or ``"prismatic"``.
 
     Returns:
-        (6, 6) matrix, infinite on the diagonal except for RZ or TZ.
+        (6, 6) matrix whose diagonal is infinite except for RZ or TZ.
     """
     own = 5 if joint == "prismatic" else 2
     diagonal = np.full(6, np.inf)

@@ -42,11 +42,11 @@ class ThreeRRRParameters:
     )
 
     def feet(self) -> NDArray:
-        """Return (3, 2) [m] positions of the drives, on a circle."""
+        """Return (3, 2) [m] positions of the drives, which are on a circle."""
         return self.base_radius * _triangle()
 
     def corners(self) -> NDArray:
-        """Return (3, 2) [m] platform's pins in its own axes, on a circle."""
+        """Return (3, 2) [m] positions of the platform's pins, in platform axes."""
         return self.platform_radius * _triangle()
 
 
@@ -82,5 +82,5 @@ def three_rrr(parameters: ThreeRRRParameters | None = None) -> Robot:
 
 
 def _triangle() -> NDArray:
-    """Return (3, 2) corners of an equilateral triangle in the unit circle, one up."""
+    """Return (3, 2) corners of an equilateral triangle in the unit circle."""
     return np.array([direction(math.pi * (1 / 2 + 2 * k / 3)) for k in range(3)])

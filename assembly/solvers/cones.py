@@ -1,26 +1,26 @@
-"""Vectors of clearances by their cones, discs and intervals of radius 1."""
+"""Vectors of clearances by their cones: discs, intervals and balls of radius 1."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 
 def cone_starts(group: NDArray) -> NDArray:
-    """Return (cones + 1,) first columns of cones, and nu, of (nu,) cones in order."""
+    """Return (cones + 1,) first columns of cones, and nu, for (nu,) cones in order."""
     return np.append(0, np.cumsum(np.bincount(group)))
 
 
 def cone_sums(values: NDArray, group: NDArray) -> NDArray:
-    """Return the (..., cones) sums of vectors' (..., nu) components in each cone."""
+    """Return (..., cones) sums of the components (..., nu) of vectors in each cone."""
     if values.ndim == 1:
         return np.bincount(group, weights=values)
     return values @ (group[:, None] == np.arange(np.bincount(group).size))
 
 
 def cone_sizes(values: NDArray, group: NDArray) -> NDArray:
-    """Return the (..., cones) Euclidean size of vectors' parts in each cone."""
+    """Return the (..., cones) Euclidean norm of the components in each cone."""
     return np.sqrt(cone_sums(values**2, group))
 
 
 def into_cones(u: NDArray, group: NDArray) -> NDArray:
-    """Return vectors with the part in each cone shortened to length 1 if longer."""
+    """Return vectors whose part in each cone is shortened to length 1 if longer."""
     return u / np.maximum(1.0, cone_sizes(u, group))[group]

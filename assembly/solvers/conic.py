@@ -2,11 +2,11 @@
 
 There are two problems: the least energy of a reduced problem (22), and the least factor
 on the clearances of problem (21).  Both are scaled here to size 1.  Clarabel solves the
-second.  The first is solved by Clarabel with ``"reference"``, each solution refined in
-:mod:`assembly.solvers.pressed_cones`.  With ``"compiled"`` the compiled interior-point
-method solves it, in doubt Clarabel, each solution refined by Newton's method on the
-dual (:mod:`assembly.solvers.one_problem`).  The certified gap, which does not depend on
-the solvers, decides which solution is kept.
+second problem.  With ``"reference"``, Clarabel also solves the first problem, and
+:mod:`assembly.solvers.pressed_cones` refines each solution.  With ``"compiled"``, the
+compiled interior-point method solves it, or Clarabel if in doubt, and Newton's method
+on the dual (:mod:`assembly.solvers.one_problem`) refines each solution.  The certified
+gap, which does not depend on the solvers, decides which solution is kept.
 
 Sources:
     Goulart, Chen (2024), Clarabel: an interior-point solver for conic programs with
@@ -31,24 +31,27 @@ _TOLERANCE = 1e-13
 # Clarabel's default static regularisation, 1e-8, stops 3 of 12 points of the paper's
 # robot at a relative gap of 1e-6; without it the gap is 1e-13 for all of them
 _REGULARISATIONS = (0.0, 1e-10, 1e-8)
-# gap that counts as proved: relative to the energy, and to that without clearance
+# gap that counts as proved: relative to the energy, and to the energy without clearance
 GAP, GAP_WITHOUT_CLEARANCE = 1e-8, 1e-12
-_GAP_WITHIN = 1e-12  # required of the interior-point method
-# of the proved gap that is required here: the full problem adds to the gap
+_GAP_WITHIN = 1e-12  # relative gap required of the interior-point method
+# share of the proved gap that is required here, because the full problem adds to the
+# gap
 _SHARE = 0.1
 _STOP = 1e-2  # share of this gap at which Newton's method stops
-_STEPS, _FIRST_SIGMA = 150, 1e6  # most steps of Newton's method, and its first sigma
+# largest number of Newton steps, and first sigma of the method
+_STEPS, _FIRST_SIGMA = 150, 1e6
 _RESIDUAL = 1e-11  # accepted residual of a row without springs
-_LARGEST_FACTOR = 1e8  # on the clearances: infeasibility is proved up to this factor
+# largest factor on the clearances, up to which infeasibility is proved
+_LARGEST_FACTOR = 1e8
 _UNPROVED = "PrimalInfeasible, but its multipliers do not prove it"
 
 
 class SolverFailed(RuntimeError):
-    """The solver gave up on a problem.
+    """Error: the solver found no solution of a problem.
 
     Attributes:
         problem: name of the problem.
-        status: reported by the solver.
+        status: status that the solver reported.
     """
 
     def __init__(self, problem: str, status: str) -> None:
@@ -61,12 +64,13 @@ class ConicSolution:
     """Solution of :func:`minimise_energy`.
 
     Attributes:
-        clearances: (nu,) in units of their cones.
-        springs: (r,) [sqrt(2 J)] multipliers of the springs, G u + h up to the gap.
-        rigid_multipliers: (p,) [J] of the rows without springs.
-        value: [J] of the objective.
+        clearances: (nu,) clearances relative to their bounds.
+        springs: (r,) [sqrt(2 J)] multipliers of the springs, equal to G u + h up to the
+            gap.
+        rigid_multipliers: (p,) [J] multipliers of the rows without springs.
+        value: [J] value of the objective.
         bound: [J] certified lower bound of the objective.
-        feasible: whether any clearances satisfy the rows without springs.
+        feasible: whether there are clearances that satisfy the rows without springs.
     """
 
     clearances: NDArray
@@ -100,13 +104,14 @@ def minimise_energy(
     """Minimise |G u + h|^2 / 2 - d.u subject to H u = k and every cone's |u_k| <= 1.
 
     Args:
-        G: (r, nu) [sqrt(2 J)].
-        h: (r,) [sqrt(2 J)].
-        d: (nu,) [J].
-        H: (p, nu) of full row rank.
-        k: (p,).
+        G: (r, nu) [sqrt(2 J)] matrix.
+        h: (r,) [sqrt(2 J)] vector.
+        d: (nu,) [J] vector.
+        H: (p, nu) matrix of full row rank.
+        k: (p,) vector.
         group: (nu,) cone of each column, counted from 0.
-        method: ``"compiled"``, in doubt Clarabel; ``"reference"``, Clarabel alone.
+        method: ``"compiled"``, with Clarabel if in doubt; ``"reference"`` for Clarabel
+            only.
 
     Returns:
         The minimiser with a certified lower bound.
@@ -168,7 +173,7 @@ def _proved(least: ConicSolution, h: NDArray) -> bool:
 def _compiled(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray
 ) -> tuple[NDArray | None, NDArray, str]:
-    """Solve by this package's interior-point method; the solution must satisfy H."""
+    """Solve by the compiled interior-point method; the solution must satisfy H."""
     u, n = one_problem.interior_point((G, h, d, H, k), cone_starts(group), _GAP_WITHIN)
     finite = np.isfinite(u).all() and np.isfinite(n).all()
     if not finite or np.abs(H @ u - k).max(initial=0.0) > _RESIDUAL:
@@ -184,7 +189,7 @@ def _by_clarabel(
     r, nu = G.shape
     cones, radii = _unit_cones(group, np.ones(nu))
     rows = np.vstack([G, H, cones.toarray()])
-    # dense: assembling so small a sparse matrix takes longer than its solution
+    # dense, because assembling a small sparse matrix takes longer than its solution
     A = csc_matrix(np.hstack([rows, np.eye(len(rows), r)]))
     b = np.concatenate([-h, k, radii])
     P = csc_matrix(np.diag(np.repeat([0.0, 1.0], [nu, r])))
@@ -210,14 +215,14 @@ _SOLVERS: dict[Method, tuple[_Solver, ...]] = {
 def _certified(
     problem: ConeProgramme, u: NDArray, rigid: NDArray, method: Method
 ) -> Iterator[ConicSolution]:
-    """Return a solution with the bound of its own springs, or refined by Newton."""
+    """Return solution with the bound by its springs, or refined by Newton's method."""
     own = _certify(problem, u, problem.G @ u + problem.h, rigid)
-    if method == "reference":  # Clarabel's own is rarely better
+    if method == "reference":  # Clarabel's multipliers are rarely better
         for refined in refine(problem, u, rigid):
             yield from _checked(problem, *refined)
     yield own
     if method == "reference" or np.bincount(problem.group).max() > 2:
-        return  # the compiled Newton's method knows discs and intervals only
+        return  # the compiled Newton's method supports discs and intervals only
     G, h, d, H, k, group = problem
     u, y, starts = u.copy(), np.concatenate([h, -rigid]), cone_starts(group)
     relative = _STOP * GAP
@@ -230,7 +235,7 @@ def _certified(
 def _checked(
     problem: ConeProgramme, u: NDArray, springs: NDArray, rigid: NDArray
 ) -> Iterator[ConicSolution]:
-    """Return the end of Newton's method, if it is a solution."""
+    """Return the last iterate of Newton's method if it is a solution."""
     u = into_cones(u, problem.group)
     if all(np.isfinite(part).all() for part in (u, springs, rigid)):
         if np.abs(problem.H @ u - problem.k).max(initial=0.0) <= _RESIDUAL:
@@ -255,18 +260,18 @@ def _certify(
 
 
 def _energy_bound(problem: ConeProgramme, spring: NDArray, rigid: NDArray) -> float:
-    """Return a certified lower bound of problem (22) from a guess of its multipliers.
+    """Return a certified lower bound of problem (22) from estimated multipliers.
 
     For every y and n:  |Gu + h|^2/2 - d.u  >=  y.(Gu + h) - y.y/2 - d.u + n.(k - Hu).
     The minimum of the right side over the unit cones has a closed form.
 
     Args:
-        problem: scaled.
-        spring: (r,) the guess y; G u + h at the minimum is best.
-        rigid: (p,) the guess n.
+        problem: scaled problem.
+        spring: (r,) estimate of y; G u + h at the minimum is the best one.
+        rigid: (p,) estimate of n.
 
     Returns:
-        The bound; close to the minimum if the guess is close.
+        The bound, which is close to the minimum if the estimates are close.
     """
     G, h, d, H, k, group = problem
     gradient = G.T @ spring - d - H.T @ rigid
@@ -280,20 +285,21 @@ def least_factor(
     """Return the least t with B u = right and |u_k| <= t (or <= 1 if not scaled).
 
     Args:
-        B: (m, nu) of full row rank, m >= 1.
-        right: (m,).
+        B: (m, nu) matrix of full row rank, m >= 1.
+        right: (m,) right side.
         group: (nu,) cone of each column.
         scaled: (nu,) bool, whether t scales the column's cone.
 
     Returns:
-        t, None if no factor suffices; u (nu,); the multipliers (m,) that prove it.
+        t, None if no factor is sufficient; u (nu,); and the multipliers (m,) that prove
+        it.
 
     Raises:
         SolverFailed: Clarabel gave no usable solution.
     """
     m, nu = B.shape
     rows = np.linalg.norm(B, axis=1)
-    # with every cone scaled, t is proportional to the right side: solve for size 1
+    # if every cone is scaled, t is proportional to the right side, so size 1 is solved
     size = np.linalg.norm(right / rows) if scaled.all() else 1.0
     unit_cones, radii = _unit_cones(group, np.where(scaled, 0.0, 1.0))
     _, factors = _unit_cones(group, np.where(scaled, -1.0, 0.0))
@@ -323,9 +329,9 @@ def least_factor(
 
 
 def _unit_cones(group: NDArray, radius: NDArray) -> tuple[csc_matrix, NDArray]:
-    """Return rows s = b - A u, s in second-order cones [radius; -u_k], as (A, b)."""
+    """Return rows s = b - A u in second-order cones [radius; -u_k], as (A, b)."""
     nu, cones = len(group), int(group.max()) + 1
-    # each cone's rows: one for the radius, then its columns, in order
+    # rows of each cone: one for the radius, then its columns, in order
     at = np.arange(nu) + group + 1
     A = csc_matrix((np.ones(nu), (at, np.arange(nu))), shape=(nu + cones, nu))
     b = np.zeros(nu + cones)
@@ -346,7 +352,7 @@ def _clarabel(
     P: csc_matrix, q: NDArray, A: csc_matrix, b: NDArray, cones: _Cones,
     regularisation: float,
 ) -> tuple[NDArray | None, NDArray, str]:  # fmt: skip
-    """Minimise x.P.x/2 + q.x, A x + s = b; return primal (or None), dual, status."""
+    """Minimise x.P.x/2 + q.x with A x + s = b; return primal, dual and status."""
     import clarabel
 
     settings = clarabel.DefaultSettings()
@@ -361,7 +367,7 @@ def _clarabel(
     solution = clarabel.DefaultSolver(P, q, A, b, sets, settings).solve()
     status = str(solution.status)
     x, z = np.array(solution.x), np.array(solution.z)
-    # an inaccurate solution may still be good: its certificate decides
+    # an inaccurate solution may still be good, because its certificate decides
     usable = {"Solved", "AlmostSolved", "InsufficientProgress", "MaxIterations"}
     if status not in usable or not (np.isfinite(x).all() and np.isfinite(z).all()):
         return None, z, status
@@ -372,8 +378,8 @@ def _proves_no_point(
     n: NDArray, H: NDArray, k: NDArray, group: NDArray, radius: NDArray
 ) -> bool:
     """Return whether n proves that no u with |u_k| <= radius_k satisfies H u = k."""
-    # n.H u is at most the sum of radius_k |(H^T n)_k|: a larger n.k is a proof, if it
-    # also exceeds the rounding of its own terms
+    # n.H u is at most the sum of radius_k |(H^T n)_k|, so a larger n.k is a proof if it
+    # also exceeds the rounding of its terms
     most = float(cone_sizes(H.T @ n, group) @ radius)
     rounding = 1e-13 * float(np.abs(n) @ (np.abs(k) + np.abs(H).sum(axis=1)))
     return bool(float(n @ k) > most + rounding)

@@ -3,7 +3,7 @@
 import logging
 from typing import Literal, get_args
 
-# the C++ of assembly/kernels, or numpy and Clarabel alone
+# the C++ code of assembly/kernels, or numpy and Clarabel only
 Method = Literal["compiled", "reference"]
 METHODS = get_args(Method)
 _LOG = logging.getLogger("forcefit.solve")

@@ -1,6 +1,6 @@
-"""Compiled cone programmes with cones of any size, and a body's farthest screw.
+"""Compiled solvers for cones of any size, and for the farthest screw of a body.
 
-They solve one problem at a time; :func:`farthest_points` solves many in parallel.
+They solve one problem at a time, except :func:`farthest_points`, which solves many.
 """
 
 from collections.abc import Callable
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from assembly.kernels.choice import kernels
 
 Problem = tuple[NDArray, NDArray, NDArray, NDArray, NDArray]
-# function of a direction: certified height, (6,) screw that (nearly) attains it,
-# (nv,) gradient
+# function of a direction that returns the certified height, the (6,) screw that attains
+# it (at least nearly), and the (nv,) gradient
 Support = Callable[[NDArray], tuple[float, NDArray, NDArray]]
 
 
@@ -21,9 +21,9 @@ class SolverLimits(NamedTuple):
     """Limits of an iterative method.
 
     Attributes:
-        relative: required gap, relative to |G u + h|^2 / 2 ..
-        absolute: .. plus this.
-        first_sigma: first sigma of Newton's method, times the mean |G_k^T h|.
+        relative: required gap relative to |G u + h|^2 / 2.
+        absolute: required gap that is added to the relative one.
+        first_sigma: first sigma of Newton's method, relative to the mean |G_k^T h|.
         steps: largest number of Newton steps.
     """
 
@@ -40,7 +40,7 @@ def interior_point(
 
     Args:
         problem: G (r, nu), h (r,), d (nu,), H (p, nu) of full row rank, k (p,).
-        starts: (cones + 1,) first column of each cone, and nu.
+        starts: (cones + 1,) index of the first column of each cone, and nu.
         tolerance: required gap.
 
     Returns:
@@ -61,9 +61,9 @@ def newton(
         problem: see :func:`interior_point`.
         starts: see :func:`interior_point`.
         limits: limits of the iteration.
-        u: (nu,) first guess within the cones; overwritten with the solution.
-        y: (r + p,) overwritten with the multipliers of G's rows, and of H's, whose
-            values are a first guess.
+        u: (nu,) first estimate within the cones; overwritten with the solution.
+        y: (r + p,) first estimate of the multipliers of the rows of G and of H;
+            overwritten with the solution.
     """
     kernels.newton(*_contiguous(*problem), _integers(starts), *limits, u, y)
 
@@ -75,16 +75,16 @@ def farthest_points(
     """Maximise d.u over {rows u = right, |u_k| <= 1 for each cone} for many d.
 
     Args:
-        rows: (p, nu) of full row rank.
-        starts: (cones + 1,) first column of each cone, and nu.
-        directions: (k, nu) d, of length 1.
-        right: (k, p).
+        rows: (p, nu) matrix of full row rank.
+        starts: (cones + 1,) index of the first column of each cone, and nu.
+        directions: (k, nu) directions d, of length 1.
+        right: (k, p) right sides.
         tolerance: (k,) accepted gap of d.u.
 
     Returns:
-        u (k, nu) and the multipliers n (k, p) of the rows at the last iterate: d.u <=
-        n.right + sum |(d - rows^T n)_c|; (k,) bool, whether both sides are as close as
-        required and the rows hold to rounding.
+        u (k, nu) and the multipliers n (k, p) of the rows at the last iterate, with d.u
+        <= n.right + sum |(d - rows^T n)_c|.  And (k,) bool, True if both sides are as
+        close as required and the rows hold to rounding.
     """
     count, (p, nu) = len(directions), rows.shape
     points, multipliers = np.zeros((count, nu)), np.zeros((count, p))
@@ -103,21 +103,21 @@ def farthest(
     """Bracket the largest size of half a screw in {centre + X (v - start)}.
 
     Args:
-        centre: (6,) [rad, m] the screw at ``start``.
-        X: (6, nv) [rad, m].
-        H: (p, nv) orthonormal rows; H (v - start) = 0.
-        start: (nv,) within the unit cones.
-        starts: (cones + 1,) first column of each cone, and nv.
+        centre: (6,) [rad, m] screw at ``start``.
+        X: (6, nv) [rad, m] map to screws.
+        H: (p, nv) orthonormal rows with H (v - start) = 0.
+        start: (nv,) point within the unit cones.
+        starts: (cones + 1,) index of the first column of each cone, and nv.
         half: 0 for the rotation, 3 for the translation.
         tolerance: [rad or m] required difference of upper and lower bound.
-        support: function of a direction (3,) of that half; its gradient is X^T d less
-            the part of the rows' multipliers.  It is called if the compiled method is
-            not accurate enough.
+        support: function of a direction (3,) of that half, which is called if the
+            compiled method is not accurate enough; its gradient is X^T d minus the part
+            of the rows' multipliers.
 
     Returns:
-        (2,) lower and upper bound, (6,) the screw that attains the lower, and the
-        number of support functions: at most 400, with which the bounds may be wider
-        than required.
+        (2,) lower and upper bound, (6,) the screw that attains the lower bound, and the
+        number of support functions.  After 400 of them the bounds may be wider than
+        required.
     """
 
     def asked(direction: tuple[float, float, float]) -> tuple[float, NDArray, NDArray]:

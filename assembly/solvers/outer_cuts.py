@@ -1,8 +1,9 @@
-"""The farthest screw of a body, bracketed by cuts: the reference, in numpy.
+"""Bounds of the farthest screw of a body by cuts, in numpy (reference method).
 
 Each support function d.x <= h(d) cuts off a half space; the cuts form a polytope around
-the body.  Its farthest corner is an upper bound; the farthest point that attains a
-support is a lower bound.  The next cut is made in the direction of that corner.
+the body.  The farthest corner of the polytope is an upper bound; the farthest point
+that attains a support function is a lower bound.  The next cut is in the direction of
+that corner.
 
 Sources:
     Hoffman (1981), A method for globally minimizing concave functions over convex sets,
@@ -16,7 +17,7 @@ from assembly.solvers.one_problem import Support
 
 _MOST = 400  # largest number of support functions
 # distance of every cut from the body, so that a flat body has corners too: relative to
-# the tolerance, and at least to its size
+# the tolerance, and at least relative to the body's size
 _SLACK, _LEAST_SLACK = 0.25, 1e-7
 
 
@@ -26,14 +27,14 @@ def farthest(
     """Bracket the largest size of half a screw of a bounded convex body.
 
     Args:
-        centre: (6,) [rad, m] a screw of the body.
+        centre: (6,) [rad, m] screw of the body.
         half: 0 for the rotation, 3 for the translation.
         tolerance: [rad or m] required difference of upper and lower bound.
-        support: function of a direction (3,) of that half.
+        support: support function of a direction (3,) of that half.
 
     Returns:
-        Lower and upper bound, (6,) the screw that attains the lower, and the number of
-        support functions: at most 400, with which the bounds may be wider than
+        Lower and upper bound, (6,) the screw that attains the lower bound, and the
+        number of support functions.  After 400 of them the bounds may be wider than
         required.
     """
     part = slice(half, half + 3)
@@ -58,7 +59,7 @@ def farthest(
 
 
 def _farthest_corner(cuts: NDArray, room: NDArray, centre: NDArray) -> NDArray:
-    """Return the (3,) corner of {cuts (x - centre) <= room} of the largest size."""
+    """Return the (3,) corner of {cuts (x - centre) <= room} with the largest size."""
     from scipy.spatial import HalfspaceIntersection
 
     unit = room.max()

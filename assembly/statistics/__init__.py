@@ -1,4 +1,4 @@
-"""Monte Carlo statistics of geometric errors, and tolerance allocation.
+"""Monte Carlo statistics of geometric errors, and allocation of tolerances.
 
-Begin at ``monte_carlo.py`` for draws, at ``allocation.py`` for tolerances.
+Begin at ``monte_carlo.py`` for random errors, at ``allocation.py`` for tolerances.
 """

@@ -1,4 +1,4 @@
-"""An allocation: tolerances, their cost and their proof, as values and as data set."""
+"""Result of an allocation: tolerances, cost and proof, as values and data set."""
 
 from dataclasses import dataclass, field
 from importlib.metadata import version
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.error_distributions import KINDS
+from assembly.statistics.callout_sources import CalloutSources
 from assembly.statistics.clearance_positions import clearance_means, contact_length_of
 from assembly.statistics.quantities import UNITS
 from assembly.statistics.requirement import Plan
@@ -28,24 +29,25 @@ _SHARE_OF = {
 
 @dataclass(frozen=True, eq=False)
 class Allocation:
-    """Tolerances, their cost, and proven bounds of both.
+    """Tolerances and their cost, with proven bounds of both.
 
     Attributes:
         plan: costs and limits.
-        tolerances: (G,) [rad or m].
+        tolerances: (G,) [rad or m] tolerance of each class.
         price: cost of the tolerances.
-        uniformly_scaled: (G,) [rad or m] tolerances with the proportions of the convex
-            programme, scaled uniformly to meet all limits.
+        uniformly_scaled: (G,) [rad or m] tolerances in the proportions of the convex
+            programme, multiplied by one factor so that they meet all limits.
         price_uniformly_scaled: cost of ``uniformly_scaled``, at least ``price``.
         price_bound: lower bound of the cost of tolerances that always meet the convex
-            limits; NaN for a yield below 1, or where a limit is not convex.
-        cuts: planes in the convex programme.
-        worst: by limit and for yield 1: the worst corner found and the proven upper
-            bound, over all postures; NaN if not proven.
+            limits; NaN for a yield below 1, or if a limit is not convex.
+        cuts: number of cutting planes in the convex programme.
+        worst: for each limit, for yield 1: the quantity at the worst corner found, and
+            its proven upper bound over all postures; NaN if not proven.
         proven_scale: factor on the tolerances, 1 or less, at which the upper bounds
             meet the limits too; NaN if not proven.
-        verification: verification by fresh draws: yields with their intervals.
-        perfect_parts: by limit on a pose error, the pose error [rad or m] due to
+        verification: results of the verification by new random draws: yields with
+            intervals.
+        perfect_parts: for each limit on a pose error, the pose error [rad or m] due to
             clearances alone, and its posture.
     """
 
@@ -81,6 +83,7 @@ def allocation_of(allocation: Allocation) -> dict[str, Any]:
             "share": float(shares[g]),
             "loosest_allowed": plan.most[g],
             "at_loosest": bool(allocation.tolerances[g] >= plan.most[g] * (1 - 1e-3)),
+            **({"width": True} if _is_width(plan, g) else {}),
         }
         for g, name in enumerate(plan.names)
     ]
@@ -111,14 +114,15 @@ def allocation_of(allocation: Allocation) -> dict[str, Any]:
 
 
 def price_shares(allocation: Allocation) -> NDArray:
-    """Return the share of each class in the saving by looser tolerances.
+    """Return the share of each class in the saving by larger tolerances.
 
     At least cost, the saving for a relative change of a tolerance is the multiplier of
-    the limit times the change of the limited quantity.  This is cost / tolerance, or
-    the cost if the law is logarithmic.  It has no unit, so angles and lengths compare.
+    the limit times the change of the limited quantity.  This is cost / tolerance or,
+    for the logarithmic law, the cost.  It has no unit, so angles and lengths are
+    comparable.
 
     Args:
-        allocation: the tolerances.
+        allocation: result of the allocation.
 
     Returns:
         (G,) shares that add up to 1.
@@ -134,9 +138,10 @@ def price_shares(allocation: Allocation) -> NDArray:
 def _taken(
     allocation: Allocation, key: str, reached: float, at: str
 ) -> dict[str, float | str]:
-    """Return the part of a limit due to clearances, and the cost without it."""
+    """Return the part of a limit due to clearances, and the cost without clearances."""
     plan, limit = allocation.plan, allocation.plan.limits[key]
-    # pose errors by errors and by clearances nearly add up; tolerances scale with them
+    # pose errors due to errors and to clearances nearly add up, and scale with
+    # tolerances
     looser = limit / (limit - reached) if reached < limit else np.inf
     without = allocation.price / looser
     if plan.cost == "logarithm":
@@ -149,13 +154,15 @@ def _taken(
 
 def _distribution(plan: Plan) -> dict[str, Any]:
     """Return how errors are distributed within their tolerances."""
-    kind = KINDS[int(plan.sources.kind[0])]
-    cut = float(plan.sources.limit[0]) if kind == "truncated" else None
+    sources = plan.sources
+    own = sources.independent if isinstance(sources, CalloutSources) else sources
+    kind = "as in the robot file" if own is None else KINDS[int(own.kind[0])]
+    cut = float(own.limit[0]) if own is not None and kind == "truncated" else None
     return {"distribution": kind, "deviations": cut}
 
 
 def _contact_length(plan: Plan) -> float | None:
-    """Return the [m] contact length of the contact model, None for the others."""
+    """Return the [m] contact length of the contact model; None for other models."""
     if not plan.limits_pose or plan.clearance != "contact":
         return None
     return plan.contact_length or contact_length_of(plan.sources.robot)
@@ -164,14 +171,28 @@ def _contact_length(plan: Plan) -> float | None:
 def _unit(allocation: Allocation, group: int) -> str:
     """Return the unit of a class of tolerances."""
     first = int(np.flatnonzero(allocation.plan.group == group)[0])
-    return "rad" if allocation.plan.sources.component[first] < 3 else "m"
+    # callouts are shifts and tilts together, within a zone of a width
+    return "rad" if allocation.plan.sources.units[first] == "rad" else "m"
+
+
+def _is_width(plan: Plan, group: int) -> bool:
+    """Return whether a tolerance is the full width of a zone, not to each side."""
+    if not isinstance(plan.sources, CalloutSources):
+        return False
+    columns = set(np.flatnonzero(plan.group == group).tolist())
+    return any(
+        bool(placed.callout.widths) and bool(columns & set(of.tolist()))
+        for placed, of in zip(plan.sources.placed, plan.sources.columns, strict=True)
+    )
 
 
 def allocation_text(results: dict[str, Any]) -> str:
     """Return an allocation as text."""
     lines = []
     for one in results["tolerances"]:
-        line = f"  {one['name']}: +-{in_unit(one['tolerance'], _SHOWN[one['unit']])}"
+        sides = "" if one.get("width") else "+-"
+        size = in_unit(one["tolerance"], _SHOWN[one["unit"]])
+        line = f"  {one['name']}: {sides}{size}"
         note = "the loosest allowed" if one["at_loosest"] else f"{one['share']:.0%}"
         lines.append(f"{line} ({note})")
     if lines:
@@ -218,7 +239,7 @@ def _taken_text(key: str, one: dict[str, Any]) -> str:
 
 
 def _looks_text(check: dict[str, Any]) -> str:
-    """Return the number of verifications, and the confidence of each and of all."""
+    """Return a text on the verifications: number, confidence of each and of all."""
     left = check["yield"]["undecided"]
     undecided = f", {left} draws undecided" if left else ""
     return (
@@ -229,7 +250,7 @@ def _looks_text(check: dict[str, Any]) -> str:
 
 
 def _price_text(results: dict[str, Any]) -> str:
-    """Return the cost of the tolerances, and its lower bound or its reduction."""
+    """Return cost of the tolerances, with its lower bound or its reduction, as text."""
     price, alike, bound = (results[k] for k in ("price", "price_alike", "price_bound"))
     text = f"price {price:.5g}"
     if np.isfinite(bound):

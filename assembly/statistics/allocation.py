@@ -1,11 +1,12 @@
 """Tolerance allocation: tolerances of least cost within limits.
 
-Tolerances t_g, one for each class of errors, cost ``c_g / t_g`` (or ``-c_g log t_g``).
-Limits of margin and energy are convex: :mod:`assembly.statistics.cutting_planes` finds
-the least cost and proves it for a yield of 1.  A yield below 1, and limits of wrenches,
-stress and pose errors, are not: :mod:`assembly.statistics.least_cost` continues from
-there to a local minimum.  Last, all tolerances are scaled uniformly until independent
-draws, or the worst corners, just meet every limit, and fresh draws verify them.
+Tolerances t_g, one for each class of errors, have a cost ``c_g / t_g`` (or ``-c_g log
+t_g``).  Limits of margin and energy are convex:
+:mod:`assembly.statistics.cutting_planes` finds the least cost and proves it for a yield
+of 1.  A yield below 1, and limits of wrenches, stress and pose errors, are not convex;
+:mod:`assembly.statistics.least_cost` continues to a local minimum.  Finally, all
+tolerances are multiplied by one factor until independent draws, or the worst corners,
+just meet every limit, and new draws verify them.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,7 +29,8 @@ from assembly.statistics.scaling import (
 )
 from assembly.statistics.verification import prove_worst, verify
 
-_SCALING_DRAWS = 4  # times the training draws: many, since only one factor is searched
+# multiple of the number of training draws; many are possible for a single factor
+_SCALING_DRAWS = 4
 
 
 def allocate(
@@ -38,12 +40,12 @@ def allocate(
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
     replay: Replay | None = None,
 ) -> Allocation:
-    """Find the cheapest tolerances that meet a plan over postures, and verify them.
+    """Find and verify the tolerances of least cost that meet a plan over postures.
 
     Args:
-        postures: postures of one robot, the workspace.
+        postures: postures of one robot in its workspace.
         plan: costs and limits.
-        fresh: independent draws for the verification; 0 for none.
+        fresh: number of independent draws for the verification; 0 for none.
         progress: called with the name of a step, its progress and its total.
         replay: stored results, from which a killed computation resumes.
 
@@ -51,15 +53,15 @@ def allocate(
         The tolerances.
 
     Raises:
-        BadInput: no part takes up an error, or a limit is violated by perfect parts or
-            by the tightest tolerances.
+        BadInput: no part can take up an error, or a limit is violated without errors or
+            with the tightest tolerances.
     """
     replay = replay or Replay()
     requirement = Requirement(postures, plan, replay)
     perfect_parts = requirement.perfect_parts()
     convex_requirement = requirement
     if not requirement.convex:
-        # no convex limit: start from the proportions that a limit of energy gives
+        # without convex limits, start from the proportions due to a limit of the energy
         typical = _typical_energy(requirement)
         convex_requirement = Requirement(
             postures, replace(plan, limits={"energy": typical}), replay
@@ -94,7 +96,7 @@ def _scaled_tolerances(
     proportions: NDArray,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, NDArray]:
-    """Return the cheapest tolerances, and the given proportions scaled uniformly."""
+    """Return the tolerances of least cost, and given proportions scaled uniformly."""
     samples = draw_samples(requirement, TRAINING)
     if requirement.is_convex:
         uniformly_scaled = scale_uniformly(
@@ -121,7 +123,7 @@ def _scaled_tolerances(
 
 
 def _typical_energy(requirement: Requirement) -> float:
-    """Return [J] median of draws at the loosest tolerances, at the first posture."""
+    """Return [J] median energy of draws at the loosest tolerances, first posture."""
     plan = requirement.plan
     values = plan.draws_of(TRAINING, 200) * plan.spread(plan.most)
     rows = requirement.experiments[0].evaluate(values, range(len(values)))

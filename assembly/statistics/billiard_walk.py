@@ -1,4 +1,4 @@
-"""The billiard walk through the set of clearance positions, compiled.
+"""Compiled billiard walk through the set of clearance positions.
 
 Sources:
     Gryazina, Polyak (2014), Random sampling: billiard walk algorithm.
@@ -19,8 +19,8 @@ class Positions:
 
     Attributes:
         M: (nu, n) axes of Dikin's ellipsoid.
-        starts: (cones + 1,) first column of each cone, and nu.
-        to_screw: (6, nu) [rad, m] from u to the platform's screw.
+        starts: (cones + 1,) index of the first clearance of each cone, and nu.
+        to_screw: (6, nu) [rad, m] map from u to the platform's screw.
     """
 
     M: NDArray
@@ -29,18 +29,18 @@ class Positions:
 
     @cached_property
     def gram(self) -> NDArray:
-        """(nu, nu) M M^T."""
+        """(nu, nu) product M M^T."""
         return self.M @ self.M.T
 
     def start_chains(
         self, u: NDArray, rng: np.random.Generator, walks: NDArray
     ) -> None:
-        """Compute the chains' starts: close to the boundary, in random directions.
+        """Compute start points of the chains near the boundary, in random directions.
 
         Args:
-            u: (nu,) the ellipsoid's centre.
+            u: (nu,) centre of the ellipsoid.
             rng: generator of random numbers.
-            walks: (chains, nu) the starts, overwritten.
+            walks: (chains, nu) start points, overwritten.
         """
         bits = rng.bit_generator
         with bits.lock:
@@ -49,13 +49,13 @@ class Positions:
     def walk(
         self, u: NDArray, every: int, rng: np.random.Generator, trace: NDArray
     ) -> None:
-        """Continue a chain; keep its platform screw at regular intervals.
+        """Continue a chain, and record its platform screw at regular intervals.
 
         Args:
-            u: (nu,) the chain's point, overwritten.
-            every: number of trajectories between two screws.
+            u: (nu,) present point of the chain, overwritten.
+            every: number of trajectories between two recorded screws.
             rng: generator of random numbers.
-            trace: (kept, 6) [rad, m] overwritten with the screws.
+            trace: (kept, 6) [rad, m] overwritten with the recorded screws.
         """
         bits = rng.bit_generator
         with bits.lock:

@@ -1,8 +1,8 @@
-"""Clearance positions where bounds of passive joints' own motion may be active.
+"""Clearance positions if bounds on the motion of passive joints may be active.
 
-Those bounds are left out of the prepared posture, because clearances reach hardly any
-of them.  Draws in which one may be reached are positioned one by one.  For them the set
-of platform screws of problem (27), ``frozen``, has every bound that counts as a cone
+Those bounds are left out of the prepared posture, because clearances can reach hardly
+any of them.  Draws in which one may be reached are computed one by one.  In these, the
+set of platform screws of problem (27), ``frozen``, has every relevant bound as a cone
 (:mod:`assembly.linear.reference.pose_error`).
 """
 
@@ -19,19 +19,20 @@ from assembly.linear.reference.reduction import FreeMotion
 from assembly.solvers.conic import SolverFailed
 from assembly.statistics.linear_response import LinearResponse
 
-ASSUMPTION = "frozen"  # every spring is as in the solution of (22)
+# assumption of (27): every spring has its deformation in the solution of (22)
+ASSUMPTION = "frozen"
 
 
 def draws_at_bounds(prepared: LinearResponse, draws: Assembly) -> NDArray:
-    """Return the draws in which a passive joint may reach the bound of its own motion.
+    """Return the draws in which a passive joint may reach a bound of its motion.
 
     Args:
-        prepared: the posture.
-        draws: its solutions for k draws.
+        prepared: the prepared posture.
+        draws: solutions of the posture for k draws.
 
     Returns:
-        (k,) bool: a bound is active in the solution, or the clearances can move a joint
-        up to its bound, or the bound alone holds the joint and with it the platform.
+        (k,) bool, True if a bound is active in the solution, if the clearances can move
+        a joint to its bound, or if only the bound holds the joint and the platform.
     """
     solved = np.isfinite(draws.energy)
     active = solved & np.isnan(draws.clearances).any(axis=1)
@@ -50,7 +51,7 @@ def draws_at_bounds(prepared: LinearResponse, draws: Assembly) -> NDArray:
 
 
 def _moves_platform(prepared: LinearResponse) -> NDArray:
-    """Return (nq,) bool: free motions of the platform that no closure holds."""
+    """Return (nq,) bool: free motions of the platform that no closure prevents."""
     mismatch = prepared.posture.mismatch
     A_q = prepared.closures @ prepared.joints.free
     P_q = prepared.platform @ prepared.joints.free
@@ -67,13 +68,13 @@ def bounded_position(
     Args:
         draws: draws of one posture.
         i: index of the draw.
-        wrench: (6,) [N m, N] that displaces the platform to contact; None for the
+        wrench: (6,) [N m, N] wrench that moves the platform to contact; None for the
             uniform distribution.
-        rng: generator of random numbers, for the uniform distribution.
+        rng: generator of random numbers for the uniform distribution.
 
     Returns:
-        (6,) [rad, m], NaN if the draw has no solution or the solver fails; and whether
-        the walk mixed.  Motions without any bound stay at their least size.
+        (6,) [rad, m] screw, NaN if the draw has no solution or the solver fails; and
+        whether the walk mixed.  Motions without any bound have their smallest size.
     """
     from assembly.statistics.uniform_clearance import sample_uniform_position
 

@@ -1,20 +1,21 @@
-"""Clearance models: the positions that clearances take in an assembled robot.
+"""Clearance models: positions of the clearances in an assembled robot.
 
-At least energy the clearances that carry load are at their bound.  The other clearances
-may move without changing any spring; their positions form a convex set.  The models are
+At least energy, the clearances that carry load are at their bounds.  The other
+clearances may move without changing any spring; their positions form a convex set.  The
+models are
 
 ======== =====================================================================
-worst    any position: the largest pose errors count, see
+worst    any position; the largest pose errors are used, see
          :mod:`assembly.statistics.worst_clearance`
 uniform  uniformly distributed over the set (billiard walk)
 contact  displaced by a wrench of random direction on the platform until in contact
-least    that of the solution of (22): one possible position of many
+least    the position in the solution of (22), one of many possible ones
 ======== =====================================================================
 
-The contact model needs a length: random moments divided by it are as large as random
-forces.  The positions depend on this length, so it is stated with every result.  Where
-the loads in service are known they determine how the clearances close, and no length is
-needed.
+The contact model needs a length: random moments divided by this length have the size of
+random forces.  The positions depend on the length, so it is stated with every result.
+If the loads in service are known, they determine how the clearances close, and no
+length is needed.
 """
 
 from collections.abc import Sequence
@@ -36,7 +37,7 @@ CLEARANCE_MODELS = {
     "contact": "clearances displaced to contact by a wrench of random direction",
     "least": "positions of the least-energy solution, one of many possible ones",
 }
-CLEARANCE_STREAM = 1  # number of the stream of random numbers; 0 is the errors' stream
+CLEARANCE_STREAM = 1  # stream of random numbers for clearances; stream 0 is for errors
 
 
 def position_clearances(
@@ -46,22 +47,22 @@ def position_clearances(
     generators: Sequence[np.random.Generator],
     contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:
-    """Return the platform screws with the clearances at positions of a clearance model.
+    """Return the platform screws with clearances positioned by a clearance model.
 
     Args:
-        prepared: the posture.
-        draws: k of them, by the posture's ``solve``.
-        clearance: one of :data:`CLEARANCE_MODELS` except the worst.
-        generators: of random numbers, one for each draw; not used for "least".
-        contact_length: [m] of the contact model, see :func:`contact_length_of`.
+        prepared: the prepared posture.
+        draws: solutions for k draws, from the posture's ``solve``.
+        clearance: one of :data:`CLEARANCE_MODELS` except the worst model.
+        generators: generator of random numbers for each draw; not used for "least".
+        contact_length: [m] length of the contact model, see :func:`contact_length_of`.
 
     Returns:
-        (k, 6) [rad, m]; NaN where a draw has no solution.  (k,) bool: False where the
-        walks of the uniform model had not mixed at their greatest length, see
+        (k, 6) [rad, m] screws, NaN where a draw has no solution; and (k,) bool, False
+        where the walks of the uniform model had not mixed at their greatest length, see
         :func:`assembly.statistics.uniform_clearance.sample_uniform_position`.
 
     Raises:
-        ValueError: ``clearance`` is something else.
+        ValueError: ``clearance`` is not a valid model.
     """
     if clearance not in CLEARANCE_MODELS or clearance == "worst":
         valid = tuple(name for name in CLEARANCE_MODELS if name != "worst")
@@ -91,7 +92,7 @@ def _moved_clearances(
     prepared: LinearResponse, draws: Assembly, left: NDArray, wrenches: NDArray | None,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the clearances' motions in the draws ``left``, and whether walks mixed."""
+    """Return the motions of clearances in the draws ``left``; whether walks mixed."""
     clearances, mixed = draws.clearances.copy(), np.ones(len(left), dtype=bool)
     loaded = loaded_clearances(prepared, draws)
     patterns, pattern_of_draw = np.unique(loaded, axis=0, return_inverse=True)
@@ -115,7 +116,7 @@ def contact_length_of(robot: Robot) -> float:
 
 
 def clearance_means(clearance: str, contact_length: float | None = None) -> str:
-    """Return a clearance model in words, with the length of the contact model."""
+    """Return the meaning of a clearance model, with the length of the contact model."""
     words = CLEARANCE_MODELS[clearance]
     if clearance != "contact" or contact_length is None:
         return words
@@ -125,7 +126,7 @@ def clearance_means(clearance: str, contact_length: float | None = None) -> str:
 def _random_wrenches(
     generators: Sequence[np.random.Generator], length: float
 ) -> NDArray:
-    """Return (k, 6) random wrenches on the platform, moments times the length."""
+    """Return (k, 6) random wrenches on the platform; moments include the length."""
     scale = np.repeat([1.0, 1.0 / length], 3)
     wrenches = np.array([rng.normal(size=6) for rng in generators])
     return wrenches.reshape(-1, 6) * scale
@@ -135,7 +136,7 @@ def _at_random(
     prepared: LinearResponse, loaded: NDArray, clearances: NDArray,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the clearances uniform over their set, and whether the walks mixed."""
+    """Return clearances distributed uniformly over their set; whether walks mixed."""
     from assembly.statistics.uniform_clearance import sample_uniform_position
 
     free = ~loaded
@@ -167,7 +168,7 @@ def _at_contact(
 
 
 def free_starts(prepared: LinearResponse, free: NDArray) -> NDArray:
-    """Return the (cones + 1,) first columns of the free cones, among free columns."""
+    """Return the (cones + 1,) first columns of the free cones among free columns."""
     sizes = np.diff(prepared.starts)[free[prepared.starts[:-1]]]
     return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
@@ -179,7 +180,7 @@ def _at_contact_alone(
     clearances: NDArray,
     direction: NDArray,
 ) -> NDArray:
-    """Return the (nu,) farthest position, by Clarabel."""
+    """Return the (nu,) farthest position by the interior-point method of Clarabel."""
     group = np.unique(prepared.joints.group[free], return_inverse=True)[1]
     none, size = np.zeros((0, int(free.sum()))), np.linalg.norm(direction[free])
     solution = minimise_energy(
@@ -202,7 +203,7 @@ def loaded_clearances(prepared: LinearResponse, draws: Assembly) -> NDArray:
         forces += prepared.loads.joint @ prepared.joints.cones
     force_sizes = _sizes(forces, prepared.starts)
     slack = np.maximum(0.0, 1.0 - _sizes(draws.clearances, prepared.starts))
-    # force times slack is about the solver's gap: one of them is nearly zero
+    # force times slack is about the solver's gap, so one of them is nearly zero
     scale = np.maximum(draws.energy, 1e-18)[:, None]
     loaded = (force_sizes > scale * slack) & (force_sizes > 1e-9 * scale)
     return np.repeat(loaded, np.diff(prepared.starts), axis=1)
@@ -216,10 +217,10 @@ def clearance_constraints(prepared: LinearResponse, loaded: NDArray) -> NDArray:
 
 
 def _cone_columns(prepared: LinearResponse) -> NDArray:
-    """Return the (m, nu) closure columns of the clearances."""
+    """Return the (m, nu) columns of the clearances in the closures."""
     return prepared.closures @ prepared.joints.cones
 
 
 def _sizes(values: NDArray, starts: NDArray) -> NDArray:
-    """Return the (k, cones) size of each cone's part."""
+    """Return the (k, cones) norm of each cone's components."""
     return np.sqrt(np.add.reduceat(values**2, starts[:-1], axis=1))

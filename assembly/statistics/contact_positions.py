@@ -12,18 +12,18 @@ def move_to_contact(
     rows: NDArray, starts: NDArray, free: NDArray, positions: NDArray,
     directions: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return the farthest point of the clearances' set along each direction.
+    """Return the point of the clearances' set that is farthest in each direction.
 
     Args:
-        rows: (p, nu) orthonormal, zero where not ``free``.
-        starts: (cones + 1,) first column of each cone, and nu.
-        free: (nu,) bool, True for clearances that may move; whole cones.
+        rows: (p, nu) orthonormal rows, zero for clearances that are not ``free``.
+        starts: (cones + 1,) index of the first clearance of each cone, and nu.
+        free: (nu,) bool, True for clearances that may move; equal within a cone.
         positions: (k, nu) points of the set.
-        directions: (k, nu) linear objectives to be maximised.
+        directions: (k, nu) directions, in which the position is maximised.
 
     Returns:
-        (k, nu) the farthest points; NaN where the interior-point method fails, as it
-        may in a set with empty interior.
+        (k, nu) the farthest points; NaN if the interior-point method fails, which may
+        happen if the set has empty interior.
     """
     ends = positions.copy()
     along = np.where(free, directions, 0.0)

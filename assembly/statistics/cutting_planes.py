@@ -3,13 +3,13 @@
 Two requirements are convex in the tolerances t:
 
 - *always* (yield 1): margin or energy at every corner of the tolerances.  For every
-  choice s of signs ``m(t s)`` is convex in t; for the margin it is proportional to t.
-- *with a yield*: the mean of the worst (1 - yield) of many fixed draws s (the
-  conditional value at risk), which is stricter than the yield.
+  choice s of signs, ``m(t s)`` is convex in t; for the margin it is proportional to t.
+- *with a yield*: the mean over the worst (1 - yield) of many fixed draws s (the
+  conditional value at risk), which is a stricter condition than the yield.
 
 Each iteration solves the programme, finds the largest violation of the requirement, and
 adds the plane of its slopes.  Every plane holds for all tolerances that meet the
-requirement, so the programme's cost is a lower bound of theirs.
+requirement, so the programme's cost is a lower bound of their cost.
 
 Sources:
     Kelley (1960), The cutting-plane method for solving convex programs; Rockafellar,
@@ -25,24 +25,25 @@ from assembly.statistics.requirement import TRAINING, Plan, Requirement
 from assembly.statistics.worst_case import CORNERS, random_corners
 from forcefit.inputs.table import BadInput
 
-_TOLERANCE = 1e-3  # relative to a limit: largest violation accepted at the end
+_TOLERANCE = 1e-3  # relative to a limit: largest violation that is accepted at the end
 _MOST_CUTS = 200
 
 
 def cut_planes(
     requirement: Requirement, progress: Callable[[str, int, int], None]
 ) -> tuple[NDArray, float, int]:
-    """Return the cheapest tolerances that meet the convex limits of a requirement.
+    """Return the tolerances of least cost that meet the convex limits.
 
     Args:
-        requirement: limits at all postures.
+        requirement: requirement at all postures.
         progress: called with the name of a step, its progress and its total.
 
     Returns:
-        (G,) [rad or m] tolerances, a lower bound of their cost, number of planes.
+        (G,) [rad or m] tolerances, a lower bound of their cost, and the number of
+        planes.
 
     Raises:
-        BadInput: even perfect parts, or the tightest tolerances, exceed a limit.
+        BadInput: a limit is exceeded without errors, or with the tightest tolerances.
     """
     plan = requirement.plan
     planes: list[NDArray] = []
@@ -63,16 +64,16 @@ def cut_planes(
 def cheapest_within(
     plan: Plan, planes: Sequence[NDArray], least: NDArray, most: NDArray
 ) -> NDArray:
-    """Return cheapest tolerances with ``a.t <= 1`` for all planes a, and within bounds.
+    """Return the tolerances of least cost with ``a.t <= 1`` for all planes a.
 
     Args:
-        plan: its costs.
-        planes: (G,) each [1/rad or 1/m].
-        least: (G,) [rad or m].
-        most: (G,) [rad or m].
+        plan: plan that gives the costs.
+        planes: (G,) [1/rad or 1/m] coefficients a of each plane.
+        least: (G,) [rad or m] smallest tolerances.
+        most: (G,) [rad or m] largest tolerances.
 
     Returns:
-        (G,) [rad or m].
+        (G,) [rad or m] tolerances.
 
     Raises:
         BadInput: no tolerances satisfy the planes.
@@ -80,7 +81,7 @@ def cheapest_within(
     import cvxpy as cp
 
     A = np.array(planes).reshape(-1, len(plan.names))
-    # scaled so that each tolerance alone reaches its plane at 1
+    # scaled so that each tolerance alone reaches its steepest plane at 1
     steepest = np.maximum(A, 0.0).max(axis=0, initial=0.0)
     scale = np.minimum(most, 1.0 / np.maximum(steepest, 1e-300))
     x = cp.Variable(len(plan.names))
@@ -130,7 +131,7 @@ def _violated(requirement: Requirement, t: NDArray) -> Iterator[NDArray]:
 
 
 def _plane(slopes: NDArray, value: float, t: NDArray, limit: float) -> NDArray:
-    """Return the plane ``a.t' <= 1`` of a linearised quantity and its limit."""
+    """Return the plane ``a.t' <= 1`` of a linearised quantity with its limit."""
     right = limit - value + float(slopes @ t)
     if right <= 0:
         raise BadInput(f"even perfect parts exceed a limit of {limit:g}")

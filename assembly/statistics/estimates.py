@@ -1,8 +1,9 @@
-"""Estimates from a sample of draws, each with its confidence interval.
+"""Estimates from a sample of draws, with confidence intervals.
 
-Intervals of probabilities are Clopper's and Pearson's, exact for any number of draws.
-Those of quantiles are order statistics, valid for any distribution.  Those of means
-come from the central limit theorem, of the most probable value from the bootstrap.
+Intervals of probabilities are those of Clopper and Pearson, which are exact for any
+number of draws.  Intervals of quantiles are order statistics, which are valid for any
+distribution.  Intervals of means follow from the central limit theorem, those of the
+most probable value from the bootstrap.
 """
 
 from typing import Literal
@@ -18,9 +19,9 @@ def proportion(successes: int, count: int, level: float = 0.95) -> dict[str, flo
     """Return the probability of success with its Clopper-Pearson interval.
 
     Args:
-        successes: successes of ``count`` independent trials.
-        count: > 0.
-        level: level of confidence; the coverage is at least this.
+        successes: number of successes in ``count`` independent trials.
+        count: number of trials, > 0.
+        level: level of confidence; the coverage is at least this level.
 
     Returns:
         ``probability``, ``lower``, ``upper``.
@@ -35,16 +36,16 @@ def proportion(successes: int, count: int, level: float = 0.95) -> dict[str, flo
 def bracketed(
     holds: int, fails: int, count: int, level: float = 0.95
 ) -> dict[str, float]:
-    """Return the probability of success, where some trials are undecided.
+    """Return the probability of success if some trials are undecided.
 
     Args:
-        holds: certain successes of ``count`` independent trials.
-        fails: certain failures.
-        count: > 0.
+        holds: number of certain successes in ``count`` independent trials.
+        fails: number of certain failures.
+        count: number of trials, > 0.
         level: level of confidence, for any outcome of the undecided trials.
 
     Returns:
-        ``probability`` of a certain success, ``lower``, ``upper``, number of
+        ``probability`` of a certain success, ``lower``, ``upper``, and the number of
         ``undecided`` trials.
     """
     surely = proportion(holds, count, level)
@@ -57,19 +58,19 @@ def quantile(values: ArrayLike, share: float, level: float = 0.95) -> dict[str, 
 
     Args:
         values: (k,) a sample.
-        share: share of the distribution below it, in (0, 1).
+        share: fraction of the distribution below the quantile, in (0, 1).
         level: level of confidence.
 
     Returns:
-        ``value``, ``lower``, ``upper``; infinite where the sample is too small, or has
+        ``value``, ``lower``, ``upper``; infinite if the sample is too small or has
         infinite values.
     """
     x = np.sort(np.asarray(values, dtype=float))
     count = len(x)
-    # no interpolation between infinite values
+    # infinite values are not interpolated
     way: Literal["linear", "higher"] = "linear" if np.isfinite(x).all() else "higher"
     low, high = stats.binom.ppf([(1 - level) / 2, (1 + level) / 2], count, share)
-    # P(fewer than low values below the quantile) < (1 - level)/2; above likewise
+    # P(fewer than low values below the quantile) < (1 - level)/2; likewise above
     below, above = int(low) - 1, int(high)
     return {
         "value": float(np.quantile(x, share, method=way)),
@@ -86,7 +87,7 @@ def mean(values: ArrayLike, level: float = 0.95) -> dict[str, float]:
         level: level of confidence.
 
     Returns:
-        ``value``, ``lower``, ``upper``, ``deviation`` of one draw.
+        ``value``, ``lower``, ``upper``, and standard ``deviation`` of one draw.
     """
     x = np.asarray(values, dtype=float)
     value, deviation = float(x.mean()), float(x.std(ddof=1))
@@ -107,7 +108,8 @@ def most_probable(
     Args:
         values: (k,) a sample.
         level: level of confidence.
-        positive: whether the samples are sizes; the kernel is then reflected at zero.
+        positive: whether the samples are magnitudes; the kernel is then reflected at
+            zero.
         seed: seed of the bootstrap.
 
     Returns:
@@ -119,9 +121,9 @@ def most_probable(
     x = np.asarray(values, dtype=float)
     spread = float(np.quantile(x, 0.75) - np.quantile(x, 0.25)) / 1.349
     scale = min(float(x.std()), spread) or float(x.std())
-    if scale <= 1e-12 * np.abs(x).max():  # all equal up to rounding
+    if scale <= 1e-12 * np.abs(x).max():  # all values are equal except for rounding
         return dict.fromkeys(("value", "lower", "upper"), float(x[0]))
-    # a long tail must not widen the bins: the mode is elsewhere
+    # a long tail must not widen the bins, because the mode is elsewhere
     ends = np.quantile(x, [0.25, 0.75]) + np.array([-8.0, 8.0]) * scale
     low = 0.0 if positive else max(float(x.min()) - 4 * scale, float(ends[0]))
     high = min(float(x.max()) + 4 * scale, float(ends[1]))
@@ -137,8 +139,8 @@ def most_probable(
 
 
 def _modes(counts: NDArray, width: float) -> NDArray:
-    """Return the modes of smoothed histograms, one a row, refined by parabolas."""
-    # a cosine transform continues the density beyond both ends by reflection
+    """Return the modes of smoothed histograms, one per row, refined by parabolas."""
+    # a cosine transform reflects the density at both ends
     bins = counts.shape[1]
     decay = np.exp(-0.5 * (np.pi * np.arange(bins) / bins * width) ** 2)
     density = fft.idct(fft.dct(counts.astype(float), axis=1) * decay, axis=1)
@@ -146,6 +148,7 @@ def _modes(counts: NDArray, width: float) -> NDArray:
     inner = (i > 0) & (i < bins - 1)
     rows, middle = np.arange(len(i)), np.clip(i, 1, bins - 2)
     a, b, c = (density[rows, middle + k] for k in (-1, 0, 1))
-    with np.errstate(invalid="ignore", divide="ignore"):  # flat, at an end
+    # the density is flat, or its maximum is at an end
+    with np.errstate(invalid="ignore", divide="ignore"):
         offset = (a - c) / (2 * (a - 2 * b + c))
     return np.where(inner, i + offset, i)

@@ -1,7 +1,7 @@
-"""A Monte Carlo experiment: distributions at a posture, quantities of each draw."""
+"""A Monte Carlo experiment: distributions at a posture, and quantities of each draw."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,9 +11,10 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.assembled import without_rounding
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.zone import MARGINS
-from assembly.model.error_distributions import ErrorSources, draw_generator
+from assembly.model.error_distributions import draw_generator
 from assembly.model.given_load import Load, one_load
 from assembly.model.link_stress import peak_stresses, stressed_links
+from assembly.statistics.callout_sources import CalloutSources, Sources
 from assembly.statistics.clearance_positions import (
     CLEARANCE_MODELS,
     CLEARANCE_STREAM,
@@ -25,11 +26,12 @@ from assembly.statistics.posture_margins import PostureMargins, prepare_margins
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.stiffness_spread import draw_stiffnesses
 from assembly.statistics.worst_clearance import PRECISION, bound_worst_errors
+from assembly.steps.bolted import bolted_errors
 from forcefit.inputs.renamed import renamed_fields, warn_renamed
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
 
-# relative to a limit on a pose error: required upper minus lower bound
+# relative to a limit on a pose error: required difference of upper and lower bound
 _PRECISION = 1e-3
 
 
@@ -39,9 +41,9 @@ class Experiment:
     """Distributions of the errors at a posture, and the quantities of each draw.
 
     Attributes:
-        posture: of the robot; drawn errors replace its own.
-        sources: of the errors.
-        seed: of all draws.
+        posture: posture of the robot; drawn errors replace the robot's own.
+        sources: distributions of the errors.
+        seed: seed of all draws.
         clearance: one of
             :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
         margins: whether the zone margins are computed.
@@ -49,17 +51,17 @@ class Experiment:
         load: (6,) [N m, N] on the platform at its origin, base axes, or by component,
             ``{"fz": -50}``; none if absent.
         gravity: (3,) [m/s^2] base axes; none if absent.
-        stiffness: state of the platform's stiffness, one of
+        stiffness: state in which the platform's stiffness is computed, one of
             :data:`assembly.sweeps.point_stiffness.STATES` except the nominal one; empty
-            for none.
-        precision: [rad, m] of the largest pose errors of the worst clearance model:
-            required upper minus lower bound; inf if not needed.
-        contact_length: [m] random moments of the contact model divided by it are as
-            large as random forces; None for the robot's longest body.
+            if it is not computed.
+        precision: [rad, m] required difference between upper and lower bound of the
+            largest pose errors in the worst clearance model; inf if not needed.
+        contact_length: [m] length of the contact model; random moments divided by it
+            have the size of random forces; None for the robot's longest body.
     """
 
     posture: Posture
-    sources: ErrorSources
+    sources: Sources
     seed: int = 1
     clearance: str = "worst"
     margins: bool = True
@@ -94,17 +96,17 @@ class Experiment:
 
     @property
     def used_contact_length(self) -> float | None:
-        """[m] contact length of the contact model, None for the others."""
+        """[m] contact length of the contact model; None for other models."""
         if self.clearance != "contact":
             return None
         return self.contact_length or contact_length_of(self.posture.robot)
 
     @cached_property
     def energies(self) -> LinearResponse:
-        """The posture, prepared for problem (22).
+        """The posture prepared for problem (22).
 
         Raises:
-            BadInput: the load drives a motion that nothing resists.
+            BadInput: the load acts along a motion without stiffness.
         """
         try:
             return linear_response(self.posture, self.wrench, self.gravity)
@@ -113,7 +115,7 @@ class Experiment:
 
     @cached_property
     def zones(self) -> dict[str, PostureMargins]:
-        """The posture, prepared for problem (21), by quantity."""
+        """The posture prepared for problem (21), by quantity."""
         if not self.margins:
             return {}
         return {k: prepare_margins(self.posture, r) for k, r in MARGINS.items()}
@@ -127,14 +129,14 @@ class Experiment:
 
     @property
     def stress_errors(self) -> list[float]:
-        """[-] estimated relative error of each link's stress by its mesh."""
+        """[-] estimated relative error of each link's stress due to its mesh."""
         if not self.stress:
             return []
         return [x.relative_error for x in stressed_links(self.posture.robot)]
 
     @cached_property
     def record_type(self) -> np.dtype:
-        """Type of a record: the quantities of one draw."""
+        """Type of a record, which holds the quantities of one draw."""
         shapes: dict[str, tuple[int, ...]] = {
             "energy": (), "duality_gap": (), "platform_screw": (6,), "rotation": (),
             "translation": (), "force": (), "moment": (), "stress": (len(self.links),),
@@ -152,11 +154,11 @@ class Experiment:
         """Reject limits on quantities that are not computed.
 
         Raises:
-            BadInput: margins were left out, or no link's stress can be computed.
+            BadInput: margins are not computed, or no link has a stress.
         """
         for name in limits:
             if name.startswith("margin") and not self.margins:
-                raise BadInput(f"limit {name}: the margins were left out")
+                raise BadInput(f"limit {name}: the margins are not computed")
             if name == "stress" and not self.links:
                 raise BadInput(
                     f"limit stress: no link of {self.posture.robot.name} has a shape "
@@ -169,18 +171,39 @@ class Experiment:
         return self.evaluate(values, range(first, first + count))
 
     def evaluate(self, values: NDArray, draws: Sequence[int] | NDArray) -> NDArray:
-        """Return the records of given values of the sources.
+        """Return the records for given values of the error sources.
 
         Args:
-            values: (k, m) [rad or m].
-            draws: (k,) numbers of the random streams of the clearance positions.
+            values: (k, m) [rad or m] errors.
+            draws: (k,) numbers of the random streams for the clearance positions.
 
         Returns:
-            (k,) of :attr:`record_type`; NaN and status 1 where there is no solution.
-            With the worst clearance model, rotation and translation are upper bounds of
-            the largest, and the platform's screw is that of the solution of (22).
+            (k,) records of :attr:`record_type`; NaN and status 1 if there is no
+            solution.  In the worst clearance model, rotation and translation are upper
+            bounds of the largest errors, and the platform's screw is that of the
+            solution of (22).
         """
-        errors = self.sources.errors(values)
+        if not isinstance(self.sources, CalloutSources) or not self.sources.fits:
+            parts = [self._without_stress(values, draws)]
+        else:
+            parts = []
+            for own, draw in zip(values, np.asarray(draws).tolist(), strict=True):
+                # every draw has clearances of its own
+                robot = self.sources.with_clearances(own)
+                one = replace(self, posture=replace(self.posture, robot=robot))
+                parts.append(one._without_stress(own[None], [draw]))
+        rows, wrenches, at_tips = (
+            np.concatenate(arrays) for arrays in zip(*parts, strict=True)
+        )
+        if self.links:
+            rows["stress"] = peak_stresses(self.posture.robot, wrenches, at_tips)
+        return rows
+
+    def _without_stress(
+        self, values: NDArray, draws: Sequence[int] | NDArray
+    ) -> tuple[NDArray, NDArray, NDArray]:
+        """Return records with the posture's clearances, wrenches, and their weights."""
+        errors = bolted_errors(self.posture.robot, self.sources.errors(values))
         solved = self.energies.solve(errors)
         rows = np.zeros(len(values), dtype=self.record_type)
         rows["energy"] = solved.energy
@@ -192,7 +215,8 @@ class Experiment:
             for i, name in enumerate(POSE_ERRORS):
                 rows[f"{name}_lower"], rows[name] = bounds[:, i].T
         else:
-            # the positions of "least" are not random, and generators are slow to create
+            # positions in the model "least" are not random, and generators are slow to
+            # create
             numbers = np.asarray(draws).tolist() if self.clearance != "least" else []
             rngs = [draw_generator(self.seed, d, CLEARANCE_STREAM) for d in numbers]
             screws, mixed = position_clearances(
@@ -209,28 +233,26 @@ class Experiment:
             through = wrenches[..., part] - at_tips[..., part]
             sizes = np.sqrt((through**2).sum(axis=-1))
             rows[name] = sizes.max(axis=1)
-        if self.links:
-            rows["stress"] = peak_stresses(self.posture.robot, wrenches, at_tips)
         for name, zone in self.zones.items():
             rows[name] = zone.solve(errors).margin
         if self.stiffness:
             rows["stiffness"], rows["free_motion"] = draw_stiffnesses(
                 self.posture, errors, self.stiffness, self.wrench, self.gravity
             )
-        return rows
+        return rows, wrenches, np.broadcast_to(at_tips, wrenches.shape)
 
 
 def precision_for(
     limits: Mapping[str, float], share: float = _PRECISION
 ) -> tuple[float, float]:
-    """Return the precision of pose errors that suffices to check limits on them.
+    """Return the precision of pose errors that is sufficient to check limits on them.
 
     Args:
         limits: limits by quantity.
-        share: share of a limit.
+        share: precision relative to a limit.
 
     Returns:
-        [rad, m] for an :class:`Experiment`.
+        [rad, m] precision for an :class:`Experiment`.
     """
     rotation, translation = (
         min(usual, share * limits.get(name, np.inf))

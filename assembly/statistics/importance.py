@@ -1,17 +1,17 @@
-"""Variance-based importance of the errors: Sobol's indices.
+"""Variance-based importance of the errors: Sobol indices.
 
-The first-order index of a source is the share of a result's variance that it explains
-alone; the total index is the share that involves it.  Saltelli's design computes both
-from (groups + 2) times the draws.  If a result is linear in the errors they have a
-closed form, ``a_i^2 var_i / sum_j a_j^2 var_j``, and are equal.
+The first-order index of a source is the share of a result's variance that the source
+explains alone; the total index is the share that involves the source.  Saltelli's
+design computes both from (groups + 2) times the number of draws.  If a result is linear
+in the errors, both are equal to ``a_i^2 var_i / sum_j a_j^2 var_j``.
 
-A draw without a solution is discarded with the draws compared with it, and counted. The
-errors of the remaining draws are then dependent.  So if more than a few are discarded,
-a reason is given instead of indices.
+A draw without a solution is discarded together with the draws that are compared with
+it, and is counted.  The errors of the remaining draws are then dependent.  So if more
+than a few are discarded, a reason is given instead of indices.
 
 Sources:
     Saltelli et al. (2010), Variance based sensitivity analysis of model output, table 2
-    (b for the first index, f for the total one: Jansen's).
+    (formula b for the first-order index, f for the total index, by Jansen).
 """
 
 from collections.abc import Callable, Sequence
@@ -21,27 +21,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.error_distributions import ErrorSources
-from assembly.statistics.ranking import kind_of
+from assembly.statistics.callout_sources import CalloutSources, Sources
+from assembly.statistics.ranking import group_of
 
 STREAMS = (
     2,
     3,
-)  # of random numbers, see assembly.model.error_distributions
-MOST_FAILED = 0.05  # largest share of draws discarded: the others are dependent
+)  # number of a stream of random numbers, see assembly.model.error_distributions
+# largest share of discarded draws, because the errors of the others are dependent
+MOST_FAILED = 0.05
 _RESAMPLES = 200
 
 
 @dataclass(frozen=True, eq=False)
 class Importance:
-    """Sobol's indices of s results and d groups of sources.
+    """Sobol indices of s results and d groups of sources.
 
     Attributes:
         groups: names of the groups.
-        first: (s, d, 3) share explained alone: value, lower, upper.
-        total: (s, d, 3) share that involves the group: value, lower, upper.
-        variance: (s,) of the results.
-        failed: (s, d) share of the base draws discarded because one of the three draws
-            compared has no solution; beyond :data:`MOST_FAILED` the indices are NaN.
+        first: (s, d, 3) first-order indices: value, lower bound, upper bound.
+        total: (s, d, 3) total indices: value, lower bound, upper bound.
+        variance: (s,) variances of the results.
+        failed: (s, d) share of the base draws that are discarded because one of three
+            compared draws has no solution; above :data:`MOST_FAILED` the indices are
+            NaN.
     """
 
     groups: tuple[str, ...]
@@ -53,11 +56,11 @@ class Importance:
 
 @dataclass(frozen=True, eq=False)
 class SaltelliDesign:
-    """Saltelli's design: A, B, and A with the columns of each group from B.
+    """Saltelli's design: A, B, and A with the columns of each group replaced by B's.
 
     Attributes:
-        A: (k, m) independent draws of the numbers.
-        B: (k, m) another set of independent draws.
+        A: (k, m) independent draws of the errors.
+        B: (k, m) second set of independent draws.
         groups: name and columns of each of d groups.
     """
 
@@ -69,7 +72,7 @@ class SaltelliDesign:
         return len(self.A) * (len(self.groups) + 2)
 
     def rows(self, first: int, count: int) -> NDArray:
-        """Return the (count, m) rows from ``first`` on."""
+        """Return (count, m) rows, beginning with row ``first``."""
         matrix, base = np.divmod(np.arange(first, first + count), len(self.A))
         rows = np.where((matrix == 1)[:, None], self.B[base], self.A[base])
         for g, (_, columns) in enumerate(self.groups):
@@ -85,13 +88,14 @@ def sobol_importance(
     count: int,
     level: float = 0.95,
 ) -> Importance:
-    """Return Sobol's indices of any function of independent numbers.
+    """Return the Sobol indices of any function of independent variables.
 
     Args:
-        evaluate: (k, m) numbers to (k, s) results, NaN without a solution.
-        sample: stream and count to (count, m) independent draws of the numbers.
-        groups: name and columns of each group of numbers.
-        count: base draws; (groups + 2) times as many are evaluated.
+        evaluate: function from (k, m) variables to (k, s) results, NaN without a
+            solution.
+        sample: function from stream and count to (count, m) independent draws.
+        groups: name and columns of each group of variables.
+        count: number of base draws; (groups + 2) times as many are evaluated.
         level: level of confidence of the bootstrap intervals.
 
     Returns:
@@ -105,11 +109,12 @@ def sobol_importance(
 def sobol_indices(
     design: SaltelliDesign, results: NDArray, level: float = 0.95
 ) -> Importance:
-    """Return Sobol's indices from the results of a design.
+    """Return the Sobol indices from the results of a design.
 
     Args:
         design: design of k base draws and d groups.
-        results: (k (d + 2), s) in the order of its rows; not finite without a solution.
+        results: (k (d + 2), s) in the order of the design's rows; not finite without a
+            solution.
         level: level of confidence of the bootstrap intervals.
 
     Returns:
@@ -141,7 +146,7 @@ def sobol_indices(
 
 
 def _shares(f: NDArray, weights: NDArray, level: float) -> tuple[NDArray, NDArray]:
-    """Return first and total index, each (3,), from results (3, k) of the design."""
+    """Return the first-order and total index, (3,) each, from results (3, k)."""
     alone, left = f[1] * (f[2] - f[0]), 0.5 * (f[2] - f[0]) ** 2
     mean = weights @ (f[0] + f[1]) / 2
     variance = weights @ (f[0] ** 2 + f[1] ** 2) / 2 - mean**2
@@ -159,7 +164,7 @@ def linear_importance(
     """Return the closed-form indices of results that are linear in the errors.
 
     Args:
-        slopes: (s, m) of the results with each source.
+        slopes: (s, m) derivatives of the results by each source.
         sources: the m sources.
         groups: name and columns of each group.
 
@@ -171,25 +176,25 @@ def linear_importance(
     return shares / parts.sum(axis=1, keepdims=True)
 
 
-def source_groups(sources: ErrorSources, by: str) -> list[tuple[str, NDArray]]:
+def source_groups(sources: Sources, by: str) -> list[tuple[str, NDArray]]:
     """Return the groups of sources: each by itself, by frame, or by kind of error.
 
     Args:
         sources: sources of a robot.
         by: ``"source"``; ``"frame"``; or ``"kind"``: the same component of the frame
-            of the same name in every leg.
+            with the same name in every leg.
 
     Returns:
-        Name and columns of each.
+        Name and columns of each group.
 
     Raises:
-        ValueError: ``by`` is something else.
+        ValueError: ``by`` is not one of these words.
     """
     if by not in {"source", "frame", "kind"}:
         raise ValueError(f"by is {by!r}, expected 'source', 'frame' or 'kind'")
-    keys = [
-        {"source": label, "frame": label.rpartition(".")[0], "kind": kind_of(label)}[by]
-        for label in sources.labels
-    ]
+    if isinstance(sources, CalloutSources):
+        keys = sources.groups_by(by)
+    else:
+        keys = [group_of(label, by) for label in sources.labels]
     names = list(dict.fromkeys(keys))
     return [(n, np.flatnonzero([k == n for k in keys])) for n in names]

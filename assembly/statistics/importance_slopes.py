@@ -1,44 +1,46 @@
-"""Exact slopes of the platform's screw with the errors, by groups of errors.
+"""Exact slopes of the platform's screw by groups of errors.
 
-A quotient of sampled deviations is no derivative, because it has the sample's noise.
-Where the same clearances are active the solution of (22) is linear in the errors, and
-its slopes are known exactly (:mod:`assembly.statistics.sensitivity`).  A group's gain
-is their root mean square: over the group's errors, weighted by variance, and over some
-draws.
+A quotient of sampled deviations is not a derivative, because it has the noise of the
+sample.  As long as the same clearances are active, the solution of (22) is linear in
+the errors, and its slopes are known exactly (:mod:`assembly.statistics.sensitivity`).
+The gain of a group is the root mean square of the slopes, over the group's errors
+weighted by variance, and over some draws.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.energy import Assembly
-from assembly.model.error_distributions import ErrorSources
+from assembly.statistics.callout_sources import Sources
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance import SaltelliDesign
 from assembly.statistics.linear_response import LinearResponse
 from assembly.statistics.sensitivity import solution_slopes
 
-DRAWS = 32  # number of draws whose slopes are averaged
+DRAWS = 32  # number of draws over which the slopes are averaged
 
 
 def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
-    """Return the gains of groups of errors: the platform's motion for a unit of error.
+    """Return the gains of groups of errors: motion of the platform per unit of error.
 
     Args:
         experiment: distributions and posture.
-        design: its first draws and its groups are used.
+        design: design, whose first draws and groups are used.
 
     Returns:
-        (2, d) rotation [rad] and translation [m] for each rad or m; NaN for a group of
-        angles and lengths, and where none of the draws has a solution.
+        (2, d) rotation [rad] and translation [m] per rad or m of error; NaN for a group
+        of angles and lengths, if none of the draws has a solution, and for robots with
+        bolted joints, whose locked-in clearances depend on the errors too.
     """
     sources = experiment.sources
     values = design.A[:DRAWS]
     squares = np.zeros((2, len(sources)))
     draws = experiment.energies.solve(sources.errors(values))
     known = np.isfinite(draws.energy) & np.isfinite(draws.clearances).all(axis=1)
+    known &= not any(f.locked_at for f in sources.robot.frames)
     if known.any():
         slopes = platform_slopes(experiment.energies, draws[known])
-        of_sources = slopes[:, :, sources.frame, sources.component]
+        of_sources = sources.of_numbers(slopes)
         mean = (of_sources**2).mean(axis=1)
         squares = np.stack([mean[:3].sum(axis=0), mean[3:].sum(axis=0)])
     gains = np.full((2, len(design.groups)), np.nan)
@@ -51,14 +53,14 @@ def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
 
 
 def platform_slopes(prepared: LinearResponse, draws: Assembly) -> NDArray:
-    """Return the slopes of the platform's screw with every geometric error.
+    """Return the slopes of the platform's screw by every geometric error.
 
     Args:
-        prepared: the posture.
-        draws: k of its draws, with their clearances in unit cones.
+        prepared: the prepared posture.
+        draws: solutions of k draws, with clearances relative to their bounds.
 
     Returns:
-        (6, k, n, 6) [rad or m for each rad or m].
+        (6, k, n, 6) [rad or m per rad or m] slopes.
     """
     count, frames = draws.errors.shape[:2]
     repeated = draws[np.tile(np.arange(count), 6)]
@@ -68,7 +70,8 @@ def platform_slopes(prepared: LinearResponse, draws: Assembly) -> NDArray:
     return slopes.reshape(6, count, frames, 6)
 
 
-def error_units(sources: ErrorSources, design: SaltelliDesign) -> list[str]:
+def error_units(sources: Sources, design: SaltelliDesign) -> list[str]:
     """Return the units of the errors of each group."""
-    angles = [sources.component[columns] < 3 for _, columns in design.groups]
-    return ["rad" if a.all() else "rad, m" if a.any() else "m" for a in angles]
+    units = sources.units
+    of_groups = [{units[i] for i in columns} for _, columns in design.groups]
+    return [of.pop() if len(of) == 1 else "rad, m" for of in of_groups]

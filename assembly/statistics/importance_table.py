@@ -1,13 +1,13 @@
 """The importance of errors as a data set, as plain values and as a text table.
 
-Two sizes are given in addition to the shares of the variance.  A group's *part* is the
-standard deviation of the platform's screw due to the group, from the same sample.  The
-*gain* is an exact derivative, micrometres of the platform for each micrometre of error:
-see :mod:`assembly.statistics.importance_slopes`.  Both are of the platform's vector, so
-a platform that follows an error has a gain of 1.
+Two values are given in addition to the shares of the variance.  The *part* of a group
+is the standard deviation of the platform's screw due to the group, from the same
+sample. The *gain* is an exact derivative, micrometres of the platform for each
+micrometre of error, see :mod:`assembly.statistics.importance_slopes`.  Both are norms
+of the platform's vector, so a platform that follows an error has a gain of 1.
 
-Shares are estimates.  Groups whose intervals overlap are not distinguished, and share
-their possible ranks: see :mod:`assembly.statistics.ranking`.
+Shares are estimates.  Groups with overlapping intervals are not distinguished and share
+their possible ranks, see :mod:`assembly.statistics.ranking`.
 """
 
 from collections.abc import Mapping
@@ -39,16 +39,17 @@ if TYPE_CHECKING:
     import xarray
 
 EXPLAINED = ("energy", "margin_free", "rotation", "translation", "force", "stress")
-_ROWS = 15  # of the table
+_ROWS = 15  # largest number of rows of the table
 
 
 @dataclass(frozen=True)
 class ImportanceOptions:
-    """How the importance of errors is computed.
+    """Options for the importance of errors.
 
     Attributes:
-        draws: base draws; (groups + 2) times as many are solved.
-        by: see :func:`assembly.statistics.importance.source_groups`.
+        draws: number of base draws; (groups + 2) times as many are solved.
+        by: kind of the groups, see
+            :func:`assembly.statistics.importance.source_groups`.
         level: level of confidence of the intervals.
     """
 
@@ -64,7 +65,7 @@ def importance_design(
 
     Args:
         experiment: distributions and quantities.
-        asked: number of base draws, and groups.
+        asked: number of base draws, and kind of the groups.
 
     Returns:
         The design.
@@ -79,17 +80,17 @@ def importance_rows(
 ) -> NDArray:
     """Return the records of some rows of a design.
 
-    Random clearance positions would add variance that is not due to the errors.  The
-    positions of the solution of (22) are used in their place.
+    Random clearance positions would add variance that is not due to the errors, so the
+    positions in the solution of (22) are used instead.
 
     Args:
-        experiment: the quantities.
-        design: the draws.
-        first: row of the design.
+        experiment: distributions and quantities.
+        design: design of the draws.
+        first: first row of the design.
         count: number of rows.
 
     Returns:
-        (count,) of the experiment's record type.
+        (count,) records of the experiment's record type.
     """
     asked = replace(
         experiment, clearance=importance_clearance_model(experiment), stiffness=""
@@ -114,13 +115,14 @@ def importance_dataset(
     Args:
         experiment: distributions and quantities.
         design: design of the draws.
-        rows: rows of the experiment's record type, of all rows of the design.
+        rows: records of the experiment's record type for all rows of the design.
         level: level of confidence of the intervals.
 
     Returns:
-        Data set ``first_index``, ``total_index`` over ``quantity``, ``group`` and
-        ``estimate`` (value, lower, upper), ``failed_share``, and ``part`` and ``gain``
-        over ``component`` (rotation, translation), to be merged with the draws'.
+        Data set with ``first_index`` and ``total_index`` over ``quantity``, ``group``
+        and ``estimate`` (value, lower, upper), with ``failed_share``, and with ``part``
+        and ``gain`` over ``component`` (rotation, translation).  It can be merged with
+        the data set of the draws.
     """
     import xarray
 
@@ -159,9 +161,9 @@ def importance_dataset(
 
 
 def _parts(variances: NDArray) -> NDArray:
-    """Return the (2, d) parts from the variance (6, d) of the screw due to groups."""
+    """Return the (2, d) parts from the variances (6, d) of the screw due to groups."""
     lost = np.isnan(variances).all(axis=0)
-    # a component that does not vary has no index and adds zero
+    # a component that does not vary has no index and contributes nothing
     variances = np.maximum(np.nan_to_num(variances), 0.0)
     part = np.sqrt(np.stack([variances[:3].sum(axis=0), variances[3:].sum(axis=0)]))
     part[:, lost] = np.nan
@@ -172,12 +174,12 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
     """Return the data of :func:`importance_dataset` as plain values.
 
     Args:
-        data: data with it, or merged with the draws.
+        data: result of :func:`importance_dataset`, alone or merged with the draws.
 
     Returns:
-        Base draws, the indices of each quantity with the ranks that their intervals
-        allow, and by group part and gain; the share of draws discarded and, without
-        indices, the reason.
+        Number of base draws; the indices of each quantity with the ranks that their
+        intervals allow; part and gain of each group; the share of discarded draws and,
+        without indices, the reason.
     """
     groups = [str(g) for g in data["group"].values]
     quantities: dict[str, Any] = {}
@@ -188,7 +190,7 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
         if most > MOST_FAILED:
             results["reason"] = (
                 f"no indices are computed if more than {MOST_FAILED:.0%} of the "
-                f"draws have no answer: up to {most:.1%} were left out, and the "
+                f"draws have no solution: up to {most:.1%} were left out, and the "
                 "errors of the other draws are not independent"
             )
         elif np.isnan(of_quantity["total_index"]).all():
@@ -215,7 +217,7 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
 
 
 def importance_text(report: Mapping[str, Any]) -> str:
-    """Return the importance as a text table, the largest shares first."""
+    """Return the importance as a text table, with the largest shares first."""
     quantities = report["quantities"]
     lines = [
         f"importance of the errors, {report['base_draws']} base draws, clearances "
@@ -228,7 +230,7 @@ def importance_text(report: Mapping[str, Any]) -> str:
         elif one["largest_share_left_out"] > 0:
             lines.append(
                 f"{name}: up to {one['largest_share_left_out']:.1%} of the draws have "
-                "no answer and are left out"
+                "no solution and are left out"
             )
     translation, platform = quantities["translation"], report["platform"]
     total, rank = translation["total_index"], translation.get("rank", {})
@@ -256,7 +258,7 @@ def importance_text(report: Mapping[str, Any]) -> str:
 
 
 def _moves_text(one: Mapping[str, Any]) -> str:
-    """Return the part and exact slope of a group, in the table's columns."""
+    """Return part and exact slope of a group as columns of the table."""
     gain = {
         "m": (f"{one['translation_gain']:11.4g}", " " * 13),
         "rad": (" " * 11, f"{1e3 * one['translation_gain']:13.4g}"),

@@ -1,16 +1,16 @@
-"""Tolerances of locally least cost for nonconvex limits: sequential programming.
+"""Tolerances of locally least cost for nonconvex limits, by sequential programming.
 
 Wrenches, stress and pose errors are not convex in the errors, and a yield is not convex
-in the tolerances.  But the worst samples have slopes with every error, and so with
-every tolerance.  A convex programme with these planes, within a trust region around the
-current tolerances, gives a trial point.  The trial point is scaled uniformly until the
-samples just meet the limits again.  It is accepted if it is cheaper; otherwise the
-trust region is reduced.  So the cost never increases.  The end is a local minimum,
-which is not proved to be global.
+in the tolerances.  But the slopes of the worst samples by every error are known, and so
+are the slopes by every tolerance.  A convex programme with these planes, within a trust
+region around the present tolerances, gives a trial point.  The trial point is scaled
+uniformly until the samples just meet the limits again.  It is accepted if its cost is
+smaller; otherwise the trust region is reduced.  So the cost never increases.  The end
+is a local minimum, which is not proved to be global.
 
-With a yield, the plane is the mean over the samples closest to a limit: the slope of
-the quantile.  For a yield of 1 each of the worst samples has its own plane, and the
-worst corners of the tolerances are searched again at every step.
+With a yield, the plane is the mean over the samples closest to a limit, that is the
+slope of the quantile.  For a yield of 1, each of the worst samples has a separate
+plane, and the worst corners of the tolerances are searched again at every step.
 
 Sources:
     Hong (2009), Estimating quantile sensitivities; Fletcher, Leyffer (2002), for
@@ -27,30 +27,33 @@ from assembly.statistics.requirement import Plan, Requirement
 from assembly.statistics.scaling import Samples, scale_uniformly, with_worst_corners
 
 _COARSE = 1e-3  # relative to the limits: precision of intermediate costs
-_GAIN = 1e-4  # relative, of the cost: smallest reduction of a step
-_LARGEST_RADIUS, _SMALLEST_RADIUS = 2.0, 1.01  # factors of the trust region
+# relative to the cost: smallest reduction by a step that continues the iteration
+_GAIN = 1e-4
+# factors on the tolerances that bound the trust region
+_LARGEST_RADIUS, _SMALLEST_RADIUS = 2.0, 1.01
 _MOST_STEPS = 60
-_PLANES = 200  # number of worst samples, for a yield of 1
-_NEARLY_ACTIVE = 0.8  # relative to a limit: samples above it count as active
+_PLANES = 200  # number of worst samples with a plane, for a yield of 1
+_NEARLY_ACTIVE = 0.8  # relative to a limit: samples above this share count as active
 
 
 def least_cost(
     requirement: Requirement, samples: Samples, t: NDArray,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, Samples]:  # fmt: skip
-    """Return tolerances that cost no more than given proportions scaled uniformly.
+    """Return tolerances that cost at most as much as uniformly scaled proportions.
 
     Args:
-        requirement: limits at all postures.
-        samples: samples of the errors, that must meet the limits.
-        t: (G,) [rad or m] proportions to start from.
+        requirement: requirement at all postures.
+        samples: samples of the errors that must meet the limits.
+        t: (G,) [rad or m] proportions at the start.
         progress: called with the name of a step, its progress and its total.
 
     Returns:
-        (G,) [rad or m], and the samples with all worst corners of the iterations.
+        (G,) [rad or m] tolerances, and the samples with the worst corners of all
+        iterations.
 
     Raises:
-        BadInput: the samples meet the limits at no scale.
+        BadInput: the samples do not meet the limits at any scale.
     """
     plan, radius = requirement.plan, _LARGEST_RADIUS
     t = scale_uniformly(requirement, samples, t, _COARSE)
@@ -73,7 +76,7 @@ def least_cost(
         if _saving(plan, t, trial) > _GAIN:
             t = trial
             continue
-        # half the rejected step, in logarithms
+        # half of the rejected step, in logarithms
         radius = np.exp(np.abs(np.log(trial / t)).max() / 2)
         if radius < _SMALLEST_RADIUS:
             break
@@ -111,7 +114,7 @@ def _planes(requirement: Requirement, samples: Samples, t: NDArray) -> list[NDAr
         )
         slopes[rows] = [requirement.plan.gather(one) for one in slopes_of_case]
     utilisation = utilisations[cases, draws]
-    relative_slopes = slopes / t  # of the utilisation with every tolerance
+    relative_slopes = slopes / t  # of the utilisation by every tolerance
     if requirement.plan.asked_yield < 1.0:
         # a draw with zero utilisation has no relative slopes
         nonzero = utilisation > 0

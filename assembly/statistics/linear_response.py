@@ -1,7 +1,7 @@
-"""Linear effect of clearances and errors on springs, closures and platform.
+"""Linear response of springs, closures and platform to clearances and errors.
 
-It belongs to one posture, and is the same for all draws of the errors;
-:func:`assembly.linear.energy.solve_assembly` solves these.
+It belongs to one posture and is the same for all draws of the errors;
+:func:`assembly.linear.energy.solve_assembly` solves the draws.
 """
 
 from dataclasses import dataclass
@@ -36,33 +36,33 @@ from assembly.solvers.cones import cone_starts
 
 @dataclass(frozen=True, eq=False)
 class LinearResponse:
-    """Response of a posture to clearances and errors, by :func:`linear_response`.
+    """Response of a posture to clearances and errors, from :func:`linear_response`.
 
-    With n frames, nu clearances, r springs after elimination, m = 6 closures;
-    ``screws`` and ``motions`` take the columns [clearances | errors].
+    There are n frames, nu clearances, r springs after elimination, and m = 6 closures
+    rows. ``screws`` and ``motions`` have the columns [clearances | errors].
 
     Attributes:
-        posture: the robot's configuration; its own errors do not matter.
-        joints: its virtual joints.
-        starts: (cones + 1,) first clearance of each cone, and nu.
-        G: (r, nu) sensitivity of the scaled strains to the clearances.
-        H: (p, nu) rows of the clearances without springs.
+        posture: the robot's configuration; its own errors are not used.
+        joints: virtual joints of the posture.
+        starts: (cones + 1,) index of the first clearance of each cone, and nu.
+        G: (r, nu) derivative of the scaled strains by the clearances.
+        H: (p, nu) rows that the clearances satisfy independently of springs.
         closures: (m, 6n) scaled closure rows.
-        misfit: (r, 6n) sensitivity of the scaled strains to the errors.
-        closing: (m, r) closure multipliers of the springs'.
-        redundant: (m, m - ..) closure rows without free motions and springs,
-            orthonormal columns.
+        misfit: (r, 6n) derivative of the scaled strains by the errors.
+        closing: (m, r) map from springs to closure multipliers.
+        redundant: (m, m - ..) orthonormal columns: combinations of closure rows without
+            free motions and springs.
         infeasible: (m - .., 6n) infeasible component of the errors, redundant.T @
             closures.
-        screws: (6, nu + 6n) platform screw.
-        platform: (6, 6n) map of all frames' screws to the platform's.
-        motions: (nq, nu + 6n) free motions.
-        ranges: (nq,) [rad or m] bounds of the free motions, which were left out.
+        screws: (6, nu + 6n) derivative of the platform screw.
+        platform: (6, 6n) map from the screws of all frames to the platform's screw.
+        motions: (nq, nu + 6n) derivative of the free motions.
+        ranges: (nq,) [rad or m] bounds of the free motions; they are not applied.
         wrench: (n, 6, m) [N m, N] wrenches of unit closure multipliers.
-        load: (6,) [N m, N] on the platform at its origin, base axes; None for none.
-        gravity: (3,) [m/s^2] base axes; None for none.
-        loads: both loads on every small screw, None if there are none.
-        load_motions: (nq,) [rad, m] free motions under the loads without clearance.
+        load: (6,) [N m, N] on the platform at its origin, base axes; None without one.
+        gravity: (3,) [m/s^2] base axes; None without one.
+        loads: load and weight on every small screw; None without them.
+        load_motions: (nq,) [rad, m] free motions under the loads at zero clearance.
     """
 
     posture: Posture
@@ -89,14 +89,14 @@ class LinearResponse:
         """Return the least energies of k draws.
 
         Args:
-            errors: (k, n, 6) [rad, m] delta l.
+            errors: (k, n, 6) [rad, m] geometric errors delta l.
 
         Returns:
-            The assemblies under the loads, clearances in the columns of
+            The assemblies under the loads; their clearances are in the columns of
             :attr:`joints`.
 
         Raises:
-            ValueError: the shape does not fit the robot, or a value is not finite.
+            ValueError: the shape does not match the robot, or a value is not finite.
         """
         errors = checked_errors(errors, len(self.posture.robot.frames))
         found = solve_assembly(
@@ -111,14 +111,14 @@ def checked_errors(errors: ArrayLike, n: int) -> NDArray:
     """Return the errors of k draws.
 
     Args:
-        errors: (k, n, 6) [rad, m] delta l.
-        n: frames.
+        errors: (k, n, 6) [rad, m] geometric errors delta l.
+        n: number of frames.
 
     Returns:
         The errors as an array.
 
     Raises:
-        ValueError: the shape does not fit the robot, or a value is not finite.
+        ValueError: the shape does not match the robot, or a value is not finite.
     """
     errors = np.asarray(errors, dtype=float)
     if errors.shape != (len(errors), n, 6) or not np.isfinite(errors).all():
@@ -131,7 +131,7 @@ def checked_errors(errors: ArrayLike, n: int) -> NDArray:
 def linear_response(
     posture: Posture, load: ArrayLike | None = None, gravity: ArrayLike | None = None
 ) -> LinearResponse:
-    """Eliminate free motions and springs at a posture.
+    """Return the response of a posture, with free motions and springs eliminated.
 
     Args:
         posture: the robot's configuration.
@@ -139,11 +139,11 @@ def linear_response(
         gravity: (3,) [m/s^2] base axes.
 
     Returns:
-        The linear response.  Bounds of passive joints' own motion are left out, unless
-        a load drives a joint up to its bound.
+        The linear response.  Bounds on the motion of passive joints are left out,
+        unless a load moves a joint to its bound.
 
     Raises:
-        FreeMotion: a load drives a motion that nothing resists.
+        FreeMotion: a load acts along a motion without stiffness.
     """
     robot = posture.robot
     lin, joints = linearise(posture), virtual_joints(robot)
@@ -159,10 +159,10 @@ def linear_response(
         reduced = reduce_problem(lin, joints, loads)
     A, free = lin.rows, joints.free
     closing = reduced.basis @ reduced.elastic_inverse.T @ reduced.spread
-    # rows without free motions and springs, as orthonormal rows
+    # rows without free motions and springs, made orthonormal
     held = np.linalg.qr(closing)[0] if closing.shape[1] else closing
     redundant = reduced.basis @ complement(reduced.basis.T @ held, RANK)
-    # free motions of least size close the remaining gap
+    # free motions of least size remove the remaining closure error
     inverse = np.linalg.pinv(A @ free, rcond=RANK)
     springs = joints.elastic @ reduced.spread
     misfit = -closing.T @ A
@@ -196,12 +196,12 @@ def linear_response(
 
 
 def _bent(reduced: Reduction, closing: NDArray) -> NDArray:
-    """Return the (6n,) [rad, m] deformations by loads, without clearance."""
-    # wrenches that balance the free motions with least spring energy
+    """Return the (6n,) [rad, m] deformations due to loads at zero clearance."""
+    # wrenches that balance the free motions, of least spring energy
     bent = reduced.spread.T @ reduced.load_springs
     springs = spring_deformations(
         reduced.linearisation, reduced.joints, reduced.frame_loads,
         reduced.load_multipliers - closing @ bent,
     )  # fmt: skip
-    springs -= reduced.spread @ (reduced.spread.T @ springs)  # rounding
+    springs -= reduced.spread @ (reduced.spread.T @ springs)  # removes rounding
     return reduced.joints.elastic @ springs

@@ -1,9 +1,9 @@
 """Monte Carlo simulation at one posture: problems (21), (22) and (27) for each draw.
 
 Draws are solved in blocks, in any order and by any number of threads; each draw depends
-on its number and the seed only.  If a file is given, finished blocks are written to a
-journal next to it, from which a killed run resumes.  The rows of the design for the
-importance of errors are further blocks.
+only on its number and the seed.  If a file is given, finished blocks are written to a
+journal next to it, from which an interrupted run resumes.  The rows of the design for
+the importance of errors are additional blocks.
 """
 
 from collections.abc import Callable, Iterator
@@ -40,9 +40,9 @@ from stiffness.screws import SCREW, WRENCH
 if TYPE_CHECKING:
     import xarray
 
-BLOCK = 1024  # draws solved and journalled together
+BLOCK = 1024  # number of draws that are solved and written to the journal together
 # by axis: no limit is one number
-_QUEUED = 4  # blocks submitted ahead for each thread
+_QUEUED = 4  # number of blocks that are queued for each thread
 
 
 def run_draws(
@@ -54,25 +54,26 @@ def run_draws(
     importance: ImportanceOptions | None = None,
     held: ExitStack | None = None,
 ) -> "xarray.Dataset":
-    """Solve draws 0 .. count - 1.
+    """Solve the draws 0 .. count - 1.
 
     Args:
         experiment: distributions and quantities.
         count: number of draws.
-        path: NetCDF file to write; its journal is used and then removed.
-        workers: threads.
-        progress: called with the draws done and their number.
-        importance: importance of errors; None if not computed.
+        path: NetCDF file to write; its journal is used during the computation, then
+            removed.
+        workers: number of threads.
+        progress: called with the number of finished draws and the number of all draws.
+        importance: options for the importance of errors; None if it is not computed.
         held: context that keeps the journal until it is closed, as in
             :func:`assembly.sweeps.sweep.run_sweep`.
 
     Returns:
-        Data set over ``draw``, with the importance if requested; the file holds the
-        same.
+        Data set over ``draw``, with the importance if requested; the file has the same
+        content.
 
     Raises:
-        BadInput: the journal is another run's or locked by one, or a file cannot be
-            written.
+        BadInput: the journal belongs to another run or is locked by one, or a file
+            cannot be written.
         ModuleNotFoundError: xarray is missing.
     """
     need("xarray")
@@ -87,10 +88,10 @@ def _run_draws(
     progress: Callable[[int, int], None], importance: ImportanceOptions | None,
     held: ExitStack,
 ) -> "xarray.Dataset":  # fmt: skip
-    """Return the data set of draws; ``held`` keeps the journal."""
+    """Return the data set of draws; ``held`` keeps the journal until it is closed."""
     design = None if importance is None else importance_design(experiment, importance)
     more = 0 if design is None else len(design)
-    # blocks of draws, then of the design: first row and number of rows of each
+    # blocks of draws, then of the design: first row and number of rows
     spans = [(i, min(BLOCK, count - i)) for i in range(0, count, BLOCK)]
     drawn = len(spans)
     spans += [(i, min(BLOCK, more - i)) for i in range(0, more, BLOCK)]
@@ -116,7 +117,7 @@ def _run_draws(
     done = sum(map(len, kept.values()))
     progress(done, count + more)
     missing = [b for b in range(len(spans)) if b not in kept]
-    with threadpool_limits(1):  # only our own threads run in parallel
+    with threadpool_limits(1):  # only these threads run in parallel
         for block, rows in _solved(solve, missing, workers):
             if journal is not None:
                 journal.add(block, rows, {})
@@ -138,10 +139,10 @@ def _run_draws(
 def _solved(
     solve: Callable[[int], NDArray], blocks: list[int], workers: int
 ) -> Iterator[tuple[int, NDArray]]:
-    """Yield blocks when finished; a few are queued ahead, which bounds the memory."""
+    """Yield finished blocks; a limited number is queued, which bounds the memory."""
     if not blocks:
         return
-    # the first one fills the caches that the threads share
+    # the first block fills the caches that the threads share
     yield blocks[0], solve(blocks[0])
     waiting = iter(blocks[1:])
     with ThreadPoolExecutor(workers) as pool:
@@ -166,11 +167,7 @@ def provenance(experiment: Experiment) -> dict[str, str | int | float]:
     """Return the values that must be equal for two runs to have the same draws."""
     posture, sources = experiment.posture, experiment.sources
     contact = experiment.used_contact_length
-    numbers = [
-        sources.frame, sources.component, sources.kind, sources.centre, sources.scale,
-        sources.least, sources.limit, sources.signed, posture.transforms,
-        *([] if sources.fixed is None else [sources.fixed]),
-    ]  # fmt: skip
+    numbers = [*sources.identity, posture.transforms]
     digest = sha256(b"".join(np.ascontiguousarray(n).tobytes() for n in numbers))
     return {
         "robot": posture.robot.name,
@@ -195,10 +192,11 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
 
     Args:
         experiment: experiment of the draws.
-        rows: (k,) of its record type.
+        rows: (k,) records of the experiment's record type.
 
     Returns:
-        Data set over ``draw``; the pose errors' meanings name the clearance model.
+        Data set over ``draw``; the descriptions of pose errors name the clearance
+        model.
     """
     import xarray
 

@@ -1,9 +1,9 @@
-"""Quantities of perfect parts: clearances and loads alone, with all errors zero.
+"""Quantities of perfect parts: effect of clearances and loads without errors.
 
-No tolerance can meet a limit that perfect parts exceed.  In the worst clearance model
-each joint's clearance has a part in the pose error.  Without errors the largest pose
-error is homogeneous in the clearances.  So by Euler it is the sum of each clearance
-times its slope, the multiplier of its bound.
+If perfect parts exceed a limit, no tolerance can meet it.  In the worst clearance model
+each joint's clearance contributes a part of the pose error.  Without errors the largest
+pose error is homogeneous in the clearances.  So by Euler's theorem it is the sum of
+each clearance times its slope, which is the multiplier of its bound.
 """
 
 import json
@@ -13,33 +13,33 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.clearance import BOUND_OF_COMPONENT
+from assembly.model.clearance import bound_name
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.linear_response import LinearResponse
 from assembly.statistics.quantities import POSE_ERRORS, UNITS
 from assembly.statistics.ranking import kind_of
 from assembly.statistics.worst_clearance import bound_worst_errors, worst_error_slopes
 
-_DRAWS = 200  # number of positions of a random clearance model, whose median is used
+# number of positions of a random clearance model from which the median is taken
+_DRAWS = 200
 _PRECISION = (1e-9, 1e-9)  # [rad, m] required precision of the largest pose errors
 _SHARE = 1e-3  # relative to the largest pose error: smaller parts are not listed
-_KEYS = ("tilt", "spin", "radial", "axial")
 _OWN = 0.02  # relative to the largest pose error: precision of the parts
 OWN_MOTION = "own motion of passive joints"
-_EXCEEDED = 1e-9  # relative excess above a limit
+_EXCEEDED = 1e-9  # relative excess above a limit that counts as exceeded
 
 
 def perfect_parts(experiment: Experiment) -> dict[str, Any]:
-    """Return the quantities with all errors zero.
+    """Return the quantities of a robot without errors.
 
     Args:
         experiment: posture, loads and clearance model.
 
     Returns:
-        By quantity: ``reached``, for random clearance models the median of 200
+        By quantity: ``reached``, which for random clearance models is the median of 200
         positions.  For pose errors of the worst model without loads also
-        ``clearances``, the part [rad or m] of each kind of clearance, the largest
-        first.  Empty if perfect parts have no solution.
+        ``clearances``, the part [rad or m] of each kind of clearance, largest first.
+        Empty if perfect parts have no solution.
     """
     random = experiment.clearance in {"uniform", "contact"}
     count = _DRAWS if random else 1
@@ -50,7 +50,7 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
         values = rows[lower if lower in (rows.dtype.names or ()) else key]
         values = values.max(axis=1, initial=0.0) if values.ndim == 2 else values
         value = float(np.median(values))
-        if not np.isnan(value):  # infinite where the platform moves freely
+        if not np.isnan(value):  # infinite if the platform moves freely
             reached[key] = {"reached": value, "unit": UNITS[key]}
     prepared = experiment.energies
     if experiment.clearance == "worst" and prepared.loads is None:
@@ -58,7 +58,7 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
             whole = reached.get(key, {}).get("reached", np.nan)
             if np.isfinite(whole):
                 own = whole - sum(parts.values())
-                # bounds of passive joints' own motion are no clearances of the posture
+                # bounds of passive joints are not clearances of the prepared posture
                 if np.isfinite(prepared.ranges).any() and own > _OWN * whole:
                     parts[OWN_MOTION] = own
                 largest_first = sorted(parts.items(), key=lambda item: -item[1])
@@ -89,14 +89,12 @@ def _clearance_parts(prepared: LinearResponse) -> dict[str, dict[str, float]]:
 
 def _clearance_kinds(prepared: LinearResponse) -> list[str]:
     """Return the kind of each cone, such as ``hinge.tilt``, common to all legs."""
-    rows: NDArray = np.abs(prepared.joints.cones[:, prepared.starts[:-1]]).argmax(
-        axis=0
-    )
-    frames = prepared.posture.robot.frames
-    return [
-        f"{kind_of(frames[row // 6].name)}.{_KEYS[BOUND_OF_COMPONENT[row % 6]]}"
-        for row in rows.tolist()
-    ]
+    frames, kinds = prepared.posture.robot.frames, []
+    for first, end in zip(prepared.starts[:-1], prepared.starts[1:], strict=True):
+        columns: NDArray = prepared.joints.cones[:, first:end]
+        frame = frames[int(columns.any(axis=1).argmax()) // 6]
+        kinds.append(f"{kind_of(frame.name)}.{bound_name(columns)}")
+    return kinds
 
 
 def stored_perfect_parts(experiment: Experiment) -> str:
@@ -107,14 +105,14 @@ def stored_perfect_parts(experiment: Experiment) -> str:
 def limits_broken(
     parts: Mapping[str, Any], limits: Mapping[str, float]
 ) -> dict[str, Any]:
-    """Return the limits that perfect parts break.
+    """Return the limits that perfect parts exceed.
 
     Args:
-        parts: parts of :func:`perfect_parts`.
+        parts: result of :func:`perfect_parts`.
         limits: limits by quantity.
 
     Returns:
-        By quantity the value of perfect parts, its unit and the limit.
+        By quantity the value for perfect parts, its unit and the limit.
     """
     return {
         key: {**parts[key], "limit": limit}
@@ -124,7 +122,7 @@ def limits_broken(
 
 
 def perfect_text(summary: Mapping[str, Any]) -> list[str]:
-    """Return text lines: the values of perfect parts, and the limits they exceed."""
+    """Return lines of text on the values for perfect parts and on exceeded limits."""
     parts, lines = summary.get("perfect_parts", {}), []
     alone = {k: parts[k] for k in POSE_ERRORS if parts.get(k, {}).get("reached")}
     why = "clearances and loads alone" if summary.get("load") else "clearances alone"
@@ -142,14 +140,14 @@ def perfect_text(summary: Mapping[str, Any]) -> list[str]:
 
 
 def _size_text(one: Mapping[str, Any]) -> str:
-    """Return the value of perfect parts, with its unit."""
+    """Return the value for perfect parts as text, with its unit."""
     if np.isinf(one["reached"]):
         return "without bound"
     return f"of {one['reached']:.4g} {one['unit']}"
 
 
 def _of_text(one: Mapping[str, Any]) -> str:
-    """Return the two largest parts of clearances, in brackets."""
+    """Return the two largest parts of clearances as text in brackets."""
     parts = list(one.get("clearances", {}).items())[:2]
     if not parts:
         return ""

@@ -1,4 +1,4 @@
-"""Figures of draws, importance and tolerances, from their data sets alone."""
+"""Figures of draws, importance and tolerances from their data sets."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -36,8 +36,9 @@ def figure_of_draws(
 
     Args:
         data: data set saved by ``statistics`` or ``tolerances``, or another data set.
-        kind: ``"histogram"``, ``"tornado"`` or ``"allocation"``; None to choose.
-        quantities: quantities of a histogram, by the names of
+        kind: ``"histogram"``, ``"tornado"`` or ``"allocation"``; by default it depends
+            on the data.
+        quantities: quantities of a histogram, by the names in
             :mod:`assembly.sweeps.panels`.
 
     Returns:
@@ -45,7 +46,7 @@ def figure_of_draws(
 
     Raises:
         ValueError: the data set lacks the variables of the kind.
-        BadInput: a quantity is unknown, or named for another kind of figure.
+        BadInput: a quantity is unknown, or is given for another kind of figure.
     """
     if kind is None:
         own = {"tolerance": "allocation", "sources_and_posture_sha256": "histogram"}
@@ -63,12 +64,12 @@ def figure_of_draws(
 def histogram_figure(
     data: "xarray.Dataset", quantities: Sequence[str] = ()
 ) -> "Figure":
-    """Return the histograms with medians, 95 % quantiles and most probable values.
+    """Return histograms with medians, 95 % quantiles and most probable values.
 
     Args:
-        data: data of :func:`assembly.statistics.monte_carlo.run_draws`.
-        quantities: to be shown, by the names of :mod:`assembly.sweeps.panels`; those
-            with a limit if empty.
+        data: result of :func:`assembly.statistics.monte_carlo.run_draws`.
+        quantities: quantities to show, by the names in :mod:`assembly.sweeps.panels`;
+            by default those with a limit.
 
     Returns:
         A panel for each quantity that varies; bands are 95 % confidence intervals.
@@ -110,7 +111,7 @@ def histogram_figure(
 
 
 def _histogram(panel: Any, text: str, values: Any) -> None:
-    """Draw one panel; of a variable with components, the largest."""
+    """Draw one panel; for a variable with components, its largest one."""
     x = values.max(axis=1) if values.ndim == 2 else values
     x = x[np.isfinite(x)]
     panel.set(xlabel=text, ylabel="draws")
@@ -130,19 +131,19 @@ def _histogram(panel: Any, text: str, values: Any) -> None:
             panel.axvspan(
                 estimate["lower"], estimate["upper"], color=colour, alpha=0.25
             )
-    # matplotlib's search for the emptiest place takes seconds with many bars
+    # matplotlib's search for the best position takes seconds if there are many bars
     panel.legend(fontsize=8, loc="upper right")
 
 
 def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
-    """Return the tornado plot of the importance, the largest on top, with intervals.
+    """Return the tornado plot of the importance with intervals, largest share on top.
 
     Args:
         data: data with ``first_index`` and ``total_index``.
         most: largest number of bars in a panel.
 
     Returns:
-        A panel for each quantity: the total share light, the share alone dark.
+        A panel for each quantity: the total share is light, the first-order share dark.
 
     Raises:
         ValueError: the data set has no importance.
@@ -182,15 +183,16 @@ def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
 
 
 def allocation_figure(data: "xarray.Dataset") -> "Figure":
-    """Draw a bar chart of the tolerances with upper bounds; angles and lengths apart.
+    """Return a bar chart of the tolerances with upper bounds, angles and lengths apart.
 
     Args:
         data: data of
             :func:`assembly.statistics.allocated_tolerances.tolerance_dataset`.
 
     Returns:
-        A figure: wide bars are of least cost; narrow ones, where different, are those
-        of the convex programme, scaled uniformly.  The title has cost and verification.
+        A figure.  Wide bars are tolerances of least cost; narrow bars, where different,
+        are those of the convex programme, scaled uniformly.  The title states cost and
+        verification.
 
     Raises:
         ValueError: the data set has no tolerances.

@@ -1,7 +1,8 @@
 """Problem (21) at one posture for many draws of the errors, with slopes.
 
-The margin is ``max q.K e`` over multipliers q with ``sum_k |B_k^T q| <= 1``: convex in
-the errors e, proportional to them, and its slope is ``K^T q`` of the best q.
+The margin is ``max q.K e`` over multipliers q with ``sum_k |B_k^T q| <= 1``.  It is
+convex in the errors e and proportional to them; its slope is ``K^T q`` with the optimal
+q.
 """
 
 from dataclasses import dataclass
@@ -18,19 +19,20 @@ from assembly.linear.zone import Compliant, Zone, zone_margin
 from assembly.solvers.cones import cone_starts
 from assembly.statistics.linear_response import checked_errors
 
-_CLEARLY_INFEASIBLE = 1e-10  # [rad, reference lengths] error that no motion can close
+# [rad, reference lengths] smallest error that certainly no motion can close
+_CLEARLY_INFEASIBLE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class PostureMargins:
-    """A posture prepared for the margins of any errors, by :func:`prepare_margins`.
+    """A posture prepared for the margins of given errors, by :func:`prepare_margins`.
 
     Attributes:
-        posture: the robot's configuration; its own errors do not matter.
-        starts: (cones + 1,) first clearance of each cone, and nu.
-        B: (p, nu) orthonormal rows that the clearances must satisfy.
-        K: (p, 6n) their right side by the errors: B u = K e.
-        infeasible: (.., 6n) infeasible component of the errors.
+        posture: the robot's configuration; its own errors are not used.
+        starts: (cones + 1,) index of the first clearance of each cone, and nu.
+        B: (p, nu) orthonormal rows of the equations for the clearances u, B u = K e.
+        K: (p, 6n) map from the errors e to the right side of these equations.
+        infeasible: (.., 6n) map from the errors to their infeasible component.
         compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
     """
 
@@ -45,14 +47,15 @@ class PostureMargins:
         """Return the margins of k draws.
 
         Args:
-            errors: (k, n, 6) [rad, m] delta l.
+            errors: (k, n, 6) [rad, m] geometric errors delta l.
 
         Returns:
-            Margins with their certificates; if no factor closes the errors, the forces
-            are those on the part that clearances close.
+            Margins with their certificates.  If no factor on the clearances closes the
+            errors, the forces belong to the part of the errors that clearances can
+            close.
 
         Raises:
-            ValueError: the shape does not fit the robot, or a value is not finite.
+            ValueError: the shape does not match the robot, or a value is not finite.
         """
         errors = checked_errors(errors, len(self.posture.robot.frames))
         left = errors.reshape(len(errors), -1) @ self.infeasible.T
@@ -67,30 +70,30 @@ class PostureMargins:
         return found
 
     def slopes(self, zone: Zone) -> NDArray:
-        """Return the slopes of margins with each error.
+        """Return the slopes of margins by each error.
 
         Args:
-            zone: zone of k draws, by :meth:`solve`.
+            zone: result of :meth:`solve` for k draws.
 
         Returns:
-            (k, n, 6) [1/rad, 1/m]; NaN where the reference solved it.
+            (k, n, 6) [1/rad, 1/m] slopes; NaN where the reference method was needed.
         """
         slopes = zone.forces @ self.B.T @ self.K
         return slopes.reshape(len(slopes), -1, 6)
 
 
 def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureMargins:
-    """Eliminate free motions at a posture, for the margins of any errors.
+    """Return a posture prepared for margins, with free motions eliminated.
 
     Args:
         posture: the robot's configuration.
         compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
 
     Returns:
-        The prepared posture, for :meth:`PostureMargins.solve`.
+        The prepared posture.
 
     Raises:
-        ValueError: ``compliant`` is something else.
+        ValueError: ``compliant`` is not one of these words.
     """
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")

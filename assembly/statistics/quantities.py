@@ -5,7 +5,7 @@ import numpy as np
 from forcefit.inputs.table import BadInput, nearest
 from forcefit.results.quantities import QUANTITIES
 
-# of each draw, in the order of reports
+# unit of each quantity of a draw, in the order of reports
 UNITS = {
     name: QUANTITIES[name].unit
     for name in (
@@ -19,22 +19,23 @@ _UNLIMITED = {"platform_screw", "duality_gap", "rotation_lower", "translation_lo
 
 
 def limit_names() -> tuple[str, ...]:
-    """Return the quantities that may be limited."""
+    """Return the quantities on which limits are possible."""
     return tuple(k for k in UNITS if k not in _UNLIMITED)
 
 
 def parse_limit(text: str) -> tuple[str, float]:
-    """Return the quantity and limit from text such as ``"energy=5"``.
+    """Return quantity and limit from text such as ``"energy=5"``.
 
     Args:
-        text: one of energy [J], margin, margin_free, rotation [rad], translation [m],
-            force [N], moment [N m], stress [Pa], and a number > 0.
+        text: name of the quantity, "=", and a number > 0; names are energy [J], margin,
+            margin_free, rotation [rad], translation [m], force [N], moment [N m],
+            stress [Pa].
 
     Returns:
-        Both.
+        The name and the limit.
 
     Raises:
-        BadInput: the text has another form.
+        BadInput: the text has a different form.
     """
     name, _, number = (piece.strip() for piece in text.partition("="))
     names = limit_names()

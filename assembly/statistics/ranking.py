@@ -1,4 +1,4 @@
-"""Ranks of sampled shares, and names of contributors that are not distinguished."""
+"""Possible ranks of sampled shares, and joint names of undistinguished contributors."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -14,10 +14,10 @@ NOT_DISTINGUISHED = (
 
 
 def possible_ranks(shares: Mapping[str, NDArray]) -> dict[str, tuple[int, int]]:
-    """Return the first and the last rank that each contributor may have.
+    """Return the first and the last possible rank of each contributor.
 
     Args:
-        shares: value, lower and upper bound by name.
+        shares: value, lower and upper bound of each share, by name.
 
     Returns:
         First and last rank by name.  A share precedes another one if its lower bound is
@@ -35,7 +35,7 @@ def possible_ranks(shares: Mapping[str, NDArray]) -> dict[str, tuple[int, int]]:
 
 
 def rank_text(rank: Sequence[int] | None) -> str:
-    """Return possible ranks such as 1 or 2-4; empty where there are none."""
+    """Return possible ranks as text, such as 1 or 2-4; empty without ranks."""
     if rank is None:
         return ""
     first, last = rank
@@ -48,15 +48,15 @@ def leaders(ranks: Mapping[str, Sequence[int]]) -> list[str]:
 
 
 def named_together(names: Iterable[str], among: Iterable[str]) -> list[str]:
-    """Return the names of contributors, with those of all legs joined to one.
+    """Return the names of contributors; equal ones of all legs become one name.
 
     Args:
-        names: names such as ``leg1.hinge.RX``, the contributors.
+        names: names of the contributors, such as ``leg1.hinge.RX``.
         among: all names.
 
     Returns:
-        ``hinge.RX of all legs`` if each leg's is among the names, in the order of the
-        names; other names unchanged.
+        ``hinge.RX of all legs`` if the component of each leg is among the names, in the
+        order of the names; other names are unchanged.
     """
     names = list(names)
     of_kind: dict[str, list[str]] = {}
@@ -70,8 +70,15 @@ def named_together(names: Iterable[str], among: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(together))
 
 
+def group_of(label: str, by: str) -> str:
+    """Return the group of an error ``hinge.RX`` by source, frame or kind."""
+    return {
+        "source": label, "frame": label.rpartition(".")[0], "kind": kind_of(label)
+    }[by]  # fmt: skip
+
+
 def kind_of(name: str) -> str:
-    """Return a frame's or an error's name without its leg's: ``hinge.RX``."""
+    """Return the name of a frame or an error without the leg's name: ``hinge.RX``."""
     frame, dot, component = name.rpartition(".")
     if component not in SCREW:
         frame, dot, component = name, "", ""

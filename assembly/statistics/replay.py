@@ -1,8 +1,8 @@
-"""Expensive results of a deterministic computation, stored in a journal in order.
+"""Results of an expensive deterministic computation, stored in a journal in order.
 
-A killed computation resumes when it is run again: results in the journal are read
-instead of computed.  Each is stored with a digest of its arguments.  It is computed
-again if the digest differs, as after a change of the program.
+An interrupted computation resumes when it is run again: results in the journal are read
+instead of computed.  Each result is stored with a digest of its arguments and is
+computed again if the digest differs, for example after a change of the program.
 """
 
 import io
@@ -25,11 +25,11 @@ _DIGEST = 32
 
 @dataclass(eq=False)
 class Replay:
-    """Results stored so far.
+    """The stored results.
 
     Attributes:
-        journal: journal of records :data:`RECORD`; None to store nothing.
-        asked: number of results requested.
+        journal: journal of records :data:`RECORD`; None if nothing is stored.
+        asked: number of results requested so far.
     """
 
     journal: Journal | None = None
@@ -38,11 +38,11 @@ class Replay:
     def recall(
         self, compute: Callable[[], tuple[ArrayLike, ...]], *given: ArrayLike
     ) -> tuple[NDArray, ...]:
-        """Return the next result.
+        """Return the next result, from the journal or computed.
 
         Args:
-            compute: function that computes it.
-            given: numbers and words on which it depends.
+            compute: function that computes the result.
+            given: numbers and texts on which the result depends.
 
         Returns:
             The results of ``compute``, as arrays.
@@ -70,17 +70,17 @@ class Replay:
 def journalled(
     path: Path | None, whose: dict[str, Any]
 ) -> Generator[Replay, None, None]:
-    """Store results next to a file until it is written.
+    """Store results next to a file until the file is written.
 
     Args:
-        path: path of the file; None to store nothing.
+        path: path of the file; None if nothing is stored.
         whose: values that must be equal for two computations to share results.
 
     Yields:
         The stored results; the journal is removed when the block ends without an error.
 
     Raises:
-        BadInput: the journal is another computation's, or cannot be written.
+        BadInput: the journal belongs to another computation, or cannot be written.
     """
     if path is None:
         yield Replay()

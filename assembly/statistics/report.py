@@ -1,4 +1,4 @@
-"""Page of draws: yields, values of perfect parts, and the main contributors."""
+"""Page of draws: yields, values for perfect parts, and the main contributors."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ from assembly.statistics.quantities import POSE_ERRORS, UNITS
 from assembly.statistics.ranking import NOT_DISTINGUISHED, rank_text
 from assembly.statistics.summary import WORDS
 from assembly.statistics.tightening import ranked, tightening_tiles
+from assembly.statistics.worst_pose_report import worst_section
 from forcefit.page.charts import BLUE, GREY, RED, Axis, bars, chart, grid
 from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
     import xarray
 
 _BINS = 60
-_GOOD = 0.95  # a lower yield is shown as a warning
-_LISTED = 20  # errors in a table of shares
+_GOOD = 0.95  # a yield below this value is shown as a warning
+_LISTED = 20  # largest number of errors in a table of shares
 _ASSUMED = (
     "Small screws: the closures are linear in the errors of each draw.",
     "Yields count all draws; energies, forces, pose errors only those that assemble.",
@@ -35,11 +36,11 @@ def draws_page(
     """Return the page of an experiment.
 
     Args:
-        summary: summary of :func:`assembly.statistics.summary.summarise`, with
+        summary: result of :func:`assembly.statistics.summary.summarise`, with
             ``robot``.
         data: the draws.
-        provenance: command and files.
-        robot: HTML of :func:`assembly.statistics.scenes.drawn_robot`.
+        provenance: the command and the files.
+        robot: HTML from :func:`assembly.statistics.scenes.drawn_robot`.
 
     Returns:
         HTML, which needs no other file.
@@ -63,7 +64,9 @@ def draws_page(
                 section(
                     "Distributions", _quantities(summary), _histograms(summary, data)
                 ),
+                _capability(summary),
                 _importance(summary),
+                worst_section(summary["worst_case"]) if "worst_case" in summary else "",
             ],
             assumed=_ASSUMED,
             provenance=provenance,
@@ -73,7 +76,7 @@ def draws_page(
 
 
 def _share(summary: Mapping[str, Any]) -> Mapping[str, float]:
-    """Return the yield: all limits met, or assembled if there are no limits."""
+    """Return the yield: all limits are met or, without limits, the draw assembles."""
     limits: Mapping[str, float] | None = summary.get("within_limits")
     forced: Mapping[str, float] = summary["assembles"]["forced"]
     return limits or forced
@@ -86,7 +89,7 @@ def _share_text(interval: Mapping[str, float]) -> str:
 
 
 def _draws_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles of yield, pose error, and the errors that matter."""
+    """Return tiles of the yield, the pose error, and the main errors."""
     share = _share(summary)
     low, high = (100 * share[end] for end in ("lower", "upper"))
     words = "all limits kept" if "within_limits" in summary else WORDS["forced"]
@@ -124,7 +127,7 @@ def _yields(summary: Mapping[str, Any]) -> str:
 
 
 def _perfect_parts(summary: Mapping[str, Any]) -> str:
-    """Return the values of perfect parts, with the part of each kind of clearance."""
+    """Return the values for perfect parts, with the part of each kind of clearance."""
     parts = {k: v for k, v in summary["perfect_parts"].items() if v["reached"]}
     if not parts:
         return ""
@@ -178,7 +181,7 @@ def _histograms(summary: Mapping[str, Any], data: "xarray.Dataset") -> str:
 
 
 def _histogram(name: str, one: Mapping[str, Any], values: NDArray) -> str:
-    """Return the counts of a quantity in bins of one width."""
+    """Return the number of draws in bins of equal width."""
     counts, edges = np.histogram(values, _BINS)
     traces: list[dict[str, Any]] = [{
         "type": "bar", "x": (edges[1:] + edges[:-1]) / 2, "y": counts,
@@ -194,8 +197,21 @@ def _histogram(name: str, one: Mapping[str, Any], values: NDArray) -> str:
     return chart(traces, Axis(name, one["unit"]), Axis("draws"), caption)
 
 
+def _capability(summary: Mapping[str, Any]) -> str:
+    """Return the table of Cpk and parts per million."""
+    rows: list[list[Cell]] = [
+        [NAMES[key], Value(one["limit"], one["unit"]),
+         *(one["cpk"][k] for k in ("value", "lower", "upper")),
+         *(one["ppm"][k] for k in ("value", "lower", "upper"))]
+        for key, one in summary.get("capability", {}).items()
+    ]  # fmt: skip
+    words = ("Cpk", "at least", "at most", "ppm above", "ppm at least", "ppm at most")
+    head: list[str | Column] = ["", "limit", *map(Column, words)]
+    return section("Capability", table(head, rows, "capability")) if rows else ""
+
+
 def _importance(summary: Mapping[str, Any]) -> str:
-    """Return the errors that cause the variance."""
+    """Return the section on the errors that cause the variance."""
     pieces = []
     for key, one in summary.get("importance", {}).get("quantities", {}).items():
         shares = ranked(summary, key)[:_LISTED]

@@ -1,4 +1,4 @@
-"""Requirements on tolerances: limits at every posture, always or with a yield."""
+"""Requirements on tolerances: limits at every posture, for all robots or a yield."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from assembly.kinematics.posture import Posture
 from assembly.linear.zone import MARGINS
 from assembly.model.error_distributions import ErrorSources
+from assembly.statistics.callout_sources import Sources
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.quantities import POSE_ERRORS, UNITS
@@ -21,10 +22,11 @@ from forcefit.results.display import html_table, short_repr
 
 CONVEX = ("margin", "margin_free", "energy")
 COSTS = ("reciprocal", "logarithm")
-# relative to a limit on a pose error: required upper minus lower bound
+# relative to a limit on a pose error: required difference of upper and lower bound
 _PRECISION = 1e-4
-_BATCH = 512  # draws solved and stored together
-TRAINING, SCALING, FRESH = 10, 11, 12  # streams of random numbers; more from 12 on
+_BATCH = 512  # number of draws that are solved and stored together
+# numbers of streams of random numbers; further verifications use higher numbers
+TRAINING, SCALING, FRESH = 10, 11, 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,26 +34,27 @@ class Plan:
     """Costs and limits of tolerances.
 
     Attributes:
-        sources: m errors within tolerances of 1 [rad or m].
+        sources: m errors within tolerances of 1 [rad or m]; zones of callouts of
+            width 1 m.
         group: (m,) class of each.
         names: names of the G classes.
-        costs: (G,) > 0.
-        least: (G,) [rad or m] tightest tolerances.
-        most: (G,) [rad or m] loosest tolerances.
-        cost: ``"reciprocal"`` or ``"logarithm"``.
+        costs: (G,) cost coefficient of each class, > 0.
+        least: (G,) [rad or m] smallest tolerances.
+        most: (G,) [rad or m] largest tolerances.
+        cost: law of the cost, ``"reciprocal"`` or ``"logarithm"``.
         limits: limits by quantity: margin, margin_free, energy [J], force [N], moment
             [N m], stress [Pa], rotation [rad], translation [m].
-        asked_yield: 1 means always; else the share of robots that must meet every
-            limit at every posture.
-        draws: training draws at every posture.
-        seed: of all draws.
+        asked_yield: 1 if all robots must meet the limits; otherwise the share of robots
+            that must meet every limit at every posture.
+        draws: number of training draws at every posture.
+        seed: seed of all draws.
         clearance: for limits of pose errors, one of
             :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
-        contact_length: [m] of the contact model, see
+        contact_length: [m] length of the contact model, see
             :class:`assembly.statistics.experiment.Experiment`.
     """
 
-    sources: ErrorSources
+    sources: Sources
     group: NDArray
     names: tuple[str, ...]
     costs: NDArray
@@ -67,7 +70,7 @@ class Plan:
 
     @property
     def limits_pose(self) -> bool:
-        """Whether a pose error is limited, so that the clearance model matters."""
+        """Whether a pose error is limited, so that the clearance model is used."""
         return bool(set(POSE_ERRORS) & set(self.limits))
 
     __repr__, _repr_html_ = short_repr, html_table
@@ -87,7 +90,7 @@ class Plan:
         return float(-(self.costs * np.log(tolerances)).sum())
 
     def draws_of(self, stream: int, count: int) -> NDArray:
-        """Return (count, m) drawn errors, as factors on the tolerances."""
+        """Return (count, m) drawn errors as factors on the tolerances."""
         return self.sources.draw(0, count, self.seed, stream)
 
 
@@ -96,7 +99,7 @@ class Requirement:
     """A plan at postures of one robot, prepared for the limited quantities.
 
     Attributes:
-        postures: the workspace.
+        postures: postures of the workspace.
         plan: costs and limits.
         replay: stored results.
     """
@@ -109,7 +112,7 @@ class Requirement:
 
     @cached_property
     def experiments(self) -> list[Experiment]:
-        """All quantities except the margins, at each posture."""
+        """Experiments for all quantities except the margins, one at each posture."""
         plan = self.plan
         rotation, translation = (
             _PRECISION * plan.limits.get(key, np.inf) for key in POSE_ERRORS
@@ -129,7 +132,7 @@ class Requirement:
 
     @cached_property
     def prepared(self) -> dict[str, list]:
-        """By limit, the prepared postures."""
+        """Prepared postures by limit."""
         return {
             key: [prepare_margins(p, MARGINS[key]) for p in self.postures]
             if key in MARGINS else [e.energies for e in self.experiments]
@@ -138,12 +141,12 @@ class Requirement:
 
     @cached_property
     def convex(self) -> dict[str, list]:
-        """The prepared postures of limits that are convex in the errors."""
+        """Prepared postures by limit, for limits that are convex in the errors."""
         return {key: self.prepared[key] for key in CONVEX if key in self.prepared}
 
     @property
     def is_convex(self) -> bool:
-        """Whether all limits are convex in the tolerances; only for a yield of 1."""
+        """Whether all limits are convex in the tolerances; requires a yield of 1."""
         return self.plan.asked_yield == 1.0 and len(self.convex) == len(self.prepared)
 
     @property
@@ -152,14 +155,14 @@ class Requirement:
         return [(key, i) for key in self.plan.limits for i in range(len(self.postures))]
 
     def utilisations(self, values: NDArray) -> tuple[NDArray, NDArray]:
-        """Return the utilisation of the limits: every limited quantity over its limit.
+        """Return the utilisation of the limits: each quantity divided by its limit.
 
         Args:
             values: (k, m) [rad or m] errors.
 
         Returns:
             (limits x postures, k) lower and upper bounds, see :attr:`cases`.  They
-            differ for pose errors of the worst clearance model only; inf without a
+            differ only for pose errors of the worst clearance model; inf without a
             solution.
         """
         chunks = [
@@ -171,7 +174,7 @@ class Requirement:
     def _batch_utilisations(
         self, values: NDArray, first: int
     ) -> tuple[NDArray, NDArray]:
-        """Return the utilisations of a batch, posture by posture."""
+        """Return the utilisations of a batch, one posture after the other."""
         some = values[first : first + _BATCH]
         rows = np.arange(first, first + len(some))
         keys = list(self.plan.limits)
@@ -215,12 +218,12 @@ class Requirement:
         return bounds[0], bounds[1]
 
     def utilisation_slopes(self, case: int, values: NDArray) -> NDArray:
-        """Return the (k, m) slopes of a row of :meth:`utilisations` with each error."""
+        """Return (k, m) slopes of a row of :meth:`utilisations` by each error."""
         key, i = self.cases[case]
         return self.respond(key, i, values)[1] / self.plan.limits[key]
 
     def respond(self, key: str, i: int, values: NDArray) -> tuple[NDArray, NDArray]:
-        """Return a limited quantity at posture i and its slopes with each error."""
+        """Return a limited quantity at posture i, and its slopes by each error."""
         size, slopes = self.replay.recall(
             lambda: respond(
                 self.prepared[key][i],
@@ -238,11 +241,12 @@ class Requirement:
 
     def worst_corner(self, key: str, i: int, t: NDArray, corners: NDArray) -> Corner:
         """Return the worst corner of tolerances (G,) found at posture i."""
-        spread = self.plan.spread(t)
+        spread, sources = self.plan.spread(t), self.plan.sources
+        assert isinstance(sources, ErrorSources)  # callouts have no corners
 
         def search() -> tuple:
             corner = worst_corner(
-                self.prepared[key][i], self.plan.sources, spread, corners, key,
+                self.prepared[key][i], sources, spread, corners, key,
                 self.plan.clearance, self.plan.contact_length,
             )  # fmt: skip
             return corner.value, corner.signs, corner.slopes
@@ -254,11 +258,11 @@ class Requirement:
         """Return the part of each limit on a pose error that clearances alone use.
 
         Returns:
-            By quantity the largest pose error [rad or m] over all postures, a lower
-            bound, and its posture; empty for other clearance models than the worst.
+            By quantity a lower bound of the largest pose error [rad or m] over all
+            postures, and its posture; empty for clearance models other than the worst.
 
         Raises:
-            BadInput: one of them exceeds its limit.
+            BadInput: one of the pose errors exceeds its limit.
         """
         if self.plan.clearance != "worst" or not self.plan.limits_pose:
             return {}
@@ -277,7 +281,7 @@ class Requirement:
         return reached
 
     def _refuse_broken(self, reached: Mapping[str, tuple[float, str]]) -> None:
-        """Reject the limit that clearances alone exceed the most."""
+        """Reject the limit that clearances alone exceed most."""
         limits = self.plan.limits
         for key in sorted(reached, key=lambda k: -reached[k][0] / limits[k]):
             value, where = reached[key]
@@ -291,18 +295,16 @@ class Requirement:
                 )
 
     def check_taken_up(self) -> None:
-        """Reject errors that neither clearances nor springs take up at some posture.
+        """Reject errors that no clearance or spring can take up at some posture.
 
         Raises:
-            BadInput: there is one; the message names it.
+            BadInput: there is such an error; the message names it.
         """
-        sources = self.plan.sources
-        columns = 6 * sources.frame + sources.component
+        sources, n = self.plan.sources, len(self.postures[0].robot.frames)
         for key, prepared in self.convex.items():
             for posture in prepared:
-                residual = np.abs(posture.infeasible[:, columns]).max(
-                    axis=0, initial=0.0
-                )
+                rows = posture.infeasible.reshape(-1, n, 6)
+                residual = np.abs(sources.of_numbers(rows)).max(axis=0, initial=0.0)
                 if residual.max(initial=0.0) > 1e-9:
                     name = sources.labels[int(residual.argmax())]
                     raise BadInput(

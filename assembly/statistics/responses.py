@@ -1,11 +1,12 @@
-"""A limited quantity as a function of the errors, and its slopes with each of them."""
+"""A limited quantity as a function of the errors, with its slopes by each error."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.energy import Assembly
-from assembly.model.error_distributions import ErrorSources, draw_generator
+from assembly.model.error_distributions import draw_generator
 from assembly.model.link_stress import WEIGHTLESS, LinkStress, stressed_links
+from assembly.statistics.callout_sources import Sources
 from assembly.statistics.clearance_positions import (
     CLEARANCE_STREAM,
     position_clearances,
@@ -16,45 +17,46 @@ from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.sensitivity import solution_slopes
 from assembly.statistics.worst_clearance import bound_worst_errors, worst_error_slopes
 
-_STEP = 1e-6  # step relative to a wrench, for differences of the stress formula
+_STEP = 1e-6  # relative to a wrench: step for differences of the stress formula
 _PRECISION = 1e-9  # [rad or m] required precision of the largest pose errors
 _PARTS = {"moment": slice(0, 3), "force": slice(3, 6)}
 
 
 def respond(
-    prepared: PostureMargins | LinearResponse, sources: ErrorSources, values: NDArray,
+    prepared: PostureMargins | LinearResponse, sources: Sources, values: NDArray,
     key: str = "energy", clearance: str = "worst",
     contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return a quantity for given errors, and its slopes with each of them.
+    """Return a quantity for given errors, with its slopes by each error.
 
     Args:
-        prepared: a posture prepared for margins, or for energies and all others.
-        sources: m of them.
-        values: (k, m) [rad or m].
-        key: the quantity, for a posture prepared for energies: energy [J], force [N],
-            moment [N m], stress [Pa], rotation [rad] or translation [m].
+        prepared: a posture prepared for margins, or for energies and all other
+            quantities.
+        sources: m sources of errors.
+        values: (k, m) [rad or m] errors.
+        key: name of the quantity, for a posture prepared for energies: energy [J],
+            force [N], moment [N m], stress [Pa], rotation [rad] or translation [m].
         clearance: for a pose error, one of
-            :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.  With the
-            worst, value and slopes are those of the largest error found.  With uniform
-            and contact positions the slopes are those of the solution of (22).
-        contact_length: [m] of the contact model, see
+            :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.  In the
+            worst model, value and slopes are those of the largest error found.  For
+            uniform and contact positions the slopes are those of the solution of (22).
+        contact_length: [m] length of the contact model, see
             :class:`assembly.statistics.experiment.Experiment`.
 
     Returns:
-        (k,) and (k, m); NaN without a solution.
+        (k,) values and (k, m) slopes; NaN without a solution.
     """
     errors = sources.errors(values)
     if isinstance(prepared, PostureMargins):
         margins = prepared.solve(errors)
         slopes = prepared.slopes(margins)
-        return margins.margin, slopes[:, sources.frame, sources.component]
+        return margins.margin, sources.of_numbers(slopes)
     draws = prepared.solve(errors)
     if key == "energy":
-        return draws.energy, -draws.wrenches[:, sources.frame, sources.component]
+        return draws.energy, -sources.of_numbers(draws.wrenches)
     size = np.full(len(values), np.nan)
     slopes = np.full(errors.shape, np.nan)
-    # without clearances in unit cones their active bounds are unknown
+    # draws whose clearances are not known have unknown active bounds
     known = np.isfinite(draws.energy) & np.isfinite(draws.clearances).all(axis=1)
     solved = np.flatnonzero(known)
     if len(solved):
@@ -70,14 +72,14 @@ def respond(
         slopes[solved] = solution_slopes(
             prepared, some, by_wrench, by_screw, by_clearance
         )
-    return size, slopes[:, sources.frame, sources.component]
+    return size, sources.of_numbers(slopes)
 
 
 def _pose_error(
     prepared: LinearResponse, draws: Assembly, key: str,
     model: tuple[str, float | None], numbers: NDArray,
 ) -> tuple[NDArray, NDArray, NDArray | None]:  # fmt: skip
-    """Return a pose error, and its slopes with platform screw and clearances."""
+    """Return a pose error, and its slopes by platform screw and clearances."""
     part, (clearance, contact_length) = 3 * POSE_ERRORS.index(key), model
     if clearance == "worst":
         precision = (_PRECISION, np.inf) if key == "rotation" else (np.inf, _PRECISION)
@@ -97,7 +99,7 @@ def _pose_error(
 
 
 def _wrench_quantity(some: Assembly, key: str) -> tuple[NDArray, NDArray]:
-    """Return the largest moment, force or stress, and its slopes with the wrenches."""
+    """Return the largest moment, force or stress, and its slopes by the wrenches."""
     wrenches, at_tips = some.wrenches, some.frame_loads.at_tips
     slopes, draws = np.zeros_like(wrenches), np.arange(len(wrenches))
     if key != "stress":
@@ -118,7 +120,7 @@ def _wrench_quantity(some: Assembly, key: str) -> tuple[NDArray, NDArray]:
 
 
 def _size(parts: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the lengths of vectors, and their slopes with the components."""
+    """Return the norms of vectors, and their slopes by the components."""
     size = np.linalg.norm(parts, axis=-1)
     return size, parts / np.maximum(size, 1e-300)[..., None]
 
@@ -126,9 +128,9 @@ def _size(parts: NDArray) -> tuple[NDArray, NDArray]:
 def _stress_slopes(
     link: LinkStress, wrenches: NDArray, at_tip: NDArray = WEIGHTLESS
 ) -> NDArray:
-    """Return the (k, 6) slopes of the peak stress with a link's wrench."""
-    # differences of the formula, not of the solution: a fibre's stress is the root of
-    # a quadratic form, and central differences lose 1e-10 of its slope
+    """Return the (k, 6) slopes of the peak stress by a link's wrench."""
+    # differences of the formula, not of the solution; the stress of a fibre is the root
+    # of a quadratic form, so the relative error of central differences is 1e-10
     slopes = np.zeros_like(wrenches)
     for part in (slice(0, 3), slice(3, 6)):
         step = _STEP * np.linalg.norm(wrenches[:, part], axis=1).max(initial=1e-9)

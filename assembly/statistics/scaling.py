@@ -16,10 +16,10 @@ _MOST_TRIALS = 80
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Errors that must meet every limit at every posture, except a few.
+    """Samples of errors that must meet every limit at every posture, except a few.
 
     Attributes:
-        values: (k, m) within tolerances of 1.
+        values: (k, m) errors within tolerances of 1.
         allowed: number of samples that may fail.
     """
 
@@ -28,18 +28,19 @@ class Samples:
 
 
 def draw_samples(requirement: Requirement, stream: int, times: int = 1) -> Samples:
-    """Return the fixed draws, or corners of the tolerances for a yield of 1.
+    """Return fixed draws, or corners of the tolerances for a yield of 1.
 
     Args:
-        requirement: limits at all postures.
+        requirement: requirement at all postures.
         stream: stream of random numbers.
-        times: multiple of the plan's draws.
+        times: factor on the number of the plan's draws.
 
     Returns:
-        The samples; with the failures allowed, they show the required yield at 95 %.
+        The samples.  If no more than the allowed number fail, they show the required
+        yield with 95 % confidence.
 
     Raises:
-        BadInput: too few draws to show that yield.
+        BadInput: there are too few draws to show that yield.
     """
     plan = requirement.plan
     if plan.asked_yield == 1.0:
@@ -53,15 +54,15 @@ def draw_samples(requirement: Requirement, stream: int, times: int = 1) -> Sampl
 def with_worst_corners(
     requirement: Requirement, samples: Samples, t: NDArray
 ) -> Samples:
-    """Return the samples with the worst corners of tolerances, by limit and posture.
+    """Return samples with the worst corners of tolerances for each limit and posture.
 
     Args:
-        requirement: limits at all postures; no failure is allowed.
-        samples: corners so far.
+        requirement: requirement at all postures; no failure is allowed.
+        samples: present corners.
         t: (G,) [rad or m] tolerances.
 
     Returns:
-        The samples with the corners that were not among them.
+        The samples, with the corners that were not yet among them.
     """
     corners = np.vstack([
         samples.values[: CORNERS // 2],
@@ -81,19 +82,19 @@ def with_worst_corners(
 def scale_uniformly(
     requirement: Requirement, samples: Samples, t: NDArray, precision: float = _FINE
 ) -> NDArray:
-    """Scale tolerances uniformly, within their bounds, until the samples just fit.
+    """Multiply tolerances by a factor, within bounds, until the samples just fit.
 
     Args:
-        requirement: limits at all postures.
+        requirement: requirement at all postures.
         samples: samples of the errors.
-        t: (G,) [rad or m] proportions.
-        precision: relative, of the largest utilisation, or of the factor.
+        t: (G,) [rad or m] proportions of the tolerances.
+        precision: relative precision of the largest utilisation, or of the factor.
 
     Returns:
-        (G,) [rad or m]; all at their loosest if they fit there.
+        (G,) [rad or m] tolerances; all at their upper bounds if the samples fit there.
 
     Raises:
-        BadInput: the samples fit at no scale.
+        BadInput: the samples do not fit at any scale.
     """
     plan = requirement.plan
     low, high, factor, power = 0.0, np.inf, 1.0, 1.0
@@ -103,7 +104,7 @@ def scale_uniformly(
         utilisations = requirement.utilisations(samples.values * plan.spread(trial))[
             1
         ].max(axis=0)
-        # the largest utilisation of all samples except those that may fail
+        # largest utilisation among all samples except those that may fail
         utilisation = float(
             np.partition(utilisations, -1 - samples.allowed)[-1 - samples.allowed]
         )
@@ -126,7 +127,7 @@ def scale_uniformly(
             steep = np.log(utilisation / previous[1]) / np.log(factor / previous[0])
             power = float(np.clip(steep, 0.3, 10.0))
         previous = factor, utilisation
-        # a power law of the utilisation predicts the factor; else the interval's middle
+        # a power law of the utilisation predicts the factor, or the interval is halved
         factor = _next_factor(low, high, factor, utilisation, power, precision)
     return np.clip(low * t, plan.least, plan.most)
 
@@ -147,7 +148,7 @@ def _next_factor(
 
 def _allowed_failures(draws: int, asked: float) -> int:
     """Return the largest number of failures that shows a yield at 95 %, one-sided."""
-    # proportion() decreases with the failures: bisection
+    # proportion() decreases with the number of failures, so bisection is used
     low, high = -1, draws
     while high - low > 1:
         middle = (low + high) // 2

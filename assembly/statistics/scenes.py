@@ -13,6 +13,7 @@ from assembly.report.scene import robot_scene
 from assembly.solvers.conic import SolverFailed
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.plot import NAMES
+from assembly.steps.bolted import bolt_joints
 from forcefit.page.charts import Axis, Layer, value_map
 
 if TYPE_CHECKING:
@@ -27,14 +28,14 @@ _CAPTION = (
 
 
 def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
-    """Return the draw whose pose error is nearest to its 95 % quantile, assembled.
+    """Return the scene of the draw whose pose error is nearest to its 95 % quantile.
 
     Args:
         experiment: the experiment of the draws.
         data: the draws, numbered from 0.
 
     Returns:
-        HTML of a scene; empty if no draw assembles.
+        HTML of a scene with the assembled robot; empty if no draw assembles.
     """
     solved = data["status"].values == 0
     for key in ("translation", "energy"):
@@ -48,7 +49,7 @@ def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
     draw = int(np.nanargmin(np.abs(np.where(known, values, np.nan) - level)))
     drawn = experiment.sources.draw(draw, 1, experiment.seed)
     errors = experiment.sources.errors(drawn)[0]
-    robot = experiment.posture.robot.with_errors(errors)
+    robot = bolt_joints(experiment.posture.robot.with_errors(errors))
     return _forced_robot(
         replace(experiment.posture, robot=robot), experiment.wrench, experiment.gravity,
         why=f"Draw {draw}, whose {NAMES[key]} is nearest to 95 % of them.",
@@ -56,17 +57,17 @@ def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
 
 
 def tightest_robot(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
-    """Return the robot at its largest margin, assembled with its present errors.
+    """Return the scene of the robot at its largest margin, with its present errors.
 
     Args:
-        postures: the postures assessed.
+        postures: the assessed postures.
         present: result of :func:`assembly.statistics.tolerances.present_errors`.
 
     Returns:
-        HTML of a scene; empty if it cannot be assembled.
+        HTML of a scene with the assembled robot; empty if it cannot be assembled.
     """
     worst = postures[int(np.nanargmax(present["margins"]))]
-    why = "The posture of the largest margin, with the errors there are."
+    why = "The posture of the largest margin, with the present errors."
     return _forced_robot(worst, why=why)
 
 
@@ -86,10 +87,10 @@ def _forced_robot(
 
 
 def margin_map(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
-    """Return the margins over the postures of a grid.
+    """Return the map of the margins over the postures of a grid.
 
     Args:
-        postures: the postures assessed.
+        postures: the assessed postures.
         present: result of :func:`assembly.statistics.tolerances.present_errors`.
 
     Returns:

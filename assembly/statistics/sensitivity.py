@@ -1,10 +1,11 @@
 """Sensitivity to every geometric error, from multipliers and active clearances.
 
 The least energy (22) is the maximum of its dual ``-w.dl - ..`` over all balanced
-wrenches w.  So its slope with delta l is minus the wrench through the body.
+wrenches w.  So its slope by delta l is minus the wrench through the body.
 
-Wrenches and the platform's screw are part of the solution.  While the active clearances
-stay the same, its slopes follow from the optimality conditions, differentiated:
+Wrenches and the platform's screw are part of the solution.  As long as the active
+clearances are the same, the slopes of the solution follow from the differentiated
+optimality conditions:
 
     G^T (G u + h) + H^T eta + nu u = 0,   H u = k,   |u_c| = 1 where nu_c > 0,
 
@@ -13,7 +14,7 @@ so du is orthogonal to u_c in every active cone, and
     P (G^T G + nu) P du + P H^T deta = -P G^T dh,   H P du = dk
 
 where P is the projector on these directions.  One solution of the transposed equations
-gives the slopes with any number of errors (adjoint method).
+gives the slopes by any number of errors (adjoint method).
 """
 
 import numpy as np
@@ -23,22 +24,23 @@ from assembly.linear.energy import Assembly
 from assembly.solvers.conic import GAP_WITHOUT_CLEARANCE
 from assembly.statistics.linear_response import LinearResponse
 
-# relative to the largest force on any cone: smaller forces count as zero
+# relative to the largest force on any cone; smaller forces count as zero
 _ACTIVE = 1e-7
-_RANK = 1e-10  # relative rank tolerance: undetermined directions do not move
+# relative rank tolerance; undetermined directions are assumed not to move
+_RANK = 1e-10
 
 
 def energy_slopes(assembly: Assembly) -> NDArray:
-    """Return the slopes of the least energy with every geometric error.
+    """Return the slopes of the least energy by every geometric error.
 
     Args:
-        assembly: the assembly at least energy; under a load these are the slopes of
-            energy minus the load's work.
+        assembly: the assembly at least energy; under a load the slopes are those of the
+            energy minus the work of the load.
 
     Returns:
-        (n, 6) [J/rad, J/m], delta l of every frame in its axes.  Where rigid parts are
-        overconstrained the wrenches are not unique; the least ones, and their slopes,
-        are returned.
+        (n, 6) [J/rad, J/m] slopes by delta l of every frame in its axes.  If rigid
+        parts are overconstrained, the wrenches are not unique; the least wrenches and
+        their slopes are returned.
     """
     return -assembly.wrenches
 
@@ -47,19 +49,19 @@ def solution_slopes(
     prepared: LinearResponse, draws: Assembly, by_wrench: NDArray, by_screw: NDArray,
     by_clearance: NDArray | None = None,
 ) -> NDArray:  # fmt: skip
-    """Return slopes of a function of wrenches and platform screw with each error.
+    """Return the slopes of a function of wrenches and platform screw by each error.
 
     Args:
-        prepared: the posture.
-        draws: draws of :meth:`LinearResponse.solve`, k draws.
-        by_wrench: (k, n, 6) slopes of the function with the wrench through every body.
-        by_screw: (k, 6) slopes with the platform's screw.
-        by_clearance: (k, nu) slopes with the clearances, in units of their cones.
+        prepared: the prepared posture.
+        draws: solutions of k draws, from :meth:`LinearResponse.solve`.
+        by_wrench: (k, n, 6) slopes of the function by the wrench through every body.
+        by_screw: (k, 6) slopes by the platform's screw.
+        by_clearance: (k, nu) slopes by the clearances, relative to their bounds.
 
     Returns:
-        (k, n, 6) slopes with delta l of every frame in its axes; one of several if a
+        (k, n, 6) slopes by delta l of every frame in its axes; one of several if a
         clearance is weakly active.  Undetermined clearances do not move.  A passive
-        joint at the end of its motion is treated as if its motion had no bound.
+        joint at a bound of its motion is treated as if there were no bound.
     """
     A, nu, k = prepared.closures, prepared.starts[-1], len(draws.energy)
     closure_columns = A @ prepared.joints.cones
@@ -94,8 +96,8 @@ def _active_clearances(
     """Return (k, nu, nu) projectors normal to active clearances, and multipliers."""
     k, nu = forces.shape
     P, N = np.tile(np.eye(nu), (k, 1, 1)), np.zeros((k, nu, nu))
-    # inside a zone multipliers y are rounding: energies y^2 / 2 are far below forces G
-    # y
+    # inside a zone the multipliers y are due to rounding: energies y^2 / 2 are far
+    # below the forces G y
     pressed = draws.energy > GAP_WITHOUT_CLEARANCE * np.abs(forces).sum(
         axis=1, initial=0.0
     )

@@ -1,8 +1,8 @@
-"""Spread of the platform's stiffness over draws of errors and clearances.
+"""Distribution of the platform's stiffness over draws of errors and clearances.
 
-Errors do not change the nominal K_C.  They change which clearances are pressed, so the
-tangent of (22) differs from draw to draw.  The tangent of the exact equilibrium also
-has the effects of internal forces and rotated parts.
+Errors do not change the nominal K_C.  They change which clearances are in contact, so
+the tangent of (22) differs between draws.  The tangent of the exact equilibrium also
+contains the effects of internal forces and rotated parts.
 """
 
 from collections.abc import Mapping
@@ -24,27 +24,27 @@ from assembly.sweeps.point_stiffness import STATES
 from forcefit.results.display import numbers
 from stiffness.screws import WRENCH
 
-_NAMED = 5  # largest number of free motions reported, those of most draws
-_ALIKE = 2  # decimals to which motions of two draws are compared
+_NAMED = 5  # largest number of free motions that are reported, most frequent first
+_ALIKE = 2  # number of decimals in which the motions of two draws are compared
 
 
 def draw_stiffnesses(
     posture: Posture, errors: NDArray, state: str,
     load: ArrayLike | None = None, gravity: ArrayLike | None = None,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the stiffness along every axis, the others free, of each draw.
+    """Return the stiffness along every axis, with the other axes free, of each draw.
 
     Args:
         posture: the robot's configuration.
-        errors: (k, n, 6) [rad, m] of its frames.
+        errors: (k, n, 6) [rad, m] errors of the frames.
         state: ``"contact"`` or ``"exact"``.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
 
     Returns:
-        (k, 6) [N m/rad, N/m] for ``[mx my mz fx fy fz]``; 0 for a free motion, as
-        within a clearance, NaN without equilibrium.  And (k, 6, 6) [rad, m] the unit
-        screws of free motions, a row each; other rows are NaN.
+        (k, 6) [N m/rad, N/m] for ``[mx my mz fx fy fz]``: 0 for a free motion, such as
+        one within a clearance; NaN without equilibrium.  And (k, 6, 6) [rad, m] unit
+        screws of free motions in rows; other rows are NaN.
     """
     stiffnesses = np.full((len(errors), 6), np.nan)
     motions = np.full((len(errors), 6, 6), np.nan)
@@ -67,11 +67,11 @@ def draw_stiffnesses(
 def stiffness_report(
     stiffnesses: NDArray, motions: NDArray, state: str, level: float
 ) -> dict[str, Any]:
-    """Return the spread of the stiffness along each axis.
+    """Return the distribution of the stiffness along each axis.
 
     Args:
-        stiffnesses: (k, 6) of :func:`draw_stiffnesses`.
-        motions: (k, 6, 6) of the same.
+        stiffnesses: (k, 6) result of :func:`draw_stiffnesses`.
+        motions: (k, 6, 6) free motions from the same function.
         state: state of the tangents.
         level: level of confidence.
 
@@ -111,7 +111,7 @@ def stiffness_report(
 
 
 def stiffness_spread_text(report: Mapping[str, Any]) -> str:
-    """Return the spread as text, a line for each axis."""
+    """Return the distribution as text, with one line for each axis."""
     lines = [f"stiffness of the platform, {report['means']}:"]
     for name, one in report["axes"].items():
         shares = {

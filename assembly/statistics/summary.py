@@ -1,8 +1,8 @@
 """Summary of the draws of an experiment: yields, quantiles, most probable values.
 
 Yields count all draws.  Energies, wrenches and pose errors exist only for the draws
-that assemble, whose number is given with each.  Margins exist for all draws, and are
-summarised for all as well.  Every pose error is given with its clearance model.
+that assemble, and the number of these is stated.  Margins exist for all draws and are
+also summarised for all.  Every pose error is stated with its clearance model.
 """
 
 import json
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.zone import ASSEMBLABLE
+from assembly.statistics.capability import capability_text, draws_capability
 from assembly.statistics.clearance_positions import clearance_means
 from assembly.statistics.estimates import (
     bracketed,
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     import xarray
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
-_ROUNDING = 1e-18  # relative to the largest value: smaller ones count as zero
+_ROUNDING = 1e-18  # relative to the largest value: smaller values count as zero
 _MARGINS = {"margin": "rigid", "margin_free": "rigid_compliant_free"}
 WORDS = {
     "forced": "assembles, by force if necessary",
@@ -48,26 +49,28 @@ def summarise(
     limits: Mapping[str, float] | None = None,
     strength: float | None = None,
     level: float = 0.95,
+    capable: bool = False,
 ) -> dict[str, Any]:
-    """Return a summary of draws of :func:`assembly.statistics.monte_carlo.run_draws`.
+    """Return a summary of draws from :func:`assembly.statistics.monte_carlo.run_draws`.
 
     Args:
         data: the draws.
-        limits: limits by quantity; a draw meets them if none is exceeded.
+        limits: limits by quantity; a draw meets the limits if it exceeds none.
         strength: [Pa] yield strength of the links.
         level: level of confidence of all intervals.
+        capable: whether Cpk and parts per million of every limit are added.
 
     Returns:
         ``draws`` and the number of them that are ``assembled``; ``clearance``, its
-        meaning and its ``contact_length`` [m].  ``assembles`` (with any energy, rigidly
-        with compliant joints held or free), ``exceeds`` and ``within_limits``:
-        probabilities among all draws.  ``perfect_parts`` and the limits that these
-        exceed.  Mean, quantiles and most probable value of every quantity among the
-        assembled draws, for margins also among all.  Mean, covariance and most probable
-        platform screw.
+        meaning and its ``contact_length`` [m].  Probabilities among all draws:
+        ``assembles`` (with any energy, or by clearances with compliant joints rigid or
+        free), ``exceeds`` and ``within_limits``.  ``perfect_parts`` and the limits that
+        these exceed.  Mean, quantiles and most probable value of every quantity among
+        the assembled draws, for margins also among all draws.  Mean, covariance and
+        most probable platform screw.
 
     Raises:
-        BadInput: a limit's quantity was not computed.
+        BadInput: the quantity of a limit was not computed.
     """
     limits = dict(limits or {})
     if strength is not None:
@@ -109,7 +112,7 @@ def summarise(
         }  # fmt: skip
     if strength is not None:
         largest = data["stress"].values[solved].max(axis=0, initial=0.0)
-        with np.errstate(divide="ignore"):  # infinite without any stress
+        with np.errstate(divide="ignore"):  # infinite for zero stress
             report["safety"] = strength / largest
         errors = data["stress"].attrs.get("estimated_relative_error")
         if errors is not None:
@@ -121,6 +124,11 @@ def summarise(
             str(data.attrs["stiffness"]),
             level,
         )
+    if capable:
+        report["capability"] = {
+            key: draws_capability(_worst(data, key), one, level)
+            for key, one in report["exceeds"].items()
+        }
     if "total_index" in data:
         report["importance"] = importance_report(data)
     return report
@@ -129,7 +137,7 @@ def summarise(
 def _yields(
     data: "xarray.Dataset", solved: NDArray, limits: Mapping[str, float], level: float
 ) -> dict[str, Any]:
-    """Return how often limits are exceeded, each and any, with undecided draws."""
+    """Return how often each limit and any limit is exceeded, with undecided draws."""
     count = len(solved)
     met, failed, exceeds = solved.copy(), ~solved, {}
     for key, limit in limits.items():
@@ -140,7 +148,8 @@ def _yields(
             )
         values, lower = _worst(data, key), f"{key}_lower"
         over = ~(values <= limit)
-        # for a largest pose error the draws hold two bounds, otherwise one value
+        # for a largest pose error the draws have two bounds, for other quantities one
+        # value
         least = data[lower].values if lower in data else values
         surely = ~solved | (least > limit)
         met &= ~over
@@ -161,7 +170,7 @@ def _yields(
 
 
 def _worst(data: "xarray.Dataset", key: str) -> NDArray:
-    """Return the (k,) values of a quantity; of several links the most stressed."""
+    """Return the (k,) values of a quantity; of several links the largest."""
     values = np.asarray(data[key].values, dtype=float)
     return values.max(axis=1) if values.ndim == 2 else values
 
@@ -169,7 +178,7 @@ def _worst(data: "xarray.Dataset", key: str) -> NDArray:
 def _described(
     data: "xarray.Dataset", key: str, solved: NDArray, level: float
 ) -> dict[str, Any]:
-    """Return mean, quantiles and most probable value; 0 if most values are zero."""
+    """Return mean, quantiles and most probable value, 0 if most values are zero."""
     every = _worst(data, key)
     values = every[solved]
     finite = values[np.isfinite(values)]
@@ -187,7 +196,7 @@ def _described(
         }
     if len(finite) < 2:
         return description
-    # draws inside a zone store no energy: a point mass at zero, up to rounding
+    # draws inside a zone store no energy, so many values are zero up to rounding
     zero = finite <= _ROUNDING * finite.max()
     often = dict.fromkeys(("value", "lower", "upper"), 0.0)
     if zero.sum() <= len(finite) / 2:
@@ -225,6 +234,8 @@ def summary_text(summary: Mapping[str, Any]) -> str:
     if "within_limits" in summary:
         results = summary["within_limits"]
         lines.append(f"{_titled('yield', results)}, all limits met: {_share(results)}")
+    if "capability" in summary:
+        lines.append(capability_text(summary["capability"]))
     lines += perfect_text(summary)
     lines.append(f"of the {assembled} of {draws} draws that assemble:")
     if not assembled:
@@ -245,11 +256,15 @@ def summary_text(summary: Mapping[str, Any]) -> str:
         lines.append(stiffness_spread_text(summary["stiffness"]))
     if "importance" in summary:
         lines.append(importance_text(summary["importance"]))
+    if "worst_case" in summary:
+        from assembly.statistics.worst_pose_report import worst_text
+
+        lines.append(worst_text(summary["worst_case"]))
     return "\n".join(lines)
 
 
 def _titled(name: str, results: Mapping[str, Any]) -> str:
-    """Return a name with its clearance model, if it has one."""
+    """Return a name with its clearance model, if it depends on one."""
     return (
         f"{name} [clearance {results['clearance']}]" if "clearance" in results else name
     )
@@ -264,7 +279,7 @@ def _share(interval: Mapping[str, float]) -> str:
 
 
 def _named(value: float, unit: str) -> str:
-    """Return a number with its unit."""
+    """Return a number as text with its unit."""
     return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
 
 

@@ -1,4 +1,4 @@
-"""The error or clearance that dominates a result of draws, and advice to tighten it."""
+"""The error or clearance that dominates a result, and advice to tighten it."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,18 +10,18 @@ from assembly.statistics.ranking import leaders, named_together
 from forcefit.page.page import Tile
 from forcefit.page.tables import Value
 
-_NAMED = 3  # contributors in a tile
+_NAMED = 3  # largest number of contributors named in a tile
 
 
 def ranked(summary: Mapping[str, Any], key: str) -> list[tuple[str, list[float]]]:
-    """Return the total shares of a quantity's variance by error, the largest first.
+    """Return the total shares of a quantity's variance by error, largest first.
 
     Args:
-        summary: summary of :func:`assembly.statistics.summary.summarise`.
-        key: the quantity.
+        summary: result of :func:`assembly.statistics.summary.summarise`.
+        key: name of the quantity.
 
     Returns:
-        Names with (value, lower, upper); none without shares.
+        Names with (value, lower, upper); empty if there are no shares.
     """
     one = summary.get("importance", {}).get("quantities", {}).get(key, {})
     if "reason" in one or "total_index" not in one:
@@ -32,13 +32,13 @@ def ranked(summary: Mapping[str, Any], key: str) -> list[tuple[str, list[float]]
 
 
 def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles: values of perfect parts, the main contributor, what to tighten.
+    """Return tiles: values for perfect parts, the main contributor, what to tighten.
 
     Args:
-        summary: summary of :func:`assembly.statistics.summary.summarise`.
+        summary: result of :func:`assembly.statistics.summary.summarise`.
 
     Returns:
-        The tiles; without importance, no tiles of errors.
+        The tiles; without importance there are no tiles on errors.
     """
     tiles = _clearance_tiles(summary)
     broken, key = summary["perfect_parts_break"], _deciding(summary)
@@ -68,7 +68,7 @@ def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
 
 
 def _deciding(summary: Mapping[str, Any]) -> str:
-    """Return the quantity exceeded most often; without any, translation or energy."""
+    """Return the limit exceeded most often; without limits translation or energy."""
     exceeds = sorted(
         summary["exceeds"], key=lambda k: -summary["exceeds"][k]["probability"]
     )
@@ -78,7 +78,7 @@ def _deciding(summary: Mapping[str, Any]) -> str:
 
 
 def _clearance_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Return the pose error of perfect parts."""
+    """Return tiles on the pose error of perfect parts."""
     parts = summary["perfect_parts"]
     answer: list[str | Value] = []
     for key in ("translation", "rotation"):
@@ -94,7 +94,7 @@ def _clearance_tiles(summary: Mapping[str, Any]) -> list[Tile]:
 
 
 def _broken_tile(broken: Mapping[str, Any]) -> Tile:
-    """Return the tile that advises to tighten clearances instead of errors."""
+    """Return the tile with the advice to tighten clearances instead of errors."""
     key, one = next(iter(broken.items()))
     largest = next(iter(one.get("clearances", {})), "")
     note: list[str | Value] = [

@@ -1,39 +1,47 @@
 """Tolerance files: classes of errors, their costs, and the limits to be met.
 
-See ``docs/tolerances.md``.
+The format is described in ``docs/tolerances.md``.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from assembly.kinematics.callout_maps import place_callouts
+from assembly.kinematics.posture import home_posture
 from assembly.model.error_distributions import KINDS, ErrorSources
 from assembly.model.random_errors import frames_named
 from assembly.model.robot import Robot
+from assembly.statistics.callout_sources import CalloutSources, Sources
 from assembly.statistics.quantities import UNITS, limit_names
+from assembly.statistics.ranking import kind_of
 from assembly.statistics.requirement import COSTS, Plan
+from assembly.steps.bolted import refuse_bolted
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from stiffness.screws import SCREW
 
-_LOOSEST = (0.1, 0.01)  # [rad, m] largest small screws
+# [rad, m] largest accepted tolerances, up to which screws are small
+_LOOSEST = (0.1, 0.01)
 
 
 def read_plan(path: Path | str, robot: Robot) -> Plan:
     """Return the plan of a tolerance file.
 
     Args:
-        path: TOML file.
-        robot: the robot with the frames named in the file.
+        path: path of the TOML file.
+        robot: robot with the frames that the file names.
 
     Returns:
         The plan.
 
     Raises:
-        BadInput: the file breaks a rule.
+        BadInput: the file violates a rule, or a joint of the robot is bolted at a pose.
     """
     root = read_toml(path)
+    refuse_bolted(robot, "allocation of tolerances")
     cost = _choice(root, "cost", COSTS)
     distribution = _choice(root, "distribution", ("uniform", "truncated"))
     asked_yield = root.number("yield", "1", 1.0, above=0.0, largest=1.0)
@@ -41,29 +49,25 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
     draws = root.number("draws", "1", 1000.0, least=1.0, largest=1e7)
     seed = root.number("seed", "1", 1.0, least=0.0, largest=1e15)
     if draws != int(draws) or seed != int(seed):
-        raise root.bad("draws", "expected whole numbers as draws and seed")
+        raise root.bad("draws", "expected whole numbers for draws and seed")
     limits = _limits(root.table("limits")) if root.has("limits") else {}
     tables = root.tables("tolerance")
     root.finish()
     if not tables:
         raise root.bad("tolerance", "missing; expected tables [[tolerance]]")
     groups = _groups(root, tables, robot)
-    frame, component = np.array(list(groups.of)).T
-    count = len(groups.of)
-    sources = ErrorSources(
-        robot=robot,
-        frame=frame,
-        component=component,
-        kind=np.full(count, KINDS.index(distribution)),
-        centre=np.zeros(count),
-        scale=np.full(count, 1.0 / deviations if distribution == "truncated" else 1.0),
-        least=np.zeros(count),
-        limit=np.full(count, deviations),
-        signed=np.ones(count, dtype=bool),
-    )
+    if groups.callouts and asked_yield == 1.0:
+        fault = "found 1 with callouts, expected less than 1"
+        raise root.bad("yield", f"{fault}; statistics --worst-case is their worst case")
+    sources: Sources = _independent(robot, groups, distribution, deviations)
+    group = list(groups.of.values())
+    if groups.callouts:
+        own = sources if group and isinstance(sources, ErrorSources) else None
+        sources, more = _with_callouts(robot, groups, own)
+        group += more
     return Plan(
         sources=sources,
-        group=np.array(list(groups.of.values())),
+        group=np.array(group),
         names=tuple(groups.names),
         costs=np.array(groups.costs),
         least=np.array(groups.least),
@@ -76,10 +80,47 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
     )
 
 
+def _independent(
+    robot: Robot, groups: "_Groups", distribution: str, deviations: float
+) -> ErrorSources:
+    """Independent errors within tolerances of 1."""
+    frame, component = np.array(list(groups.of), dtype=int).reshape(-1, 2).T
+    count = len(groups.of)
+    return ErrorSources(
+        robot=robot,
+        frame=frame,
+        component=component,
+        kind=np.full(count, KINDS.index(distribution)),
+        centre=np.zeros(count),
+        scale=np.full(count, 1.0 / deviations if distribution == "truncated" else 1.0),
+        least=np.zeros(count),
+        limit=np.full(count, deviations),
+        signed=np.ones(count, dtype=bool),
+    )
+
+
+def _with_callouts(
+    robot: Robot, groups: "_Groups", independent: ErrorSources | None
+) -> tuple[CalloutSources, list[int]]:
+    """Errors with callouts of width 1 m, and the classes of the callouts' numbers."""
+    placed = place_callouts(home_posture(robot))
+    unit = [
+        replace(placed[k], errors=placed[k].errors / placed[k].callout.first_width)
+        for k in groups.callouts
+    ]
+    classes = [
+        number
+        for one, number in zip(unit, groups.callouts.values(), strict=True)
+        for _ in range(sum(one.zone.dimensions))
+    ]
+    return CalloutSources(robot, tuple(unit), independent), classes
+
+
 class _Groups(NamedTuple):
-    """Tables ``[[tolerance]]``: groups of errors with a common tolerance."""
+    """Groups of errors with a common tolerance, from the tables ``[[tolerance]]``."""
 
     of: dict[tuple[int, int], int]  # by frame and component
+    callouts: dict[int, int]  # by callout
     names: list[str]
     costs: list[float]
     least: list[float]
@@ -88,9 +129,14 @@ class _Groups(NamedTuple):
 
 def _groups(root: Table, tables: Sequence[Table], robot: Robot) -> _Groups:
     """Return the groups of errors of a file."""
-    rows, names, costs, least, most = groups = _Groups({}, [], [], [], [])
+    rows, callouts, names, costs, least, most = groups = _Groups({}, {}, [], [], [], [])
     for number, table in enumerate(tables):
-        places, unit = _places(table, robot)
+        if table.has("callouts"):
+            places, unit = list[tuple[int, int]](), 1
+            default = _callouts(table, robot, callouts, number)
+        else:
+            places, unit = _places(table, robot)
+            default = f"{robot.frames[places[0][0]].name}.{SCREW[places[0][1]]}"
         for place in places:
             if place in rows:
                 label = f"{robot.frames[place[0]].name}.{SCREW[place[1]]}"
@@ -98,7 +144,6 @@ def _groups(root: Table, tables: Sequence[Table], robot: Robot) -> _Groups:
                 where = "this table" if first == number else quoted(names[first])
                 raise table.bad("", f"found {quoted(label)} again, first in {where}")
             rows[place] = number
-        default = f"{robot.frames[places[0][0]].name}.{SCREW[places[0][1]]}"
         names.append(table.text("name", default))
         symbol = ("rad", "m")[unit]
         costs.append(table.number("cost", "1", 1.0, above=0.0))
@@ -112,6 +157,26 @@ def _groups(root: Table, tables: Sequence[Table], robot: Robot) -> _Groups:
             "found two tolerances of the same name, expected different names",
         )
     return groups
+
+
+def _callouts(table: Table, robot: Robot, callouts: dict[int, int], number: int) -> str:
+    """Add the callouts of a table to its class; return the default of its name."""
+    value = table.content["callouts"]
+    if not isinstance(value, list) or not all(isinstance(v, str) for v in value):
+        raise table.bad("callouts", "expected a list of names of [[tolerance]]")
+    names = [callout.name for callout in robot.callouts]
+    for name in value:
+        # a name without its leg's is that of every leg
+        found = [k for k, own in enumerate(names) if name in (own, kind_of(own))]
+        if not found:
+            raise table.bad("callouts", f"found {quoted(name)}{nearest(name, names)}")
+        for k in found:
+            if callouts.setdefault(k, number) != number:
+                raise table.bad("callouts", f"found {quoted(names[k])} again")
+    if not value:
+        raise table.bad("callouts", "expected at least one")
+    words = robot.callouts[next(k for k, n in callouts.items() if n == number)].words
+    return f"{words} of {value[0]}"
 
 
 def _choice(table: Table, key: str, valid: tuple[str, ...]) -> str:
@@ -134,7 +199,7 @@ def _limits(table: Table) -> dict[str, float]:
 
 
 def _places(table: Table, robot: Robot) -> tuple[list[tuple[int, int]], int]:
-    """Return frames and components with one tolerance; 0 for angles, 1 for lengths."""
+    """Return the frames and components of a table; 0 for angles, 1 for lengths."""
     names = table.require("frames", "a list of frame names")
     parts = table.require("components", 'a list such as ["TX"]')
     for key, value in (("frames", names), ("components", parts)):

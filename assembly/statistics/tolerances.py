@@ -1,4 +1,4 @@
-"""The postures of a workspace, and an assessment of a robot's present errors there."""
+"""Postures of a workspace, and an assessment of a robot's present errors there."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -29,15 +29,15 @@ def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int
     """Return the postures of a grid that the robot can reach and use.
 
     Args:
-        robot: any robot.
+        robot: the robot.
         grid: grid such as ``"tx=-0.2:0.2:0.1,tz=-0.5"``.
 
     Returns:
-        The postures; and the number of those left out, by status: out of reach, and
-        those of :func:`assembly.kinematics.verdict.verdicts`.
+        The postures, and the number of omitted postures by status: out of reach, or a
+        status of :func:`assembly.kinematics.verdict.verdicts`.
 
     Raises:
-        BadInput: the grid is invalid, or no posture of it is reached.
+        BadInput: the grid is invalid, or none of its postures can be reached.
     """
     targets = grid_targets(parse_grid(grid))
     rows = targets.at(np.arange(int(np.prod(targets.shape))))
@@ -61,7 +61,7 @@ def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int
 
 
 def left_out_text(left_out: dict[str, int]) -> str:
-    """Return a line on the postures that were left out."""
+    """Return a line on the postures that were omitted."""
     counts = ", ".join(f"{status}: {n}" for status, n in left_out.items())
     text = f"postures left out: {counts}"
     if SINGULAR in left_out:
@@ -72,8 +72,8 @@ def left_out_text(left_out: dict[str, int]) -> str:
 def identity_of(postures: Sequence[Posture], plan: Plan, fresh: int) -> dict[str, Any]:
     """Return the values that must be equal for two allocations to share results."""
     arrays = [p.transforms for p in postures]
-    for one in (plan, plan.sources):
-        arrays += [v for v in vars(one).values() if isinstance(v, np.ndarray)]
+    arrays += [v for v in vars(plan).values() if isinstance(v, np.ndarray)]
+    arrays += plan.sources.identity
     digest = sha256(b"".join(np.ascontiguousarray(a).tobytes() for a in arrays))
     return {
         "robot_sha256": robot_hash(plan.sources.robot),
@@ -100,13 +100,13 @@ def present_errors(
 
     Args:
         postures: postures of a robot with errors.
-        compliant: ``"free"`` or ``"rigid"``, about the own axis of compliant joints.
-        progress: called with postures done and their number.
+        compliant: ``"free"`` or ``"rigid"``, for the axis of compliant joints.
+        progress: called with the number of finished postures and of all postures.
 
     Returns:
-        The margins, the largest and its posture; the factor on all errors at which it
-        is 1; slopes of the margin and of the energy there, by error, the steepest
-        first.
+        The margins, the largest margin and its posture; the factor on all errors at
+        which it is 1; slopes of the margin and of the energy at this posture by error,
+        largest first.
     """
     prepared, zones = [], []
     for i, posture in enumerate(postures):
@@ -149,7 +149,7 @@ def present_errors(
 
 
 def present_text(results: dict[str, Any]) -> str:
-    """Return results of :func:`present_errors` as text: the five largest errors."""
+    """Return the results of :func:`present_errors` as text, with five errors."""
     where = ", ".join(
         f"{k} = {v:.4g}" for k, v in results["at"].items() if abs(v) > 1e-9
     )

@@ -12,8 +12,9 @@ from forcefit.page.charts import Axis, bars, grid
 from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 
-_LISTED = 20  # errors in a table of shares
-_ALIKE = 0.01  # relative to the largest share: shares as close are equal
+_LISTED = 20  # largest number of errors in a table of shares
+# relative to the largest share: difference below which shares count as equal
+_ALIKE = 0.01
 _ASSUMED = (
     "Limits hold at the postures of the grid; nothing is known between them.",
     "Errors are independent and keep within their tolerances.",
@@ -35,10 +36,10 @@ def tolerances_page(
     """Return the page of ``assembly tolerances``.
 
     Args:
-        results: results with ``present``, ``allocation`` or both, number of
+        results: results with ``present``, ``allocation`` or both, the number of
             ``postures`` and their ``grid``.
-        provenance: command and files.
-        pictures: HTML of :mod:`assembly.statistics.scenes`, of the errors present.
+        provenance: the command and the files.
+        pictures: HTML from :mod:`assembly.statistics.scenes`, with the present errors.
 
     Returns:
         HTML, which needs no other file.
@@ -79,7 +80,7 @@ def tolerances_page(
 
 
 def _present_tiles(present: Mapping[str, Any]) -> list[Tile]:
-    """Return the largest margin, and the error that contributes most to it."""
+    """Return tiles of the largest margin, and of the error that contributes most."""
     at = ", ".join(f"{k} = {v:.4g}" for k, v in present["at"].items() if abs(v) > 1e-9)
     note = f"at {at or 'the origin'} [m, rad]; it assembles up to 1."
     tiles = [Tile("Largest margin", [Value(present["largest_margin"])], [note])]
@@ -95,7 +96,7 @@ def _present_tiles(present: Mapping[str, Any]) -> list[Tile]:
 
 
 def _present_section(present: Mapping[str, Any]) -> str:
-    """Return the shares of the present errors in the largest margin."""
+    """Return the section on the shares of the present errors in the largest margin."""
     rows: list[list[Cell]] = [
         [one["error"], Value(one["value"], _error_unit(one["error"])),
          one["share_of_margin"]]
@@ -116,7 +117,7 @@ def _error_unit(name: str) -> str:
 
 
 def _allocation_sentence(allocation: Mapping[str, Any]) -> str:
-    """Return whether the tolerances are met, by proof and by fresh draws."""
+    """Return sentence on whether the tolerances meet the limits, by proof and draws."""
     text = f"Tolerances for a yield of {allocation['yield']:g}"
     proven = allocation["proven_scale"]
     if np.isfinite(proven):
@@ -146,7 +147,7 @@ def _allocation_tiles(allocation: Mapping[str, Any]) -> list[Tile]:
 
 
 def _tighten_tile(allocation: Mapping[str, Any]) -> Tile:
-    """Return the tolerances with the largest share of the cost, if any is tight."""
+    """Return a tile of the tolerances with the largest share of the cost, if any."""
     tight = [one for one in allocation["tolerances"] if not one["at_loosest"]]
     if not tight:
         why = "every tolerance may be the loosest allowed."
@@ -165,7 +166,7 @@ def _tighten_tile(allocation: Mapping[str, Any]) -> Tile:
 
 
 def _asked_section(results: Mapping[str, Any], allocation: Mapping[str, Any]) -> str:
-    """Return the limits, yield, clearances, distribution, cost law and postures."""
+    """Return table of limits, yield, clearances, distribution, cost and postures."""
     rows: list[list[Cell]] = [
         [f"{NAMES[key]}, at most", Value(limit, UNITS[key].removesuffix("1"), 6)]
         for key, limit in allocation["limits"].items()
@@ -196,7 +197,7 @@ def _asked_section(results: Mapping[str, Any], allocation: Mapping[str, Any]) ->
 
 
 def _allocation_section(allocation: Mapping[str, Any]) -> str:
-    """Return the tolerances by class, price and worst cases."""
+    """Return the section on tolerances by class, cost and worst cases."""
     classes = allocation["tolerances"]
     rows: list[list[Cell]] = [
         [one["name"], *(Value(one[k], one["unit"]) for k in
@@ -226,11 +227,11 @@ def _allocation_section(allocation: Mapping[str, Any]) -> str:
     if worst:
         columns = ["quantity", "limit", "worst found", "proven at most"]
         pieces.append(table(columns, worst, "limits"))
-    return section("The tolerances there may be", *pieces)
+    return section("Allocated tolerances", *pieces)
 
 
 def _price_paragraph(allocation: Mapping[str, Any]) -> str:
-    """Return the cost, and whether a lower bound of it is proved."""
+    """Return a paragraph on the cost, and on a lower bound if one is proved."""
     price, bound = (allocation[key] for key in ("price", "price_bound"))
     if np.isfinite(bound):
         return paragraph(
@@ -238,14 +239,14 @@ def _price_paragraph(allocation: Mapping[str, Any]) -> str:
             "less than ", Value(bound, "", 5), ".",
         )  # fmt: skip
     return paragraph(
-        "Price ", Value(price, "", 5), ". It is least in a neighbourhood; that nothing "
-        "cheaper lies elsewhere is not proved, for the limits are not convex in the "
+        "Price ", Value(price, "", 5), ". It is a local minimum; a global minimum is "
+        "not proved, because the limits are not convex in the "
         "tolerances.",
     )  # fmt: skip
 
 
 def _clearance_sections(allocation: Mapping[str, Any]) -> list[str]:
-    """Return the share of clearances alone in the limits on the pose."""
+    """Return sections on the share of clearances alone in the limits on the pose."""
     taken = {k: v for k, v in allocation["perfect_parts"].items() if v["reached"] > 0.0}
     if not taken:
         return []

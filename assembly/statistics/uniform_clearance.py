@@ -1,14 +1,14 @@
 """Uniformly distributed positions of the clearances, by the billiard walk.
 
 The set is {u : rows (u - start) = 0, |u_k| <= 1 for each cone k}.  Near the edge of a
-zone it is thin in some directions, and a walk with isotropic steps would mix slowly.
+zone it is thin in some directions, where a walk with isotropic steps would mix slowly.
 So the directions are drawn from Dikin's ellipsoid at the analytic centre, which has the
-proportions of the set: the ellipsoid lies inside the set, and the set inside the
+proportions of the set: the ellipsoid is inside the set, and the set is inside the
 ellipsoid scaled by the number of cones.  The walk is affine invariant.
 
-A trajectory is straight and reflected at every bound, for a random time.  It crosses
+A trajectory is straight and is reflected at every bound, for a random time.  It crosses
 the set several times, while a step of hit-and-run ends at the first bound.  Several
-chains from different starts are compared.  Their length is doubled, with the first half
+chains from different starts are compared.  Their length is doubled, and the first half
 discarded, until split R-hat and the effective sample size of every component of the
 platform's screw meet their criteria.
 
@@ -21,24 +21,27 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-CHAINS, KEPT = 4, 64  # chains, and points of each that are compared
-R_HAT, EFFECTIVE = 1.05, 100.0  # largest R-hat, smallest effective sample size
-DOUBLINGS = 10  # of the chains, at most: 4 x 65 472 trajectories of a draw
-_CONSTANT = 1e-12  # [rad or m] standard deviation of a component that does not vary
-_NEWTON = 300  # largest number of iterations
+# number of chains, and number of points of each chain that are compared
+CHAINS, KEPT = 4, 64
+# largest accepted R-hat, smallest accepted effective sample size
+R_HAT, EFFECTIVE = 1.05, 100.0
+# largest number of doublings of the chains: 4 x 65 472 trajectories for a draw
+DOUBLINGS = 10
+_CONSTANT = 1e-12  # [rad or m] standard deviation below which a component is constant
+_NEWTON = 300  # largest number of Newton iterations
 
 
 def sample_uniform_position(
     Z: NDArray, starts: NDArray, to_screw: NDArray, u: NDArray,
     rng: np.random.Generator, doublings: int = DOUBLINGS,
 ) -> bool:  # fmt: skip
-    """Return a point uniformly distributed over the set.
+    """Return a point that is uniformly distributed over the set.
 
     Args:
-        Z: (nu, n) orthonormal columns: the directions in which u may move.
-        starts: (cones + 1,) first column of each cone, and nu.
+        Z: (nu, n) orthonormal columns: directions in which u may move.
+        starts: (cones + 1,) index of the first clearance of each cone, and nu.
         to_screw: (6, nu) [rad, m] map from u to the platform's screw.
-        u: (nu,) a point of the set, overwritten with the new one.
+        u: (nu,) a point of the set, overwritten with the new point.
         rng: generator of random numbers.
         doublings: largest number of doublings of the chains.
 
@@ -71,13 +74,13 @@ def sample_uniform_position(
 def _ellipsoid(
     Z: NDArray, starts: NDArray, start: NDArray
 ) -> tuple[NDArray, NDArray] | None:
-    """Return the analytic centre and (nu, n) the axes of Dikin's ellipsoid there.
+    """Return the analytic centre, and (nu, n) the axes of Dikin's ellipsoid there.
 
-    Minimum of -sum log(rho^2 - |u_k|^2) by damped Newton steps, which stay inside.  At
-    first rho is large enough for the start to be inside; it decreases to 1.
+    The minimum of -sum log(rho^2 - |u_k|^2) is found by damped Newton steps, which stay
+    inside.  At first rho is large enough for the start to be inside; it decreases to 1.
 
     Returns:
-        Centre and axes, each axis a column; None if the set has empty interior.
+        Centre and axes in columns; None if the set has empty interior.
     """
     u, heads = start.copy(), starts[:-1]
     cone = np.repeat(np.arange(len(heads)), np.diff(starts))
@@ -95,7 +98,7 @@ def _ellipsoid(
                 # M M^T = Z H^-1 Z^T
                 M = np.linalg.solve(np.linalg.cholesky(H), Z.T).T
                 return u, np.ascontiguousarray(M)
-        except np.linalg.LinAlgError:  # numerically empty interior
+        except np.linalg.LinAlgError:  # the interior is numerically empty
             return None
         u += Z @ (step / (1.0 + decrement))
         if rho > 1.0 and decrement < 0.5:
@@ -110,7 +113,7 @@ def _ellipsoid(
 
 
 def _largest(heads: NDArray, u: NDArray) -> float:
-    """Return the largest size over the cones; 1 on the boundary."""
+    """Return the largest norm over the cones; 1 on the boundary."""
     return float(np.sqrt(np.add.reduceat(u * u, heads).max()))
 
 
@@ -118,17 +121,17 @@ def is_mixed(trace: NDArray) -> bool:
     """Return whether all varying components (chains, kept, components) have mixed."""
     moving = trace[:, :, trace.std(axis=(0, 1)) > _CONSTANT]
     return all(
-        # written so that NaN fails
+        # written so that NaN counts as not mixed
         r_hat <= R_HAT and effective >= EFFECTIVE
         for r_hat, effective in map(diagnose, np.moveaxis(moving, 2, 0))
     )
 
 
 def diagnose(x: NDArray) -> tuple[float, float]:
-    """Compute split R-hat and effective sample size of one component.
+    """Return split R-hat and the effective sample size of one component.
 
     Args:
-        x: (chains, 2 k) values along each chain; the halves count as chains.
+        x: (chains, 2 k) values along each chain; each half counts as a chain.
 
     Returns:
         R-hat and size.  R-hat tends to 1 as the chains become independent of their
@@ -144,8 +147,8 @@ def diagnose(x: NDArray) -> tuple[float, float]:
         return np.inf, 0.0
     whole = within * (k - 1) / k + float(means.var()) * m / (m - 1)
     r_hat = np.sqrt(whole / within)
-    # Geyer's initial monotone sequence: sums of pairs of autocorrelations, while
-    # positive and not increasing
+    # Geyer's initial monotone sequence: sums of pairs of autocorrelations as long as
+    # they are positive and do not increase
     time, before = -1.0, np.inf
     for lag in range(0, k - 1, 2):
         pair = 0.0

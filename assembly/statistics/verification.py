@@ -1,4 +1,4 @@
-"""Verification of tolerances: proven upper bounds, and fresh draws."""
+"""Verification of tolerances by proven upper bounds and by new random draws."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -17,9 +17,10 @@ from assembly.statistics.worst_case import (
     random_corners,
 )
 
-_BATCH = 256  # number of draws between two reports of progress
+_BATCH = 256  # number of draws between two progress reports
 _ROUNDING = 1e-9  # relative to a limit: excess that counts as rounding
-LOOKS, CONFIDENCE = 4, 0.95  # largest number of verifications; their joint confidence
+# largest number of verifications, and their joint confidence
+LOOKS, CONFIDENCE = 4, 0.95
 
 
 def prove_worst(
@@ -28,14 +29,14 @@ def prove_worst(
     """Return bounds of the worst case of errors within tolerances, over all postures.
 
     Args:
-        requirement: limits at all postures.
+        requirement: requirement at all postures.
         t: (G,) [rad or m] tolerances.
         progress: called with the name of a step, its progress and its total.
 
     Returns:
-        By limit the worst corner found and the proven upper bound, NaN where the
-        limit is not convex; and the factor on the tolerances, 1 or less, at which the
-        upper bounds meet all limits, NaN if some limit is not convex.
+        For each limit the value at the worst corner found, and the proven upper bound,
+        NaN if the limit is not convex.  And the factor on the tolerances, 1 or less, at
+        which the upper bounds meet all limits, NaN if a limit is not convex.
     """
     plan = requirement.plan
     spread, worst, scale = plan.spread(t), {}, np.inf
@@ -57,7 +58,7 @@ def prove_worst(
         if key not in requirement.convex:
             scale = np.nan
             continue
-        # the margin is proportional to the tolerances, the energy quadratic
+        # the margin is proportional to the tolerances, the energy to their square
         power = 0.5 if key == "energy" else 1.0
         scale = np.minimum(scale, (plan.limits[key] / max(upper, 1e-300)) ** power)
     return worst, float(np.minimum(1.0, scale))
@@ -74,15 +75,15 @@ def verify(
     fresh: int,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, dict[str, Any]]:
-    """Verify tolerances by fresh draws; tighten those that fail.
+    """Verify tolerances by new draws; tighten tolerances that fail.
 
-    Each verification takes independent draws.  The error probability of the confidence
-    is split over all verifications (Bonferroni).
+    Each verification uses independent draws.  The error probability of the confidence
+    is divided among all verifications (Bonferroni).
 
     Args:
-        requirement: limits at all postures.
+        requirement: requirement at all postures.
         t: (G,) [rad or m] tolerances.
-        fresh: number of draws of each verification, used only there.
+        fresh: number of draws of each verification; they are used only once.
         progress: called with the name of a step, its progress and its total.
 
     Returns:
@@ -110,20 +111,20 @@ def verify_yield(
     progress: Callable[[str, int, int], None], stream: int = FRESH,
     level: float = CONFIDENCE,
 ) -> dict[str, Any]:  # fmt: skip
-    """Compute the yield of fresh draws, of each posture and of all together.
+    """Compute the yield of new draws for each posture, and for all together.
 
     Args:
-        requirement: limits at all postures.
+        requirement: requirement at all postures.
         t: (G,) [rad or m] tolerances.
-        fresh: number of draws, used only here.
+        fresh: number of draws; they are used only here.
         progress: called with the name of a step, its progress and its total.
         stream: stream of random numbers.
         level: level of confidence of the interval.
 
     Returns:
-        Plain values: the yield with its interval, that of every posture, the verdict.
-        A draw whose pose error is undecided counts as failed; the interval holds for
-        both outcomes.
+        Plain values: the yield with its interval, the yield of every posture, the
+        verdict.  A draw whose pose error is undecided counts as failed; the interval
+        holds for both outcomes.
     """
     plan = requirement.plan
     values = plan.draws_of(stream, fresh) * plan.spread(t)

@@ -1,12 +1,12 @@
 """Worst case of errors within tolerances: lower and upper bounds.
 
 Margin and energy are convex in the errors, so their worst case is a corner, where every
-error is at one end of its tolerance.  The slopes at a corner point to another corner,
-whose value is never lower.  Repeated from many corners this yields a lower bound.  The
-same search bounds a wrench, a stress or a pose error from below, whose worst case need
-not be a corner.  For an upper bound the clearances are affine in the errors, ``u =
-sum_i V_i s_i`` for errors ``t_i s_i``, abs(s_i) <= 1.  One cone programme computes V,
-which certifies the bound.
+error is at one end of its tolerance.  The slopes at a corner determine another corner,
+whose value is never lower.  Repeated from many corners, this gives a lower bound.  For
+a wrench, a stress or a pose error, whose worst case need not be a corner, the same
+search gives a lower bound too.  For an upper bound the clearances are affine in the
+errors, ``u = sum_i V_i s_i`` for errors ``t_i s_i``, abs(s_i) <= 1.  A single cone
+programme computes V, which certifies the bound.
 
 Sources:
     Ben-Tal, El Ghaoui, Nemirovski (2009), Robust Optimization, ch. 14 (affinely
@@ -23,8 +23,9 @@ from assembly.statistics.linear_response import LinearResponse
 from assembly.statistics.posture_margins import PostureMargins
 from assembly.statistics.responses import respond
 
-CORNERS = 24  # number of corners to start from
-_ITERATIONS = 12  # most steps from corner to corner; three usually suffice
+CORNERS = 24  # number of random corners from which the search starts
+# largest number of steps from corner to corner; three are usually sufficient
+_ITERATIONS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,9 +33,9 @@ class Corner:
     """The worst corner of the tolerances that a search found.
 
     Attributes:
-        value: the quantity there: a lower bound of the worst case.
-        signs: (m,) of the errors, -1 or 1.
-        slopes: (m,) [its unit per rad or m] of the value with each error.
+        value: the quantity at the corner, a lower bound of the worst case.
+        signs: (m,) signs of the errors, -1 or 1.
+        slopes: (m,) [unit of the value per rad or m] slopes of the value by each error.
     """
 
     value: float
@@ -48,23 +49,24 @@ def worst_corner(
     clearance: str = "worst",
     contact_length: float | None = None,
 ) -> Corner:  # fmt: skip
-    """Search from corner to corner; return the worst of all searches.
+    """Return the worst corner that several searches from corner to corner find.
 
     Args:
-        prepared: a posture prepared for margins, or for energies and all others.
-        sources: m of them; their distributions do not matter.
-        tolerances: (m,) [rad or m] half widths.
-        corners: (k, m) signs to start from.
+        prepared: a posture prepared for margins, or for energies and all other
+            quantities.
+        sources: m sources of errors; their distributions are not used.
+        tolerances: (m,) [rad or m] half widths of the tolerances.
+        corners: (k, m) signs at the start of each search.
         key: the quantity, see :func:`assembly.statistics.responses.respond`.
-        clearance: see the same function.
-        contact_length: [m] see the same function.
+        clearance: clearance model, see the same function.
+        contact_length: [m] contact length, see the same function.
 
     Returns:
         The worst corner.
     """
     signs = corners.copy()
     if isinstance(prepared, LinearResponse):
-        # where clearances take up an error completely the energy has zero slope
+        # where clearances take up an error completely, the energy has zero slope
         signs = np.vstack([
             signs,
             _worst_without_clearance(prepared, sources, tolerances, signs),
@@ -89,7 +91,7 @@ def _worst_without_clearance(
     prepared: LinearResponse, sources: ErrorSources, tolerances: NDArray,
     corners: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return (k, m) worst corners without clearances: the energy is (h s)^2 / 2."""
+    """Return (k, m) worst corners without clearances; the energy is (h s)^2 / 2."""
     h = prepared.misfit[:, 6 * sources.frame + sources.component] * tolerances
     signs = corners
     for _ in range(_ITERATIONS):
@@ -109,12 +111,12 @@ def bound_margin(
     """Return an upper bound of the largest margin over all errors within tolerances.
 
     Args:
-        zone: a posture prepared for margins, every clearance scaled by the margin.
-        sources: m of them.
-        tolerances: (m,) [rad or m] half widths.
+        zone: a posture prepared for margins; the margin scales every clearance.
+        sources: m sources of errors.
+        tolerances: (m,) [rad or m] half widths of the tolerances.
 
     Returns:
-        The bound; inf if no clearance takes up an error.
+        The bound; inf if no clearance can take up an error.
     """
     columns = 6 * sources.frame + sources.component
     if np.abs(zone.infeasible[:, columns] * tolerances).max(initial=0.0) > 1e-12:
@@ -134,13 +136,13 @@ def bound_energy(
 
     Args:
         prepared: a posture prepared for energies.
-        sources: m of them.
-        tolerances: (m,) [rad or m] half widths.
+        sources: m sources of errors.
+        tolerances: (m,) [rad or m] half widths of the tolerances.
 
     Returns:
-        [J] the bound, for clearances and springs affine in the errors.  It adds up the
-        sizes of their deflections, so it may be several times the worst case.  inf if
-        no spring takes up an error.
+        [J] the bound for clearances and springs that are affine in the errors.  It adds
+        up the norms of their deflections, so it may be several times the worst case;
+        inf if no spring can take up an error.
     """
     columns = 6 * sources.frame + sources.component
     if np.abs(prepared.infeasible[:, columns] * tolerances).max(initial=0.0) > 1e-12:
@@ -155,29 +157,31 @@ def bound_energy(
 
 
 def _reach(V: NDArray, starts: NDArray) -> NDArray:
-    """Return the (cones,) largest sizes of affine clearances in each cone."""
+    """Return the (cones,) largest norms of affine clearances in each cone."""
     return np.sqrt(np.add.reduceat(V**2, starts[:-1], axis=0)).sum(axis=1)
 
 
 def _affine_clearances(
     B: NDArray, asked: NDArray, starts: NDArray, G: NDArray | None, h: NDArray | None
 ) -> NDArray:
-    """Return (nu, m) V with B V = asked: least in the cones, or of least energy."""
+    """Return (nu, m) V with B V = asked, smallest in the cones or of least energy."""
     import cvxpy as cp
 
     nu, m = starts[-1], asked.shape[1]
     size = np.linalg.norm(asked) or 1.0
     V, largest = cp.Variable((nu, m)), cp.Variable()
     single = starts[:-1][np.diff(starts) == 1]
-    double = starts[:-1][np.diff(starts) == 2]
     limit = largest if G is None else 1.0
     constraints = []
     if len(single):
         constraints.append(cp.sum(cp.abs(V[single, :]), axis=1) <= limit)
-    if len(double):
-        pairs = cp.vstack([cp.vec(V[double + i, :], order="C") for i in (0, 1)])
-        sizes = cp.reshape(cp.norm(pairs, 2, axis=0), (len(double), m), order="C")
-        constraints.append(cp.sum(sizes, axis=1) <= limit)
+    for width in (2, 3):
+        heads = starts[:-1][np.diff(starts) == width]
+        if len(heads):
+            of_cone = [cp.vec(V[heads + i, :], order="C") for i in range(width)]
+            sizes = cp.norm(cp.vstack(of_cone), 2, axis=0)
+            sizes = cp.reshape(sizes, (len(heads), m), order="C")
+            constraints.append(cp.sum(sizes, axis=1) <= limit)
     if G is None or h is None:
         constraints.append(B @ V == asked / size)
         goal = cp.Minimize(largest)

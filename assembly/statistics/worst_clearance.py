@@ -1,14 +1,14 @@
 """Largest pose errors over all clearance positions: problem (27) for many draws.
 
-The assumption is ``frozen``: all springs as in the solution of (22), all unloaded
-clearances anywhere within their bounds.  By strict convexity every solution of (22) has
-the same springs, and by complementary slackness the same loaded clearances.  So this is
-the set of *all* solutions of (22), inside a zone and outside.  It contains the
-positions of the uniform and the contact model, and the solver's own solution.  The
-other assumptions change the robot: ``free`` lets compliant joints turn without energy,
-``budget`` allows more energy than the least.
+The assumption is ``frozen``: springs have the deformations of the solution of (22), and
+unloaded clearances may be anywhere within their bounds.  By strict convexity every
+solution of (22) has the same springs, and by complementary slackness the same loaded
+clearances.  So this is the set of *all* solutions of (22), inside and outside a zone.
+It contains the positions of the uniform and the contact model, and the solver's
+solution. The other assumptions change the robot: with ``free``, compliant joints rotate
+without energy; with ``budget``, more energy than the least is allowed.
 
-Under a load the same holds for energy minus work: only clearances without force are
+Under a load the same holds for energy minus work; only clearances without force are
 free.
 """
 
@@ -30,7 +30,8 @@ from assembly.statistics.quantities import POSE_ERRORS
 
 ASSUMPTION = "frozen"
 PRECISION = (1e-6, 1e-6)  # [rad, m] required difference of upper and lower bounds
-_SUPPORT_PRECISION = 1e-12  # [rad or m] of a support whose multipliers are slopes
+# [rad or m] precision of a support function whose multipliers are used as slopes
+_SUPPORT_PRECISION = 1e-12
 
 
 def bound_worst_errors(
@@ -39,7 +40,7 @@ def bound_worst_errors(
     """Return certified bounds of the largest pose errors over all clearance positions.
 
     Args:
-        draws: k of them, at one posture.
+        draws: solutions of k draws at one posture.
         precision: [rad, m] required difference of upper and lower bounds; inf for a
             part that is not needed.
 
@@ -47,7 +48,7 @@ def bound_worst_errors(
         (k, 2, 2) lower and upper bounds of the rotation [rad] and the translation [m],
         at least as large as for the screw of ``draws``.  NaN for a draw without a
         solution; upper bounds are inf if not proved.  And (k, 2, 6) [rad, m] screws
-        that (nearly) attain the lower bounds.
+        that attain the lower bounds, at least nearly.
     """
     bounds = np.full((len(draws), 2, 2), np.nan)
     screws = np.tile(draws.platform_screw[:, None], (1, 2, 1))
@@ -103,20 +104,20 @@ def _under_load(
 def worst_error_slopes(
     prepared: LinearResponse, draws: Assembly, key: str, screws: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return slopes of the largest pose error with platform screw and clearances.
+    """Return the slopes of the largest pose error by platform screw and clearances.
 
-    The farthest point attains a support function in its own direction, so by the
-    envelope theorem the slopes are those of the support function there.
+    The farthest point attains the support function in its own direction, so by the
+    envelope theorem the slopes are those of this support function.
 
     Args:
-        prepared: the posture.
-        draws: its solutions for k draws, none under a load.
+        prepared: the prepared posture.
+        draws: solutions of k draws without loads.
         key: ``"rotation"`` or ``"translation"``.
-        screws: (k, 6) [rad, m] that attain the largest error, of
+        screws: (k, 6) [rad, m] screws that attain the largest error, from
             :func:`bound_worst_errors`.
 
     Returns:
-        (k, 6) slopes of the largest error with the platform's screw, and (k, nu)
+        (k, 6) slopes of the largest error by the platform's screw, and (k, nu)
         multipliers of the bounds of the clearances that carry no load.
     """
     part = 3 * POSE_ERRORS.index(key)
@@ -124,7 +125,7 @@ def worst_error_slopes(
     by_screw, by_clearance = np.zeros_like(screws), np.zeros_like(draws.clearances)
     by_screw[:, part : part + 3] = screws[:, part : part + 3] / np.maximum(size, 1e-300)
     loaded = loaded_clearances(prepared, draws)
-    # [rad or m] by clearances; those that press on their cones' bounds stay
+    # [rad or m] by clearances; those in contact with their bounds remain
     along = by_screw @ prepared.screws[:, : draws.clearances.shape[1]]
     patterns, pattern_of = np.unique(loaded, axis=0, return_inverse=True)
     for k, pattern in enumerate(patterns):
@@ -140,7 +141,7 @@ def worst_error_slopes(
 def _pressing(
     prepared: LinearResponse, free: NDArray, along: NDArray, clearances: NDArray
 ) -> NDArray:
-    """Return directions (k, ..) of free clearances, less the part of the equations."""
+    """Return directions (k, ..) of free clearances, projected onto the equations."""
     rows = clearance_constraints(prepared, ~free)[:, free]
     size = np.linalg.norm(along, axis=1, keepdims=True)
     moving = size[:, 0] > 0.0

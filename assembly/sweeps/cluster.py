@@ -1,11 +1,11 @@
-"""Solution of a sweep in parallel: Dask distributed, local or on a cluster.
+"""Parallel solution of a sweep with Dask, on this machine or on a cluster.
 
 The client keeps a few tasks in flight for each worker and writes their results to the
 journal.  So neither the client nor a worker ever holds more than a few blocks.  A task
 has as many blocks as take about half a second, fewer towards the end, so that workers
-end together.  Dask gives the tasks of a dead worker to others.  The distribution of
-blocks changes no number: each process computes on one thread, and points do not depend
-on their neighbours.
+finish together.  Dask reassigns the tasks of a lost worker.  The distribution of blocks
+changes no result: each process computes on one thread, and points do not depend on
+their neighbours.
 """
 
 import logging
@@ -35,10 +35,10 @@ if TYPE_CHECKING:
 _TASK = 0.5  # [s] target duration of a task; Dask recommends at least 0.1
 _IN_FLIGHT = 3  # number of tasks for each thread of the cluster
 _LARGEST = 256  # largest number of blocks in a task
-_LAST = 2  # tasks for each thread into which the last blocks are divided
-# Dask's profiler, which samples every 10 ms, makes workers a thirtieth slower
+_LAST = 2  # number of tasks for each thread into which the last blocks are divided
+# Dask's profiler samples every 10 ms, which makes workers a thirtieth slower
 _QUIET = {"distributed.worker.profile.enabled": False}
-_PATIENCE = 60.0  # [s] longest wait for a first worker
+_PATIENCE = 60.0  # [s] longest wait for the first worker
 
 Task = tuple[int, Points]
 
@@ -48,15 +48,15 @@ def cluster_solver(
     scheduler: str | None = None,
     report: Callable[[str], None] = lambda text: None,
 ) -> Solver:
-    """Return a solver for :func:`assembly.sweeps.sweep.run_sweep` that uses a cluster.
+    """Return a solver for :func:`assembly.sweeps.sweep.run_sweep` on a cluster.
 
     Args:
-        workers: number of processes of a cluster started here, or
+        workers: number of processes of a cluster that is started here, or
         scheduler: address of a running cluster, such as ``tcp://10.0.0.1:8786``.
-        report: function called with a line at the end: number of tasks, median time.
+        report: function called at the end with a line: number of tasks, median time.
 
     Returns:
-        The solver; the cluster is connected, or started, when it begins.
+        The solver; the cluster is connected or started when the solver begins.
     """
 
     def solve(
@@ -65,7 +65,7 @@ def cluster_solver(
         import dask
         from distributed import Client, LocalCluster
 
-        # the sweep itself reports failures, in one message
+        # failures are reported by the sweep, in one message
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         if scheduler is not None:
             with _connected(scheduler) as client:
@@ -84,7 +84,7 @@ def cluster_solver(
 
 @contextmanager
 def _without_interrupts() -> Generator[None, None, None]:
-    """Make processes started in the block ignore Ctrl-C: the sweep stops them."""
+    """Make processes started in the block ignore Ctrl-C; the sweep ends them."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -114,7 +114,7 @@ def _distribute_connected(
     blocks: list[int],
     report: Callable[[str], None],
 ) -> Iterator[tuple[int, SolvedPoints]]:
-    """Distribute blocks; report the loss of the scheduler in one message."""
+    """Distribute blocks; report a loss of the scheduler in one message."""
     from distributed.comm import CommClosedError
 
     try:
@@ -132,7 +132,7 @@ def _distribute(
     blocks: list[int],
     report: Callable[[str], None],
 ) -> Iterator[tuple[int, SolvedPoints]]:
-    """Distribute blocks as workers become free; results come in any order."""
+    """Distribute blocks as workers become free, and yield results in any order."""
     from distributed import KilledWorker, as_completed
 
     _check_workers(client)
@@ -174,17 +174,17 @@ def _distribute(
 
 
 def _threads(client: "distributed.Client") -> int:
-    """Return the present number of threads of all workers: clusters grow and shrink."""
+    """Return the present number of threads of all workers, because clusters change."""
     from distributed.comm import CommClosedError
 
     try:
         return max(1, sum(client.nthreads().values()))
-    except OSError as error:  # a lost scheduler refuses the query, too
+    except OSError as error:  # a lost scheduler refuses this query too
         raise CommClosedError(str(error)) from error
 
 
 def _check_workers(client: "distributed.Client") -> None:
-    """Reject a cluster without workers, or with another program version on them."""
+    """Reject a cluster without workers, or with workers of another program version."""
     try:
         client.wait_for_workers(1, timeout=_PATIENCE)
     except TimeoutError:
@@ -202,7 +202,7 @@ def _check_workers(client: "distributed.Client") -> None:
 
 
 def _program() -> dict[str, str]:
-    """Return this program's version, and the digest of its sources and libraries."""
+    """Return version of this program, and the digest of its sources and libraries."""
     return {
         "program": f"forcefit {version('forcefit')}",
         "program_sha256": program_hash(),
@@ -212,18 +212,19 @@ def _program() -> dict[str, str]:
 def solve_task(
     question: bytes, digest: str, tasks: list[Task]
 ) -> tuple[float, list[tuple[int, SolvedPoints]]]:
-    """Solve some blocks on one thread, on a worker.
+    """Solve some blocks on one thread of a worker.
 
     Args:
-        question: pickled.
+        question: pickled question of the sweep.
         digest: digest of the question on the client.
         tasks: number and points of each block.
 
     Returns:
-        [s] of computation, and each block's number with its results.
+        Time of computation [s], and the number of each block with its results.
 
     Raises:
-        BadInput: the digest differs here, because a mesh or a library differs.
+        BadInput: the digest on this worker differs, because a mesh or a library
+            differs.
     """
     from threadpoolctl import threadpool_limits
 
@@ -236,7 +237,7 @@ def solve_task(
 
 @lru_cache(maxsize=4)
 def _question(content: bytes, digest: str) -> Question:
-    """Return question, unpickled once on each worker: robots are cached by identity."""
+    """Return question, unpickled once on each worker; robots are cached by identity."""
     asked: Question = pickle.loads(content)
     question = replace(asked, robot=solve_links(asked.robot))
     if question_hash(question) != digest:

@@ -1,7 +1,7 @@
-"""A sweep's results as an xarray data set, in memory or in a NetCDF file.
+"""Results of a sweep as an xarray data set, in memory or in a NetCDF file.
 
-A file is written from the journal by blocks, so memory stays bounded, and its bytes
-depend on the sweep alone.
+A file is written from the journal block by block, so the memory is bounded.  The bytes
+of the file depend on the sweep only.
 """
 
 import os
@@ -25,20 +25,21 @@ if TYPE_CHECKING:
     from assembly.sweeps.plan import Sweep
 
 Texts = dict[str, dict[int, str]]
-# kinds of files that commands write, and an attribute that identifies each
+# kinds of files that commands write, and the attribute that identifies each kind
 KINDS = {
-    "a sweep": "near", "draws": "sources_and_posture_sha256", "tolerances": "cost_law"
+    "a sweep": "near", "draws": "sources_and_posture_sha256", "tolerances": "cost_law",
+    "a path": "path_law",
 }  # fmt: skip
 _TEXT = {name: QUANTITIES[name].meaning for name in ("status", *TEXTS)}
 _TEXT["status"] += ": " + ", ".join(OF_POINTS[1:])
-# names in files of older releases, and the present ones
+# names in files of older releases, with the present names
 _OLD_NAMES = {
     "rotation_error_play": "rotation_error_clearance",
     "translation_error_play": "translation_error_clearance",
     "play_mixed": "clearance_mixed",
 }
 _OLD_ATTRIBUTES = {"play": "clearance", "reading": "assumption"}
-# number of blocks written together: one write takes as long as a hundred points
+# number of blocks written together; a write takes as long as solving a hundred points
 _TOGETHER = 256
 
 
@@ -46,12 +47,12 @@ def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dat
     """Return the data set of a whole sweep in memory.
 
     Args:
-        sweep: sweep of the results.
-        records: (points,) rows of all points.
-        texts: texts by name, the text of points that have one.
+        sweep: sweep to which the results belong.
+        records: (points,) records of all points.
+        texts: texts by name: for each, the text of the points that have one.
 
     Returns:
-        The data set; units in the attribute ``units``.
+        The data set; units are in the attribute ``units``.
     """
     import xarray
 
@@ -72,12 +73,12 @@ def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dat
 def write_sweep(
     sweep: "Sweep", read: Callable[[int], tuple[NDArray, Texts]], path: Path
 ) -> None:
-    """Write the data set of a whole sweep as a NetCDF file, whole or not at all.
+    """Write the data set of a whole sweep as a NetCDF file, completely or not at all.
 
     Args:
-        sweep: sweep of the results.
-        read: rows and texts of a block.
-        path: path of the new file; it replaces an old one only when it is complete.
+        sweep: sweep to which the results belong.
+        read: function that returns the records and texts of a block.
+        path: path of the file; an old file is replaced only by a complete one.
 
     Raises:
         BadInput: the file cannot be written.
@@ -140,8 +141,8 @@ def slabs(shape: tuple[int, ...], first: int, last: int) -> Iterator[tuple[slice
 
     Args:
         shape: shape of the array.
-        first: point, counted in C order.
-        last: the one after the last point.
+        first: number of the first point, counted in C order.
+        last: number after the last point.
 
     Yields:
         A slice for each axis; the boxes follow each other in the order of the points.
@@ -165,7 +166,7 @@ def slabs(shape: tuple[int, ...], first: int, last: int) -> Iterator[tuple[slice
 
 
 def _joined(blocks: list[tuple[NDArray, Texts]]) -> tuple[NDArray, Texts]:
-    """Return the blocks one after the other."""
+    """Return the blocks joined one after the other."""
     texts: Texts = {name: {} for name in TEXTS}
     start = 0
     for records, texts_of_block in blocks:
@@ -178,7 +179,7 @@ def _joined(blocks: list[tuple[NDArray, Texts]]) -> tuple[NDArray, Texts]:
 
 
 def _text_column(name: str, records: NDArray, texts: Texts) -> NDArray:
-    """Return the (k,) texts of a variable, as objects."""
+    """Return the (k,) texts of a variable as objects."""
     if name == "status":
         return np.array(OF_POINTS, dtype=object)[records["status"]]
     column = np.full(len(records), "", dtype=object)
@@ -188,7 +189,7 @@ def _text_column(name: str, records: NDArray, texts: Texts) -> NDArray:
 
 
 def _coordinates(sweep: "Sweep") -> dict[str, tuple[tuple[str, ...], NDArray, dict]]:
-    """Return the axes, values and attributes of every coordinate, by name."""
+    """Return axes, values and attributes of every coordinate, by name."""
     table: dict[str, tuple[tuple[str, ...], NDArray, dict]] = {}
     units = sweep.units
     for path, values in zip(sweep.question.varied, sweep.values, strict=True):
@@ -209,11 +210,11 @@ def _coordinates(sweep: "Sweep") -> dict[str, tuple[tuple[str, ...], NDArray, di
 
 
 def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
-    """Write a data set as NetCDF, whole or not at all.
+    """Write a data set as NetCDF, completely or not at all.
 
     Args:
-        data: any data.
-        path: path of the new file; it replaces an old one only once it is complete.
+        data: data set to write.
+        path: path of the file; an old file is replaced only by a complete one.
 
     Raises:
         BadInput: the file cannot be written.
@@ -225,14 +226,14 @@ def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
 
 
 def check_dataset(path: Path | str, what: str) -> None:
-    """Reject a NetCDF file that could not be written, before the work.
+    """Raise an error before the computation if a NetCDF file could not be written.
 
     Args:
-        path: path of the file to be written later.
+        path: path of the file that will be written.
         what: one of :data:`KINDS`; an existing file must be of this kind.
 
     Raises:
-        BadInput: the file is of another kind, or as in
+        BadInput: the file is of another kind, or for the reasons in
             :func:`forcefit.inputs.writing.check_writable`.
     """
     check_writable(path, NETCDF)
@@ -246,7 +247,7 @@ def check_dataset(path: Path | str, what: str) -> None:
 
 
 def _is(path: Path, what: str) -> bool:
-    """Return whether the attributes of a file are those of one of our kinds."""
+    """Return whether a file's attributes identify it as one of forcefit's kinds."""
     import h5py
 
     try:
@@ -268,7 +269,7 @@ def open_dataset(path: Path | str) -> "xarray.Dataset":
         The data set, all in memory.
 
     Raises:
-        BadInput: the file is absent or no NetCDF file.
+        BadInput: the file is absent, or is not a NetCDF file.
     """
     import xarray
 
@@ -286,7 +287,7 @@ def open_dataset(path: Path | str) -> "xarray.Dataset":
 
 
 def _with_new_names(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return a data set of an older release under the present names."""
+    """Return a data set of an older release with the present names."""
     old = {name: new for name, new in _OLD_NAMES.items() if name in data.data_vars}
     data.attrs = {_OLD_ATTRIBUTES.get(str(k), k): v for k, v in data.attrs.items()}
     return data.rename_vars(old)

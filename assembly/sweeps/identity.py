@@ -1,6 +1,6 @@
 """Digests that identify results: of the program, the robot and the question.
 
-Each is a SHA-256, compared by journals and by the workers of a cluster.
+Each digest is a SHA-256, which journals and the workers of a cluster compare.
 """
 
 import hashlib
@@ -23,7 +23,7 @@ from assembly.model.robot import LibraryLink, MeshLink, Robot
 from assembly.sweeps.parameters import Design
 from forcefit.inputs.program import sources_hash
 
-# libraries on which the numbers depend: another version may round differently
+# libraries on which the results depend; another version may round differently
 _LIBRARIES = ("numpy", "scipy", "clarabel")
 
 
@@ -36,10 +36,10 @@ def program_hash() -> str:
 
 
 def robot_hash(robot: Robot) -> str:
-    """Return the SHA-256 of the content of a robot file, and of the meshes it names.
+    """Return the SHA-256 of a robot's file content, and of the meshes that it names.
 
     Args:
-        robot: any robot.
+        robot: the robot.
 
     Returns:
         The digest.
@@ -59,10 +59,10 @@ def robot_hash(robot: Robot) -> str:
 
 
 def question_hash(question: Any) -> str:
-    """Return the SHA-256 of a question: every attribute, by its name.
+    """Return the SHA-256 of a question: of every attribute with its name.
 
     Args:
-        question: plain values, arrays, robots, designs and dataclasses of such.
+        question: plain values, arrays, robots, designs and dataclasses of these.
 
     Returns:
         The digest.
@@ -71,10 +71,10 @@ def question_hash(question: Any) -> str:
 
 
 def _as_json(value: Any) -> Any:
-    """Return a value in terms of JSON; different values have different results."""
+    """Return a value in terms of JSON, so that different values differ."""
     if isinstance(value, Robot):
         return ["robot", robot_hash(value)]
-    if isinstance(value, Design):  # independent of its file's path
+    if isinstance(value, Design):  # independent of the path of the design's file
         return ["design", _as_json(value.content)]
     if isinstance(value, np.ndarray):
         content = np.ascontiguousarray(value)

@@ -1,11 +1,11 @@
-"""A sweep's journal: finished blocks on disk, safe against a kill of the program.
+"""Journal of a sweep: finished blocks on disk, protected against an interruption.
 
-The file begins with one line of JSON that identifies its sweep, and its check sum.
-Records follow, each appended by one write: a block's number, its length and a check
+The file begins with one line of JSON that identifies the sweep, with a check sum.
+Records follow, each appended by one write: number of a block, its length and a check
 sum, then its rows and texts.  Each check sum continues that of the first line, so that
 every record identifies its sweep.  Records with a wrong check sum are ignored, such as
-a last record cut short by a kill, or a damaged one.  Records may come in any order, and
-twice.  One program at a time locks the file.
+a last record that was cut by an interruption, or a damaged one.  Records may be in any
+order and may occur twice.  Only one program at a time can lock the file.
 """
 
 import json
@@ -38,8 +38,8 @@ class Journal:
     Attributes:
         path: path of the file.
         record_type: type of the rows.
-        owner: check sum of the first line, which those of the records continue.
-        places: offset and length of the content of each finished block's record.
+        owner: check sum of the first line, which is continued in the records.
+        places: offset and length of the content of each finished block.
     """
 
     path: Path
@@ -50,15 +50,15 @@ class Journal:
     def add(
         self, block: int, records: NDArray, texts: dict[str, dict[int, str]]
     ) -> None:
-        """Append a finished block; it is in the file when this returns.
+        """Append a finished block, which is in the file when this function returns.
 
         Args:
-            block: its number.
-            records: its rows.
-            texts: texts by name, the text of rows that have one.
+            block: number of the block.
+            records: records of its points.
+            texts: texts by name: for each, the text of the rows that have one.
 
         Raises:
-            BadInput: the file cannot be written, as on a full disk.
+            BadInput: the file cannot be written, for example because the disk is full.
         """
         text = json.dumps(texts, separators=(",", ":"), sort_keys=True).encode()
         content = struct.pack("<Q", len(records)) + records.tobytes() + text
@@ -84,16 +84,16 @@ class Journal:
         held.push(remove)
 
     def read(self, block: int) -> tuple[NDArray, dict[str, dict[int, str]]]:
-        """Return the rows and texts of a finished block.
+        """Return the records and texts of a finished block.
 
         Args:
-            block: its number.
+            block: number of the block.
 
         Returns:
-            The rows and texts, as they were added.
+            The records and texts as they were added.
 
         Raises:
-            BadInput: the file was changed in between, or cannot be read.
+            BadInput: the file was changed in the meantime, or cannot be read.
         """
         start, length = self.places[block]
         try:
@@ -122,20 +122,20 @@ class Journal:
 def open_journal(
     path: Path, whose: dict[str, Any], record_type: np.dtype
 ) -> Generator[Journal, None, None]:
-    """Open a new journal, or that of an interrupted sweep, until the block ends.
+    """Open a new journal, or that of an interrupted sweep, for the time of a block.
 
     Args:
         path: path of the file.
-        whose: plain values that identify the sweep: all must be equal, except
-            ``program``, whose version differs between commits of equal sources.
-        record_type: type of the rows.
+        whose: plain values that identify the sweep; all must be equal, except
+            ``program``, because the version differs between commits with equal sources.
+        record_type: type of the records.
 
     Yields:
-        The journal, with the blocks that are finished.
+        The journal with the finished blocks.
 
     Raises:
         BadInput: another program has locked the file; it belongs to another sweep, is
-            no journal, or cannot be written.
+            not a journal, or cannot be written.
     """
     check_writable(path)
     equal = {name: value for name, value in whose.items() if name != "program"}
@@ -156,7 +156,7 @@ def open_journal(
 
 
 def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]]:
-    """Return the places of finished blocks; repair the first line, cut a torn end."""
+    """Return the places of finished blocks; repair the first line and the end."""
     try:
         with path.open("r+b") as file:
             size = os.fstat(file.fileno()).st_size
@@ -167,7 +167,7 @@ def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]
                 with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
                     places, end = _scan(content, len(header), owner)
             if first_line != header:
-                # valid records identify the sweep: only the first line was damaged
+                # valid records identify the sweep, so only the first line was damaged
                 if not places and not header.startswith(first_line):
                     file.seek(0)
                     raise BadInput(f"{path}: {_difference(file.readline(), header)}")
@@ -208,12 +208,12 @@ def _check(owner: int, block: int, content: bytes) -> int:
 
 
 def _difference(first_line: bytes, header: bytes) -> str:
-    """Return how a journal differs from the one expected."""
+    """Return the difference between a journal and the expected one, as text."""
     expected = json.loads(header.rpartition(b" ")[0])
     line, _, check = first_line.rstrip(b"\n").rpartition(b" ")
     if not first_line.startswith(b'{"kind": "forcefit sweep journal'):
         return (
-            "found a file that is no journal of a sweep; expected a journal or "
+            "found a file that is not a journal of a sweep; expected a journal or "
             "no file: delete it or write to another file"
         )
     if check != b"%08x" % zlib.crc32(line):
@@ -224,7 +224,7 @@ def _difference(first_line: bytes, header: bytes) -> str:
         )
     other = json.loads(line)
     keys = [k for k in expected if other.get(k) != expected[k]]
-    # the hash of the whole question is redundant if a part of it is named
+    # the hash of the whole question is omitted if a part of it is named
     keys = [k for k in keys if k != "question_sha256"] or keys
     theirs = ", ".join(f"{k} {str(other.get(k))[:60]!r}" for k in keys)
     wanted = ", ".join(f"{k} {str(expected[k])[:60]!r}" for k in keys)

@@ -1,6 +1,6 @@
-"""Figures of a sweep, from its data set alone: maps over two axes, lines along one.
+"""Figures of a sweep from its data set: maps over two axes, lines along one axis.
 
-Functions take a data set and return a figure; none solves, shows or saves.
+Each function takes a data set and returns a figure.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,20 +25,20 @@ def figure_of(
     at: Mapping[str, float | str] | None = None,
     quantities: Sequence[str] = (),
 ) -> "Figure":
-    """Return the maps of a sweep over two axes, or lines along one.
+    """Return the maps of a sweep over two axes, or lines along one axis.
 
     Args:
         data: data of a sweep, as saved.
-        at: values on other axes, by name; the nearest points are shown.  Unless a draw
-            is chosen, the median of the draws is shown.
-        quantities: to be shown, by the names of :mod:`assembly.sweeps.panels`; those
-            of the paper's figure 5 if empty.
+        at: values on other axes by name; the nearest points are shown.  If no draw is
+            selected, the median of the draws is shown.
+        quantities: quantities to show, by the names in :mod:`assembly.sweeps.panels`;
+            by default those of the paper's figure 5.
 
     Returns:
-        A figure with a panel for each; with six panels if no quantity is named.
+        A figure with a panel for each quantity, with six panels by default.
 
     Raises:
-        BadInput: an axis or a quantity is unknown, or more than two axes are left.
+        BadInput: an axis or a quantity is unknown, or more than two axes remain.
     """
     if "status" not in data:
         raise BadInput(
@@ -55,13 +55,13 @@ def figure_of(
 
 
 def check_axes(sizes: Mapping[str, int]) -> None:
-    """Reject axes that form neither a map nor a line.
+    """Reject axes that allow neither a map nor a line.
 
     Args:
         sizes: number of values on each axis.
 
     Raises:
-        BadInput: no axis, or more than two, with more than one value, besides draws.
+        BadInput: not one or two axes have more than one value, apart from draws.
     """
     long = {name: n for name, n in sizes.items() if n > 1 and name != "draw"}
     if len(long) > 2:
@@ -79,14 +79,14 @@ def check_axes(sizes: Mapping[str, int]) -> None:
 def part_of_sweep(
     data: "xarray.Dataset", at: Mapping[str, float | str]
 ) -> tuple["xarray.Dataset", str]:
-    """Return a part of a sweep: some axes at fixed values, draws by their median.
+    """Return a part of a sweep: some axes at fixed values, draws as their median.
 
     Args:
         data: data of a sweep.
-        at: value by axis.
+        at: value for each of these axes.
 
     Returns:
-        The part, without axes of one value, and a note that describes it.
+        The part without axes of one value, and a note that describes the selection.
 
     Raises:
         BadInput: an axis or a value is unknown.
@@ -125,7 +125,7 @@ def _number(name: str, value: float | str) -> float:
 
 
 def _median(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return the median over the draws; the first status other than ok, if any."""
+    """Return the median over the draws; for the status the first that is not ok."""
     numbers = [k for k, v in data.data_vars.items() if v.dtype.kind == "f"]
     middle = data[numbers].median("draw", skipna=True)
     first = data.isel(draw=0, drop=True)
@@ -142,7 +142,7 @@ def _median(data: "xarray.Dataset") -> "xarray.Dataset":
 
 
 def _squeezed(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return the data set without the points' axes of one value."""
+    """Return the data set without the axes of points that have one value."""
     single = [d for d in data["status"].dims if data.sizes[d] == 1]
     return data.squeeze(single, drop=True)
 
@@ -150,18 +150,18 @@ def _squeezed(data: "xarray.Dataset") -> "xarray.Dataset":
 def map_figure(
     data: "xarray.Dataset", panels: Sequence[Panel] | None = None
 ) -> "Figure":
-    """Return the maps over a two-dimensional grid: margins, energy and platform error.
+    """Return maps over a two-dimensional grid: margins, energy and platform error.
 
     Args:
         data: data of a sweep over two axes with more than one value each.
-        panels: to be shown; the usual ones and the status if absent.
+        panels: panels to show; by default the usual ones and the status.
 
     Returns:
-        A figure with a panel for each quantity; the contour of margin 1 bounds the
+        A figure with a panel for each quantity.  The contour of margin 1 bounds the
         assembly zone; crosses mark nearby singularities.
 
     Raises:
-        ValueError: the grid does not have two such axes.
+        ValueError: the grid does not have two axes with several values.
     """
     data = _along_numbers(_squeezed(data))
     names = [str(d) for d in data["status"].dims]
@@ -203,11 +203,11 @@ def _figure_for(count: int, height: float) -> tuple["Figure", "list[Axes]"]:
 def path_figure(
     data: "xarray.Dataset", panels: Sequence[Panel] | None = None
 ) -> "Figure":
-    """Return figures of the quantities along one axis, or over the postures of a list.
+    """Return a figure of the quantities along one axis, or over a list of postures.
 
     Args:
         data: data of a sweep over one axis.
-        panels: to be shown; the usual ones and the condition if absent.
+        panels: panels to show; by default the usual ones and the condition.
 
     Returns:
         A figure with a panel for each quantity; crosses mark nearby singularities.
@@ -240,7 +240,7 @@ def path_figure(
 
 
 def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return data set with increasing numbers on each axis: labels become 1, 2, .."""
+    """Return the data set with increasing numbers on each axis, 1, 2, .. for labels."""
     for name in map(str, data["status"].dims):
         if data[name].dtype.kind not in "fiu":
             data = data.assign_coords({name: np.arange(data.sizes[name]) + 1})
@@ -249,7 +249,7 @@ def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
 
 
 def _near(data: "xarray.Dataset") -> NDArray:
-    """Return a bool array: where a singularity is near."""
+    """Return a bool array: True where a singularity is near."""
     if "near_singularity" not in data:
         return np.zeros(data["status"].shape, dtype=bool)
     texts = data["near_singularity"].transpose(*data["status"].dims)
@@ -266,7 +266,7 @@ def _mark(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
 
 
 def _states(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
-    """Draw the status of the points, as text and colour."""
+    """Draw the status of the points as text and colour."""
     texts = data["status"].transpose(y, x).values.astype(str)
     _, codes = np.unique(texts, return_inverse=True)
     codes = codes.reshape(texts.shape)
@@ -276,7 +276,7 @@ def _states(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
 
 
 def _label(panel: "Axes", data: "xarray.Dataset", x: str, y: str, title: str) -> None:
-    """Set title and axes; two axes of lengths have the same scale."""
+    """Set title and axes; two axes of lengths get the same scale."""
     same = data[x].attrs.get("units") == data[y].attrs.get("units")
     spans = [float(np.ptp(data[k].values)) for k in (x, y)]
     fits = same and 0.2 < spans[0] / spans[1] < 5
@@ -297,7 +297,7 @@ def _counts(data: "xarray.Dataset") -> str:
 
 
 def _caption(data: "xarray.Dataset") -> str:
-    """Return the robot, statuses, and the singularities that the crosses mark."""
+    """Return a caption: the robot, the statuses, and the marked singularities."""
     caption = f"{data.attrs.get('robot', '')}; {_counts(data)}"
     if _near(data).any():
         texts = np.unique(data["near_singularity"].values.astype(str))
@@ -305,5 +305,5 @@ def _caption(data: "xarray.Dataset") -> str:
             part.partition(",")[0] for t in texts if t for part in t.split("; ")
         })  # fmt: skip
         more = f" and {len(kinds) - 6} more" if len(kinds) > 6 else ""
-        caption += f"\nx: singularities near by ({'; '.join(kinds[:6])}{more})"
+        caption += f"\nx: nearby singularities ({'; '.join(kinds[:6])}{more})"
     return plot_label(caption)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import unwritable, whole_file
 
-_HEAP = b"GCOL\x01\x00\x00\x00"  # HDF5's mark of a global heap, and its version
+_HEAP = b"GCOL\x01\x00\x00\x00"  # mark of a global heap in HDF5, with its version
 
 
 @contextmanager
@@ -22,7 +22,7 @@ def netcdf_file(path: Path | str) -> Generator[Any, None, None]:
     """Write a NetCDF file.
 
     Args:
-        path: path of the file; it appears when the block ends without an error.
+        path: path of the file; it exists only after the block ended without an error.
 
     Yields:
         The open ``h5netcdf.File``.
@@ -43,12 +43,12 @@ def netcdf_file(path: Path | str) -> Generator[Any, None, None]:
 
 
 class Stored(NamedTuple):
-    """A variable of a file, with the attribute names of xarray.
+    """A variable of a file, with the attribute names that xarray uses.
 
     Attributes:
-        dims: names of its axes.
-        values: all of them.
-        attrs: its attributes.
+        dims: names of the axes.
+        values: values of the variable.
+        attrs: attributes of the variable.
     """
 
     dims: tuple[str, ...]
@@ -60,7 +60,7 @@ class StoredDataset(NamedTuple):
     """A data set for a summary, read without xarray, whose import takes a second.
 
     Attributes:
-        data_vars: variables by name, coordinates left out.
+        data_vars: variables by name, without coordinates.
         attrs: attributes of the whole data set.
     """
 
@@ -69,13 +69,13 @@ class StoredDataset(NamedTuple):
 
 
 def stored_dataset(path: Path | str) -> StoredDataset:
-    """Return a newly written data set, for its summary.
+    """Return a newly written data set for its summary.
 
     Args:
         path: path of a NetCDF file written by forcefit.
 
     Returns:
-        All of its variables except the coordinates.
+        All variables except the coordinates.
     """
     import h5netcdf
 
@@ -101,20 +101,20 @@ def _decoded(values: NDArray) -> NDArray:
 
 
 def forgive_damaged_files() -> None:
-    """Keep h5netcdf from writing to stderr when it closes a damaged file."""
+    """Prevent h5netcdf from writing to stderr when it closes a damaged file."""
     import h5netcdf
 
-    h5netcdf.File._writable = False  # until a file sets it
+    h5netcdf.File._writable = False  # until a file sets this attribute
 
 
 def check_heaps(path: Path) -> None:
-    """Reject a file whose heaps of texts are damaged: HDF5 would read them endlessly.
+    """Reject a file with damaged heaps of texts, which HDF5 would read endlessly.
 
     Args:
-        path: path of an HDF5 file; other files pass.
+        path: path of an HDF5 file; other files are accepted.
 
     Raises:
-        BadInput: an entry of a heap points outside it.
+        BadInput: an entry of a heap points outside the heap.
     """
     size = path.stat().st_size
     if not size:
@@ -126,7 +126,7 @@ def check_heaps(path: Path) -> None:
             end, place = start + min(length, size - start), start + 16
             while place + 16 <= end:
                 number, _, own = struct.unpack_from("<HH4xQ", data, place)
-                # an entry, or the free space, which includes its own head
+                # an entry, or the free space, whose size includes its own header
                 step = 16 + -(-own // 8) * 8 if number else own
                 if step < 16:
                     raise BadInput(f"{path}: cannot be read as NetCDF: damaged heap")
@@ -135,10 +135,10 @@ def check_heaps(path: Path) -> None:
 
 
 class _Target:
-    """The file to which HDF5 writes; when it fails, a copy in memory replaces it.
+    """The file to which HDF5 writes; after a failure a copy in memory replaces it.
 
-    HDF5 crashes the whole process when a file cannot be closed, or when data read back
-    differ from the data written.
+    HDF5 crashes the whole process if a file cannot be closed, or if data that it reads
+    again differ from the data written.
     """
 
     def __init__(self, file: FileIO) -> None:
@@ -146,7 +146,7 @@ class _Target:
         self.failure: OSError | None = None
 
     def write(self, content: Any) -> int:
-        """Write the content; record a failure and return success."""
+        """Write the content; if this fails, record the failure and return success."""
         left = memoryview(content).cast("B")
         size = len(left)
         while left:
@@ -159,7 +159,7 @@ class _Target:
         return size
 
     def readinto(self, content: Any) -> int:
-        """Read bytes written before."""
+        """Read bytes that were written before."""
         return self.file.readinto(content) or 0
 
     def read(self, size: int = -1) -> bytes:
@@ -175,7 +175,7 @@ class _Target:
         return self.file.tell()
 
     def truncate(self, size: int | None = None) -> int:
-        """Set the file's size; record a failure."""
+        """Set the size of the file; if this fails, record the failure."""
         try:
             return self.file.truncate(size)
         except OSError as error:
@@ -183,10 +183,10 @@ class _Target:
             return self.truncate(size)
 
     def flush(self) -> None:
-        """Do nothing: no data are buffered."""
+        """Do nothing, because no data are buffered."""
 
     def _go_on_in_memory(self, failure: OSError) -> None:
-        """Keep the failure and copy the data written so far."""
+        """Record the failure, and copy the data written so far to memory."""
         self.failure = failure
         position = self.file.tell()
         self.file.seek(0)

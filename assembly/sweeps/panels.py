@@ -1,9 +1,9 @@
-"""Panels of a figure of a sweep or of draws: quantities, units, titles.
+"""Panels of figures of a sweep or of draws: quantities, units, titles.
 
 A quantity is a variable of the data set, with its component if it has several:
 ``energy``, ``stiffness.FX``, ``wrench.leg1.link_a.FZ``.  These are the column names of
 :func:`assembly.sweeps.point_table.point_table`.  ``rotation`` and ``translation`` are
-the sizes of the platform's pose error.
+the magnitudes of the platform's pose error.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 _MOST = 12  # largest number of panels in a readable figure
 _HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
-# unit in the file: factor and unit in the figure
+# for each unit in the file: factor and unit in the figure
 _SHOWN = {
     "rad": (1e3, "mrad"), "m": (1e3, "mm"), "N/m": (1e-6, "N/um"), "Pa": (1e-6, "MPa"),
     "1": (1.0, "-"),
@@ -33,8 +33,8 @@ class Panel(NamedTuple):
 
     Attributes:
         key: name of the quantity.
-        scale: factor on its numbers.
-        title: title with the unit after the factor.
+        scale: factor on the values.
+        title: title with the unit of the scaled values.
         colours: colour map.
     """
 
@@ -44,7 +44,7 @@ class Panel(NamedTuple):
     colours: str
 
 
-# the six panels of the paper's figure 5, then those that replace the last two if these
+# the six panels of the paper's figure 5; further ones replace the last two if these
 # were not computed
 _PAPER = (
     Panel("margin_free", 1.0, "zone margin, compliant joints free [-]", "magma_r"),
@@ -72,10 +72,10 @@ def usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
         data: data of a sweep.
 
     Returns:
-        Those whose quantities are stored.
+        The usual panels whose quantities are stored.
 
     Raises:
-        BadInput: the sweep stored none of their quantities.
+        BadInput: the sweep stored none of these quantities.
     """
     usual = _usual_panels(data)
     panels = tuple(panel for panel in usual if _is_stored(data, panel.key))
@@ -97,7 +97,7 @@ def _is_stored(data: "xarray.Dataset", key: str) -> bool:
 
 
 def _usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
-    """Return the panels if all quantities are stored."""
+    """Return the panels of the paper's figure if their quantities are stored."""
     if "rotation_error_clearance" in data:
         return _PAPER
     middle = _STIFFNESS if "eigen_stiffness" in data else _PAPER[2:4]
@@ -107,7 +107,7 @@ def _usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
 
 
 def named_panels(data: "xarray.Dataset", names: Sequence[str]) -> tuple[Panel, ...]:
-    """Return panels of named quantities; a variable's name means all its components.
+    """Return panels of named quantities; a variable's name selects all components.
 
     Args:
         data: data of a sweep or of draws.
@@ -117,7 +117,7 @@ def named_panels(data: "xarray.Dataset", names: Sequence[str]) -> tuple[Panel, .
         A panel for each component.
 
     Raises:
-        BadInput: there is no such quantity, or a figure would have too many panels.
+        BadInput: there is no such quantity, or the figure would have too many panels.
     """
     known = _quantities(data)
     panels: list[Panel] = []
@@ -147,14 +147,14 @@ def quantity(data: "xarray.Dataset", key: str) -> Any:
 
     Args:
         data: data of a sweep or of draws.
-        key: its name; the size of a pose error is the certified upper bound, or
-            otherwise half the platform screw.
+        key: name of the quantity; the magnitude of a pose error is the certified upper
+            bound or, without bounds, a half of the platform screw.
 
     Returns:
         Data array over the axes of the points.
 
     Raises:
-        KeyError: there is no quantity of that name.
+        KeyError: there is no quantity with that name.
     """
     if key in _HALVES and key not in data:
         if f"{key}_error" in data:

@@ -1,6 +1,6 @@
-"""Design parameters: any number of a robot file, addressed by its path.
+"""Design parameters: any number in a robot file, addressed by its path.
 
-A path is the frame's name and the keys of the number, such as
+A path consists of the frame's name and the keys of the number, such as
 ``leg1.link_a.link.beam.radius`` or ``leg1.elbow.clearance.radial``.  A frame's name
 without its leg means that frame in every leg.  Three numbers in brackets are x, y, z;
 six are rx .. tz, and so are the rows and columns of six by six (``stiffness.rx.ty``
@@ -19,6 +19,7 @@ from assembly.files.drawing_file import is_drawing
 from assembly.files.robot_file import declared_robot, robot_of, robot_table
 from assembly.files.solved_links import solve_links
 from assembly.model.robot import Robot
+from assembly.steps.bolted import bolt_joints
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 
 _AXES = {3: ("x", "y", "z"), 6: ("rx", "ry", "rz", "tx", "ty", "tz")}
@@ -30,7 +31,7 @@ _PLACED: dict[str, Any] = {"translation": [0.0] * 3, "rotation": [0.0] * 3}
 _DH_UNITS = {"theta": "rad", "d": "m", "a": "m", "alpha": "rad"}
 _UNITS = {
     "translation": "m", "rotation": "rad", "radial": "m", "axial": "m",
-    "tilt": "rad", "spin": "rad",
+    "tilt": "rad", "spin": "rad", "ball": "m",
     "radius": "m", "inner_radius": "m", "width": "m", "height": "m", "length": "m",
     "area": "m^2", "I_y": "m^4", "I_z": "m^4", "J": "m^4", "shear_y": "1",
     "shear_z": "1", "young": "Pa", "poisson": "1", "density": "kg/m^3", "mass": "kg",
@@ -43,11 +44,12 @@ Setter = Callable[[float], None]
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """A robot as the content of its file, whose numbers can be changed.
+    """A robot as the content of its file, in which numbers can be changed.
 
     Attributes:
-        content: the root table, plain values.
-        file: name of the file, for messages; paths in the table start in its folder.
+        content: the root table as plain values.
+        file: name of the file, for messages; paths in the table are relative to its
+            folder.
         name: name of the robot if the table has none.
     """
 
@@ -67,16 +69,16 @@ class Design:
         return {path: float(value) for path, value, _ in numbers}
 
     def find(self, path: str) -> list[str]:
-        """Return the full paths that a path matches.
+        """Return the full paths that a path selects.
 
         Args:
-            path: full, or with the frame's name without its leg.
+            path: full path, or path with the frame's name without its leg.
 
         Returns:
-            One path, or one for each leg.
+            One path, or one path for each leg.
 
         Raises:
-            BadInput: the robot has no such number; the nearest is named.
+            BadInput: the robot has no such number; the message names a similar one.
         """
         known = self.paths
         matches = [p for p in known if p == path] or [
@@ -88,16 +90,16 @@ class Design:
         return matches
 
     def changed(self, values: Mapping[str, float]) -> dict[str, Any]:
-        """Return the root table with other numbers.
+        """Return the root table with changed numbers.
 
         Args:
-            values: values by path.
+            values: new values by path.
 
         Returns:
             A new table.
 
         Raises:
-            BadInput: a path leads to no number.
+            BadInput: a path does not lead to a number.
         """
         content = copy.deepcopy(self.content)
         setters = {path: setter for path, _, setter in _numbers(content)}
@@ -107,39 +109,40 @@ class Design:
         return content
 
     def robot(self, values: Mapping[str, float]) -> Robot:
-        """Return the robot with other numbers.
+        """Return the robot with changed numbers.
 
         Args:
-            values: values by path.
+            values: new values by path.
 
         Returns:
-            The robot, checked as if its file had been written so.
+            The robot, after the checks of a robot file with these numbers.
 
         Raises:
-            BadInput: a path leads to no number, a value breaks a rule of the format,
-                the closures no longer hold, or a link's mesh or library is not usable.
+            BadInput: a path does not lead to a number, a value violates a rule of the
+                format, the closures no longer hold, or a link's mesh or library is not
+                usable.
         """
         robot = robot_of(Table(self.changed(values), self.file, ""), self.name)
         try:
-            return solve_links(robot)
+            return bolt_joints(solve_links(robot))
         except BadInput as error:
             raise BadInput(f"{self.file}: {error}") from None
 
     def check(self, values: Mapping[str, float]) -> None:
-        """Reject numbers that break a rule of the format.
+        """Reject numbers that violate a rule of the format.
 
         Args:
-            values: values by path.
+            values: new values by path.
 
         Raises:
-            BadInput: a number breaks a rule; whether the closures still hold is not
+            BadInput: a number violates a rule; whether the closures still hold is not
                 checked.
         """
         declared_robot(Table(self.changed(values), self.file, ""), self.name)
 
 
 def design_of(robot: Robot) -> Design:
-    """Return a robot in memory as the file it could be written to."""
+    """Return a robot in memory in the form of a robot file."""
     return Design(robot_table(robot), robot.name, robot.name)
 
 
@@ -153,19 +156,19 @@ def load_design(name: str | Path) -> Design:
         The design.
 
     Raises:
-        BadInput: neither a built-in name nor a file.
+        BadInput: the name is neither a built-in name nor a file.
     """
     from assembly.exchange.robot_files import is_robot_file, load_robot
     from assembly.robots import BUILT_IN
 
-    # refuses an invalid file before numbers are changed
+    # an invalid file is refused before numbers are changed
     robot = load_robot(name, links=False)
     if str(name) in BUILT_IN or not is_robot_file(Path(name)):
         return design_of(robot)
     table = read_toml(Path(name))
     if is_drawing(
         table
-    ):  # its bodies have copies; the frames are each a number's place
+    ):  # its bodies may be copied, so numbers are addressed in frames
         return Design(robot_table(robot), str(name), robot.name)
     return Design(table.content, str(name), robot.name)
 
@@ -181,7 +184,7 @@ def unit_of(path: str) -> str:
 
 
 def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
-    """Yield path, value and setter of every number; absent zeros are added."""
+    """Yield path, value and setter of every number; omitted zeros are included."""
     for frame in content.get("frame", ()):
         given = dict(_ABSENT) if "dh" in frame else _ABSENT | _PLACED
         if frame.get("joint", "fixed") != "fixed":
@@ -211,7 +214,7 @@ def _inside(path: str, table: dict[str, Any]) -> Iterator[tuple[str, float, Sett
 
 
 def _is_number(value: object) -> bool:
-    """Return whether a plain value is a number; true and false are not."""
+    """Return whether a plain value is a number; booleans are not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 

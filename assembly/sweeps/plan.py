@@ -1,4 +1,4 @@
-"""A sweep: a question and the points at which it is asked."""
+"""A sweep: the requested quantities, and the points at which they are computed."""
 
 import hashlib
 import json
@@ -20,15 +20,15 @@ from forcefit.results.display import html_table, short_repr
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """A question and the points at which it is asked.
+    """The requested quantities, and the points at which they are computed.
 
     Attributes:
         question: the quantities.
         targets: the postures.
         values: values of each varied parameter, in the order of ``question.varied``.
-        draws: number of draws of errors; 0 for the robot's own.
-        command: command line, for provenance; empty without one.
-        block_size: number of points solved and journalled together.
+        draws: number of draws of errors; 0 if the robot's own errors are used.
+        command: command line, for the provenance; empty without one.
+        block_size: number of points that are solved and stored together.
     """
 
     question: Question
@@ -84,14 +84,14 @@ class Sweep:
 
     @property
     def units(self) -> dict[str, str]:
-        """Unit of each varied parameter and of each component of the postures."""
+        """Unit of each varied parameter, and of each component of the postures."""
         robot = self.question.robot
         of_postures = {n: unit_of_target(n, robot) for n in self.targets.names}
         return {path: unit_of(path) for path in self.question.varied} | of_postures
 
     @cached_property
     def provenance(self) -> dict[str, str | int]:
-        """Provenance of the numbers, as attributes of the data set."""
+        """Provenance of the results, as attributes of the data set."""
         question = self.question
         provenance: dict[str, str | int] = {
             "robot": question.robot.name,

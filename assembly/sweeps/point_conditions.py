@@ -1,4 +1,4 @@
-"""Conditions at the points of a sweep: load, gravity and the effects of the robot.
+"""Conditions at the points of a sweep: load, gravity and effects of the robot.
 
 Compiled functions solve points together, under loads and with effects that change
 errors, springs or clearances.  Points with nonlinear compliances are solved one by one,
@@ -30,16 +30,16 @@ from assembly.sweeps.quantities import Question
 def point_conditions(
     question: Question, robot: Robot, postures: list[Posture], errors: NDArray | None
 ) -> Conditions:
-    """Return the conditions at points of one design, effects applied.
+    """Return the conditions at points of one design, with effects applied.
 
     Args:
-        question: question of the sweep: load, gravity and covariates.
+        question: question of the sweep, with load, gravity and covariates.
         robot: robot of the design.
-        postures: k of them.
-        errors: (k, n, 6) [rad, m] drawn; None for the robot's own.
+        postures: k postures.
+        errors: (k, n, 6) [rad, m] drawn errors; None for the robot's own errors.
 
     Returns:
-        k rows.
+        k rows of conditions.
     """
     many = Posture(
         robot.without_effects(),
@@ -68,15 +68,15 @@ def is_loaded(conditions: Conditions) -> bool:
 
 
 def assemble_rows(conditions: Conditions) -> tuple[Assembly, NDArray, NDArray]:
-    """Return the least energies of all rows under loads.
+    """Return the solutions of least energy of all rows under loads.
 
     Args:
         conditions: k rows of a robot of n frames.
 
     Returns:
-        Assemblies, screws and certificates in the order given; the (k, n, 6) [N m, N]
-        wrenches of the links' springs; and (k, n, 6) the part of them that is the
-        links' own weight.
+        Assemblies, with screws and certificates in the given order; the (k, n, 6) [N m,
+        N] wrenches of the links' springs; and the (k, n, 6) part of these wrenches due
+        to the links' own weight.
     """
     c = conditions
     if not (c.laws or c.yields):
@@ -93,7 +93,7 @@ def assemble_rows(conditions: Conditions) -> tuple[Assembly, NDArray, NDArray]:
 
 
 def _assembled(conditions: Conditions, i: int) -> Assembly | Exception:
-    """Return one point solved separately, or the exception raised."""
+    """Return the solution of one point, or the exception that was raised."""
     try:
         assembly = assemble_row(conditions, i)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:

@@ -1,7 +1,8 @@
 """Properties of a sweep's points that follow from the nominal geometry alone.
 
 They are joint coordinates, distances to singularities, and whether the posture is
-usable: within the joints' limits, regular, and on home's side of all singularities.
+usable, that is within the joints' limits, regular, and not separated from home by a
+singularity.
 """
 
 from collections.abc import Sequence
@@ -17,26 +18,28 @@ from assembly.model.robot import Robot
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.targets import of_joints
 
-_NEAR = 1e-4  # distance below which a posture is examined more closely
+# distance from a singularity below which a posture is examined more closely
+_NEAR = 1e-4
 
 
 def note_geometry(
     question: Question, robot: Robot, goals: NDArray, postures: Sequence[Posture],
     rows: Sequence[range], records: NDArray, near_singularity: dict[int, str],
 ) -> list[tuple[str, str]]:  # fmt: skip
-    """Record the geometry of postures; return which of them are not usable.
+    """Record the geometry of postures; return the postures that are not usable.
 
     Args:
         question: question of the sweep.
         robot: robot of the design.
-        goals: (k, 6) or (k, n) of the k postures, as they were reached.
-        postures: the postures reached.
-        rows: indices of each posture's records.
-        records: records of the points, to fill.
-        near_singularity: by row, the names of nearby singularities, to fill.
+        goals: (k, 6) or (k, n) poses or coordinates of the k postures.
+        postures: the postures that were reached.
+        rows: indices of the records of each posture.
+        records: records of the points, to be filled in.
+        near_singularity: names of nearby singularities by row, to be filled in.
 
     Returns:
-        Status and reason of each, as :func:`assembly.kinematics.verdict.verdicts`.
+        Status and reason of each posture, as in
+        :func:`assembly.kinematics.verdict.verdicts`.
     """
     if not postures:
         return []

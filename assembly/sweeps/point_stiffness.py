@@ -1,8 +1,8 @@
 """K_C at the points of a sweep: nominal, or with errors, loads and clearances.
 
-Errors, loads and clearances do not change the nominal K_C, so draws of a posture share
-it.  A tangent is computed point by point: of problem (22), with its clearances free or
-pressed, or of the exact equilibrium, with its internal forces.
+Errors, loads and clearances do not change the nominal K_C, so the draws of a posture
+share it.  A tangent is computed point by point: of problem (22), with clearances free
+or in contact, or of the exact equilibrium, with its internal forces.
 """
 
 from collections.abc import Mapping
@@ -42,7 +42,7 @@ def stiffness_parts(robot: Robot, state: str) -> tuple[str, ...]:
         state: state of :data:`STATES`.
 
     Returns:
-        Links and joints; for a tangent also pressed clearances, or existing forces.
+        Links and joints; for a tangent also clearances in contact, or existing forces.
     """
     return tuple(map(_name, _parts(robot, state)))
 
@@ -58,7 +58,7 @@ def _parts(robot: Robot, state: str) -> list[Part]:
 
 
 def _name(part: Part) -> str:
-    """Return a part's label."""
+    """Return the label of a part."""
     return f"{part.frame} {part.kind}" if part.frame else "internal forces and loads"
 
 
@@ -71,7 +71,7 @@ def nominal_stiffnesses(
         posture: k postures.
 
     Returns:
-        Quantities by name, k rows each; and the free motions by row.
+        Quantities by name, with k rows each; and the free motions by row.
     """
     many: Any = platform_stiffness(posture)  # of many postures: Stiffnesses
     by_axis = [list(many.shares(axis).values()) for axis in np.eye(6)]
@@ -95,8 +95,8 @@ def tangent_stiffnesses(
         state: ``"contact"`` or ``"exact"``.
 
     Returns:
-        As :func:`nominal_stiffnesses`; NaN without equilibrium, 0 along free motions;
-        and the reasons by row.
+        The quantities of :func:`nominal_stiffnesses`, NaN without equilibrium and 0
+        along free motions; and the reasons by row.
     """
     parts = _parts(conditions.robot, state)
     rows, reasons = [], {}

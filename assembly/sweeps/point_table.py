@@ -1,6 +1,6 @@
-"""Data sets as tables: one row for each point or draw, one column for each component.
+"""Data sets as tables with a row for each point or draw, a column for each component.
 
-``xarray.Dataset.to_dataframe`` multiplies all axes of all variables: a sweep of some
+``xarray.Dataset.to_dataframe`` multiplies all axes of all variables, so a sweep of some
 megabytes becomes tens of millions of rows.
 """
 
@@ -17,29 +17,29 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# variables whose axes are those of the points: of sweeps and draws, and of tolerances
+# variables whose axes are those of the points: in sweeps and draws, in tolerances
 _OF_POINTS = ("status", "tolerance")
 
 
 def point_table(
     data: "xarray.Dataset | Path | str", rows: Sequence[str] = ()
 ) -> "pandas.DataFrame":
-    """Return a data set as a table, one row for each point, draw or tolerance.
+    """Return a data set as a table with one row for each point, draw or tolerance.
 
     Args:
-        data: data of a sweep, of draws or of tolerances; or the path of its file.
+        data: data of a sweep, of draws or of tolerances; or the path of a file.
         rows: axes whose points are the rows, such as ``["quantity", "group"]`` for the
-            importance of errors; those of the sweep's points, the draws or the
-            tolerances' classes if empty.
+            importance of errors; by default the axes of the sweep's points, the draws
+            or the classes of tolerances.
 
     Returns:
-        Table whose columns are (variable, component), component empty for plain
-        numbers; ``table["platform_screw", "TX"]`` is one.  Its index has the axes.
-        Units by variable and axis are in its ``attrs["units"]``.
+        Table whose columns are pairs (variable, component); the component is empty for
+        plain numbers.  For example, ``table["platform_screw", "TX"]`` is a column.  The
+        index has the axes.  ``attrs["units"]`` has the units by variable and axis.
 
     Raises:
-        BadInput: the file cannot be read; an axis is unknown; or ``rows`` is empty and
-            the data set is of none of these kinds.
+        BadInput: the file cannot be read, an axis is unknown, or ``rows`` is empty and
+            the data set is of another kind.
     """
     whose = "table"
     if isinstance(data, str | Path):
@@ -62,9 +62,9 @@ def point_table(
 def write_point_table(
     data: "xarray.Dataset | Path | str", path: Path | str, rows: Sequence[str] = ()
 ) -> None:
-    """Write the table of :func:`point_table` as a CSV file, whole or not at all.
+    """Write the table of :func:`point_table` as CSV, completely or not at all.
 
-    The first column is ``id``, the number of the row from 0; then come the axes and the
+    The first column is ``id``, the number of the row from 0.  The axes follow, and the
     columns, ``variable.component [unit]``.  A missing number is an empty cell.
 
     Args:
@@ -73,7 +73,7 @@ def write_point_table(
         rows: see :func:`point_table`.
 
     Raises:
-        BadInput: as :func:`point_table`; or the file cannot be written.
+        BadInput: for the reasons of :func:`point_table`, or the file cannot be written.
     """
     check_writable(path, TABLE)
     table = point_table(data, rows)

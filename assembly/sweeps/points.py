@@ -1,8 +1,8 @@
-"""Solution of a sweep's points: margins, energy, wrenches, errors, singularities.
+"""Solution of the points of a sweep: margins, energy, wrenches, errors, singularities.
 
-Points are solved in blocks.  A point without a solution has its reason in ``status``
-and ``reason`` and stops no other point.  No point's numbers depend on the others of its
-block.
+Points are solved in blocks.  The reason why a point has no solution is in ``status``
+and ``reason``; other points are still solved.  The results of a point do not depend on
+the other points of its block.
 """
 
 from collections.abc import Iterator, Mapping
@@ -33,6 +33,7 @@ from assembly.model.statuses import (
 from assembly.platform_stiffness.vibration import natural_modes
 from assembly.report.first_order import MOST_ENERGY, off_by
 from assembly.solvers.conic import SolverFailed
+from assembly.steps.bolted import bolted_errors
 from assembly.sweeps.point_conditions import (
     assemble_rows,
     is_loaded,
@@ -61,9 +62,9 @@ class Points:
     """Some points of a sweep.
 
     Attributes:
-        values: (k, p) of the varied parameters.
-        rows: (k, components) of the postures.
-        draws: (k,) number of the draw of errors; not used without sources.
+        values: (k, p) values of the varied parameters.
+        rows: (k, components) components of the postures.
+        draws: (k,) number of the draw of errors; not used without error sources.
     """
 
     values: NDArray
@@ -71,7 +72,7 @@ class Points:
     draws: NDArray
 
     def part(self, some: slice) -> "Points":
-        """Return a selection of the points."""
+        """Return selected points."""
         return Points(self.values[some], self.rows[some], self.draws[some])
 
 
@@ -80,8 +81,9 @@ class SolvedPoints:
     """Results at k points.
 
     Attributes:
-        records: (k,) of :func:`record_type`; NaN where there is no solution.
-        texts: texts by name in :data:`TEXTS`, the text of points that have one.
+        records: (k,) records of :func:`record_type`; NaN where there is no solution.
+        texts: texts by name in :data:`TEXTS`: for each, the text of points that have
+            one.
     """
 
     records: NDArray
@@ -93,10 +95,11 @@ def solve_points(question: Question, points: Points) -> SolvedPoints:
 
     Args:
         question: the quantities.
-        points: consecutive in the sweep, so that points of one posture are adjacent.
+        points: points in the order of the sweep, so that points of one posture are
+            adjacent.
 
     Returns:
-        Rows in the order of the points.
+        Records in the order of the points.
     """
     count = len(points.rows)
     whole = record_of(computed(question))
@@ -116,7 +119,7 @@ def solve_points(question: Question, points: Points) -> SolvedPoints:
 
 
 def _runs(rows: NDArray) -> Iterator[slice]:
-    """Yield the runs of equal rows."""
+    """Yield the ranges of consecutive equal rows."""
     steps = np.flatnonzero(np.any(rows[1:] != rows[:-1], axis=1)) + 1
     edges = [0, *steps.tolist(), len(rows)]
     for first, last in zip(edges, edges[1:], strict=False):
@@ -125,7 +128,7 @@ def _runs(rows: NDArray) -> Iterator[slice]:
 
 @lru_cache(maxsize=4)
 def _robots(question: Question, values: tuple[float, ...]) -> tuple[Robot, Robot]:
-    """Return the robot of a design, and the same without errors."""
+    """Return the robot of a design, and the same robot without errors."""
     robot = question.robot
     if question.design is not None:
         robot = question.design.robot(dict(zip(question.varied, values, strict=True)))
@@ -135,7 +138,7 @@ def _robots(question: Question, values: tuple[float, ...]) -> tuple[Robot, Robot
 def _solve_variant(
     question: Question, points: Points, solved: SolvedPoints, first: int
 ) -> None:
-    """Solve points of one design, into rows ``first`` .. of the results."""
+    """Solve points of one design; records begin at ``first``."""
     count = len(points.rows)
     runs = list(_runs(points.rows))
     starts = [run.start for run in runs]
@@ -162,7 +165,8 @@ def _solve_variant(
             _fail(solved, rows[i], status, reason)
             continue
         reachable += [(row, posture) for row in rows[i]]
-        if status:  # its numbers are right; it is unknown whether the robot gets there
+        # the results are right, but it is unknown whether the robot can reach the pose
+        if status:
             far += [(row, reason) for row in rows[i]]
     if not reachable:
         return
@@ -170,7 +174,7 @@ def _solve_variant(
     postures_reached = [posture for _, posture in reachable]
     errors = None
     if question.sources is not None:
-        errors = _errors(question, points.draws[rows_reached - first])
+        errors = _errors(question, robot, points.draws[rows_reached - first])
     _solve_or_split(
         question, robot, perfect, postures_reached, errors, solved, rows_reached
     )
@@ -205,15 +209,17 @@ def _fail(solved: SolvedPoints, rows: range, status: str, reason: str) -> None:
     solved.texts["reason"].update(dict.fromkeys(rows, reason))
 
 
-def _errors(question: Question, draws: NDArray) -> NDArray:
-    """Return the (k, n, 6) [rad, m] errors of some draws."""
+def _errors(question: Question, robot: Robot, draws: NDArray) -> NDArray:
+    """Return the (k, n, 6) [rad, m] errors of given draws, bolted joints locked in."""
     pages = {page: _page(question, page) for page in np.unique(draws // _PAGE).tolist()}
-    return np.array([pages[d // _PAGE][d % _PAGE] for d in draws.tolist()])
+    own, which = np.unique(draws, return_inverse=True)
+    errors = np.array([pages[d // _PAGE][d % _PAGE] for d in own.tolist()])
+    return bolted_errors(robot, errors)[which]
 
 
 @lru_cache(maxsize=8)
 def _page(question: Question, page: int) -> NDArray:
-    """Return the (256, n, 6) [rad, m] errors of draws 256 page .."""
+    """Return the (256, n, 6) [rad, m] errors of the draws from 256 page on."""
     sources = question.sources
     assert sources is not None
     return sources.errors(sources.draw(page * _PAGE, _PAGE, question.seed))
@@ -223,7 +229,7 @@ def _solve_reached(
     question: Question, robot: Robot, perfect: Robot, postures: list[Posture],
     errors: NDArray | None, solved: SolvedPoints, rows: NDArray,
 ) -> None:  # fmt: skip
-    """Solve points whose posture exists; most failures become a status here."""
+    """Solve points whose posture exists; most failures become a status."""
     out = solved.records
     conditions = point_conditions(question, robot, postures, errors)
     if robot.has_effects:
@@ -274,7 +280,7 @@ def _solve_reached(
 def _solved_rows(
     energies: Assembly, failed: Mapping[int, str], solved: SolvedPoints, rows: NDArray
 ) -> list[int]:
-    """Return the points with a solution; keep status and reason of the others."""
+    """Return the points with a solution; record status and reason of the others."""
     ok = []
     for i, row in enumerate(rows.tolist()):
         status, reason = energies.status[i], energies.reason[i]
@@ -308,7 +314,7 @@ def _record_wrenches(
 def _record_stiffness(
     state: str, conditions: Conditions, solved: SolvedPoints, rows: NDArray
 ) -> None:
-    """Record K_C: the nominal one per posture, tangents per point."""
+    """Record K_C: the nominal stiffness for each posture, tangents for each point."""
     T = conditions.transforms
     runs = list(_runs(T.reshape(len(T), -1)))
     if state == "nominal":
@@ -329,7 +335,7 @@ def _record_frequencies(
     count: int, robot: Robot, conditions: Conditions, solved: SolvedPoints,
     rows: NDArray,
 ) -> None:  # fmt: skip
-    """Record natural frequencies per posture, as K_C; NaN beyond the existing modes."""
+    """Record natural frequencies for each posture; NaN beyond the existing modes."""
     T = conditions.transforms
     for run in _runs(T.reshape(len(T), -1)):
         i = run.start
@@ -339,12 +345,12 @@ def _record_frequencies(
         try:
             frequencies = natural_modes(there, count).frequencies
         except BadInput:
-            continue  # no part with a mass moves there
+            continue  # no part with a mass moves in these modes
         solved.records["frequency"][rows[run], : len(frequencies)] = frequencies
 
 
 def _record_bounds(bounds: PoseError, solved: SolvedPoints, rows: NDArray) -> None:
-    """Record bounds of (27) where (22) has a solution; a failure fails the point."""
+    """Record bounds of (27) where (22) has a solution; failures mark the point."""
     out = solved.records
     for i in np.flatnonzero(out["status"][rows] == 0).tolist():
         row = int(rows[i])
@@ -384,7 +390,7 @@ def _compare_finite(
         assert isinstance(exact, ExactAssembly)
         difference = exact.linearisation_error
     except (SolverFailed, CannotAssemble) as error:
-        # the linear solution remains valid: only its error is unknown
+        # the linear solution remains valid; only its linearisation error is unknown
         solved.texts["reason"][row] = f"linearisation error unknown: {error}"
         return
     if abs(difference.relative_energy) > MOST_ENERGY:

@@ -1,4 +1,4 @@
-"""The quantities of a sweep: those that may be requested, and their table."""
+"""The quantities that a sweep can compute, and their table."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,33 +23,34 @@ BY_CLEARANCE = ("rotation_error_clearance", "translation_error_clearance")
 FINITE = ("linearisation_rotation", "linearisation_translation", "linearisation_energy")
 STRESS = ("stress", "stress_error", "safety")
 
-_READING = ("registration", "drift")  # effects that change readings, not screws
+_READING = ("registration", "drift")  # effects that change readings but not screws
 
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """The quantities requested at every point; sent to each worker once.
+    """The quantities requested at every point; sent once to each worker.
 
     robot: robot with its errors, which are used if none are drawn.
-    design: its parameters, if some vary; otherwise None.
-        design: its parameters, if some vary; else None.
+    design: design parameters of the robot, if some vary.
+        design: design parameters of the robot, if some vary; otherwise None.
         varied: paths of the varied parameters.
         components: components of the postures, see :mod:`assembly.sweeps.targets`.
-        sources: sources of drawn errors; None for the robot's own.
+        sources: sources of drawn errors; None if the robot's own errors are used.
         seed: seed of the draws.
-        assumption: assumption of problem (27), or None to leave its bounds out.
-        clearance_only: bound (27) also for the robot without errors.
-        wrenches: frames whose wrench is recorded.
-        linearisation: compare each point with finite motions.
-        near: distance below which a singularity is named.
+        assumption: assumption of problem (27); None if its bounds are not computed.
+        clearance_only: whether (27) is also bounded for the robot without errors.
+        wrenches: frames whose wrenches are recorded.
+        linearisation: whether each point is compared with finite motions.
+        near: distance below which a singularity is reported.
         strength: [Pa] yield strength of the links; stress and safety are then computed.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
-        under: covariates that the robot's effects depend on.
+        under: covariates on which the robot's effects depend.
         stiffness: state of K_C, in :data:`assembly.sweeps.point_stiffness.STATES`, if
-            K_C and the shares of its parts are computed too; otherwise empty.
-        frequencies: number of natural frequencies, of the same K_C and declared masses.
-        kept: names of the variables that are stored; all that are computed if empty.
+            K_C and the shares of its parts are computed; otherwise empty.
+        frequencies: number of natural frequencies, from the same K_C and declared
+            masses.
+        kept: names of the variables that are stored; by default all computed ones.
     """
 
     robot: Robot
@@ -88,9 +89,9 @@ class Variable:
     """One quantity of a data set.
 
     Attributes:
-        dims: axes beside those of the points, with their labels.
-        quantity: of the table of quantities.
-        condition: under which it is computed; it follows the meaning.
+        dims: axes in addition to those of the points, with their labels.
+        quantity: entry in the table of quantities.
+        condition: condition of the computation, which follows the meaning.
     """
 
     dims: Mapping[str, tuple[str, ...]]
@@ -105,7 +106,7 @@ class Variable:
 
 
 def _variable(name: str, condition: str = "", **labels: tuple[str, ...]) -> Variable:
-    """A quantity of the table over its dimensions, all labelled."""
+    """Return a quantity of the table, with labels for its dimensions."""
     known = QUANTITIES[name]
     every = {**LABELS, **labels}
     dims = {dim: every[dim] for dim in (*labels, *known.dims)}
@@ -119,7 +120,7 @@ def variables(question: Question) -> dict[str, Variable]:
         question: question of a sweep.
 
     Returns:
-        All but ``status`` and the texts.
+        All quantities except ``status`` and the texts.
     """
     table = computed(question)
     return {k: v for k, v in table.items() if not question.kept or k in question.kept}
@@ -132,7 +133,7 @@ def computed(question: Question) -> dict[str, Variable]:
         question: question of a sweep.
 
     Returns:
-        All but ``status`` and the texts.
+        All quantities except ``status`` and the texts.
     """
     names = [
         "margin", "margin_free", "energy", "platform_screw", "closure_residual",
@@ -172,7 +173,7 @@ def _moving(robot: Robot) -> tuple[str, ...]:
 
 
 def _stiffness_variables(robot: Robot, state: str) -> dict[str, Variable]:
-    """The variables of K_C and of its parts."""
+    """Return the variables of K_C and of its parts."""
     eigen, parts = tuple("123456"), stiffness_parts(robot, state)
     return {
         "compliance": _variable("compliance", f", at its origin, {STATES[state]}"),
@@ -189,7 +190,7 @@ def record_type(question: Question) -> np.dtype:
 
 
 def record_of(table: Mapping[str, Variable]) -> np.dtype:
-    """Return the type of a record of some quantities, and ``status`` as a code."""
+    """Return the type of a record of given quantities, and ``status`` as a code."""
     fields = [
         (name, "<f8", tuple(len(labels) for labels in v.dims.values()))
         for name, v in table.items()

@@ -1,4 +1,4 @@
-"""A sweep from the options of its command, checked before solving; its summary."""
+"""A sweep from the options of its command, with checks; summary of its results."""
 
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
@@ -41,12 +41,12 @@ if TYPE_CHECKING:
     from assembly.model.error_distributions import ErrorSources
     from assembly.sweeps.netcdf import Stored, StoredDataset
 
-_MODES = 100  # largest number of natural frequencies
+_MODES = 100  # largest accepted number of natural frequencies
 
 
 @dataclass(frozen=True)
 class SweepOptions:
-    """The options of :func:`assembly.sweeps.robot_sweep.sweep`, by their names."""
+    """The options of :func:`assembly.sweeps.robot_sweep.sweep`, with the same names."""
 
     grid: str | None = None
     poses: Path | str | None = None
@@ -69,17 +69,17 @@ class SweepOptions:
 
 
 def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
-    """Return the sweep that ``forcefit assembly sweep`` would run.
+    """Return the sweep that ``forcefit assembly sweep`` runs with these options.
 
     Args:
         robot: a robot, a robot file, or a built-in name.
         options: options of the command.
 
     Returns:
-        The sweep, with all its options checked.
+        The sweep; all its options have been checked.
 
     Raises:
-        BadInput: an option, a file it names or the robot breaks a rule.
+        BadInput: an option, a file that it names or the robot violates a rule.
     """
     close = closing_of(options.rest, options.mismatch, own_errors=not options.errors)
     if close is not None and options.vary:
@@ -170,7 +170,7 @@ def _check(options: SweepOptions, machine: Robot) -> None:
 def _sources(
     options: SweepOptions, machine: Robot, varied: Mapping[str, NDArray]
 ) -> "ErrorSources | None":
-    """Return the distributions of the errors drawn; None if none are drawn."""
+    """Return the distributions of the drawn errors; None if no errors are drawn."""
     if (options.errors is None) != (options.draws is None):
         raise BadInput(
             "sweep: found only one of --errors and --draws, expected both or neither"
@@ -180,7 +180,7 @@ def _sources(
     from assembly.model.error_distributions import read_sources
 
     closing = options.rest is not None or options.mismatch is not None
-    fixed = machine.errors if closing else None
+    fixed = machine.declared_errors if closing else None
     sources = read_sources(options.errors, machine, fixed)
     drawn = [path for path in varied if ".geometric_error." in path]
     if drawn:
@@ -192,7 +192,7 @@ def _sources(
 
 
 def _short(value: float | str) -> str:
-    """Return a covariate as on the command line."""
+    """Return a covariate in the form of the command line."""
     return value if isinstance(value, str) else f"{value:g}"
 
 
@@ -244,7 +244,7 @@ def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
 
 
 def _command(robot: str | Path, options: SweepOptions) -> str:
-    """Return the command of the same sweep, without options at their default."""
+    """Return the command of the same sweep, without options that have their default."""
     default = {option.name: option.default for option in fields(options)}
     given = {name: getattr(options, name) for name in default} | {
         "load": _assigned((name.lower() for name in WRENCH), options.load),
@@ -265,7 +265,7 @@ def _command(robot: str | Path, options: SweepOptions) -> str:
 
 
 def _assigned(names: Iterable[str], values: Iterable[float]) -> str | None:
-    """Return values as on the command line, without zeros; None if all are zero."""
+    """Return values in the form of the command line, without zeros."""
     given = zip(names, values, strict=True)
     return ",".join(f"{name}={value:g}" for name, value in given if value) or None
 
@@ -277,8 +277,8 @@ def summary_of(data: "xarray.Dataset | StoredDataset") -> dict[str, Any]:
         data: data of a sweep.
 
     Returns:
-        Axes, the number of points of each status, and of each quantity the least,
-        median and largest finite value with its unit; None where no value is finite.
+        Axes; the number of points with each status; for each quantity the smallest,
+        median and largest finite value with its unit, None if no value is finite.
     """
     status = data.data_vars["status"]
     names, counts = np.unique(status.values.astype(str), return_counts=True)
@@ -298,7 +298,7 @@ def summary_of(data: "xarray.Dataset | StoredDataset") -> dict[str, Any]:
 
 
 def _spread(variable: "xarray.DataArray | Stored") -> dict[str, Any] | None:
-    """Return least, median and largest finite value; None where no value is finite."""
+    """Return smallest, median and largest finite value; None if there is none."""
     values = variable.values[np.isfinite(variable.values)]
     if not values.size:
         return None
@@ -309,7 +309,7 @@ def _spread(variable: "xarray.DataArray | Stored") -> dict[str, Any] | None:
 
 
 def summary_text(summary: Mapping[str, Any], data: "StoredDataset") -> str:
-    """Return text of the statuses, and of the first reason for each that is not ok."""
+    """Return a text with the statuses, and the first reason for each that is not ok."""
     lines = [", ".join(f"{name}: {n}" for name, n in summary["status"].items())]
     status = data.data_vars["status"].values.astype(str).ravel()
     for name in summary["status"]:

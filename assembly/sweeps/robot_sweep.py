@@ -55,43 +55,43 @@ def sweep(
         robot: a robot, a robot file, or a built-in name.
         grid: grid such as ``tx=-0.2:0.2:0.025,tz=-0.5``, or
         poses: a table of postures.
-        vary: design parameters, such as ``link_a.link.beam.radius=0.03,0.04``; of a
-            robot file or a built-in name.
+        vary: design parameters, such as ``link_a.link.beam.radius=0.03,0.04``, of a
+            robot file or a built-in robot.
         errors: file with the distributions of the errors, see docs/statistics.md.
         draws: number of draws.
         seed: seed of the draws.
         assumption: assumption of problem (27): ``"frozen"``, ``"free"``, ``"budget"``,
-            or ``"none"`` to leave its bounds out.
-        quantities: names of the data variables to compute and store, with ``"default"``
-            for those that are stored if none are named.  The bounds by clearances alone
-            (``"rotation_error_clearance"``, ``"translation_error_clearance"``) and the
-            changes by finite motions (``"linearisation_rotation"``, ..) are only
-            computed if they are named.
-        wrench_of: frames whose wrench is recorded.
-        near: distance below which a singularity is named.
-        yield_strength: [Pa] of the links, for their stress and safety.
+            or ``"none"`` if its bounds are not computed.
+        quantities: names of the data variables to compute and store; ``"default"``
+            stands for those that are stored if none are named.  The bounds by
+            clearances alone (``"rotation_error_clearance"``,
+            ``"translation_error_clearance"``) and the changes by finite motions
+            (``"linearisation_rotation"``, ..) are only computed if they are named.
+        wrench_of: frames whose wrenches are recorded.
+        near: distance below which a singularity is reported.
+        yield_strength: [Pa] yield strength of the links, for their stress and safety.
         load: (6,) [N m, N] on the platform at its origin, base axes, or by component,
             ``{"fz": -50}``.
         gravity: (3,) [m/s^2] base axes.
-        under: covariates that effects of the robot's file depend on.
-        state: ``"nominal"``, ``"contact"`` or ``"exact"``: compute also K_C in this
-            state, and the shares of links and joints in it.
+        under: covariates on which effects of the robot's file depend.
+        state: ``"nominal"``, ``"contact"`` or ``"exact"``: state in which K_C, and the
+            shares of links and joints in it, are computed too.
         frequencies: number of natural frequencies.
-        rest: a frame that takes up the closures' mismatch at home.
+        rest: frame to which the closures' mismatch at home is added as geometric error.
         mismatch: ``"spring"``: redundant drives that do not fit at home are preloaded.
-        output: NetCDF file to write.  Finished points are kept in
-            ``<output>.journal``; after a kill the same call resumes from it and writes
-            the same file, byte for byte.
-        progress: function called with the number of points done, and of all.
+        output: NetCDF file to write.  Finished points are kept in ``<output>.journal``.
+            After an interruption the same call resumes from it and writes the same
+            file, byte for byte.
+        progress: function called with the number of finished points and of all points.
         solve: function that solves blocks of points; with a file, other processes may
             solve them, see :mod:`assembly.sweeps.cluster`.
 
     Returns:
-        The data set over the axes, with units; all of it in memory, even with a file.
+        The data set over the axes, with units; it is in memory, even with a file.
 
     Raises:
-        BadInput: an option, a file it names or the robot breaks a rule; the journal is
-            another sweep's, another run holds it, or a file cannot be written.
+        BadInput: an option, a file that it names or the robot violates a rule; the
+            journal belongs to another sweep or run; or a file cannot be written.
     """
     if isinstance(quantities, str):
         quantities = (quantities,)

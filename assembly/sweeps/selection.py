@@ -1,4 +1,4 @@
-"""Selection of the quantities that a sweep computes and stores, by variable names."""
+"""Selection of the variables that a sweep computes and stores, by their names."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,8 +14,8 @@ from assembly.sweeps.quantities import (
 )
 from forcefit.inputs.errors import BadInput, nearest, quoted
 
-DEFAULT = "default"  # stands for what is stored where no quantity is named
-MODES = 6  # natural frequencies where their number is not given
+DEFAULT = "default"  # stands for the variables that are stored if none are named
+MODES = 6  # number of natural frequencies if it is not given
 _STIFFNESS = (
     "compliance", "stiffness", "eigen_stiffness", "stiffness_condition", "share",
 )  # fmt: skip
@@ -30,15 +30,15 @@ def select(question: Question, texts: Sequence[str]) -> Question:
     """Restrict a question to named quantities.
 
     Args:
-        question: question of the other options.
-        texts: names of data variables, between commas; ``"default"`` means those that
-            are stored if none are named.
+        question: question from the other options.
+        texts: names of data variables, separated by commas; ``"default"`` stands for
+            those that are stored if none are named.
 
     Returns:
-        The question; nothing is computed for variables that are not named.
+        The question; variables that are not named are not computed.
 
     Raises:
-        BadInput: there is no such variable, or it needs an option that is not given.
+        BadInput: there is no such variable, or it needs an option that is missing.
     """
     every = computed(_with_optional(question))
     kept: list[str] = []

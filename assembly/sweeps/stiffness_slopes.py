@@ -1,4 +1,4 @@
-"""Derivatives of K_C by any number of a robot file, with the file's effects."""
+"""Derivatives of K_C by any number of a robot file, with the effects of the file."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,14 +11,14 @@ from assembly.platform_stiffness.tangent_slopes import TangentState, compliance_
 from assembly.sweeps.parameters import Design
 from forcefit.inputs.table import BadInput
 
-# relative to the number, or of 1 if it is zero: the derivative's error is 1e-8
+# step relative to the number, or to 1 if it is zero; the derivative's error is 1e-8
 _STEP = 1e-4
-_SMALL_STEP = 1e-8  # [rad, m] for errors, because contacts change within some um
+_SMALL_STEP = 1e-8  # [rad, m] step for errors, because contacts change within some um
 _AS_ERROR = {"translation": "t", "rotation": "r"}
 
 
 class CannotChange(BadInput):
-    """A number that cannot change alone: the robot does not exist for other values."""
+    """Error: a number cannot change alone, because no robot exists for other values."""
 
 
 def stiffness_slopes(
@@ -33,23 +33,23 @@ def stiffness_slopes(
 
     Args:
         design: the robot of the file, with its effects.
-        paths: paths of numbers; a frame's name without its leg changes all legs
-            together.
-        pose: nominal platform pose, which is kept.
-        joints: actuated coordinates, which are kept in place of the pose.
+        paths: paths of numbers; a frame's name without its leg changes the number in
+            all legs together.
+        pose: nominal platform pose, which stays the same.
+        joints: actuated coordinates, which stay the same instead of the pose.
         asked: state of the tangent, and its point; the nominal state if absent.
-        under: covariates that effects depend on.
+        under: covariates on which effects depend.
 
     Returns:
-        By path, (6, 6) dC [rad/(N m) .. m/N per unit of the number], base axes; NaN
-        where a motion of the platform is free, or at a change of contact.
+        By path, (6, 6) derivative dC [rad/(N m) .. m/N per unit of the number], base
+        axes; NaN where a motion of the platform is free, or at a change of contact.
 
     Raises:
-        BadInput: no such number.
-        CannotChange: the robot or its posture does not exist a step away, as with a
-            length in an overconstrained loop.
-        CannotAssemble: the errors cannot be closed.
-        FreeMotion: a load drives a motion that nothing resists.
+        BadInput: there is no such number.
+        CannotChange: the robot or its posture does not exist for a changed number, for
+            example a length in an overconstrained loop.
+        CannotAssemble: the closures cannot be closed with these errors.
+        FreeMotion: a load acts along a motion without stiffness.
         SolverFailed: no equilibrium was found.
     """
     state = asked or TangentState()
@@ -85,7 +85,7 @@ def stiffness_slopes(
 
 
 def _cannot_change(path: str, reason: str) -> str:
-    """Return a message: the number, the reason, and a number to use in its place."""
+    """Return a message with the number, the reason, and an alternative number."""
     frame, *keys = path.rsplit(".", 2)
     instead = ""
     if len(keys) == 2 and keys[0] in _AS_ERROR and keys[1] in {"x", "y", "z"}:

@@ -1,7 +1,7 @@
-"""A sweep over postures, draws of errors and designs, to one data set.
+"""Solution of a sweep over postures, draws of errors and designs, to one data set.
 
-A sweep's points are its designs x postures x draws, draws innermost.  They are divided
-into blocks that are solved and journalled in any order, by any process.  No number
+The points of a sweep are its designs x postures x draws; draws vary fastest.  They are
+divided into blocks that are solved and stored in any order, by any process.  No result
 depends on the process or on earlier blocks.
 """
 
@@ -37,7 +37,7 @@ def solve_here(
     sweep: Sweep, blocks: Iterable[int]
 ) -> Iterator[tuple[int, SolvedPoints]]:
     """Solve blocks one after the other, on one thread."""
-    # more threads take longer for small matrices, and sum in another order
+    # more threads take longer for small matrices, and add up in another order
     with threadpool_limits(1), _interrupts_noted() as noted:
         for block in blocks:
             yield block, solve_points(sweep.question, sweep.points(block))
@@ -47,7 +47,7 @@ def solve_here(
 
 @contextmanager
 def _interrupts_noted() -> Generator[list[int], None, None]:
-    """Record a first Ctrl-C, to finish the block; stop immediately at a second."""
+    """Record a first Ctrl-C so that the block is finished; stop at once at a second."""
     noted: list[int] = []
     if threading.current_thread() is not threading.main_thread():
         yield noted
@@ -72,26 +72,24 @@ def run_sweep(
     solve: Solver = solve_here,
     held: ExitStack | None = None,
 ) -> None:
-    """Solve a sweep into a NetCDF file, resumed from its journal if there is one.
+    """Solve a sweep into a NetCDF file; resume from its journal if there is one.
 
-    The journal, ``<path>.journal``, holds every finished block.  After a kill the same
-    sweep resumes from it and writes the same file, byte for byte.
+    The journal, ``<path>.journal``, holds every finished block.  After an interruption
+    the same sweep resumes from it and writes the same file, byte for byte.
 
     Args:
-        sweep: to be solved.
-        path: path of the file; it appears when it is complete, and the journal is
-            removed.
-        progress: called at the start and after each block with the number of points
-            that are in the journal, and of all.
+        sweep: sweep to solve.
+        path: path of the file; when it is complete, the journal is removed.
+        progress: called at the start and after each block with the number of points in
+            the journal and of all points.
         solve: function that solves blocks: :func:`solve_here`, or
             :mod:`assembly.sweeps.cluster`.
         held: context that keeps the journal until it is closed, while further results
-            are computed from the file: after a kill the same sweep has no block to
-            solve again.
+            are computed from the file; after an interruption no block is solved again.
 
     Raises:
-        BadInput: the journal is another sweep's, another run holds it, or a file
-            cannot be written.
+        BadInput: the journal belongs to another sweep or run, or a file cannot be
+            written.
     """
     path = Path(path)
     kind = record_type(sweep.question)
@@ -128,8 +126,8 @@ def sweep_in_memory(
     """Solve a sweep without a file.
 
     Args:
-        sweep: to be solved.
-        progress: called after each block with the number of points done, and of all.
+        sweep: sweep to solve.
+        progress: called after each block with the number of finished and of all points.
 
     Returns:
         The data set that :func:`run_sweep` would write.
@@ -155,18 +153,18 @@ def sweep_poses(
 
     Args:
         robot: robot with its errors, clearances and stiffnesses.
-        axes: values [m or rad] by pose component or ``q.<frame>``; components not named
+        axes: values [m or rad] by pose component or ``q.<frame>``; omitted components
             are free.
-        progress: called after each block with the number of points done, and of all.
+        progress: called after each block with the number of finished and of all points.
         assumption: assumption of problem (27): ``"frozen"``, ``"free"`` or
-            ``"budget"``; None leaves the bounds of the pose error out.
+            ``"budget"``; None if the bounds of the pose error are not computed.
 
     Returns:
         Data set over the axes: ``margin``, ``margin_free``, ``energy``,
-        ``platform_screw``, with an assumption ``rotation_error`` and
-        ``translation_error`` (lower and upper), certificates, distances to
-        singularities and ``status``; NaN where there is no solution, with the reason as
-        status.
+        ``platform_screw``; with an assumption ``rotation_error`` and
+        ``translation_error`` (lower and upper); certificates, distances to
+        singularities and ``status``.  NaN where there is no solution; the status is
+        then the reason.
     """
     targets = grid_targets(axes)
     question = Question(robot, components=targets.names, assumption=assumption)
@@ -174,5 +172,5 @@ def sweep_poses(
 
 
 def assemblable(data: "xarray.Dataset", key: str = "margin_free") -> NDArray:
-    """Return a bool array over the grid: inside the assembly zone by the margin."""
+    """Return a bool array over the grid: True inside the assembly zone."""
     return np.asarray(data[key] <= ASSEMBLABLE)

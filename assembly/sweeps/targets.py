@@ -1,8 +1,8 @@
 """The postures of a sweep: a grid of poses or joint coordinates, or a list of them.
 
 A grid has an axis for each named component; a list has one axis, ``posture``.  Names
-are ``tx ty tz rx ry rz`` for the platform's pose, or ``q.<frame>`` for the coordinate
-of an actuated joint, never both.  A list may also write ``pose.tx``, as campaigns do.
+are either ``tx ty tz rx ry rz`` for the platform's pose, or ``q.<frame>`` for the
+coordinate of an actuated joint.  A list may also use ``pose.tx``, as campaigns do.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,8 @@ from assembly.kinematics.posture import POSE
 from assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, nearest, quoted, read_rows
 
-LARGEST_GRID = 10_000_000  # largest number of points; more is a mistaken step
+# largest number of points; a larger grid is probably due to a wrong step
+LARGEST_GRID = 10_000_000
 _JOINT = "q."
 
 
@@ -26,8 +27,8 @@ class Targets:
 
     Attributes:
         names: names of the components, ``tx`` .. or ``q.<frame>``.
-        values: for a grid, the values on each component's axis, for a list those
-            of each posture [m or rad].
+        values: for a grid, the values on the axis of each component; for a list, the
+            values of each posture [m or rad].
         labels: labels of the postures of a list; None for a grid.
     """
 
@@ -48,7 +49,7 @@ class Targets:
         return self.names if self.labels is None else ("posture",)
 
     def at(self, numbers: NDArray) -> NDArray:
-        """Return the (k, components) values of postures by their numbers."""
+        """Return the (k, components) values of postures, given by numbers."""
         if self.labels is not None:
             return np.stack([v[numbers] for v in self.values], axis=1)
         places = np.unravel_index(numbers, self.shape)
@@ -57,12 +58,12 @@ class Targets:
 
 
 def goals_of(names: Sequence[str], robot: Robot, rows: NDArray) -> NDArray:
-    """Return the poses or coordinates as :mod:`assembly.kinematics.posture` takes them.
+    """Return poses or coordinates in the form of :mod:`assembly.kinematics.posture`.
 
     Args:
-        names: names of the components, of one kind.
+        names: names of the components, all of one kind.
         robot: robot of n frames.
-        rows: (k, components) of :meth:`Targets.at`.
+        rows: (k, components) values from :meth:`Targets.at`.
 
     Returns:
         (k, 6) poses, NaN where free; or (k, n) coordinates, NaN where passive.
@@ -78,7 +79,7 @@ def goals_of(names: Sequence[str], robot: Robot, rows: NDArray) -> NDArray:
 
 
 def of_joints(names: Sequence[str]) -> bool:
-    """Return whether components are joint coordinates, not a pose."""
+    """Return whether components are joint coordinates instead of a pose."""
     return any(name.startswith(_JOINT) for name in names)
 
 
@@ -88,7 +89,7 @@ def grid_targets(axes: Mapping[str, NDArray]) -> Targets:
 
 
 def unit_of_target(name: str, robot: Robot) -> str:
-    """Return ``"m"`` or ``"rad"``."""
+    """Return the unit of a component, ``"m"`` or ``"rad"``."""
     if name.startswith(_JOINT):
         frame = robot.frame(name.removeprefix(_JOINT))
         return "m" if frame.joint == "prismatic" else "rad"
@@ -96,19 +97,19 @@ def unit_of_target(name: str, robot: Robot) -> str:
 
 
 def parse_grid(text: str, robot: Robot | None = None) -> dict[str, NDArray]:
-    """Return the axes of a grid from text, ``"tx=-0.2:0.2:0.025,tz=-0.6:-0.3:0.025"``.
+    """Return the axes of a grid given as ``"tx=-0.2:0.2:0.025,tz=-0.6:-0.3:0.025"``.
 
     Args:
-        text: for each component ``start:stop:step`` [m or rad], or one number.
-            Both ends count when (stop - start)/step is whole within 1e-9.
-        robot: robot with actuated joints ``q.<frame>`` that may be named; none if
-            absent.
+        text: for each component ``start:stop:step`` [m or rad], or one number.  Both
+            ends are included if (stop - start)/step is an integer within 1e-9.
+        robot: robot with actuated joints ``q.<frame>`` that may be named; None if only
+            poses are allowed.
 
     Returns:
-        Values by component, in the order given.
+        Values by component, in the given order.
 
     Raises:
-        BadInput: the text has another form, or gives too many points.
+        BadInput: the text has a different form, or gives too many points.
     """
     axes: dict[str, NDArray] = {}
     for part in text.split(","):
@@ -133,7 +134,7 @@ def _check_name(whose: str, what: str, name: str, robot: Robot | None) -> None:
 
 
 def _check_kind(whose: str, names: Mapping | Sequence[str]) -> None:
-    """Reject poses together with joints."""
+    """Reject components of a pose together with joint coordinates."""
     joints = [name for name in names if name.startswith(_JOINT)]
     if joints and len(joints) < len(names):
         other = next(name for name in names if not name.startswith(_JOINT))
@@ -143,17 +144,17 @@ def _check_kind(whose: str, names: Mapping | Sequence[str]) -> None:
 
 
 def parse_values(whose: str, spec: str) -> NDArray:
-    """Return the values written ``start:stop:step``, or as one number.
+    """Return the values given as ``start:stop:step``, or as one number.
 
     Args:
         whose: place of the text, for messages.
         spec: the text.
 
     Returns:
-        The values; both ends where the step fits within 1e-9.
+        The values, with both ends if the step fits within 1e-9.
 
     Raises:
-        BadInput: the text has another form, or gives too many points.
+        BadInput: the text has a different form, or gives too many points.
     """
     expected = "expected START:STOP:STEP or one number"
     try:
@@ -176,13 +177,14 @@ def parse_values(whose: str, spec: str) -> NDArray:
     return start + step * np.arange(int(np.floor(count + 1e-9)) + 1)
 
 
-def read_targets(path: Path | str, robot: Robot) -> Targets:
+def read_targets(path: Path | str, robot: Robot, extra: Sequence[str] = ()) -> Targets:
     """Return the postures of a table: columns ``pose.tx`` or ``q.<frame>``, ``id``.
 
     Args:
-        path: CSV file with a header, one row a posture.
-        robot: robot with actuated joints that may be columns; joints without one keep
+        path: CSV file with a header and one row for each posture.
+        robot: robot whose actuated joints may be columns; joints without a column keep
             their ``position``.
+        extra: names of further columns of numbers, returned among the components.
 
     Returns:
         The postures in the order of the file.
@@ -200,12 +202,14 @@ def read_targets(path: Path | str, robot: Robot) -> Targets:
     header = [cell.strip() for cell in rows[0][1]]
     names = [cell.removeprefix("pose.") for cell in header if cell != "id"]
     for name in names:
-        _check_name(f"{path}: line 1", "column", name, robot)
+        if name not in extra:
+            _check_name(f"{path}: line 1", "column", name, robot)
         if names.count(name) > 1 or header.count("id") > 1:
             raise BadInput(f"{path}: line 1: a column is given twice: {quoted(name)}")
-    if not names:
+    components = [name for name in names if name not in extra]
+    if not components:
         raise BadInput(f"{path}: line 1: found no posture; expected pose.tx, .. or q.*")
-    _check_kind(f"{path}: line 1", names)
+    _check_kind(f"{path}: line 1", components)
     values, labels = np.empty((len(rows) - 1, len(names))), []
     for i, (line, cells) in enumerate(rows[1:]):
         if len(cells) != len(header):

@@ -1,4 +1,4 @@
-"""Every command: parse, call one function, print or save.
+"""The commands: each parses its options, calls one function, and prints or saves.
 
-Begin at ``app.py``; ``options.py`` has the options that commands share.
+Begin at ``app.py``; ``options.py`` has the options that several commands share.
 """

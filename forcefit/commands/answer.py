@@ -1,4 +1,4 @@
-"""How a command ends: its results are written and printed; its exit status follows."""
+"""Last step of a command: results are written and printed, the exit status is set."""
 
 from typing import Any
 
@@ -8,13 +8,13 @@ from forcefit.inputs.writing import write_json
 
 
 def answer(results: dict[str, Any], text: str, status: str, json: str | None) -> None:
-    """Write and print results; exit with status 1 where the status is not ok.
+    """Write and print results; exit with status 1 if their status is not ok.
 
     Args:
         results: plain values.
-        text: the same for people.
-        status: of the results.
-        json: target of the results, as of ``write_json``.
+        text: the results as text.
+        status: status of the results.
+        json: target of the JSON, as in ``write_json``.
 
     Raises:
         typer.Exit: the status is not ok.

@@ -1,4 +1,4 @@
-"""The command ``forcefit``: mounts the three packages' commands, plus ``study``."""
+"""The command ``forcefit`` with the commands of the three packages, and ``study``."""
 
 import io
 import signal
@@ -14,9 +14,11 @@ from typing import Annotated
 import typer
 
 from forcefit.commands import assembly, report, stiffness, validation
+from forcefit.commands.check import check
 from forcefit.commands.convert import convert
 from forcefit.commands.example import example
 from forcefit.commands.help import Commands
+from forcefit.commands.new import new
 from forcefit.commands.old_names import with_new_names
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars, report_loading
@@ -43,8 +45,10 @@ app.add_typer(
     help="Validation by simulation and measured data.",
 )
 app.add_typer(report.app, name="report", help="Comparison of two runs.")
+app.command()(check)
 app.command()(convert)
 app.command()(example)
+app.command()(new)
 app.command()(schema)
 
 
@@ -85,7 +89,7 @@ def study(
 ) -> None:
     """Run every check of a study file and write one report.
 
-    Writes report.html (self-contained), results.json and results.nc into the folder
+    Writes report.html (self-contained), results.json and results.nc to the folder that
     the study file names.  Exit status 1 if a check fails.
     """
     from validation.study.report import results_table, verdict, write_study
@@ -108,16 +112,18 @@ def study(
 
 
 def main() -> None:
-    """Run the command; bad input is one line on stderr and exit status 2."""
+    """Run the command; bad input gives one line on stderr and exit status 2."""
     if not sys.warnoptions:
-        # libraries' warnings are for programmers; ``python -W default -m forcefit``
+        # warnings of libraries are for programmers; ``python -W default -m forcefit``
+        # shows them
         warnings.simplefilter("ignore")
     _print_any_letter()
     report_loading()
     with _interrupts() as interrupts:
         try:
             with naming_packages():
-                # in place: a report's provenance then names the present options
+                # changed in place, so that the provenance in a report has the present
+                # option names
                 sys.argv[1:] = with_new_names(sys.argv[1:])
                 status = app(prog_name="forcefit", standalone_mode=False)
         except BaseException as error:
@@ -126,9 +132,10 @@ def main() -> None:
 
 
 def _print_any_letter() -> None:
-    r"""Print characters that standard output's encoding lacks as ``\u03a9``.
+    r"""Print characters that are not in the encoding of standard output as ``\u03a9``.
 
-    As stderr does: on Windows the encoding of a file or a pipe has 256 letters.
+    Standard error does this too.  On Windows the encoding of a file or a pipe has only
+    256 characters.
     """
     out = sys.stdout
     if isinstance(out, io.TextIOWrapper) and out.errors == "strict":
@@ -147,10 +154,11 @@ def _status_after(error: BaseException, interrupted: bool) -> int:
         case BrokenPipeError():
             sys.stderr.close()
             return 1
-    # an option misspelt or missing: the parser's own kind of error
+    # misspelt and missing options raise an error of the parser
     if not hasattr(error, "format_message"):
         raise error
-    if type(error).__name__ == "NoArgsIsHelpError":  # its message is the help
+    # the message of this error is the help
+    if type(error).__name__ == "NoArgsIsHelpError":
         print(error.format_message(), file=sys.stderr)
         return 2
     return _complain(_with_found(error.format_message(), error), 2)
@@ -160,9 +168,8 @@ def _status_after(error: BaseException, interrupted: bool) -> int:
 def _interrupts() -> Generator[list[int], None, None]:
     """Record Ctrl-C, and raise it as usual.
 
-    Compiled code that is interrupted fails with errors of its own, such as matplotlib's
-    ``ValueError: Invalid bounding box``; the record shows their
-    cause.
+    Interrupted compiled code may raise a different error, such as matplotlib's
+    ``ValueError: Invalid bounding box``; the record shows the actual cause.
     """
     recorded: list[int] = []
     usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -182,7 +189,7 @@ def _interrupts() -> Generator[list[int], None, None]:
 
 
 def _with_found(message: str, error: BaseException) -> str:
-    """Return a parser's message with the refused value, which newer parsers omit."""
+    """Return a parser's message with the refused value, which new parsers omit."""
     refused: list[dict] = getattr(error.__cause__, "errors", list)()
     values = [str(one.get("input")) for one in refused[:1] if one.get("input")]
     return "; ".join([message, *(f"found {quoted(v)}" for v in values)])

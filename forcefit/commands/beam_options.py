@@ -1,4 +1,4 @@
-"""The options of a beam."""
+"""The options that describe a beam."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from stiffness.link import LinkStiffness
 
 @dataclass(frozen=True)
 class BeamOptions:
-    """The options of a beam; absent values are None."""
+    """The options that describe a beam; absent values are None."""
 
     young: float
     poisson: float
@@ -36,7 +36,7 @@ class BeamOptions:
         return E, checked("--poisson", self.poisson, "1", above=-1, below=0.5)
 
     def declared(self) -> dict[str, float]:
-        """Return the section's lengths [m] or constants by name."""
+        """Return the lengths [m] or constants of the section by name."""
         plain = {
             "radius": self.radius,
             "inner_radius": self.inner_radius,
@@ -79,12 +79,12 @@ class BeamOptions:
         return given
 
     def section(self) -> Section:
-        """Return the section of the options."""
+        """Return the section that the options describe."""
         _, nu = self.material()
         return declared_section(self.declared(), nu)
 
     def checked_theory(self) -> str:
-        """Return the name of a beam theory."""
+        """Return a valid name of a beam theory."""
         if self.theory not in THEORIES:
             raise BadInput(
                 f"--theory: found {describe(self.theory)}"
@@ -95,7 +95,7 @@ class BeamOptions:
     def link(
         self, base: NDArray, tip: NDArray, up: NDArray | None = None
     ) -> LinkStiffness:
-        """Return the beam between two points, in the axes they are given in."""
+        """Return the beam between two points, in the axes of these points."""
         E, nu = self.material()
         theory = self.checked_theory()
         C = beam_compliance(

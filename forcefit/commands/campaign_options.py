@@ -1,20 +1,30 @@
-"""Options of the commands that plan or simulate a campaign: ranges and noise."""
+"""Options of commands that plan or simulate a campaign: ranges and noise."""
 
 from typing import Annotated
 
 import typer
 
 Reach = Annotated[
-    float, typer.Option(help="[rad] Largest change of a drive from home.")
+    float,
+    typer.Option(
+        help="[rad] Largest change of a revolute drive from its home position."
+    ),
 ]
 Stroke = Annotated[
-    float, typer.Option(help="[m/rad] Travel of a sliding drive per rad of reach.")
+    float,
+    typer.Option(help="[m/rad] Travel of a prismatic drive for each rad of --reach."),
 ]
 Force = Annotated[float, typer.Option(help="[N] Largest force on the platform.")]
 Temperature = Annotated[
-    str, typer.Option(help="Temperature over the rows: swing | around | constant.")
+    str,
+    typer.Option(
+        help="Course of the temperature: swing (-0.5 to 6.5 K) | "
+        "around (-4 to 4 K) | constant (6 K)."
+    ),
 ]
-CommandedIn = Annotated[str, typer.Option(help="Commanded quantities: joints | pose.")]
+CommandedIn = Annotated[
+    str, typer.Option(help="Quantities that are commanded: joints | pose.")
+]
 RotationNoise = Annotated[
     float, typer.Option(help="[rad] Standard deviation of a rotation reading.")
 ]

@@ -1,4 +1,4 @@
-"""The command ``forcefit stiffness compare``: finite elements against beams."""
+"""The command ``forcefit stiffness compare``: finite elements compared with beams."""
 
 from functools import partial
 from pathlib import Path
@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     from forcefit.commands.beam_options import BeamOptions
 
 CurveFile = Annotated[
-    Path | None, typer.Option("--curve", help="A beam along a curve (TOML).")
+    Path | None,
+    typer.Option("--curve", help="File with the pieces of a curved beam (TOML)."),
 ]
 
 
@@ -47,8 +48,8 @@ def compare(
     ratios: Annotated[
         str | None,
         typer.Option(
-            help="Instead of a SURFACE: straight bars of the section with these "
-            "slenderness ratios L / r, such as 5,10,20,40."
+            help="Instead of a SURFACE: compare straight bars of the section with "
+            "these slenderness ratios L / r, such as 5,10,20,40."
         ),
     ] = None,
     radius: Radius = None,
@@ -78,11 +79,11 @@ def compare(
     figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compare K_E by finite elements with a beam's, entry by entry.
+    """Compare K_E by finite elements with K_E of a beam.
 
-    The beam of a SURFACE is straight, of the section given, or along a curve.  With
+    The beam of a SURFACE is straight with the given section, or follows a curve.  With
     --ratios the end effect is fitted to bars of several L / r, where r is twice the
-    section's larger radius of gyration, the radius of a round bar.
+    section's larger radius of gyration (the radius of a round bar).
     """
     from forcefit.commands.beam_options import BeamOptions
 
@@ -114,7 +115,7 @@ def compare(
 
 
 def _check_no_surface(**values: object) -> None:
-    """Refuse options of a SURFACE where bars are compared."""
+    """Refuse options of a SURFACE if bars are compared."""
     for name, value in values.items():
         if value is not None:
             option = name if name == "SURFACE" else f"--{name}"
@@ -128,7 +129,7 @@ def _compare_surface(
     options: "BeamOptions", mesh: tuple[Path, str | None, str | None, str, float, str],
     curve: Path | None, up: str | None, figure: Path | None, json: str | None,
 ) -> None:  # fmt: skip
-    """Compare finite elements of a surface with a beam."""
+    """Compare the finite elements of a surface with a beam."""
     from stiffness.fem.fea import FemOptions, mesh_link
     from stiffness.fem.material import Material
     from stiffness.report.compare import compare_link
@@ -167,7 +168,7 @@ def _compare_bars(
     options: "BeamOptions", ratios: str, accuracy: float, interface: str,
     figure: Path | None, json: str | None,
 ) -> None:  # fmt: skip
-    """Compare finite elements of a section's bars with beams over L / r."""
+    """Compare the finite elements of bars with beams of the same section over L / r."""
     from forcefit.commands.options import parse_sizes
     from stiffness.report.results import sweep_results, sweep_text
     from stiffness.report.slenderness import sweep_slenderness

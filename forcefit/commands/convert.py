@@ -1,4 +1,4 @@
-"""The command ``forcefit convert``: robots of other programs, in and out."""
+"""The command ``forcefit convert``: robots from and to other programs."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from forcefit.commands.options import JsonOption, MismatchOption, RestOption
+from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import write_json
 
 
@@ -23,11 +24,19 @@ def convert(
             "-o", "--output", help="File to write: .toml, .urdf or .xml (MJCF)."
         ),
     ],
+    version: Annotated[
+        int,
+        typer.Option(
+            "--format",
+            help="Format of a robot file: 1, frames and closures, or 2, bodies and "
+            "joints by points and axes.",
+        ),
+    ] = 1,
     loops: Annotated[
         Path | None,
         typer.Option(
-            help="Loops and drives of a URDF (YAML, closed_loop). Default: the YAML "
-            "file of the URDF's name, or robot.yaml, in its folder."
+            help="File with loops and drives of a URDF (YAML, closed_loop). Default: "
+            "a YAML file in the same folder, with the name of the URDF or robot.yaml."
         ),
     ] = None,
     overlay: Annotated[
@@ -56,12 +65,14 @@ def convert(
     from assembly.exchange.convert import convert as convert_robot
     from assembly.kinematics.closing import closing_of
 
+    if version not in (1, 2):
+        raise BadInput(f"--format: found {version}, expected 1 or 2")
     named = None
     if points is not None:
         names = [name.strip() for name in points.split(",")]
         named = [] if names == ["none"] else names
     close = closing_of(rest, mismatch)
-    conversion = convert_robot(source, output, loops, overlay, named, close)
+    conversion = convert_robot(source, output, loops, overlay, named, close, version)
     write_json(conversion.table(), json)
     if json != "-":
         print(conversion.text())

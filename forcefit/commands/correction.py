@@ -1,6 +1,6 @@
 """The commands ``forcefit validation predict``, ``carry``, ``compensate``, ``explain``.
 
-Each parses, calls one function, prints or saves.
+Each command parses its options, calls one function, and prints or saves.
 """
 
 import sys
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 CommandsArgument = Annotated[
     Path,
-    typer.Argument(metavar="CAMPAIGN|CSV", help="Commands; readings may be missing."),
+    typer.Argument(metavar="CAMPAIGN|CSV", help="Commands, with or without readings."),
 ]
 
 
@@ -42,10 +42,10 @@ def predict(
 ) -> None:
     """Predict the readings of a campaign or a table.
 
-    Geometric errors, effects and functions of the robot's file are applied; readings
-    have intervals where the file states uncertainties.  Where rows are measured, the
-    error of the prediction is printed.  Exit status 1 if a row has no answer; its cells
-    are empty.
+    Geometric errors, effects and functions of the robot's file are applied.  Readings
+    have intervals if the file states uncertainties.  The error of the prediction is
+    printed for measured rows.  Exit status 1 if a row has no solution; its cells are
+    empty.
     """
     from assembly.exchange.robot_files import load_robot
     from forcefit.results.text import readings_text
@@ -71,7 +71,7 @@ def predict(
 
 
 def _about(table: dict[str, Any]) -> list[str]:
-    """Return lines on the basis of a prediction."""
+    """Return lines on the assumptions and the uncertainty of a prediction."""
     from forcefit.results.text import readings_text
 
     lines = []
@@ -103,7 +103,7 @@ def compensate(
     targets: Annotated[
         Path,
         typer.Argument(
-            metavar="TARGETS", help="Commands to be corrected: a table or a campaign."
+            metavar="TARGETS", help="Commands to correct: a table or a campaign."
         ),
     ],
     output: Annotated[
@@ -112,17 +112,19 @@ def compensate(
     offsets: Annotated[
         Path | None,
         typer.Option(
-            help="Also write the correction of each drive [rad or m], row by row (CSV)."
+            help="Also write the correction of each drive in each row [rad or m] (CSV)."
         ),
     ] = None,
     diagnosed: Annotated[
         Path | None,
-        typer.Option(help="JSON of validation diagnose, for the expected error."),
+        typer.Option(
+            help="Results of validation diagnose (JSON), for the expected error."
+        ),
     ] = None,
     as_read: Annotated[
         bool,
         typer.Option(
-            "--as-read", help="Also correct effects that act on the readings only."
+            "--as-read", help="Also correct effects that only change the readings."
         ),
     ] = False,
     json: JsonOption = None,
@@ -130,8 +132,8 @@ def compensate(
     """Find the commands that cancel the robot's errors.
 
     ROBOT has the identified errors, as saved by diagnose --save.  TARGETS command the
-    required poses of the nominal robot.  Joint limits are respected; loops stay closed.
-    Exit status 1 if a row has no answer; its command is unchanged.
+    required poses of the nominal robot.  Joint limits are respected and loops stay
+    closed. Exit status 1 if a row has no solution; its command is unchanged.
     """
     from assembly.exchange.robot_files import load_robot
     from validation.campaign.campaign_file import read_commands
@@ -156,7 +158,7 @@ def compensate(
 
 
 def _warned(commands: "Campaign") -> dict[str, Any]:
-    """Warn of variables outside the range of the identification data."""
+    """Warn about variables outside the range of the identification data."""
     from validation.diagnosis.learned_range import beyond
 
     left = beyond(commands.robot, commands)
@@ -166,7 +168,7 @@ def _warned(commands: "Campaign") -> dict[str, Any]:
 
 
 def _left(path: Path) -> dict[str, float]:
-    """Return the residual of the held-out rows [m, rad] from a diagnosis' JSON."""
+    """Return the held-out residual [m, rad] from the JSON of a diagnosis."""
     from json import loads
 
     from forcefit.inputs.table import read_text
@@ -195,7 +197,7 @@ def carry(
     fit: Annotated[
         str,
         typer.Option(
-            help="Quantities that differ between sessions: registration,tool,zeros."
+            help="Quantities that are fitted in each session: registration,tool,zeros."
         ),
     ] = "registration",
     output: Annotated[
@@ -204,13 +206,13 @@ def carry(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Carry a saved robot over to a new session.
+    """Fit a saved robot to a new session.
 
     The device's pose, effects of time and the quantities of --fit are fitted to the
     set-up rows of each session.  The robot's parameters are fitted too, with their
-    covariance as prior.  Errors are those of the other rows, by the carried and by the
-    declared robot.  Exit status 1, and no robot written, where the set-up rows do not
-    suffice or the carried robot is worse than the declared one.
+    covariance as prior.  Errors are those of the other rows, by the fitted and by the
+    declared robot. Exit status 1 if the set-up rows are not sufficient or the fitted
+    robot is worse than the declared one; no robot is written then.
     """
     from assembly.exchange.robot_files import load_robot
     from validation.campaign.campaign_file import read_campaign, read_commands
@@ -244,15 +246,17 @@ def explain(
     robot: RobotArgument,
     over: Annotated[
         list[str] | None,
-        typer.Option(help="Range of a variable: q.drive=-1:1,cov.tilt=0:0.1."),
+        typer.Option(
+            help="Plotted range of a variable, such as q.drive=-1:1,cov.tilt=0:0.1."
+        ),
     ] = None,
     figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
     """Show the functions of a robot's file as curves.
 
-    Curves have confidence bands.  A function with memory is shown by its response to a
-    unit step.
+    The curves have confidence bands.  A function with memory is shown as its response
+    to a unit step.
     """
     from assembly.exchange.robot_files import load_robot
     from validation.correction import curves
@@ -276,7 +280,7 @@ def explain(
 def _ranges(
     functions: tuple["Function", ...], texts: list[str]
 ) -> dict[str, tuple[float, float]]:
-    """Return the ranges by variable from ``--over``."""
+    """Return the range of each variable from ``--over``."""
     valid = {name for function in functions for name in (*function.variables, "time")}
     ranges = {}
     for part in ",".join(texts).split(",") if texts else ():

@@ -24,7 +24,7 @@ from forcefit.commands.progress import one_thread, progress_lines
 from forcefit.inputs.errors import BadInput, describe, nearest
 from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
 
-_MOST = 10_000  # largest number of loads of a curve
+_MOST = 10_000  # largest number of loads on a curve
 
 
 def deflection(
@@ -32,7 +32,8 @@ def deflection(
     along: Annotated[
         str,
         typer.Option(
-            help="Component of the load [N or N m], from:to:step, such as fz=0:-500:10."
+            help="Component of the load that varies, as from:to:step [N or N m], "
+            "such as fz=0:-500:10."
         ),
     ],
     pose: PoseOption = None,
@@ -51,7 +52,7 @@ def deflection(
         ),
     ] = "contact",
     back: Annotated[
-        bool, typer.Option("--back", help="Then return to the first load.")
+        bool, typer.Option("--back", help="Afterwards return to the first load.")
     ] = False,
     follow: Annotated[
         bool,
@@ -66,7 +67,8 @@ def deflection(
 ) -> None:
     """Compute load against deflection, up to critical loads.
 
-    It shows free motion within clearances, contacts, elastic deformation and jumps.
+    The curve shows free motion within clearances, contacts, elastic deformation and
+    jumps.
     """
     from assembly.model.statuses import OK
     from assembly.report.deflection import (
@@ -104,16 +106,17 @@ def deflection(
 
 
 def parse_along(text: str) -> tuple[int, list[float]]:
-    """Return the component and values of ``--along``.
+    """Return the component and the values of ``--along``.
 
     Args:
-        text: such as ``"fz=0:-500:10"``; the step's sign does not matter.
+        text: text such as ``"fz=0:-500:10"``; the sign of the step does not matter.
 
     Returns:
-        Row of the wrench, and [N m or N] values; both ends if the step fits.
+        Row of the wrench, and its values [N m or N]; both ends are included if the step
+        fits.
 
     Raises:
-        BadInput: not of that form, no change, or more than 10000 values.
+        BadInput: the text has a different form, no change, or more than 10000 values.
     """
     from assembly.model.largest import LARGEST
     from stiffness.screws import WRENCH

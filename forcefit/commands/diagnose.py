@@ -23,7 +23,8 @@ def diagnose(
     calibrate: Annotated[
         int,
         typer.Option(
-            help="Simulate this many campaigns on the same design.",
+            help="Number of campaigns that are simulated on the same design, for the "
+            "error rates.",
             min=0,
             max=1_000_000,
         ),
@@ -32,30 +33,36 @@ def diagnose(
         bool,
         typer.Option(
             "--finite-motions",
-            help="Compute the declared model with finite instead of small motions.",
+            help="Compute finite motions of the declared model instead of small ones.",
         ),
     ] = False,
     without: Annotated[
         list[str] | None,
-        typer.Option(help="Leave out an effect, function (any), geometry or springs."),
+        typer.Option(
+            help="Name of an effect to leave out; also function (all "
+            "functions), geometry, springs."
+        ),
     ] = None,
     only: Annotated[
         list[str] | None,
-        typer.Option(help="Consider only these effects; names as for --without."),
+        typer.Option(
+            help="Name of an effect to consider, no others; names as for --without."
+        ),
     ] = None,
     prior: Annotated[
         list[str] | None,
-        typer.Option(help="Multiply the prior odds of an effect: NAME=FACTOR."),
+        typer.Option(help="Factor on the prior odds of an effect: NAME=FACTOR."),
     ] = None,
     save: Annotated[
         Path | None, typer.Option(help="Also write the robot with the effects found.")
     ] = None,
 ) -> None:
-    """Trace measured deviations to the effect the model lacks.
+    """Find effects that a model lacks, from measured deviations.
 
     The verdict is explained, learned, none_needed, ambiguous, outside_library or
-    not_enough_rows.  Errors before and after are of held-out rows, on which nothing was
-    chosen or fitted.  --save writes the robot if it predicts these rows better.
+    not_enough_rows.  The errors before and after are computed on held-out rows, which
+    are used neither to choose nor to fit a model.  --save writes the robot if it
+    predicts these rows better than the declared robot.
     """
     from validation.campaign.campaign_file import read_campaign
     from validation.diagnosis import results
@@ -121,9 +128,9 @@ def _odds(without: list[str], only: list[str], prior: list[str]) -> dict[str, fl
 
 
 def _worse(diagnosis: "Diagnosis") -> str:
-    """Return why the identified robot is not saved."""
+    """Return the reason why the identified robot is not saved."""
     if not len(diagnosis.fit.unknowns) and not diagnosis.effects:
-        return "no error or effect was found that the declared robot lacks"
+        return "the diagnosis found no error or effect in addition to the declared ones"
     after, before = diagnosis.after.normalised, diagnosis.before.normalised
     return (
         "the identified robot predicts the held-out rows no better than the declared "

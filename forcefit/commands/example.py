@@ -14,8 +14,8 @@ class _Example(NamedTuple):
     """One example.
 
     Attributes:
-        about: its content, in a few words.
-        files: its files and folders, from the folder that has ``examples``.
+        about: short description of the example.
+        files: its files and folders, relative to the folder that has ``examples``.
         first: a command to begin with.
     """
 
@@ -37,8 +37,13 @@ EXAMPLES = {
         'forcefit assembly tolerances irsbot2 --grid "tx=-0.2:0.2:0.2,tz=-0.5" '
         "--plan examples/tolerance_allocation/mostly.toml",
     ),
+    "assembly_steps": _Example(
+        "the order in which the legs of a hexapod are joined",
+        ("examples/assembly_steps.toml",),
+        "forcefit assembly steps hexapod examples/assembly_steps.toml --best force",
+    ),
     "drawn": _Example(
-        "robots as drawn: a 3-UPU, a Tricept and an Agile Eye",
+        "robots as drawn: a 3-UPU, a Tricept, an Agile Eye, a toleranced four-bar",
         ("examples/drawn",),
         "forcefit assembly solve examples/drawn/tricept.toml --load fx=100",
     ),
@@ -57,13 +62,18 @@ EXAMPLES = {
         ("examples/hexapod_accuracy.py", "examples/hexapod_errors.toml"),
         "python examples/hexapod_accuracy.py",
     ),
+    "path": _Example(
+        "a path of the hexapod, for its errors under acceleration",
+        ("examples/hexapod_path.csv",),
+        "forcefit assembly path hexapod --path examples/hexapod_path.csv",
+    ),
     "link_library": _Example(
         "stiffness of links for a grid of dimensions",
         ("examples/link_library.toml",),
         "forcefit stiffness library build examples/link_library.toml",
     ),
     "part_library": _Example(
-        "stiffness of parts by their surface",
+        "stiffness of parts given by their surfaces",
         ("examples/part_library.toml", _MESH, "meshes/l_bracket.stl"),
         "forcefit stiffness library build examples/part_library.toml",
     ),
@@ -86,9 +96,9 @@ EXAMPLES = {
             f"python examples/{name}/convert.py --help",
         )
         for name, about in (
-            ("hangprinter", "a cable-driven printer's motor forces"),
+            ("hangprinter", "a cable-driven printer, by its motor forces"),
             ("hilti", "a construction robot"),
-            ("ipa_ur10", "a UR10 by a tracker"),
+            ("ipa_ur10", "a UR10, by a tracker"),
             ("serial_robots", "a UR5 and a WAM"),
             ("voron", "a printer's gantry"),
         )
@@ -110,7 +120,7 @@ def example(
     """Write the files of examples, as in the repository.
 
     The commands of the README and of the documentation then work in that folder.  If a
-    file exists with another content, nothing is written.
+    file with different content exists, nothing is written.
     """
     if not names:
         for name, one in EXAMPLES.items():
@@ -157,7 +167,7 @@ def _files(root: Path, part: str) -> Iterator[Path]:
 
 
 def _is_absent(target: Path, source: Path) -> bool:
-    """Return whether an example's file is absent; refuse another content."""
+    """Return whether an example's file is absent; refuse other content in it."""
     if not target.exists():
         check_writable(next(p for p in target.parents if p.exists()) / target.name)
         return True

@@ -30,15 +30,15 @@ def import_(
         bool,
         typer.Option(
             "--diagnose",
-            help="Then run validation diagnose; --json and --report write its results.",
+            help="Also run validation diagnose; --json and --report write its results.",
         ),
     ] = False,
     report: ReportOption = None,
 ) -> None:
     """Make a campaign from the files of a measuring device.
 
-    Readings are joined to commands by name, by time or by order; the
-    device's pose is fitted; exchanged targets and outliers are reported and left out.
+    Readings are assigned to commands by name, by time or by order.  The device's pose
+    is fitted; exchanged targets and outliers are reported, and outliers are left out.
     """
     from validation.exchange.tracker import import_readings
 

@@ -24,20 +24,20 @@ from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput, checked
 from forcefit.inputs.writing import check_json, check_new_folder, write_json
 
-DEFAULT_STRENGTH = 5.0  # [-] size of an effect over the noise
+DEFAULT_STRENGTH = 5.0  # [-] default ratio of the size of an effect to the noise
 
 
 def parse_effects(texts: list[str] | None) -> dict[str, float]:
-    """Return the names and strengths from ``--effect``.
+    """Return the names and sizes of effects from ``--effect``.
 
     Args:
-        texts: such as ``["self_weight", "link_length=3"]``.
+        texts: texts such as ``["self_weight", "link_length=3"]``.
 
     Returns:
-        Multiples of the noise by name.
+        For each name its multiple of the noise.
 
     Raises:
-        BadInput: a strength that is not a number > 0, or an effect given twice.
+        BadInput: a multiple is not a number > 0, or an effect is given twice.
     """
     from forcefit.commands.options import parse_assignments
 
@@ -71,12 +71,21 @@ def generate(
     ] = 24,
     rows: Annotated[
         int,
-        typer.Option(help="Number of measurements, interleaved.", min=1, max=1_000_000),
+        typer.Option(
+            help="Number of measurements; the configurations alternate.",
+            min=1,
+            max=1_000_000,
+        ),
     ] = 116,
     reach: Reach = 0.6,
     stroke: Stroke = 0.1,
     force: Force = 40.0,
-    loads: Annotated[str, typer.Option(help="Load levels: many | one.")] = "many",
+    loads: Annotated[
+        str,
+        typer.Option(
+            help="Loads: many (sizes and directions) | one (always the same)."
+        ),
+    ] = "many",
     temperature: Temperature = "swing",
     command: CommandedIn = "joints",
     humidity: Annotated[
@@ -87,22 +96,24 @@ def generate(
     error_size: Annotated[
         float,
         typer.Option(
-            help="[rad] Largest declared error of an angle; that of a length is 0.5 mm "
-            "per mrad of it."
+            help="[rad] Largest declared error of an angle; the largest error of a "
+            "length is "
+            "0.5 mm per mrad."
         ),
     ] = 0.0,
     outliers: Annotated[
         int, typer.Option(help="Number of outliers: rows with a large error.", min=0)
     ] = 0,
     missing: Annotated[
-        float, typer.Option(help="Share of the readings that are missing, from 0 to 1.")
+        float, typer.Option(help="Fraction of missing readings, from 0 to 1.")
     ] = 0.0,
     hidden_frame: Annotated[
-        float, typer.Option(help="[rad, m] Size of the measuring frame's unknown pose.")
+        float,
+        typer.Option(help="[rad, m] Magnitude of the measuring frame's unknown pose."),
     ] = 0.0,
     at: AtOption = None,
     program: Annotated[
-        str, typer.Option(help="Simulation: multibody | springs.")
+        str, typer.Option(help="Simulation program: multibody | springs (faster).")
     ] = "multibody",
     seed: Annotated[int, typer.Option(help="Seed of all draws.", min=0)] = 0,
     json: JsonOption = None,

@@ -1,14 +1,14 @@
-"""Help texts of the commands: options in groups, each under a title of its own."""
+"""Help texts of the commands: options in groups with titles."""
 
 from typing import Any
 
 import typer
 from typer.core import TyperCommand
 
-_WHAT = "What"  # options of no other group
+_WHAT = "What"  # title of the group of all other options
 GROUPS = {
     "Where": (
-        "pose joint grid poses rest mismatch under at along over base tip nodes "
+        "pose joint grid poses path rest mismatch under at along over base tip nodes "
         "configurations reach stroke setup"
     ),
     "How sure": (
@@ -24,7 +24,7 @@ _GROUP_OF = {
 
 
 class GroupedCommand(TyperCommand):
-    """A command whose help lists its options by group."""
+    """A command whose help lists its options by groups."""
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write the arguments and each group of options."""
@@ -42,10 +42,10 @@ class GroupedCommand(TyperCommand):
 
 
 class Commands(typer.Typer):
-    """A group of commands whose help lists options by group."""
+    """A group of commands whose help lists options by groups."""
 
     def command(self, name: str | None = None, **settings: Any) -> Any:
-        """Register a command, as :meth:`typer.Typer.command`."""
+        """Register a command, in the manner of :meth:`typer.Typer.command`."""
         return super().command(name, cls=GroupedCommand, **settings)
 
 

@@ -10,7 +10,7 @@ from forcefit.commands.progress import progress_bars
 from forcefit.inputs.writing import write_json
 
 CampaignArgument = Annotated[
-    Path, typer.Argument(metavar="CAMPAIGN", help="Folder with campaign.toml in it.")
+    Path, typer.Argument(metavar="CAMPAIGN", help="Folder that contains campaign.toml.")
 ]
 
 
@@ -18,16 +18,18 @@ def inspect(
     campaign: CampaignArgument,
     iso: Annotated[
         bool,
-        typer.Option("--iso", help="Print figures of ISO 9283 and ISO 230-2 instead."),
+        typer.Option(
+            "--iso", help="Print the characteristics of ISO 9283 and ISO 230-2 instead."
+        ),
     ] = False,
     json: JsonOption = None,
 ) -> None:
-    """Inspect measured data; figures of ISO 9283 and 230-2.
+    """Inspect measured data; characteristics of ISO 9283 and 230-2.
 
     Reports rows, loads and covariates; noise from repeats against the stated sigma;
-    effects that would show, and effects that this design cannot distinguish.
-    With --iso, from repeats: pose accuracy and repeatability, distance accuracy, drift;
-    reversal, repeatability and accuracy of each reading approached from both sides.
+    visible effects, and effects that this design cannot distinguish.  With --iso, from
+    repeats: pose accuracy and repeatability, distance accuracy, drift; reversal,
+    repeatability and accuracy of each reading approached from both sides.
     """
     from validation.campaign.campaign_file import read_campaign
     from validation.inspection.inspection import inspect_campaign

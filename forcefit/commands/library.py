@@ -43,8 +43,8 @@ def read(
     at: Annotated[
         list[str] | None,
         typer.Option(
-            help="Interpolate K_E between entries and estimate its error; "
-            "parameters in SI units, such as radius=0.02,length=0.4."
+            help="Parameters at which K_E is interpolated between entries, with an "
+            "error; in SI units, such as radius=0.02,length=0.4."
         ),
     ] = None,
     family: Annotated[
@@ -53,7 +53,7 @@ def read(
     to: Annotated[
         str | None,
         typer.Option(
-            help="Print the library as csv, or one entry's K_E for exudyn, adams or "
+            help="Print the library as csv, or K_E of one entry for exudyn, adams or "
             "mapdl."
         ),
     ] = None,
@@ -65,7 +65,7 @@ def read(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """List a library's entries, look up K_E between them, export them."""
+    """List, interpolate or export the entries of a library."""
     if at and to:
         raise BadInput(
             "library read: found both --at and --to, expected only one of them"
@@ -97,7 +97,7 @@ def _list(folder: Path, json: str | None) -> None:
 
 
 def _look_up(folder: Path, at: list[str], family: str, json: str | None) -> None:
-    """Print K_E between a library's entries, interpolated, with its error."""
+    """Print K_E interpolated between the entries of a library, and its error."""
     from forcefit.commands.options import parse_assignments
     from stiffness.link import scaled
     from stiffness.report.library import look_up, read_library
@@ -114,7 +114,7 @@ def _look_up(folder: Path, at: list[str], family: str, json: str | None) -> None
 
 
 def _export(folder: Path, to: str, key: str | None, json: str | None) -> None:
-    """Print a library, or one entry's K_E for another program."""
+    """Print a library, or K_E of one entry for another program."""
     from stiffness.report.export import library_csv, stiffness_for
     from stiffness.report.library import read_entry, read_library
 

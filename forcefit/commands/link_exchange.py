@@ -12,7 +12,7 @@ from forcefit.inputs.writing import Kind, check_writable, write_bytes, write_jso
 Length = Annotated[
     str,
     typer.Option(
-        help="Unit of lengths: m, cm, mm, um, inch; forces in N, angles in rad."
+        help="Unit of lengths: m, cm, mm, um, inch; forces are in N, angles in rad."
     ),
 ]
 
@@ -20,7 +20,10 @@ Length = Annotated[
 def import_(
     file: Annotated[
         Path,
-        typer.Argument(metavar="FILE", help=".mtx, .pch, .dmig, .npy, .npz: K_E or K."),
+        typer.Argument(
+            metavar="FILE",
+            help="K_E or a full stiffness matrix: .mtx, .pch, .dmig, .npy, .npz.",
+        ),
     ],
     base: Annotated[
         str, typer.Option(help='Held interface: a node, or "z=0" [m] with --nodes.')
@@ -34,7 +37,10 @@ def import_(
     ] = "2",
     nodes: Annotated[
         Path | None,
-        typer.Option(help="Positions of nodes: number, x, y, z; or a deck."),
+        typer.Option(
+            help="Positions of nodes: lines of number, x, y, z; or an input "
+            "file with them."
+        ),
     ] = None,
     mass: Annotated[
         Path | None, typer.Option(help="Mass matrix of the same degrees of freedom.")
@@ -43,7 +49,7 @@ def import_(
     order: Annotated[
         str,
         typer.Option(
-            help="Order of a node's degrees of freedom where the file names none: "
+            help="Order of a node's degrees of freedom if the file does not name them: "
             "translations-first, rotations-first."
         ),
     ] = "translations-first",
@@ -51,7 +57,7 @@ def import_(
 ) -> None:
     """Import K_E from another program's matrix.
 
-    The matrix is condensed on two interfaces.
+    The matrix is condensed onto two interfaces.
     """
     from stiffness.exchange.import_link import import_link
     from stiffness.report.results import link_results, link_text
@@ -95,7 +101,7 @@ def export(
             f"--output: found {quoted(output.name)}, expected the ending {expected} "
             f"for --to {to}, so that forcefit can read the file again"
         )
-    # a matrix of the same format may be replaced, nothing else
+    # only a matrix of the same format may be replaced
     endings, begins = (output.suffix.lower(),), (content[:8].lower(),)
     check_writable(output, Kind(f"a matrix for {to}", endings, begins))
     write_bytes(content, output)

@@ -1,7 +1,7 @@
-"""Old names of commands and options: each works for one release, with a line on stderr.
+"""Old names of commands and options, which work for one release with a message.
 
-The commands have the new names only; ``--help`` shows no others.  Old names in the
-public formats stay valid, without a message.
+The commands have the new names only, and ``--help`` shows no others.  Old names in the
+public formats remain valid without a message.
 """
 
 import sys
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from forcefit.inputs.errors import BadInput
 
-# new words by the old words of a merged command
+# old words of each merged command, and its new words
 COMMANDS: dict[str, tuple[str, ...]] = {
     "assembly exact": ("assembly", "solve", "--state", "exact"),
     "assembly zone": ("assembly", "solve", "--quantities", "margin"),
@@ -23,7 +23,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "validation iso": ("validation", "inspect", "--iso"),
 }
 _PICTURE: dict[str, tuple[str, ...]] = {"-o": ("--figure",), "--output": ("--figure",)}
-# new words by command and old option; a value follows where the option takes one
+# old options of each command, and new words; a value follows if the option has one
 OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "assembly error": {
         "--reading": ("--assumption",),
@@ -69,7 +69,7 @@ OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "stiffness beam": {"--axis": ("--along",)},
 }
 
-# new values of an old option
+# old values of each option, and the new values
 VALUES = {"--compliant": {"free": "margin_free", "rigid": "margin"}}
 STAY = {("assembly error", "--reading"), ("stiffness beam", "--axis")}
 
@@ -77,10 +77,10 @@ STAY = {("assembly error", "--reading"), ("stiffness beam", "--axis")}
 def with_new_names(words: Sequence[str]) -> list[str]:
     """Replace commands and options given by their old names.
 
-    Each is reported on stderr once.
+    Each replacement is reported once on stderr.
 
     Args:
-        words: of the command line, without the program's name.
+        words: words of the command line, without the program's name.
 
     Returns:
         The words that the commands understand.
@@ -89,7 +89,7 @@ def with_new_names(words: Sequence[str]) -> list[str]:
     end = words.index("--") if "--" in words else len(words)
     reported: list[str] = []
     new_words: list[str] = []
-    values: dict[str, str] = {}  # of the word that follows
+    values: dict[str, str] = {}  # new values of the word that follows
     for word in words[:end]:
         word, values = values.get(word, word), {}
         option, equals, value = _parts(word)
@@ -121,14 +121,14 @@ def _with_new_command(words: list[str]) -> list[str]:
 
 
 def _parts(word: str) -> tuple[str, str, str]:
-    """Return the option, "=" and value of a word; of ``-ofile`` too."""
+    """Return the option, "=" and the value of a word; also for words such as -ofile."""
     if word.startswith("--") or not word.startswith("-"):
         return word.partition("=")
     return word[:2], "=" * bool(word[2:]), word[2:]
 
 
 def _staying(words: Sequence[str]) -> list[str]:
-    """Return the old options of the command that the public formats name."""
+    """Return the old options of the command that are in the public formats."""
     return [old for command, old in STAY if list(words[:2]) == command.split()]
 
 

@@ -1,6 +1,6 @@
 """Options that several commands share, and the parsing of their texts.
 
-Every error message names its option.
+Every error message names the option.
 """
 
 import math
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def _built_in_names(incomplete: str) -> list[str]:
-    """Return the built-in robots whose names complete a word."""
+    """Return the built-in robots whose names begin with a text."""
     from assembly.robots import BUILT_IN
 
     return [name for name in BUILT_IN if name.startswith(incomplete)]
@@ -71,7 +71,7 @@ AtOption = Annotated[
     list[str] | None,
     typer.Option(
         "--at",
-        help="Point of the platform, in its axes [m], such as 0,0,-0.1 or z=-0.1.",
+        help="Point of the platform, in platform axes [m], such as 0,0,-0.1 or z=-0.1.",
     ),
 ]
 
@@ -94,7 +94,8 @@ UnderOption = Annotated[
     list[str] | None,
     typer.Option(
         "--under",
-        help="Covariates of the robot's effects: temperature=5,time=0,approach=1; "
+        help="Values of covariates of the robot's effects: "
+        "temperature=5,time=0,approach=1; "
         "session=NAME.",
     ),
 ]
@@ -104,7 +105,8 @@ RestOption = Annotated[
     str | None,
     typer.Option(
         "--rest",
-        help="Frame in a loop that does not close at home; the gap becomes the frame's "
+        help="Frame in a loop that does not close at home; the gap is added to this "
+        "frame's "
         "geometric error.",
     ),
 ]
@@ -114,8 +116,9 @@ MismatchOption = Annotated[
     str | None,
     typer.Option(
         "--mismatch",
-        help="spring: redundant elastic drives close the gap that their coordinates "
-        "(--joint, or those at home) leave.",
+        help="spring: redundant elastic drives deform to close the gap of their "
+        "coordinates "
+        "(--joint, or those at home).",
     ),
 ]
 
@@ -137,17 +140,17 @@ JsonOption = Annotated[
 
 
 def parse_load(texts: list[str] | None, option: str = "--load") -> list[float] | None:
-    """Return the wrench ``[mx my mz fx fy fz]`` given by component; None if not given.
+    """Return the wrench ``[mx my mz fx fy fz]`` of an option; None if it is absent.
 
     Args:
-        texts: such as ``["fx=10,mz=1"]``; components not named are zero.
+        texts: texts such as ``["fx=10,mz=1"]``; omitted components are zero.
         option: name of the option, for messages.
 
     Returns:
         Six numbers [N m, N].
 
     Raises:
-        BadInput: an unknown component or not a number.
+        BadInput: a component is unknown, or a value is not a number.
     """
     if not texts:
         return None
@@ -165,17 +168,17 @@ def parse_gravity(texts: list[str] | None) -> list[float] | None:
 
 
 def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
-    """Return three numbers given by component; None if not given.
+    """Return three numbers given by component; None if the option is absent.
 
     Args:
-        texts: such as ``["z=-9.81"]``.
+        texts: texts such as ``["z=-9.81"]``.
         option: name of the option, for messages.
 
     Returns:
         The numbers along x, y and z.
 
     Raises:
-        BadInput: a name other than x, y, z, or not a number of at most 1e6.
+        BadInput: a name is not x, y or z, or a value is not a number of at most 1e6.
     """
     if not texts:
         return None
@@ -195,13 +198,13 @@ def parse_state(
 
     Args:
         text: value of the option.
-        valid: states that the command knows.
+        valid: states that the command accepts.
 
     Returns:
-        The word.
+        The state.
 
     Raises:
-        BadInput: it is none of them.
+        BadInput: the text is not among the valid states.
     """
     if text not in valid:
         raise BadInput(f"--state: found {describe(text)}{nearest(text, valid)}")
@@ -209,17 +212,17 @@ def parse_state(
 
 
 def parse_point(texts: list[str] | None) -> tuple[float, float, float]:
-    """Return a point of the platform from ``--at``; its origin if not given.
+    """Return the point of ``--at``; the platform's origin if the option is absent.
 
     Args:
-        texts: such as ``["0,0,-0.1"]`` or ``["z=-0.1"]``.
+        texts: texts such as ``["0,0,-0.1"]`` or ``["z=-0.1"]``.
 
     Returns:
-        Three numbers [m].
+        Three coordinates [m].
 
     Raises:
-        BadInput: neither three numbers nor numbers by component, or one is not finite
-            or larger than 1e6.
+        BadInput: the text is neither three numbers nor numbers by component, or a
+            number is not finite or exceeds 1e6.
     """
     if not texts:
         return 0.0, 0.0, 0.0
@@ -240,16 +243,17 @@ def parse_point(texts: list[str] | None) -> tuple[float, float, float]:
 
 
 def parse_direction(texts: list[str] | None) -> list[float] | None:
-    """Return the direction of a platform screw from ``--along``, as a unit vector.
+    """Return the direction of ``--along`` as a unit screw of the platform.
 
     Args:
-        texts: such as ``["tx=1,tz=-1"]``.
+        texts: texts such as ``["tx=1,tz=-1"]``.
 
     Returns:
-        Six numbers ``[rx ry rz tx ty tz]``; None if not given.
+        Six numbers ``[rx ry rz tx ty tz]``; None if the option is absent.
 
     Raises:
-        BadInput: an unknown component, all zero, or rotation mixed with translation.
+        BadInput: a component is unknown, all are zero, or rotation and translation are
+            mixed.
     """
     if not texts:
         return None
@@ -273,14 +277,14 @@ def posture_of(
     rest: str | None = None, mismatch: str | None = None, own_errors: bool = True,
     note: bool = True, links: bool = True, drive_force: list[str] | None = None,
 ) -> Any:  # fmt: skip
-    """Return the posture of ``--pose`` or ``--joint``; home without either.
+    """Return the posture of ``--pose`` or ``--joint``; home if both are absent.
 
     Args:
-        robot: name or file.
-        pose: of the platform.
-        joint: coordinates.
-        rest: of ``--rest``.
-        mismatch: of ``--mismatch``.
+        robot: name or file of the robot.
+        pose: value of ``--pose``.
+        joint: value of ``--joint``.
+        rest: value of ``--rest``.
+        mismatch: value of ``--mismatch``.
         own_errors: whether the robot keeps its declared errors in addition.
         note: whether to print remarks on the posture to stderr.
         links: of :func:`assembly.exchange.robot_files.load_robot`.
@@ -311,7 +315,7 @@ def declared_posture(
     rest: str | None = None, mismatch: str | None = None, own_errors: bool = True,
     note: bool = True, links: bool = True, drive_force: list[str] | None = None,
 ) -> Any:  # fmt: skip
-    """Return the posture of the options, of the robot without the effects of its file.
+    """Return the posture of the options, without the effects of the robot's file.
 
     Remarks on the posture are printed to stderr if ``note`` is true.
     """
@@ -354,18 +358,18 @@ def declared_under(
     note: bool = True,
     drive_force: list[str] | None = None,
 ) -> Any:
-    """Return the robot under loads and covariates, its file's effects applied.
+    """Return the robot under loads and covariates, with the effects of its file.
 
     Args:
-        robot: name or file.
-        pose: of the platform.
-        joint: coordinates.
-        load: on the platform.
-        gravity: in base axes.
+        robot: name or file of the robot.
+        pose: value of ``--pose``.
+        joint: value of ``--joint``.
+        load: load on the platform.
+        gravity: gravity in base axes.
         under: covariates of the effects.
         finite: whether the exact model is used.
-        rest: of ``--rest``.
-        mismatch: of ``--mismatch``.
+        rest: value of ``--rest``.
+        mismatch: value of ``--mismatch``.
         note: whether to print remarks on the posture to stderr.
         drive_force: of ``--drive-force``.
 
@@ -392,8 +396,16 @@ def note_massless(robot: Any, gravity: list[float] | None) -> None:
         print(f"forcefit: note: {robot.name}: {remark}", file=sys.stderr)
 
 
+def note_loose(robot: Any) -> None:
+    """Print a note to stderr if a fixed joint's clearance is loose at every pose."""
+    from assembly.steps.bolted import loose_over_poses
+
+    for remark in loose_over_poses(robot):
+        print(f"forcefit: note: {robot.name}: {remark}", file=sys.stderr)
+
+
 def note_closing(robot: Any, rest: str | None, mismatch: str | None) -> None:
-    """Print to stderr how ``--rest`` or ``--mismatch`` closed a robot."""
+    """Print to stderr how ``--rest`` or ``--mismatch`` closed the robot's loops."""
     asked = [option for option in (rest, mismatch) if option is not None]
     for remark in robot.remarks[len(robot.remarks) - len(asked) :]:
         print(f"forcefit: note: {robot.name}: {remark}", file=sys.stderr)
@@ -403,13 +415,13 @@ def parse_covariates(texts: list[str] | None) -> dict[str, float | str]:
     """Return the covariates from ``--under``.
 
     Args:
-        texts: such as ``["temperature=5,approach=1"]``.
+        texts: texts such as ``["temperature=5,approach=1"]``.
 
     Returns:
-        Numbers by name; ``session`` is a text.
+        Numbers by name; ``session`` has a text.
 
     Raises:
-        BadInput: not of that form.
+        BadInput: a text has a different form.
     """
     parts = [part.strip() for text in texts or () for part in text.split(",")]
     named = [part.partition("=")[2].strip() for part in parts if _names_session(part)]
@@ -425,17 +437,17 @@ def _names_session(assignment: str) -> bool:
 
 
 def parse_axis(option: str, text: str) -> "NDArray":
-    """Return a direction as ``x``, ``-y`` or ``1,0,2``.
+    """Return a direction given as ``x``, ``-y`` or ``1,0,2``.
 
     Args:
-        option: for the message.
+        option: name of the option, for the message.
         text: value of the option.
 
     Returns:
-        (3,) of any length but zero.
+        (3,) vector of any length except zero.
 
     Raises:
-        BadInput: it is neither.
+        BadInput: the text is neither an axis nor three numbers.
     """
     import numpy as np
 
@@ -453,23 +465,23 @@ def parse_axis(option: str, text: str) -> "NDArray":
             "such as 0,0,1, not all zero"
         )
     largest = np.abs(vector).max()
-    # the square of 1e300 is no double
+    # the square of 1e300 exceeds the range of floats
     return vector if 1e-150 < largest < 1e150 else vector / largest
 
 
 def parse_sizes(option: str, text: str, unit: str) -> list[float]:
-    """Return positive numbers, separated by commas, in ascending order.
+    """Return positive numbers separated by commas, in ascending order.
 
     Args:
-        option: for the message.
+        option: name of the option, for the message.
         text: value of the option.
-        unit: for the message.
+        unit: unit for the message.
 
     Returns:
         The numbers.
 
     Raises:
-        BadInput: one is not a finite number > 0, or is given twice.
+        BadInput: a number is not finite and > 0, or is given twice.
     """
     try:
         sizes = sorted(float(part) for part in text.split(","))

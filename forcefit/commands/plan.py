@@ -28,7 +28,7 @@ from forcefit.inputs.writing import check_new_folder, write_json
 def plan(
     robot: RobotArgument,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="Campaign folder to be written.")
+        Path, typer.Option("-o", "--output", help="Folder of the new campaign.")
     ],
     rows: Annotated[
         int, typer.Option(help="Number of measurements.", min=1, max=1_000_000)
@@ -51,7 +51,7 @@ def plan(
     """Plan rows that distinguish effects.
 
     Writes campaign.toml, measurements.csv without readings and robot.toml.  Times and
-    temperatures are targets, to be replaced by the measured ones.
+    temperatures are targets; replace them by the measured ones.
     """
     from assembly.exchange.robot_files import load_robot
     from validation.inspection import planning

@@ -62,8 +62,8 @@ def stiffness(
     by: Annotated[
         list[str] | None,
         typer.Option(
-            help="Also the derivative of the compliance with a number of the robot "
-            "file, given by its path."
+            help="Path of a value in the robot file by which the compliance is also "
+            "differentiated."
         ),
     ] = None,
     figure: FigureOption = None,
@@ -142,7 +142,7 @@ def _slopes(
 
 
 def _print_slopes(results: dict[str, Any]) -> None:
-    """Print a line for each derivative, and for each reason why there is none."""
+    """Print one line for each derivative, and for each missing one its reason."""
     for key in ("slopes", "slopes_contact"):
         name = key.removeprefix("slopes").replace("_", " ")
         for path, slope in results.get(key, {}).items():

@@ -11,7 +11,7 @@ from forcefit.inputs.writing import PICTURE, TABLE, check_writable, save_figure
 
 
 def _table(path: Path | None) -> Path | None:
-    """Refuse a table that could not be written, before the computation."""
+    """Refuse a table that could not be written before the computation begins."""
     if path is not None:
         check_writable(path, TABLE)
     return path
@@ -21,7 +21,7 @@ CsvOption = Annotated[
     Path | None,
     typer.Option(
         "--csv",
-        help="Also write a CSV table: a row for each point, a column for each "
+        help="Also write a CSV table with a row for each point and a column for each "
         "component.",
         callback=_table,
     ),
@@ -44,14 +44,14 @@ def plot(
     kind: Annotated[
         str | None,
         typer.Option(
-            help="For the figure: histogram | tornado | allocation. Default: by the "
-            "file."
+            help="Kind of the figure: histogram | tornado | allocation. Default: by "
+            "the file."
         ),
     ] = None,
     quantities: Annotated[
         list[str] | None,
         typer.Option(
-            help="For the figure: variables or their components, such as "
+            help="Variables of the figure, or their components, such as "
             "stiffness.FX,translation or wrench.leg1.link_a.FZ. The name of a "
             "variable alone selects all its components."
         ),
@@ -59,7 +59,8 @@ def plot(
     rows: Annotated[
         str | None,
         typer.Option(
-            help="For the CSV table: axes of the rows instead of points, such as "
+            help="Axes whose values are the rows of the CSV table, instead of "
+            "points, such as "
             "quantity,group."
         ),
     ] = None,
@@ -68,7 +69,7 @@ def plot(
 
     A figure shows maps, lines, histograms or tolerances.  A table has a row for each
     point and a column for each component of every variable.  Its first column, id,
-    counts the rows from 0; column heads have the units in brackets.
+    counts the rows from 0; the column headings have the units in brackets.
     """
     from assembly.sweeps.point_table import write_point_table
 
@@ -87,7 +88,7 @@ def plot(
 
 
 def _check_goes_with(option: str, path: Path | None, others: dict[str, Any]) -> None:
-    """Refuse options of an output that is not written."""
+    """Refuse options of an output that is not requested."""
     for name, value in others.items():
         if value and path is None:
             raise BadInput(

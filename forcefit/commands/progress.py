@@ -10,14 +10,14 @@ from typing import Any
 
 from forcefit.inputs.errors import BadInput
 
-_DELAY = 2.0  # [s] before the first line of progress
+_DELAY = 2.0  # [s] time before the first line of progress
 
 
 def one_thread() -> AbstractContextManager:
-    """Limit linear algebra to one thread: a posture's matrices are small.
+    """Limit linear algebra to one thread, because a posture's matrices are small.
 
-    Idle threads wait actively and would slow down the working one.  Without
-    ``threadpoolctl`` there is no limit.
+    Idle threads wait actively and would slow down the working thread.  Without the
+    package ``threadpoolctl`` there is no limit.
     """
     try:
         from threadpoolctl import threadpool_limits
@@ -27,7 +27,7 @@ def one_thread() -> AbstractContextManager:
 
 
 class _Links(logging.Handler):
-    """A line for each link whose finite elements run, and on a terminal a bar."""
+    """Handler that prints a line for each link solved by finite elements, or a bar."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -35,7 +35,7 @@ class _Links(logging.Handler):
         self.bar: Any = None
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Move the bar where the record counts links, else print its message."""
+        """Advance the bar if the record counts links, otherwise print its message."""
         if not hasattr(record, "total"):
             self._begin()
             print(f"forcefit: {record.getMessage()}", file=sys.stderr)
@@ -48,7 +48,7 @@ class _Links(logging.Handler):
                 self.bar = None
 
     def _begin(self) -> None:
-        """Start a bar on stderr, if it is a terminal without another bar."""
+        """Start a bar on stderr if stderr is a terminal and shows no other bar."""
         from rich.console import Console
         from rich.errors import LiveError
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
@@ -77,8 +77,8 @@ def report_loading() -> None:
 def progress_lines() -> Generator[Any, None, None]:
     """Print progress of a usually short computation to stderr; yield ``update``.
 
-    ``update(what, done, most)`` prints a line where two seconds have passed since the
-    last one: how many steps there will be is not known, so there is no bar.
+    ``update(what, done, most)`` prints a line if two seconds have passed since the last
+    one. The total number of steps is not known, so there is no bar.
     """
     last = time.monotonic()
 
@@ -95,7 +95,7 @@ def progress_lines() -> Generator[Any, None, None]:
 def progress_bars() -> Generator[Any, None, None]:
     """Show progress bars on stderr; yield ``update(what, done, total)``.
 
-    Where stderr is no terminal, bars appear only at the end; a line is printed for
+    If stderr is not a terminal, bars appear only at the end, and a line is printed for
     a task that takes longer than two seconds.  After bad input no bar remains.
     """
     from rich.console import Console
@@ -140,7 +140,7 @@ def progress_bars() -> Generator[Any, None, None]:
         except BadInput:
             bars.live.transient = True
             bars.live.stop()
-            bars.disable = True  # or it ends with an empty line
+            bars.disable = True  # otherwise it ends with an empty line
             raise
         finally:
             for line in waiting:

@@ -1,4 +1,4 @@
-"""The commands ``forcefit report``, and the option ``--report`` of others."""
+"""The commands ``forcefit report``, and the option ``--report`` of other commands."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,7 +17,7 @@ app = Commands(no_args_is_help=True)
 
 
 def _checked(path: Path | None) -> Path | None:
-    """Refuse a page that could not be written, before the computation."""
+    """Refuse a page that could not be written before the computation begins."""
     if path is not None:
         check_writable(path, PAGE)
     return path
@@ -26,11 +26,12 @@ def _checked(path: Path | None) -> Path | None:
 ReportOption = Annotated[
     Path | None,
     typer.Option(
-        "--report", help="Also write a report, one HTML file.", callback=_checked
+        "--report", help="Also write a report as one HTML file.", callback=_checked
     ),
 ]
 _File = Annotated[
-    Path, typer.Argument(metavar="FILE", help="A report, or JSON of a command.")
+    Path,
+    typer.Argument(metavar="FILE", help="A report, or the JSON results of a command."),
 ]
 
 
@@ -74,13 +75,13 @@ def _results(path: Path) -> dict:
 
 
 def provenance(*sources: Path | str | None) -> "Provenance":
-    """Return the command that runs and the files it read.
+    """Return the running command and the files that it reads.
 
     Args:
-        sources: files, folders for the files in them, names of built-in robots, None.
+        sources: files, folders whose files are read, names of built-in robots, or None.
 
     Returns:
-        The command as typed and the files that exist.
+        The command as typed, and the files that exist.
     """
     from forcefit.page.page import Provenance, command_line
 

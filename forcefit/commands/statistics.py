@@ -20,6 +20,7 @@ from forcefit.commands.options import (
     RestOption,
     RobotArgument,
     note_closing,
+    note_loose,
     note_massless,
     parse_gravity,
     parse_load,
@@ -52,7 +53,8 @@ ClearanceOption = Annotated[
 ContactLengthOption = Annotated[
     float | None,
     typer.Option(
-        help="[m] With --clearance contact: ratio of random moments to random forces. "
+        help="[m] With --clearance contact: length, the ratio of random moments to "
+        "forces. "
         "Default: the longest body."
     ),
 ]
@@ -60,7 +62,13 @@ ContactLengthOption = Annotated[
 
 def statistics(
     robot: RobotArgument,
-    errors: Annotated[Path, typer.Option(help="Distributions of the errors (TOML).")],
+    errors: Annotated[
+        Path | None,
+        typer.Option(
+            help="Distributions of the errors (TOML), in addition to the "
+            "[[tolerance]] of the robot file."
+        ),
+    ] = None,
     pose: PoseOption = None,
     joint: JointOption = None,
     load: LoadOption = None,
@@ -72,14 +80,15 @@ def statistics(
         int, typer.Option(help="Number of draws of all errors.", min=2, max=10**9)
     ] = 10_000,
     seed: Annotated[
-        int, typer.Option(help="Seed of the draws.", min=0, max=2**63 - 1)
+        int, typer.Option(help="Seed of the random draws.", min=0, max=2**63 - 1)
     ] = 1,
     clearance: ClearanceOption = "worst",
     contact_length: ContactLengthOption = None,
     limit: Annotated[
         list[str] | None,
         typer.Option(
-            help="Limit in SI units, such as energy=5 or translation=2e-4; may be "
+            help="Limit of a result in SI units, such as energy=5 or "
+            "translation=2e-4; may be "
             "repeated."
         ),
     ] = None,
@@ -113,6 +122,20 @@ def statistics(
             "contact (clearances pressed or free) | exact (internal forces too)."
         ),
     ] = None,
+    capability: Annotated[
+        bool,
+        typer.Option(
+            "--capability", help="Also Cpk and parts per million of every --limit."
+        ),
+    ] = False,
+    worst_case: Annotated[
+        bool,
+        typer.Option(
+            "--worst-case",
+            help="Also the largest pose errors over all errors within tolerance and "
+            "all clearances.",
+        ),
+    ] = False,
     confidence: Annotated[
         float, typer.Option(help="Confidence of all intervals.")
     ] = 0.95,
@@ -129,12 +152,13 @@ def statistics(
 ) -> None:
     """Draw random errors: yield, pose errors, importance.
 
-    With OUTPUT, finished draws are kept in OUTPUT.journal: after an interruption the
-    same command continues from there and ends in the same file.
+    With OUTPUT, finished draws are kept in OUTPUT.journal.  After an interruption the
+    same command continues from there and produces the same file.
     """
     from assembly.model.error_distributions import read_sources
     from assembly.report.first_order import posture_status
     from assembly.report.results import status_line
+    from assembly.statistics.callout_sources import sources_of
     from assembly.statistics.experiment import Experiment, precision_for
     from assembly.statistics.importance_table import ImportanceOptions
     from assembly.statistics.monte_carlo import run_draws
@@ -153,6 +177,8 @@ def statistics(
     if yield_strength is not None and not 0 < yield_strength < float("inf"):
         raise BadInput(f"--yield-strength: found {yield_strength}, expected > 0")
     limits = dict(map(parse_limit, limit or ()))
+    if capability and not limits:
+        raise BadInput("--capability: found no --limit, expected one or more")
     if output is not None:
         check_dataset(output, "draws")
     if figure is not None:
@@ -162,8 +188,11 @@ def statistics(
         robot, pose, joint, rest, mismatch, own_errors=not closing, note=False,
         drive_force=drive_force,
     )  # fmt: skip
-    fixed = posture.robot.errors if closing else None
-    sources = read_sources(errors, posture.robot, fixed)
+    fixed = posture.robot.declared_errors if closing else None
+    independent = None
+    if errors is not None:
+        independent = read_sources(errors, posture.robot, fixed)
+    sources = sources_of(posture.robot, independent, fixed)
     wrench, g = parse_load(load), parse_gravity(gravity)
     note_closing(posture.robot, rest, mismatch)
     note_massless(posture.robot, g)
@@ -180,10 +209,15 @@ def statistics(
         contact_length=contact_length,
     )  # fmt: skip
     experiment.check_limits([*limits, *(["stress"] if yield_strength else [])])
+    worst = None
+    if worst_case:
+        from assembly.statistics.worst_pose_report import worst_results
+
+        worst = worst_results(experiment.energies, sources, seed)
     options = None
     if importance is not None:
         options = ImportanceOptions(importance, by, confidence)
-    held = ExitStack()  # keeps the journal until all is written
+    held = ExitStack()  # keeps the journal until all files are written
     with _interruptible(output), progress_bars() as update:
         data = run_draws(
             experiment, draws, output, workers, lambda d, n: update("draws", d, n),
@@ -196,8 +230,10 @@ def statistics(
     summary = {
         "robot": posture.robot.name, "pose": posture.pose(), "seed": seed,
         "load": wrench, "gravity": g,
-        **summarise(data, limits, yield_strength, confidence),
+        **summarise(data, limits, yield_strength, confidence, capability),
     }  # fmt: skip
+    if worst is not None:
+        summary["worst_case"] = worst
     write_json(summary, json)
     if report is not None:
         from assembly.statistics.report import draws_page
@@ -211,13 +247,13 @@ def statistics(
 
 
 def _check_word(option: str, word: str, valid: Sequence[str]) -> None:
-    """Refuse a word other than the valid ones."""
+    """Refuse a word that is not among the valid ones."""
     if word not in valid:
         raise BadInput(f'{option}: found "{word[:60]}"{nearest(word, valid)}')
 
 
 def _check_clearance_model(clearance: str, contact_length: float | None) -> None:
-    """Refuse an unknown model, and a length that it does not need or cannot use."""
+    """Refuse an unknown model, and a length that the model does not use."""
     from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 
     _check_word("--clearance", clearance, tuple(CLEARANCE_MODELS))
@@ -250,13 +286,15 @@ def tolerances(
     ],
     plan: Annotated[
         Path | None,
-        typer.Option(help="Costs of tolerances and limits of results (TOML)."),
+        typer.Option(
+            help="Plan with costs of tolerances and limits of results (TOML)."
+        ),
     ] = None,
     quantities: Annotated[
         str,
         typer.Option(
-            help="Margin of the present errors: margin_free (compliant joints free "
-            "about their own axis) | margin (rigid)."
+            help="Zone margin for the present errors: margin_free (compliant joints "
+            "free about their own axis) | margin (rigid)."
         ),
     ] = "margin_free",
     clearance: ClearanceOption = "worst",
@@ -281,8 +319,8 @@ def tolerances(
 
     Without --plan: the factor on the robot's errors at which it assembles at every
     posture, and the errors that govern its margin.  With OUTPUT, finished results are
-    kept in OUTPUT.journal: after an interruption the same command continues from there
-    and ends in the same file.
+    kept in OUTPUT.journal.  After an interruption the same command continues from there
+    and produces the same file.
     """
     from dataclasses import replace
 
@@ -318,6 +356,7 @@ def tolerances(
         check_writable(figure, PICTURE)
     machine = load_robot(robot, closing_of(rest, mismatch))
     note_closing(machine, rest, mismatch)
+    note_loose(machine)
     asked_plan = (
         None
         if plan is None
@@ -338,7 +377,7 @@ def tolerances(
         if json != "-":
             print(texts[0])
         raise typer.Exit(1)
-    held = ExitStack()  # keeps the journal until all is written
+    held = ExitStack()  # keeps the journal until all files are written
     with _interruptible(output), progress_bars() as update:
         if machine.errors.any():
             results["present"] = present_errors(
@@ -380,7 +419,7 @@ def _save_allocation(
     allocation: "Allocation", output: Path | None, figure: Path | None,
     csv: Path | None,
 ) -> None:  # fmt: skip
-    """Save the tolerances as a data set, a figure and a table, where requested."""
+    """Save the tolerances as a data set, a figure and a table, if requested."""
     from assembly.statistics.allocated_tolerances import tolerance_dataset
     from assembly.statistics.plot import allocation_figure
     from assembly.sweeps.dataset import save_dataset

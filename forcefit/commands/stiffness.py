@@ -1,4 +1,4 @@
-"""The commands ``forcefit stiffness ...``: parse, call, print or save."""
+"""The commands ``forcefit stiffness ...``: each parses, calls, prints or saves."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -63,7 +63,8 @@ def beam(
         typer.Argument(metavar="FILE", help="Pieces of a curved beam (TOML)."),
     ] = None,
     length: Annotated[
-        float | None, typer.Option(help="Length of a straight beam, base to tip [m].")
+        float | None,
+        typer.Option(help="Length of a straight beam from base to tip [m]."),
     ] = None,
     radius: Radius = None,
     inner_radius: InnerRadius = None,
@@ -82,8 +83,8 @@ def beam(
 ) -> None:
     """Compute K_E of a beam, straight or along a curve.
 
-    A straight beam has a length and a constant section.  A FILE describes a tapered,
-    bent or L-shaped one by its pieces.
+    A straight beam has a length and a constant section.  A FILE describes the pieces of
+    a tapered, bent or L-shaped beam.
     """
     from forcefit.commands.beam_options import BeamOptions
     from stiffness.report.results import link_results, link_text
@@ -199,7 +200,8 @@ def stress(
     base: Base,
     tip: Tip,
     wrench: Annotated[
-        list[str] | None, typer.Option(help="Wrench at the tip: fx=10,mz=1 [N, N m].")
+        list[str] | None,
+        typer.Option(help="Wrench at the tip [N, N m], such as fx=10,mz=1."),
     ] = None,
     young: YoungOfRest = None,
     poisson: PoissonOfRest = None,

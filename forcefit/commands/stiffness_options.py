@@ -1,4 +1,4 @@
-"""Arguments and options that the stiffness commands share, and their parsing."""
+"""Arguments and options that several stiffness commands share, and their parsing."""
 
 import logging
 from pathlib import Path
@@ -17,23 +17,29 @@ if TYPE_CHECKING:
     from stiffness.surface.interface import Interface
 
 Surface = Annotated[
-    Path, typer.Argument(metavar="SURFACE", help="STL, OBJ, PLY, VTK, MSH, STEP.")
+    Path,
+    typer.Argument(
+        metavar="SURFACE", help="Surface file: STL, OBJ, PLY, VTK, MSH, STEP."
+    ),
 ]
 Young = Annotated[float, typer.Option(help="Young's modulus [Pa].")]
 Poisson = Annotated[float, typer.Option(help="Poisson's ratio.")]
 YoungOfRest = Annotated[
     float | None,
     typer.Option(
-        "--young", help="Young's modulus [Pa] of all material that no --part declares."
+        "--young", help="Young's modulus [Pa] of the material outside all --part."
     ),
 ]
 PoissonOfRest = Annotated[
-    float | None, typer.Option("--poisson", help="Poisson's ratio, likewise.")
+    float | None,
+    typer.Option(
+        "--poisson", help="Poisson's ratio of the material outside all --part."
+    ),
 ]
 Radius = Annotated[float | None, typer.Option(help="Outer radius [m].")]
 InnerRadius = Annotated[float | None, typer.Option(help="Inner radius of a tube [m].")]
 Width = Annotated[
-    float | None, typer.Option(help="Width of the section, across `up` [m].")
+    float | None, typer.Option(help="Width of the section, normal to `up` [m].")
 ]
 Height = Annotated[
     float | None, typer.Option(help="Height of the section, along `up` [m].")
@@ -51,7 +57,7 @@ Up = Annotated[
     str | None,
     typer.Option(help="Direction of the section's z axis: x, y, z or 0,0,1."),
 ]
-Theory = Annotated[str, typer.Option(help="timoshenko or euler.")]
+Theory = Annotated[str, typer.Option(help="Beam theory: timoshenko or euler.")]
 Base = Annotated[
     str,
     typer.Option(
@@ -59,7 +65,10 @@ Base = Annotated[
     ),
 ]
 Tip = Annotated[
-    str, typer.Option(help="Interface at which the screw is read, like --base [m].")
+    str,
+    typer.Option(
+        help="Interface at which the screw is read, in the form of --base [m]."
+    ),
 ]
 Unit = Annotated[
     str,
@@ -80,7 +89,7 @@ Parts = Annotated[
     list[str] | None,
     typer.Option(
         "--part",
-        help="Part of another material: "
+        help="Part with another material: "
         '"z=0.2..0.4/young=2e11,poisson=0.3,density=7800", a box along the mesh\'s '
         'axes [m], or "solid=one+other/young=...", of a STEP file (fea: list prints '
         "its solids). May be repeated; the last counts.",
@@ -94,7 +103,9 @@ Masses = Annotated[
 ]
 OptionalSurface = Annotated[
     Path | None,
-    typer.Argument(metavar="SURFACE", help="STL, OBJ, PLY, VTK, MSH, STEP."),
+    typer.Argument(
+        metavar="SURFACE", help="Surface file: STL, OBJ, PLY, VTK, MSH, STEP."
+    ),
 ]
 OptionalBase = Annotated[
     str | None,
@@ -106,15 +117,16 @@ OptionalBase = Annotated[
 OptionalTip = Annotated[
     str | None,
     typer.Option(
-        help="Interface at which the screw is read, like --base [m]; required for a "
+        help="Interface at which the screw is read, in the form of --base [m]; "
+        "required for a "
         "mesh."
     ),
 ]
-TimeLimit = Annotated[float, typer.Option(help="Time limit [s].")]
+TimeLimit = Annotated[float, typer.Option(help="Time limit of the solution [s].")]
 
 
 def tell_progress() -> None:
-    """Print the unknowns, error and expected time of each mesh to stderr."""
+    """Print the unknowns, the error and the expected time of each mesh to stderr."""
     log = logging.getLogger("forcefit.finite_elements")
     log.setLevel(logging.INFO)
     log.handlers = [logging.StreamHandler()]
@@ -133,7 +145,7 @@ def parse_interfaces(
 
 
 def parse_up(text: str | None) -> "NDArray | None":
-    """Return the section's z, if it was given."""
+    """Return the section's z axis; None if the option is absent."""
     from forcefit.commands.options import parse_axis
 
     return None if text is None else parse_axis("--up", text)
@@ -142,7 +154,7 @@ def parse_up(text: str | None) -> "NDArray | None":
 def parse_materials(
     young: float | None, poisson: float | None, density: float, parts: list[str] | None
 ) -> "list[Material]":
-    """Return the link's materials: one that fills it, then those of its parts."""
+    """Return the materials of the link: the one that fills it, then those of parts."""
     from forcefit.commands.beam_options import BeamOptions
     from forcefit.inputs.errors import checked
     from stiffness.fem.material import Material
@@ -164,7 +176,7 @@ def parse_materials(
 
 
 def parse_accuracy(value: float) -> float:
-    """Return a valid accuracy."""
+    """Return the accuracy after a check of its range."""
     from forcefit.inputs.errors import checked
 
     return checked("--accuracy", value, "1", least=1e-5, below=0.5)
@@ -173,7 +185,7 @@ def parse_accuracy(value: float) -> float:
 def curve_link(
     path: Path, options: "BeamOptions"
 ) -> "tuple[LinkStiffness, float, float]":
-    """Return a beam along a curve, its section's size and its length [m]."""
+    """Return a beam along a curve, the size of its section, and its length [m]."""
     from forcefit.commands.beam_options import beam_name
     from stiffness.beam.curve import curve_compliance, curve_length
     from stiffness.beam.curve_file import read_curve

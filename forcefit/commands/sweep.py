@@ -17,6 +17,7 @@ from forcefit.commands.options import (
     RobotArgument,
     UnderOption,
     note_closing,
+    note_loose,
     note_massless,
     parse_covariates,
     parse_gravity,
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 
 
 def _list_quantities(names: list[str] | None) -> list[str] | None:
-    """Print the data variables of sweeps where ``list`` is given."""
+    """Print the data variables of sweeps if ``list`` is requested."""
     if names == ["list"]:
         from assembly.sweeps.selection import quantities_text
 
@@ -68,7 +69,7 @@ def sweep(
     vary: Annotated[
         list[str] | None,
         typer.Option(
-            help="Numbers of the robot file to vary: PATH=VALUE,.. or "
+            help="Values of the robot file to vary: PATH=VALUE,.. or "
             "PATH=FIRST:LAST:STEP."
         ),
     ] = None,
@@ -80,12 +81,12 @@ def sweep(
         typer.Option(help="Number of draws of errors at each point.", min=1, max=10**9),
     ] = None,
     seed: Annotated[
-        int, typer.Option(help="Seed of the draws.", min=0, max=2**63 - 1)
+        int, typer.Option(help="Seed of the random draws.", min=0, max=2**63 - 1)
     ] = 1,
     assumption: Annotated[
         str,
         typer.Option(
-            help="Assumption of the pose error: frozen | free | budget | none."
+            help="Assumption of the pose error bounds: frozen | free | budget | none."
         ),
     ] = "frozen",
     quantities: Annotated[
@@ -99,7 +100,7 @@ def sweep(
         ),
     ] = None,
     wrench_of: Annotated[
-        list[str] | None, typer.Option(help="Frame whose wrench is stored.")
+        list[str] | None, typer.Option(help="Name of a frame whose wrench is stored.")
     ] = None,
     state: Annotated[
         str | None,
@@ -112,7 +113,10 @@ def sweep(
         int | None, typer.Option(help="Number of natural frequencies.", min=1, max=1000)
     ] = None,
     near: Annotated[
-        float, typer.Option(help="Distance [-] below which a singularity is reported.")
+        float,
+        typer.Option(
+            help="Distance from a singularity [-] below which it is reported."
+        ),
     ] = 0.02,
     yield_strength: Annotated[
         float | None,
@@ -130,7 +134,8 @@ def sweep(
         typer.Option(help="Number of processes on this machine.", min=1, max=1024),
     ] = None,
     scheduler: Annotated[
-        str | None, typer.Option(help="Address of a Dask cluster, tcp://HOST:PORT.")
+        str | None,
+        typer.Option(help="Address of a Dask cluster, such as tcp://HOST:PORT."),
     ] = None,
     figure: FigureOption = None,
     csv: CsvOption = None,
@@ -138,8 +143,8 @@ def sweep(
 ) -> None:
     """Compute margins, energy, errors over postures and designs.
 
-    Finished points are kept in OUTPUT.journal: after an interruption the same command
-    continues from there and ends in the same file.
+    Finished points are kept in OUTPUT.journal.  After an interruption the same command
+    continues from there and produces the same file.
     """
     from assembly.model.statuses import UNUSABLE
     from assembly.sweeps.dataset import check_dataset, open_dataset
@@ -164,7 +169,7 @@ def sweep(
     wrench, g = parse_load(load), parse_gravity(gravity)
     covariates = parse_covariates(under)
     with progress_bars() as update:
-        update("robot", 0, 1)  # placing it may compile code
+        update("robot", 0, 1)  # placing the robot may compile code
         asked = ask_sweep(
             robot,
             SweepOptions(
@@ -180,6 +185,7 @@ def sweep(
             check_axes(dict(zip(asked.dims, asked.shape, strict=True)))
         update("robot", 1, 1)
     note_massless(asked.question.robot, g)
+    note_loose(asked.question.robot)
     note_closing(asked.question.robot, rest, mismatch)
     if frequencies is not None and (any(wrench or ()) or any(g or ())):
         print(
@@ -189,7 +195,7 @@ def sweep(
         )
     done = [0]
     solver = _solver(workers, scheduler)
-    held = ExitStack()  # keeps the journal until all is written
+    held = ExitStack()  # keeps the journal until all files are written
     try:
         with progress_bars() as update:
 
@@ -220,7 +226,7 @@ def sweep(
 
 
 def _solver(workers: int | None, scheduler: str | None) -> "Solver":
-    """Return the solver of blocks of points: this process, several, or a cluster."""
+    """Return solver of blocks of points: in this process, in several, on a cluster."""
     if workers is None and scheduler is None:
         from assembly.sweeps.sweep import solve_here
 

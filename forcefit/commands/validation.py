@@ -1,4 +1,4 @@
-"""The commands ``forcefit validation ...``: parse, call one function, print or save."""
+"""The commands ``forcefit validation ...``: each parses, calls, prints or saves."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -68,34 +68,35 @@ ErrorsOption = Annotated[
     ),
 ]
 SeedOption = Annotated[
-    int, typer.Option(help="Seed of that draw.", min=0, max=2**63 - 1)
+    int, typer.Option(help="Seed of the draw from --errors.", min=0, max=2**63 - 1)
 ]
 
 
 def _with_errors(
     posture: "Posture", errors: Path | None, seed: int, fixed: "NDArray | None"
 ) -> "Posture":
-    """Return the posture with one draw of errors, about fixed ones, or with its own."""
+    """Return the posture with one draw of errors, or with the robot's own errors."""
     if errors is None:
         return posture
     from assembly.model.error_distributions import read_sources
+    from assembly.steps.bolted import bolt_joints
 
     sources = read_sources(errors, posture.robot, fixed)
     errors_drawn = sources.errors(sources.draw(0, 1, seed)[0])
-    return replace(posture, robot=posture.robot.with_errors(errors_drawn))
+    return replace(posture, robot=bolt_joints(posture.robot.with_errors(errors_drawn)))
 
 
 def parse_scales(text: str) -> list[float]:
     """Return the factors on the errors, from ``--scale``.
 
     Args:
-        text: such as ``"1,0.5,0.25"``.
+        text: text such as ``"1,0.5,0.25"``.
 
     Returns:
-        The numbers.
+        The factors.
 
     Raises:
-        BadInput: something in it is not a number > 0, or there is only one.
+        BadInput: a value is not a number > 0, or there is only one.
     """
     try:
         scales = [float(part) for part in text.split(",")]
@@ -125,8 +126,9 @@ def crosscheck(
     scale: Annotated[
         str,
         typer.Option(
-            help="Factors on errors and load. Smaller factors are added if a check is "
-            "undecided with these."
+            help="Scales: factors on errors and load. Smaller ones are added if a "
+            "check is "
+            "undecided."
         ),
     ] = "1,0.5,0.25,0.125",
     links: Annotated[
@@ -141,13 +143,14 @@ def crosscheck(
     state: Annotated[
         str | None,
         typer.Option(
-            help="Compare the platform's stiffness instead, in a state: exact (around "
+            help="State in which the platform's stiffness is compared instead: exact "
+            "(around "
             "the equilibrium with errors and loads)."
         ),
     ] = None,
     grid: Annotated[
         str | None,
-        typer.Option(help="At every pose of a grid: tx=-0.2:0.2:0.1,tz=-0.5."),
+        typer.Option(help="Grid of poses, such as tx=-0.2:0.2:0.1,tz=-0.5."),
     ] = None,
     json: JsonOption = None,
     figure: FigureOption = None,
@@ -157,10 +160,10 @@ def crosscheck(
 ) -> None:
     """Compare with a multibody simulation, at several scales.
 
-    Errors and loads are scaled.  Both models leave out joint clearances; with
-    --with-clearance they have them, and energies and springs are compared instead of
-    poses.  Exit status 1 when a check fails, or when the robot has neither errors nor a
-    load: nothing is then compared.
+    Errors and loads are scaled.  Joint clearances are left out in both models, unless
+    --with-clearance is given; energies and springs are then compared instead of poses.
+    Exit status 1 if a check fails, or if the robot has neither errors nor a load,
+    because nothing can be compared then.
     """
     from assembly.effects.robot_effects import apply_robot_effects
     from assembly.exchange.robot_files import load_robot
@@ -194,7 +197,7 @@ def crosscheck(
     own = errors is None or rest is mismatch is None
 
     def compare(posture: "Posture") -> Crosscheck | StiffnessCheck:
-        fixed = None if own else posture.robot.errors
+        fixed = None if own else posture.robot.declared_errors
         with_errors = _with_errors(posture, errors, seed, fixed)
         applied = apply_robot_effects(with_errors, wrench, g, covariates)
         if state is not None:
@@ -266,27 +269,28 @@ def validity(
     solids: Annotated[
         bool,
         typer.Option(
-            "--solids", help="Also mesh links as solids; takes seconds for each shape."
+            "--solids",
+            help="Also mesh links as solids, which takes seconds for each shape.",
         ),
     ] = False,
     grid: Annotated[
         str | None,
-        typer.Option(help="At every pose of a grid: tx=-0.2:0.2:0.1,tz=-0.5."),
+        typer.Option(help="Grid of poses, such as tx=-0.2:0.2:0.1,tz=-0.5."),
     ] = None,
     poses: Annotated[
         Path | None,
-        typer.Option(help="At every pose of a CSV table: pose.tx .. or q.*."),
+        typer.Option(help="CSV table of poses: pose.tx .. or q.*."),
     ] = None,
     json: JsonOption = None,
     figure: FigureOption = None,
 ) -> None:
     """Estimate the errors due to the model's assumptions.
 
-    In position, rotation and energy, at a pose or over many: linear closures, beams
-    instead of solids, weight at the links' ends, disc and cone instead of pins in two
-    bushes.  Errors above 20 um or 1 % are marked.  With --solids also errors of the
-    platform's stiffness.  Exit status 1 when there is nothing to compare: a robot
-    without errors and load.
+    Errors of position, rotation and energy, at one pose or at many: due to linear
+    closures, to beams instead of solids, to weight at the links' ends, and to disc and
+    cone instead of pins in two bushes.  Errors above 20 um or 1 % are marked.  With
+    --solids also errors of the platform's stiffness.  Exit status 1 if there is nothing
+    to compare, because the robot has no errors and no load.
     """
     from assembly.sweeps.targets import grid_targets, parse_grid, read_targets
     from validation.assumptions.over_poses import costs_at, costs_over_poses
@@ -315,7 +319,7 @@ def validity(
     wrench, g = parse_load(load), parse_gravity(gravity)
     own = errors is None or rest is mismatch is None
     posture = posture_of(robot, pose, joint, rest, mismatch, own)
-    fixed = None if own else posture.robot.errors
+    fixed = None if own else posture.robot.declared_errors
     posture = _with_errors(posture, errors, seed, fixed)
     if grid is None and poses is None:
         costs = costs_at(posture, wrench, g, solids)

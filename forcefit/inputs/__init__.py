@@ -1,4 +1,5 @@
-"""Reading and checking of input files, and writing of output files as a whole.
+"""Reading and checking of input files, and complete writing of output files.
 
-Begin with ``table.py``, which reads TOML, and ``errors.py``, which words the errors.
+Begin with ``table.py``, which reads TOML, and ``errors.py``, which composes error
+messages.
 """

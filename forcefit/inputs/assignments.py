@@ -1,4 +1,4 @@
-"""Numbers given by name in a text, such as ``young=2e11,poisson=0.3``."""
+"""Numbers given by name in text, such as ``young=2e11,poisson=0.3``."""
 
 import math
 from collections.abc import Iterable
@@ -29,16 +29,16 @@ def parse_assignments(
     """Return the numbers given as ``NAME=VALUE``, with commas or in several texts.
 
     Args:
-        texts: for example ``["tx=0.1,tz=-0.5", "rz=0"]``.
+        texts: texts such as ``["tx=0.1,tz=-0.5", "rz=0"]``.
         option: name of the option, for error messages.
-        largest: bound on the absolute value of each number.
+        largest: largest accepted absolute value.
 
     Returns:
         The numbers by name.
 
     Raises:
-        BadInput: a text has another form, or a number is not finite, too large or given
-            twice.
+        BadInput: a text has a different form, or a number is not finite, too large or
+            given twice.
     """
     values: dict[str, float] = {}
     for part in ",".join(texts).split(","):

@@ -1,7 +1,7 @@
-"""Folder in which meshes and links' solutions are kept.
+"""Folder in which meshes and solutions of links are kept.
 
 The first writable folder of a list is used.  A read-only installation, a user without a
-home folder and a full disk are no errors: if no folder is writable, nothing is kept.
+home folder and a full disk are not errors: if no folder is writable, nothing is kept.
 """
 
 import os
@@ -13,7 +13,7 @@ from pathlib import Path
 
 
 def cache_folder() -> Path | None:
-    """Return the folder of results that are computed once; create it if it is absent.
+    """Return the folder of cached results; create it if it is absent.
 
     Returns:
         The first writable folder of ``$FORCEFIT_CACHE``, the user's cache folder and
@@ -38,7 +38,8 @@ def _candidates() -> Iterator[Path]:
         yield Path(given)
     with suppress(RuntimeError):  # no home folder
         yield _of_user() / "forcefit"
-    with suppress(OSError):  # no temporary folder, or another user's
+    # there is no temporary folder, or it belongs to another user
+    with suppress(OSError):
         yield _temporary()
 
 
@@ -52,8 +53,8 @@ def _of_user() -> Path:
 
 
 def _temporary() -> Path:
-    """Return the user's own temporary folder, writable by this user only."""
-    # other users could otherwise write numbers that forcefit reads
+    """Return the user's temporary folder, which only this user can write to."""
+    # otherwise other users could write values that forcefit reads
     user = os.getuid() if hasattr(os, "getuid") else 0
     folder = Path(tempfile.gettempdir()) / f"forcefit-{user}"
     folder.mkdir(mode=0o700, exist_ok=True)

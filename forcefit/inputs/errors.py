@@ -1,7 +1,7 @@
 """Error messages: one line with the place, the value found and the value expected.
 
 :class:`BadInput` is a ``ValueError``; the command line prints it and exits with status
-2.  Long values are abbreviated, so that the message stays one short line.
+2.  Long values are abbreviated, so that the message is one short line.
 """
 
 import difflib
@@ -11,12 +11,12 @@ import sys
 import unicodedata
 from collections.abc import Iterable
 
-# characters of a path, a place, the value found and the value expected
+# largest number of characters of a message: path, place, value found and value expected
 _LONGEST_MESSAGE = 800
 
 
 class BadInput(ValueError):
-    """Error of an input; its message is one line."""
+    """Error due to an input; its message is one line."""
 
     def __init__(self, message: str) -> None:
         super().__init__(one_line(message, _LONGEST_MESSAGE))
@@ -31,7 +31,7 @@ def one_line(text: str, longest: int) -> str:
 
 
 def printable(text: str) -> bool:
-    """Return whether a text has no line breaks, other controls or lone surrogates."""
+    """Return whether a text has no line breaks, controls or lone surrogates."""
     return not any(unicodedata.category(c) in {"Cc", "Cs", "Zl", "Zp"} for c in text)
 
 
@@ -86,7 +86,8 @@ _SHORT.maxstring = 60
 _SHORT.maxlist = 8
 
 
-LARGEST = 1e15  # in SI: beyond any length, modulus or density; its inverse below
+# in SI units, above any length, modulus or density; small values have the inverse limit
+LARGEST = 1e15
 
 
 def checked(

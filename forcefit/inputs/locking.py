@@ -1,4 +1,4 @@
-"""Locks on files that only one program at a time may write.
+"""Locks on files, so that only one program at a time writes them.
 
 The operating system locks a file ``FILE.lock`` next to the file, until the program
 ends.  A killed program leaves ``FILE.lock``; the next program removes it.
@@ -11,9 +11,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-# errors of network disks without locks
+# errors of network disks that do not support locks
 _NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP}
-_POLL = 0.01  # [s] between two tries to lock a file
+_POLL = 0.01  # [s] time between two attempts to lock a file
 
 
 @contextmanager
@@ -41,7 +41,7 @@ def locked_file(path: Path, wait: bool = True) -> Generator[None, None, None]:
 
 @contextmanager
 def _lock(own: Path, wait: bool) -> Generator[None, None, None]:
-    """Hold the lock on a file that exists only for it; remove the file at the end."""
+    """Hold the lock on a file that exists only for it; remove it at the end."""
     try:
         from filelock import FileLock, Timeout
     except ModuleNotFoundError:  # forcefit works without the package
@@ -66,7 +66,8 @@ def _lock(own: Path, wait: bool) -> Generator[None, None, None]:
         del _locks[id(lock)]
 
 
-# locks to be released when the program ends, because a signal may prevent it earlier
+# locks to release when the program ends, because a signal may prevent an earlier
+# release
 _locks: dict[int, tuple[Any, Path]] = {}
 
 
@@ -78,9 +79,8 @@ def _release_all() -> None:
 
 def _release(lock: Any, own: Path) -> None:
     """Remove the file of a lock and release it; another program's lock remains."""
-    # removed while it is locked: a waiting program sees that the file is gone and
-    # creates a new one; Windows cannot remove an open file, and releasing the lock
-    # removes it
+    # removed while it is locked, so that a waiting program notices this and creates a
+    # new file; Windows cannot remove an open file, but releasing the lock removes it
     if lock.is_locked:
         with suppress(OSError):
             own.unlink()

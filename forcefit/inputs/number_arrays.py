@@ -1,4 +1,4 @@
-"""Numbers and arrays of numbers from the plain values of a file or an option."""
+"""Conversion of the plain values of a file or an option to numbers and arrays."""
 
 import math
 
@@ -9,10 +9,10 @@ from forcefit.inputs.errors import describe
 
 
 def find_fault(value: object, shape: tuple[int, ...], infinite: bool = False) -> str:
-    """Return the fault in numbers of a given shape, and its place, counted from 1.
+    """Return the fault in numbers of a given shape, and its place counted from 1.
 
     Args:
-        value: nested lists with a fault, or another value.
+        value: nested lists with a fault, or a value of another type.
         shape: expected shape.
         infinite: whether inf is allowed.
 
@@ -34,7 +34,7 @@ def find_fault(value: object, shape: tuple[int, ...], infinite: bool = False) ->
 
 
 def number_array(value: object) -> NDArray | None:
-    """Return nested lists of numbers as an array; None if ragged or not of numbers."""
+    """Return nested lists of numbers as an array; None if ragged or not numeric."""
     if not isinstance(value, list):
         return None
     if value and all(isinstance(v, list) for v in value):
@@ -45,7 +45,7 @@ def number_array(value: object) -> NDArray | None:
 
 
 def comma_numbers(text: str) -> NDArray:
-    """Return the finite numbers between commas; none if one of them is not a number."""
+    """Return the finite numbers between commas; none if a text is not a number."""
     try:
         numbers = np.array([float(part) for part in text.split(",")])
     except ValueError:
@@ -54,7 +54,7 @@ def comma_numbers(text: str) -> NDArray:
 
 
 def as_number(value: object) -> float:
-    """Return a number as float; nan for other values, also for true and false."""
+    """Return a number as float; nan for other values, including true and false."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return math.nan
     try:
@@ -64,5 +64,5 @@ def as_number(value: object) -> float:
 
 
 def _proper(values: list) -> bool:
-    """Return whether all values are numbers that a float can hold; nan and inf are."""
+    """Return whether all values are numbers that a float can hold, or nan or inf."""
     return all(isinstance(v, float) or not math.isnan(as_number(v)) for v in values)

@@ -1,8 +1,7 @@
-"""Packages that only some functions need, and the command that installs them.
+"""Packages that only some functions need, and how to install them.
 
-A module imports such a package where it is used.  If the package is missing,
-:func:`naming_packages` writes an error of one line; the command line uses it
-everywhere.
+A module imports such a package where it uses it.  If the package is missing,
+:func:`naming_packages` raises an error of one line; all commands use it.
 """
 
 from collections.abc import Generator
@@ -31,7 +30,7 @@ _REQUIRED = (
     "clarabel", "cvxpy", "exudyn", "filelock", "jinja2", "numpy", "pytetwild",
     "pyvista", "rich", "scipy", "threadpoolctl", "typer", "vtkmodules",
 )  # fmt: skip
-# distributions with another name than their package
+# packages whose distribution has a different name
 _DISTRIBUTIONS = {"yaml": "pyyaml", "vtkmodules": "vtk"}
 
 

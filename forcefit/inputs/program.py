@@ -8,11 +8,11 @@ from types import ModuleType
 
 
 def sources_hash(packages: Sequence[ModuleType], libraries: Sequence[str]) -> str:
-    """Return SHA-256 of packages' Python sources and of the versions of libraries.
+    """Return the SHA-256 of packages' Python sources and of the versions of libraries.
 
     Args:
         packages: all ``.py`` files in their folders are digested.
-        libraries: names of distributions; one that is not installed counts as absent.
+        libraries: names of distributions; the digest also covers missing ones.
 
     Returns:
         The digest, the same wherever the packages are installed.
@@ -21,7 +21,7 @@ def sources_hash(packages: Sequence[ModuleType], libraries: Sequence[str]) -> st
     for package in packages:
         root = Path(str(package.__file__)).parent
         for path in sorted(root.rglob("*.py")):
-            # the line ends depend on the checkout
+            # line ends depend on the checkout, so they are unified
             source = path.read_bytes().replace(b"\r\n", b"\n")
             name = path.relative_to(root.parent).as_posix()
             digest.update(f"{name} {len(source)}\n".encode() + source)
@@ -30,7 +30,7 @@ def sources_hash(packages: Sequence[ModuleType], libraries: Sequence[str]) -> st
 
 
 def _version(name: str) -> str:
-    """Return the version of a distribution, or a text that it is absent."""
+    """Return the version of a distribution, or the text that it is absent."""
     try:
         return version(name)
     except PackageNotFoundError:

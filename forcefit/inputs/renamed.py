@@ -1,4 +1,4 @@
-"""Old names of arguments, fields and values: they work for one release and warn."""
+"""Old names of arguments, fields and values, which work for one release and warn."""
 
 import warnings
 from collections.abc import Callable, Mapping
@@ -11,13 +11,13 @@ C = TypeVar("C", bound=type)
 
 
 def warn_renamed(old: str, new: str, frames: int = 3) -> None:
-    """Warn that a name is an old one.
+    """Warn that a name is old.
 
     Args:
         old: name in the caller's code.
         new: present name.
-        frames: number of frames of the call stack up to the caller's line with the
-            name.
+        frames: number of frames of the call stack up to the caller's line that contains
+            the name.
     """
     warnings.warn(f"{old} is now {new}", FutureWarning, stacklevel=frames)
 
@@ -25,11 +25,11 @@ def warn_renamed(old: str, new: str, frames: int = 3) -> None:
 def renamed_keywords(
     **new_names: str | tuple[str, Mapping[Any, Any]],
 ) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Return a decorator that accepts old names of keywords, each with a warning.
+    """Return a decorator that accepts old names of keywords, with a warning for each.
 
     Args:
-        new_names: the present keyword by the old one; or the present keyword and the
-            present values by the old values.
+        new_names: present keyword by old keyword; or the present keyword, with its
+            present values by old values.
 
     Returns:
         A decorator.
@@ -54,10 +54,10 @@ def renamed_keywords(
 
 
 def renamed_fields(**new_names: str) -> Callable[[C], C]:
-    """Let a dataclass be made with fields by their old names too, with a warning.
+    """Return a decorator for dataclasses that accepts old names of fields and warns.
 
     Args:
-        new_names: the new field by the old one.
+        new_names: new field by old field.
 
     Returns:
         A decorator.
@@ -72,12 +72,12 @@ def renamed_fields(**new_names: str) -> Callable[[C], C]:
 
 
 def current_value(argument: str, value: str, new_values: Mapping[str, str]) -> str:
-    """Return the present word for a value given by its old word, with a warning.
+    """Return the present word for an old word, with a warning.
 
     Args:
         argument: name of the argument, for the warning.
         value: word in the caller's code.
-        new_values: the present word by the old word.
+        new_values: present word by old word.
 
     Returns:
         The present word; ``value`` itself if it is not an old word.

@@ -1,7 +1,7 @@
-"""Reading of TOML files, with one error message for each mistake.
+"""Reading of TOML files, with a separate error message for each mistake.
 
 A message names the file, the place in it, the value found and the value expected. For a
-wrong name it gives the nearest valid one; see ``forcefit/inputs/errors.py``.
+wrong name it proposes the most similar valid one; see ``forcefit/inputs/errors.py``.
 """
 
 import csv
@@ -10,9 +10,10 @@ import math
 import re
 import tomllib
 from collections.abc import Iterable
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,9 +40,23 @@ __all__ = [
     "read_toml",
 ]
 
-_LARGEST_FILE = 64 << 20  # [byte] more than a robot of a million frames needs
-# a key such as a.a.a. ... with 100 dots
+# [byte] largest accepted file; a robot of a million frames needs less
+_LARGEST_FILE = 64 << 20
+# a key with 100 dots, such as a.a.a. ...
 _DEEP_KEY = re.compile(r"(?<![\w-])(?:[\w-]+\s*\.\s*){100}")
+
+
+class Mending(Protocol):
+    """Replacement of faulty values while a file is read; see ``mending.py``."""
+
+    def text(self, path: str, text: str) -> str:
+        """Return the text to be read in place of that of a file."""
+
+    def root(self, content: dict[str, Any], file: str) -> "Table":
+        """Return the root table to be read in place of that of a file."""
+
+
+MENDING: ContextVar[Mending | None] = ContextVar("mending", default=None)
 
 
 def read_bytes(path: Path | str) -> bytes:
@@ -63,7 +78,10 @@ def read_bytes(path: Path | str) -> bytes:
         reason = getattr(error, "strerror", None) or str(error)
         raise BadInput(f"{path}: cannot be read: {reason}") from None
     if len(content) > _LARGEST_FILE:
-        raise BadInput(f"{path}: larger than {_LARGEST_FILE >> 20} MiB")
+        raise BadInput(
+            f"{path}: found a file larger than {_LARGEST_FILE >> 20} MiB, "
+            "expected a smaller one"
+        )
     return content
 
 
@@ -90,11 +108,12 @@ def read_text(path: Path | str) -> str:
     if (place := text.find("\0")) >= 0:
         line = text.count("\n", 0, place) + 1
         raise BadInput(f"{path}: line {line} holds NUL; expected a text file in UTF-8")
-    return text
+    mending = MENDING.get()
+    return text if mending is None else mending.text(str(path), text)
 
 
 def read_rows(path: Path | str) -> list[list[str]]:
-    """Return the cells of a CSV file, as a list for each of its lines.
+    """Return the cells of a CSV file, as one list for each line.
 
     Args:
         path: path of the file.
@@ -103,7 +122,7 @@ def read_rows(path: Path | str) -> list[list[str]]:
         The cells as text; an empty list for a blank line.
 
     Raises:
-        BadInput: the file cannot be read, or holds a cell without end.
+        BadInput: the file cannot be read, or a quoted cell has no end.
     """
     rows = csv.reader(read_text(path).splitlines())
     try:
@@ -127,21 +146,26 @@ def read_toml(path: Path | str) -> "Table":
     text = read_text(path)
     if _DEEP_KEY.search(text):  # tomllib would need minutes
         raise BadInput(f"{path}: not valid TOML: nested too deeply")
+    mending = MENDING.get()
     try:
-        return Table(tomllib.loads(text), str(path), "")
+        content = tomllib.loads(text)
+        if mending is not None:
+            return mending.root(content, str(path))
+        return Table(content, str(path), "")
     except RecursionError:
         raise BadInput(f"{path}: not valid TOML: nested too deeply") from None
-    except tomllib.TOMLDecodeError as error:  # its text ends with line and column
+    # the text of the error ends with line and column
+    except tomllib.TOMLDecodeError as error:
         reason = one_line(str(error), 200)
         raise BadInput(f"{path}: not valid TOML: {reason}") from None
-    except ValueError:  # Python parses no integer of more than 4300 digits
+    except ValueError:  # Python cannot parse a whole number of thousands of digits
         reason = "found a whole number of thousands of digits"
         raise BadInput(f"{path}: not valid TOML: {reason}") from None
 
 
 @dataclass(eq=False)
 class Table:
-    """A TOML table that records the keys that were read and refuses all others.
+    """A TOML table that records the keys that were read, to refuse all others.
 
     Attributes:
         content: keys and values of the table.
@@ -196,21 +220,22 @@ class Table:
         expected: str = "a string",
         longest: int = 4000,
     ) -> str:
-        """Return a string of one line.
+        """Return a string without line breaks.
 
         Args:
             key: name of the key.
             default: value of an absent key; without a default, an absent key is an
                 error.
             expected: description of a valid value, for the error message.
-            longest: most characters that the string may have.
+            longest: largest number of characters of the string.
 
         Returns:
             The string.
 
         Raises:
-            BadInput: the key is missing without a default; or the value is not a
-                string, empty, too long, or has line breaks or other control characters.
+            BadInput: the key is missing and has no default; or the value is not a
+                string, is empty or too long, or has line breaks or other control
+                characters.
         """
         if default is not None and not self.has(key):
             return default
@@ -226,13 +251,13 @@ class Table:
         return value
 
     def choice(self, key: str, valid: Iterable[str], default: str | None = None) -> str:
-        """Return a string that is one of a few valid ones.
+        """Return a string that is among a few valid ones.
 
         Returns:
             The string.
 
         Raises:
-            BadInput: the key is missing without a default, or the string is not valid.
+            BadInput: the key is missing and has no default, or the string is not valid.
         """
         valid = tuple(valid)
         names = " | ".join(f'"{v}"' for v in valid)
@@ -244,7 +269,7 @@ class Table:
         return value
 
     def boolean(self, key: str, default: bool) -> bool:
-        """Return the truth value of a key.
+        """Return the boolean value of a key.
 
         Returns:
             The value, or the default.
@@ -258,14 +283,14 @@ class Table:
         return value
 
     def integer(self, key: str, default: int | None = None, least: int = 0) -> int:
-        """Return a whole number of at least ``least``.
+        """Return an integer of at least ``least``.
 
         Returns:
             The number.
 
         Raises:
-            BadInput: the key is missing without a default, or the value is not such a
-                number.
+            BadInput: the key is missing and has no default, or the value is not such an
+                integer.
         """
         expected = f"a whole number >= {least}"
         if default is not None and not self.has(key):
@@ -294,16 +319,16 @@ class Table:
             default: value of an absent key; without a default, an absent key is an
                 error.
             above: bound that the value must exceed.
-            least: smallest value allowed.
+            least: smallest accepted value.
             below: bound that the value must not reach.
-            largest: bound on the absolute value.
+            largest: largest accepted absolute value.
 
         Returns:
             The number.
 
         Raises:
-            BadInput: the key is missing without a default, or the value is not a number
-                or out of range.
+            BadInput: the key is missing and has no default, or the value is not a
+                number or out of range.
         """
         limits = [
             f"> {above:g}" if above > -math.inf else "",
@@ -341,14 +366,14 @@ class Table:
             unit: unit for the error message.
             default: value of an absent key; without a default, an absent key is an
                 error.
-            largest: bound on the absolute value of each entry.
+            largest: largest accepted absolute value of each entry.
 
         Returns:
             The array.
 
         Raises:
-            BadInput: the key is missing without a default, or the value has another
-                shape or entries that are not finite numbers.
+            BadInput: the key is missing and has no default, or the value has a
+                different shape or entries that are not finite numbers.
         """
         size = " rows of ".join(str(n) for n in shape)
         expected = f"{size} finite numbers [{unit}]"
@@ -376,7 +401,7 @@ class Table:
         value = self.require(key, "a table")
         if not isinstance(value, dict):
             raise self.bad(key, f"found {describe(value)}, expected a table")
-        return Table(value, self.file, ".".join(filter(None, (self.place, key))))
+        return self._inner(value, ".".join(filter(None, (self.place, key))), key)
 
     def tables(self, key: str) -> list["Table"]:
         """Return the tables of ``[[key]]``; none if the key is absent.
@@ -385,7 +410,7 @@ class Table:
             A :class:`Table` for each; messages number them from 1.
 
         Raises:
-            BadInput: the key has another value.
+            BadInput: the value is not a list of tables.
         """
         value = self.get(key, [])
         if not isinstance(value, list) or not all(isinstance(v, dict) for v in value):
@@ -393,14 +418,21 @@ class Table:
             raise self.bad(key, message)
         prefix = f"{self.place}." if self.place else ""
         return [
-            Table(v, self.file, f"{prefix}{key}[{i}]") for i, v in enumerate(value, 1)
+            self._inner(v, f"{prefix}{key}[{i}]", key, i)
+            for i, v in enumerate(value, 1)
         ]
+
+    def _inner(
+        self, content: dict[str, Any], place: str, *at: str | int
+    ) -> "Table":  # fmt: skip
+        """Return a table inside this one, ``at`` its key and, in a list, its number."""
+        return Table(content, self.file, place)
 
     def finish(self) -> None:
         """Raise an error if the table has keys that were not read.
 
         Raises:
-            BadInput: names such a key.
+            BadInput: an unknown key was found; the message names it.
         """
         for key in self.content:
             if key not in self._asked:

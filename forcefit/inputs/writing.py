@@ -1,7 +1,7 @@
-"""Writing of output files, each as a whole or not at all.
+"""Writing of output files, either completely or not at all.
 
-The content is written to ``FILE.part`` in the same folder.  The complete file is then
-renamed.  The next program overwrites the remains of a killed one.
+The content is written to ``FILE.part`` in the same folder, and the complete file is
+then renamed.  The next program overwrites the remains of a killed one.
 """
 
 import io
@@ -29,7 +29,7 @@ class Kind:
     Attributes:
         name: name of the kind, for error messages.
         endings: valid endings of the file names.
-        begins: valid first bytes of the files; letters in upper or lower case.
+        begins: accepted first bytes of the files, in upper or lower case.
         packages: optional packages that write the files.
     """
 
@@ -61,7 +61,7 @@ ROBOT = Kind(
 
 
 def check_writable(path: Path | str, kind: Kind | None = None) -> None:
-    """Raise an error, before the computation, if a file cannot be written.
+    """Raise an error before the computation if a file cannot be written.
 
     Args:
         path: path of a file that will be written later.
@@ -117,8 +117,8 @@ def _check_there(path: Path, mode: int, kind: Kind | None) -> None:
         raise BadInput(unwritable(path, error)) from None
     if not head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(kind.begins):
         raise BadInput(
-            f"{path}: found a file that is not {kind.name}; expected one, or no "
-            "file: it is not overwritten, write to another file"
+            f"{path}: found a file that is not {kind.name}; expected such a file, or "
+            "no file: it is not overwritten, write to another file"
         )
 
 
@@ -131,17 +131,17 @@ def unwritable(path: Path | str, error: Exception) -> str:
 
 @contextmanager
 def whole_file(path: Path | str) -> Generator[Path, None, None]:
-    """Write a file as a whole or not at all.
+    """Write a file completely or not at all.
 
     Args:
-        path: path of the file; of a symbolic link, its target is written.
+        path: path of the file; for a symbolic link, its target is written.
 
     Yields:
         The path to write to.  At the end of the block the written file is renamed;
         after an error it is removed, and the old file is unchanged.
 
     Raises:
-        BadInput: the file cannot be written, as on a full disk.
+        BadInput: the file cannot be written, for example because the disk is full.
     """
     path = Path(path)
     check_writable(path)
@@ -164,7 +164,7 @@ def whole_file(path: Path | str) -> Generator[Path, None, None]:
 
 
 def check_new_folder(folder: Path | str) -> None:
-    """Raise an error, before the computation, if a folder cannot be filled.
+    """Raise an error before the computation if a folder cannot be filled.
 
     Args:
         folder: path of a new or empty folder.
@@ -183,7 +183,7 @@ def check_new_folder(folder: Path | str) -> None:
 
 @contextmanager
 def whole_folder(folder: Path | str) -> Generator[Path, None, None]:
-    """Write a folder with all its files or not at all.
+    """Write a folder completely, with all its files, or not at all.
 
     Args:
         folder: path of a new or empty folder.
@@ -201,7 +201,7 @@ def whole_folder(folder: Path | str) -> Generator[Path, None, None]:
     try:
         part.mkdir()
         yield part
-        if folder.is_dir():  # the empty folder; Windows replaces no folder
+        if folder.is_dir():  # the folder is empty; Windows cannot replace a folder
             folder.rmdir()
         part.replace(folder)
     except OSError as error:
@@ -215,7 +215,7 @@ def path_from(folder: Path, path: Path | str) -> str:
 
     Args:
         folder: folder of the file that will contain the path.
-        path: absolute, or relative to the working folder.
+        path: absolute path, or path relative to the working folder.
 
     Returns:
         The path relative to the folder; the absolute path if it is on another drive.
@@ -227,7 +227,7 @@ def path_from(folder: Path, path: Path | str) -> str:
 
 
 def write_text(text: str, path: Path | str) -> None:
-    r"""Write a text file as a whole or not at all.
+    r"""Write a text file completely or not at all.
 
     Args:
         text: text with line ends ``\n``, kept on every system; written in UTF-8.
@@ -241,7 +241,7 @@ def write_text(text: str, path: Path | str) -> None:
 
 
 def write_bytes(content: bytes, path: Path | str) -> None:
-    """Write a file as a whole or not at all.
+    """Write a file completely or not at all.
 
     Args:
         content: bytes of the file.
@@ -255,7 +255,7 @@ def write_bytes(content: bytes, path: Path | str) -> None:
 
 
 def save_figure(figure: Any, path: Path | str) -> None:
-    """Write a figure as a whole or not at all.
+    """Write a figure completely or not at all.
 
     Args:
         figure: figure of matplotlib.
@@ -266,7 +266,7 @@ def save_figure(figure: Any, path: Path | str) -> None:
     """
     check_writable(path, PICTURE)
     content = io.BytesIO()
-    # matplotlib draws a box for a letter that the font lacks
+    # matplotlib draws a box for a character that the font lacks, and warns
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         figure.savefig(content, dpi=150, format=Path(path).suffix[1:].lower())
@@ -274,7 +274,7 @@ def save_figure(figure: Any, path: Path | str) -> None:
 
 
 def save_pixels(pixels: Any, path: Path | str) -> None:
-    """Write an RGB picture as a whole or not at all.
+    """Write an RGB picture completely or not at all.
 
     Args:
         pixels: (rows, columns, 3) values from 0 to 255.
@@ -293,7 +293,7 @@ def save_pixels(pixels: Any, path: Path | str) -> None:
 
 
 def check_json(target: str | None) -> str | None:
-    """Raise an error, before the computation, if :func:`write_json` could not write.
+    """Raise an error before the computation if :func:`write_json` could not write.
 
     Args:
         target: a path, ``"-"`` for standard output, or None for no output.
@@ -310,7 +310,7 @@ def check_json(target: str | None) -> str | None:
 
 
 def write_json(results: dict, target: str | None) -> None:
-    """Write results as JSON to a file, as a whole or not at all, or to standard output.
+    """Write results as JSON to a file, completely or not at all, or to standard output.
 
     Args:
         results: plain values; infinities and NaN become null.

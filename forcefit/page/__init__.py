@@ -1,8 +1,8 @@
-"""Reports: one self-contained HTML page, the same for every kind of result.
+"""Reports: one self-contained HTML page, in the same form for every kind of result.
 
-Begin with :func:`forcefit.page.page.page`.  Pieces of a page are HTML texts: tables
-(:mod:`forcefit.page.tables`), charts, maps (:mod:`forcefit.page.charts`) and scenes.
-Numbers are SI in the page's data and shown in display units
-(:mod:`forcefit.results.units`); ``page.js`` draws, sorts, switches units and opens
-points.
+Begin with :func:`forcefit.page.page.page`.  A page consists of pieces of HTML: tables
+(:mod:`forcefit.page.tables`), charts and maps (:mod:`forcefit.page.charts`), and
+scenes.  Numbers are in SI in the data of the page, and in display units on the screen
+(:mod:`forcefit.results.units`).  The script ``page.js`` draws charts, sorts tables,
+changes units and shows the numbers of a point.
 """

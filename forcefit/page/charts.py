@@ -1,8 +1,8 @@
 """Charts and maps of a page: data in SI, drawn by plotly.js; a click shows values.
 
-A chart is a list of plotly traces; every axis has its SI unit and the one shown.  A map
-holds several quantities over one or two axes and all numbers of each point; a scene is
-a robot, :mod:`assembly.report.scene`.
+A chart is a list of plotly traces.  Every axis has its SI unit and a display unit.  A
+map shows several quantities over one or two axes, and has all numbers of each point.  A
+scene shows a robot, see :mod:`assembly.report.scene`.
 """
 
 import html
@@ -26,9 +26,9 @@ class Axis:
     """An axis of a chart.
 
     Attributes:
-        title: in words.
-        unit: SI, empty for a pure number.
-        options: of plotly's axis, such as ``{"type": "log"}``.
+        title: words that describe the quantity of the axis.
+        unit: SI unit, empty for a number without unit.
+        options: options of plotly's axis, such as ``{"type": "log"}``.
     """
 
     title: str
@@ -41,10 +41,10 @@ class Layer:
     """One quantity of a map.
 
     Attributes:
-        key: its name in the results.
-        title: in words.
-        unit: SI.
-        values: (nx, ny), or (nx,) over one axis; NaN where there is none.
+        key: name of the quantity in the results.
+        title: words that describe the quantity.
+        unit: SI unit.
+        values: (nx, ny), or (nx,) over one axis; NaN at points without a value.
     """
 
     key: str
@@ -54,7 +54,7 @@ class Layer:
 
 
 def label(name: str) -> str:
-    """Return a name for plotly.js, without tags."""
+    """Return a name for plotly.js, with HTML tags escaped."""
     return html.escape(name, quote=False)
 
 
@@ -62,17 +62,17 @@ def chart(
     traces: Sequence[Mapping[str, Any]], x: Axis, y: Axis, caption: str,
     bars: str = "overlay",
 ) -> str:  # fmt: skip
-    """Return a chart of plotly traces, their data in SI.
+    """Return a chart of plotly traces with data in SI.
 
     Args:
-        traces: of plotly.js; ``x``, ``y`` and ``error_*.array`` in SI.
+        traces: traces of plotly.js; ``x``, ``y`` and ``error_*.array`` are in SI.
         x: the horizontal axis.
         y: the vertical axis.
-        caption: below it.
-        bars: bars at one position: ``"overlay"`` or ``"stack"``.
+        caption: text below the chart.
+        bars: mode of several bars at one position: ``"overlay"`` or ``"stack"``.
 
     Returns:
-        HTML, drawn when the page is opened.
+        HTML of a chart that is drawn when the page is opened.
     """
     axes = {"x": _axis(x, [t["x"] for t in traces]),
             "y": _axis(y, [t["y"] for t in traces])}  # fmt: skip
@@ -87,10 +87,10 @@ def bars(values: Mapping[str, float], x: Axis, caption: str, line: float = 1.0) 
     """Return horizontal bars, the first on top, with their numbers.
 
     Args:
-        values: [SI] by name.
+        values: lengths of the bars [SI], by name.
         x: the horizontal axis.
-        caption: below them.
-        line: [SI] where a line is drawn across; NaN for none.
+        caption: text below the chart.
+        line: [SI] coordinate of a line across all bars; NaN for no line.
 
     Returns:
         HTML.
@@ -113,14 +113,15 @@ def bars(values: Mapping[str, float], x: Axis, caption: str, line: float = 1.0) 
 def matrix(
     values: ArrayLike, names: Sequence[str], title: str, caption: str, around: bool
 ) -> str:
-    """Return a square matrix as coloured cells with numbers.
+    """Return a chart of a square matrix: coloured cells with numbers.
 
     Args:
         values: (n, n).
-        names: of rows and columns.
+        names: names of the rows and columns.
         title: title of the colour scale.
-        caption: below it.
-        around: whether the colour scale is centred at zero; otherwise 0 to 1.
+        caption: text below the chart.
+        around: True: the colour scale is centred at zero; False: it extends from 0 to
+            1.
 
     Returns:
         HTML.
@@ -145,13 +146,13 @@ def value_map(
     axes: Sequence[tuple[Axis, NDArray]], layers: Sequence[Layer], states: NDArray,
     caption: str,
 ) -> str:  # fmt: skip
-    """Return a map of quantities over a grid; a click on a point shows all of them.
+    """Return a map of quantities over a grid; a click shows all quantities of a point.
 
     Args:
-        axes: one or two, with their values in SI.
-        layers: the quantities; those with one value everywhere are stated in words.
-        states: of every point, in words.
-        caption: below it.
+        axes: one or two axes, with their values in SI.
+        layers: the quantities; a constant quantity is stated in words instead.
+        states: state of every point, in words.
+        caption: text below the map.
 
     Returns:
         HTML.
@@ -183,11 +184,11 @@ def value_map(
 
 
 def scene(spec: Mapping[str, Any], caption: str) -> str:
-    """Return a robot that the reader can turn, exaggerate and close.
+    """Return a robot that the reader can rotate, magnify and close.
 
     Args:
-        spec: plain values as ``page.js`` reads them, SI.
-        caption: below it.
+        spec: plain values in SI, in the form that ``page.js`` reads.
+        caption: text below the robot.
 
     Returns:
         HTML.
@@ -201,18 +202,18 @@ def grid(*charts: str) -> str:
 
 
 def _constant(layer: Layer) -> float | None:
-    """Return the one value of a layer that does not vary; NaN if it has none."""
+    """Return the value of a constant layer; NaN if the layer varies or has no value."""
     values = np.asarray(layer.values, dtype=float)
     finite = values[np.isfinite(values)]
     if not len(finite):
         return float("nan")
-    # smaller variation is rounding, which a map would show as a pattern
+    # a smaller variation is due to rounding, and a map would show it as a pattern
     same = np.ptp(finite) <= 1e-9 * np.abs(finite).max()
     return float(finite[0]) if same else None
 
 
 def _unit(unit: str, values: ArrayLike) -> dict[str, Any]:
-    """Return the unit shown for data of an SI unit, and its factor."""
+    """Return the display unit for data in an SI unit, and the factor to this unit."""
     array = np.asarray(values, dtype=float) if unit else np.zeros(0)
     finite = array[np.isfinite(array)]
     shown = shown_in(unit, float(np.abs(finite).max()) if len(finite) else 0.0)
@@ -220,7 +221,7 @@ def _unit(unit: str, values: ArrayLike) -> dict[str, Any]:
 
 
 def _axis(axis: Axis, data: Sequence[ArrayLike]) -> dict[str, Any]:
-    """Return an axis for ``page.js``, with a unit for the data along it."""
+    """Return an axis for ``page.js``, with a display unit that suits the data."""
     arrays = [np.ravel(np.asarray(d, dtype=float)) for d in data if axis.unit]
     values = np.concatenate(arrays) if arrays else np.zeros(0)
     return _unit(axis.unit, values) | {
@@ -229,5 +230,5 @@ def _axis(axis: Axis, data: Sequence[ArrayLike]) -> dict[str, Any]:
 
 
 def _figure(spec: Mapping[str, Any], kind: str, caption: str) -> str:
-    """Return a figure that ``page.js`` fills."""
+    """Return a figure whose content ``page.js`` draws."""
     return piece("figure", kind, plain(spec), caption)

@@ -1,4 +1,4 @@
-"""Comparison of two results: every number that changed, the largest change first."""
+"""Comparison of two results: every number that differs, the largest change first."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,8 +11,8 @@ from forcefit.page.tables import Cell, Value, table
 from forcefit.results.quantities import in_words, unit_of
 
 SAME = 1e-9  # relative difference due to rounding
-_LISTED = 60  # number of changes not folded, about two printed sheets
-# accuracy and cost of a result, not its values
+_LISTED = 60  # number of changes that are shown unfolded, about two printed sheets
+# keys that describe the accuracy and cost of a result, and are not compared
 _MEASURES = {"certificate", "seconds", "cuts"}
 _NAMES = ("name", "part", "what", "error", "term", "frame", "component")
 _HEADLINES = {"worst_clearance", "within_limits", "error", "allocation"}
@@ -21,12 +21,12 @@ _FIGURES = {("solution", "energy"), ("zone", "margin"), ("zone", "margin_free")}
 
 @dataclass(frozen=True)
 class Change:
-    """A number or text of two results.
+    """A number or text that differs between two results.
 
     Attributes:
-        place: keys that lead to it.
-        before: in the first; None where it has none.
-        after: in the second; None where it has none.
+        place: keys that lead to the number or text.
+        before: value in the first result; None if the result has no value.
+        after: value in the second result; None if the result has no value.
     """
 
     place: tuple[str, ...]
@@ -35,7 +35,7 @@ class Change:
 
     @property
     def relative(self) -> float:
-        """Change over the first value; infinite from zero, NaN where there is none."""
+        """Relative change; infinite from zero, NaN without a value."""
         a, b = self.before, self.after
         if not (_is_number(a) and _is_number(b)):
             return math.nan
@@ -48,21 +48,21 @@ class Change:
 
     @property
     def unit(self) -> str:
-        """SI unit, where the key that ends the place, or one before, has one."""
+        """SI unit of the last key that has one; empty without such a key."""
         units = (unit_of(key) for key in reversed(self.place))
         return next(filter(None, units), "")
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """What differs between two results.
+    """Differences between two results.
 
     Attributes:
-        names: of both.
-        titles: subject of each, such as its robot.
-        changes: numbers first, the largest relative change on top, then texts.
+        names: names of both results.
+        titles: subject of each result, such as its robot.
+        changes: changes of numbers, the largest relative change first; then texts.
         same: number of equal values.
-        only: places that only one of the two has.
+        only: places that only one of the results has.
     """
 
     names: tuple[str, str]
@@ -72,7 +72,7 @@ class Comparison:
     only: tuple[Change, ...]
 
     def table(self) -> dict[str, Any]:
-        """Return plain values."""
+        """Return the comparison as plain values."""
         return {
             "compared": list(self.names), "same": self.same,
             "changes": [_plain(one) for one in self.changes],
@@ -86,13 +86,13 @@ def compare(
     """Compare two results of the same command.
 
     Args:
-        first: plain values, of a report or a JSON file.
-        second: the same of another run.
-        names: of both.
+        first: plain values of a report or a JSON file.
+        second: plain values of another run of the command.
+        names: names of both results.
 
     Returns:
-        All differences; the numbers of a certificate, which bound errors of the
-        others, are left out.
+        All differences.  The numbers of a certificate are excluded, because they bound
+        the errors of other numbers.
     """
     a, b = (dict(_leaves(one, ())) for one in (first, second))
     both = [place for place in a if place in b]
@@ -112,7 +112,7 @@ def compare(
 
 
 def _leaves(value: Any, place: tuple[str, ...]) -> Any:
-    """Yield every number and text, with the keys that lead to it."""
+    """Yield every number and text of a result, with the keys that lead to it."""
     if isinstance(value, Mapping):
         for key, one in value.items():
             if key not in _MEASURES:
@@ -125,7 +125,7 @@ def _leaves(value: Any, place: tuple[str, ...]) -> Any:
 
 
 def _named(row: Any) -> str:
-    """Return the name of a row of a list, whose order may change; empty if none."""
+    """Return name of a list item, because the order may change; empty without one."""
     if not isinstance(row, Mapping):
         return ""
     names = (row.get(key) for key in _NAMES)
@@ -133,19 +133,19 @@ def _named(row: Any) -> str:
 
 
 def _is_number(value: Any) -> bool:
-    """Return whether a value is a number, not a truth value."""
+    """Return whether a value is a number and not a truth value."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _vector(place: tuple[str, ...]) -> tuple[str, ...]:
-    """Return vector or matrix of which a number is a component, or its own place."""
+    """Return the place of the vector or matrix of a component, or the place itself."""
     while len(place) > 1 and place[-1].isdigit():
         place = place[:-1]
     return place
 
 
 def _sizes(leaves: Mapping[tuple[str, ...], Any]) -> dict[tuple[str, ...], float]:
-    """Return the largest component of each vector, the scale of its rounding."""
+    """Return largest component of each vector, which determines its rounding errors."""
     sizes: dict[tuple[str, ...], float] = {}
     for place, value in leaves.items():
         if _is_number(value) and math.isfinite(value):
@@ -155,28 +155,28 @@ def _sizes(leaves: Mapping[tuple[str, ...], Any]) -> dict[tuple[str, ...], float
 
 
 def _same(a: Any, b: Any, size: float) -> bool:
-    """Return whether two values are equal, up to rounding of their vector's size."""
+    """Return whether two values are equal up to rounding errors of the given size."""
     if _is_number(a) and _is_number(b):
         return math.isclose(a, b, rel_tol=SAME, abs_tol=max(1e-15, 1e-3 * SAME * size))
     return bool(a == b)
 
 
 def _is_headline(place: tuple[str, ...]) -> bool:
-    """Return whether a place is a headline figure; no component of a vector is."""
+    """Return whether a place is a headline number; components of vectors are not."""
     if any(key.isdigit() for key in place):
         return False
     return place[0] in _HEADLINES or place[-2:] in _FIGURES
 
 
 def _size(change: Change) -> tuple[int, float, tuple[str, ...]]:
-    """Return a sort key: headline numbers, other numbers by change, texts."""
+    """Return a sort key: headline numbers, other numbers by their change, texts."""
     relative = change.relative
     group = 2 if math.isnan(relative) else int(not _is_headline(change.place))
     return (group, 0.0 if group == 2 else -abs(relative), change.place)
 
 
 def _title(results: Mapping[str, Any]) -> str:
-    """Return the title, campaign or robot of results."""
+    """Return the title, the campaign or the robot of a result."""
     keys = [key for key in ("title", "campaign", "robot") if key in results]
     return str(results[keys[0]]) if keys else "results"
 
@@ -194,11 +194,11 @@ def comparison_text(comparison: Comparison, most: int = 20) -> str:
     """Return a comparison as text.
 
     Args:
-        comparison: of two results.
-        most: lines.
+        comparison: comparison of two results.
+        most: largest number of lines.
 
     Returns:
-        A sentence and a line for each change, the largest on top.
+        A sentence and a line for each change, the largest change first.
     """
     lines = [_sentence(comparison)]
     for one in comparison.changes[:most]:
@@ -211,12 +211,12 @@ def comparison_text(comparison: Comparison, most: int = 20) -> str:
 
 
 def _brief(value: Any) -> str:
-    """Return a short text of a value."""
+    """Return a value as a short text."""
     return f"{value:.6g}" if _is_number(value) else str(value)[:60]
 
 
 def _sentence(comparison: Comparison) -> str:
-    """Return a sentence on the number of changes."""
+    """Return a sentence with the number of changes."""
     changed, same = len(comparison.changes), comparison.same
     text = f"{changed} of {changed + same} values differ"
     if comparison.only:
@@ -228,11 +228,11 @@ def comparison_page(comparison: Comparison, provenance: Provenance) -> str:
     """Return a comparison as a page.
 
     Args:
-        comparison: of two results.
-        provenance: command and both files.
+        comparison: comparison of two results.
+        provenance: command, and names of both files.
 
     Returns:
-        HTML, which needs no other file.
+        HTML that needs no other file.
     """
     numbers = [c for c in comparison.changes if not math.isnan(c.relative)]
     tiles = [
@@ -270,7 +270,7 @@ def comparison_page(comparison: Comparison, provenance: Provenance) -> str:
 def _listed(
     changes: Sequence[Change], names: tuple[str, str], what: str
 ) -> Iterator[str]:
-    """Yield the first changes as a table, the others folded and not printed."""
+    """Yield the first changes as a table; the others are folded and not printed."""
     head = ["quantity", *names, "change"]
     yield table(head, [_row(one) for one in changes[:_LISTED]], what)
     more = [_row(one) for one in changes[_LISTED:]]
@@ -280,7 +280,7 @@ def _listed(
 
 
 def _row(change: Change) -> list[Cell]:
-    """Return a change as a row of a table."""
+    """Return a change as a row of the table."""
     cells = [
         Value(v, change.unit, 6) if _is_number(v) else "-" if v is None else str(v)
         for v in (change.before, change.after)

@@ -1,4 +1,4 @@
-"""The markup of pages: macros of ``page.jinja``, which escape every text."""
+"""The markup of pages: the macros of ``page.jinja``, which escape all texts."""
 
 import re
 from functools import cache, partial
@@ -9,7 +9,7 @@ _BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|[nµumkM]?(?:m|rad|N|J|Pa|Hz))(?![\w
 
 
 def piece(macro: str, *values: Any) -> str:
-    """Return a piece of a page as HTML: a macro of ``page.jinja`` with arguments."""
+    """Return a piece of a page as HTML: the result of a macro of ``page.jinja``."""
     return str(getattr(_template(), macro)(*values))
 
 
@@ -20,11 +20,11 @@ def packaged(name: str) -> bytes:
 
 @cache
 def _template() -> Any:
-    """Return the macros; import jinja2 when the first page is written."""
+    """Return macros of ``page.jinja``; jinja2 is imported for the first page only."""
     from jinja2 import Environment, StrictUndefined
 
     pages = Environment(autoescape=True, trim_blocks=True, undefined=StrictUndefined)
-    # no line ends between a number and its unit
+    # a line must not be broken between a number and its unit
     pages.filters["unbroken"] = partial(_BEFORE_UNIT.sub, "&nbsp;")
     compact = {"allow_nan": False, "separators": (",", ":")}
     pages.policies["json.dumps_kwargs"] = compact

@@ -27,17 +27,17 @@ from forcefit.page.markup import packaged, piece
 from forcefit.page.tables import Value, table
 
 _PACKAGES = ("numpy", "scipy", "clarabel", "cvxpy", "exudyn")
-_DIGITS = 300  # digits of the largest integer that a float surely holds
+_DIGITS = 300  # largest number of digits of an integer that a float can represent
 
 
 @dataclass(frozen=True)
 class Tile:
-    """One conclusion at the top of a page.
+    """A conclusion at the top of a page.
 
     Attributes:
-        title: its subject.
-        answer: a few words or numbers.
-        note: a sentence, of texts and numbers.
+        title: subject of the conclusion.
+        answer: the conclusion in a few words or numbers.
+        note: a sentence of texts and numbers.
     """
 
     title: str
@@ -47,12 +47,12 @@ class Tile:
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where the numbers of a page come from.
+    """Origin of the numbers of a page.
 
     Attributes:
-        command: the command that computed them, empty without one.
-        files: files that it read.
-        settings: in words, such as the seed.
+        command: command that computed the numbers; empty without a command.
+        files: files that the command read.
+        settings: further settings in words, such as the seed.
     """
 
     command: str = ""
@@ -65,15 +65,15 @@ class Page:
     """The content of a page.
 
     Attributes:
-        title: of the page.
+        title: title of the page.
         verdict: the conclusion in a few sentences.
-        good: whether the result is favourable; None for neither.
-        tiles: the main figures at the top.
-        about: what was computed, below the title.
-        body: pieces of HTML in their order.
-        assumed: assumptions, a sentence each.
-        provenance: where they come from.
-        results: plain values, kept inside the page for ``forcefit report compare``.
+        good: whether the result is favourable; None if it is neither good nor bad.
+        tiles: main conclusions, at the top.
+        about: a text below the title that states what was computed.
+        body: pieces of HTML, in their order.
+        assumed: assumptions, one sentence for each.
+        provenance: origin of the numbers.
+        results: plain values, stored in the page for ``forcefit report compare``.
     """
 
     title: str
@@ -88,7 +88,7 @@ class Page:
 
 
 def command_line() -> str:
-    """Return the running forcefit command as typed; empty for another program."""
+    """Return the forcefit command as typed; empty if another program is running."""
     import shlex
 
     name = Path(sys.argv[0]).name
@@ -97,13 +97,13 @@ def command_line() -> str:
 
 
 def page(content: Page) -> str:
-    """Return a page as one HTML text, which needs no other file.
+    """Return a page as an HTML text that needs no other file.
 
     Args:
-        content: of the page.
+        content: content of the page.
 
     Returns:
-        HTML; the results are inside it as JSON, SI, in full.
+        HTML with the results as JSON, in SI and with all digits.
     """
     drawn = any("class=spec>" in one for one in content.body)
     style, script = (packaged(name).decode() for name in ("page.css", "page.js"))
@@ -115,17 +115,17 @@ def page(content: Page) -> str:
 
 
 def results_in(text: str, where: str) -> dict[str, Any]:
-    """Return the results that a page holds, or those of a JSON file.
+    """Return the results in a page or in a JSON file.
 
     Args:
-        text: of a page or of a JSON file of a command.
-        where: its name, for messages.
+        text: text of a page, or of a JSON file written by a command.
+        where: name of the file, for messages.
 
     Returns:
         Plain values.
 
     Raises:
-        BadInput: it is neither.
+        BadInput: the text is neither a page nor such a JSON file.
     """
     mark = '<script type="application/json" class=results>'
     if text.lstrip()[:15].lower() == "<!doctype html>":
@@ -144,7 +144,7 @@ def results_in(text: str, where: str) -> dict[str, Any]:
 
 
 def _whole(text: str) -> int | float:
-    """Return an integer of JSON; beyond the range of floats it is infinite."""
+    """Return an integer of JSON; infinity if it is too large for a float."""
     return int(text) if len(text) <= _DIGITS else float(text)
 
 
@@ -177,7 +177,7 @@ def _version(package: str) -> str:
 
 
 def _digest(path: Path) -> str:
-    """Return SHA-256 of a file as it is now."""
+    """Return the SHA-256 of the present content of a file."""
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
@@ -186,11 +186,11 @@ def _digest(path: Path) -> str:
 
 @cache
 def packed_plotly() -> str:
-    """Return plotly.js with the traces that pages draw, compressed and as text.
+    """Return plotly.js with the traces that pages use, compressed, as text.
 
-    ``plotly/build.mjs`` makes it.  A browser unpacks it in 0.1 s.
+    ``plotly/build.mjs`` builds it.  A browser decompresses it in 0.1 s.
 
     Returns:
-        base64 of a gzip file.
+        A gzip file in base64.
     """
     return base64.b64encode(packaged("plotly/plotly.min.js.gz")).decode()

@@ -1,4 +1,4 @@
-"""Tables and numbers of a page; each number has its SI value, to switch units."""
+"""Tables and numbers of a page; each number has its SI value, to change the units."""
 
 import math
 from collections.abc import Sequence
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from forcefit.page.markup import piece
 from forcefit.results.units import Shown, number_text, shown_in
 
-_LONG = 48  # characters; longer texts may wrap in their cells
+_LONG = 48  # [characters] texts that are longer may be wrapped in their cells
 Marked = tuple[dict[str, str], str]  # attributes and text of a cell
 
 
@@ -16,9 +16,9 @@ class Value:
     """A number with its unit.
 
     Attributes:
-        value: in SI.
-        unit: SI; empty for a pure number.
-        digits: significant digits shown.
+        value: value in SI.
+        unit: SI unit; empty for a number without unit.
+        digits: number of significant digits on the page.
     """
 
     value: float
@@ -27,13 +27,13 @@ class Value:
 
     @property
     def text(self) -> str:
-        """The number in its display unit."""
+        """The number in its display unit, as text."""
         shown = shown_in(self.unit, self.value)
         return number_text(self.value * shown.factor, shown.shown, self.digits)
 
     @property
     def attributes(self) -> dict[str, str]:
-        """The SI value in full, its unit, and its text where another unit is shown."""
+        """The SI value with all digits, its unit, and its text in a display unit."""
         unit = shown_in(self.unit).unit
         si = number_text(self.value, unit, self.digits)
         marks = {"data-v": repr(float(self.value))}
@@ -43,12 +43,12 @@ class Value:
 
 @dataclass(frozen=True)
 class Column:
-    """A column of numbers of one unit, which its head states.
+    """A column of numbers in one unit, which its head states.
 
     Attributes:
-        title: in words.
-        unit: SI.
-        digits: significant digits shown.
+        title: words that describe the quantity.
+        unit: SI unit.
+        digits: number of significant digits on the page.
     """
 
     title: str
@@ -62,15 +62,15 @@ Cell = str | float | Value
 def table(
     head: Sequence[str | Column], rows: Sequence[Sequence[Cell]], name: str = "table"
 ) -> str:
-    """Return a table, sorted by a click on its head and copied by a button as CSV.
+    """Return a table; a click on its head sorts it, and a button copies it as CSV.
 
     Args:
-        head: of each column; numbers under a :class:`Column` share its unit.
+        head: head of each column; numbers under a :class:`Column` have its unit.
         rows: texts, numbers (under a :class:`Column`) or :class:`Value`.
-        name: for the button's label.
+        name: name of the table, for the label of the button.
 
     Returns:
-        HTML; texts are escaped.
+        HTML, in which texts are escaped.
     """
     columns = [_shown_column(h, [row[k] for row in rows]) for k, h in enumerate(head)]
     heads = [_head_cell(h, s) for h, s in zip(head, columns, strict=True)]
@@ -82,7 +82,7 @@ def table(
 
 
 def _shown_column(head: str | Column, cells: Sequence[Cell]) -> Shown:
-    """Return the unit of a column, by the size of its numbers."""
+    """Return the display unit of a column, which depends on the size of its numbers."""
     if isinstance(head, str):
         return Shown("", "", 1.0)
     sizes = [abs(c) for c in cells if isinstance(c, int | float) and math.isfinite(c)]
@@ -100,7 +100,7 @@ def _head_cell(head: str | Column, shown: Shown) -> Marked:
 
 
 def _cell(cell: Cell, head: str | Column, shown: Shown) -> Marked:
-    """Return the cell of a text, a number under a unit, or a number with its own."""
+    """Return cell of a text, of a number in the column's unit, or of a ``Value``."""
     if isinstance(cell, str):
         return {"class": "long"} if len(cell) > _LONG else {}, cell
     if isinstance(cell, Value):

@@ -1,4 +1,4 @@
-"""Quantities of all results: one table for text, JSON and attributes.
+"""Quantities of all results: one table for texts, JSON and attributes.
 
 Begin with :mod:`forcefit.results.quantities`.
 """

@@ -1,11 +1,12 @@
-"""Short representations of objects: a title and a few figures with their units.
+"""Short representations of objects: a title and a few values with their units.
 
-A dataclass uses them with one line in its body::
+A dataclass uses them by one line in its body::
 
     __repr__, _repr_html_ = short_repr, html_table
 
-The figures come from the object's method ``_figures``, or are its fields, abbreviated.
-The text is for a console, the table for a notebook; both are a few lines long.
+The values are those of the method ``_figures`` of the object; without this method, they
+are its fields, abbreviated.  The text is for a console, and the table is for a
+notebook; both have a few lines.
 """
 
 import html
@@ -18,15 +19,16 @@ from numpy.typing import ArrayLike, NDArray
 
 Figures = dict[str, str]
 
-_LONGEST = 72  # largest number of characters of a value
-_FEW = 6  # largest number of elements shown; of a longer array only its shape
+_LONGEST = 72  # [characters] longest text of a value
+# largest number of elements that are shown; of a longer array, only the shape is shown
+_FEW = 6
 
 
 def short_repr(self: Any) -> str:
-    """Return a title and one line for each figure.
+    """Return a title and one line for each value.
 
     Args:
-        self: a dataclass, perhaps with a method ``_figures``.
+        self: a dataclass; its method ``_figures`` is optional.
 
     Returns:
         Lines of text.
@@ -50,17 +52,17 @@ def show(self: Any, **options: Any) -> Any:
 
 
 def listing(title: str, lines: Mapping[str, str], notes: Sequence[str] = ()) -> str:
-    """Return a title and lines of words and values, aligned, then notes."""
+    """Return a title, aligned lines of words and values, and notes."""
     width = max(map(len, lines), default=0)
     rows = [f"  {words:{width}}  {value}" for words, value in lines.items()]
     return "\n".join([title, *rows, *(f"note: {note}" for note in notes)])
 
 
 def html_table(self: Any) -> str:
-    """Return a title and a table of the figures in HTML, for notebooks.
+    """Return a title and a table of the values in HTML, for notebooks.
 
     Args:
-        self: a dataclass, perhaps with a method ``_figures``.
+        self: a dataclass; its method ``_figures`` is optional.
 
     Returns:
         HTML, in which names from files are escaped.
@@ -75,7 +77,7 @@ def html_table(self: Any) -> str:
 
 
 def title(thing: object) -> str:
-    """Return the kind of an object, and its name or its robot's name if it has one."""
+    """Return the kind of an object with its name, or with the name of its robot."""
     kind = type(thing).__name__
     posture = getattr(thing, "posture", None)
     owner = getattr(thing, "robot", None) or getattr(posture, "robot", None)
@@ -87,7 +89,7 @@ def title(thing: object) -> str:
 
 
 def brief(value: object) -> str:
-    """Return a short line for any value; only its kind if the value is too long."""
+    """Return a value as a short line; only its kind if the line would be too long."""
     if isinstance(value, np.ndarray):
         if 0 < value.size <= _FEW and value.dtype.kind in "fiu":
             return "[" + " ".join(f"{v:.4g}" for v in value.ravel()) + "]"
@@ -112,7 +114,7 @@ def numbers(values: Iterable[float]) -> str:
 
 
 def rounded(value: float) -> float:
-    """Return a number for display; below 1e-9, a rounding error, it is zero."""
+    """Return a number for display; below 1e-9, a rounding error, it becomes 0."""
     return 0.0 if abs(value) < 1e-9 else float(value)
 
 
@@ -130,26 +132,26 @@ def largest(screws: ArrayLike) -> str:
 
 
 def largest_row(sizes: ArrayLike) -> int:
-    """Return row of the largest number; of numbers equal within 1e-9, the first.
+    """Return the row of the largest number; the first row of numbers equal within 1e-9.
 
     Args:
-        sizes: (k,) >= 0, k > 0.
+        sizes: (k,) numbers >= 0, with k > 0.
 
     Returns:
-        The row, the same on every processor.
+        Number of the row, which is the same on every processor.
     """
     values = np.asarray(sizes, dtype=float)
     return int(np.argmax(values >= (1 - 1e-9) * np.nanmax(values)))
 
 
 def bracket(bounds: Sequence[float] | NDArray, unit: str) -> str:
-    """Return two bounds [rad or m] in thousandths; the unit is mrad or mm."""
+    """Return two bounds [rad or m] as text in mrad or mm."""
     low, high = 1e3 * bounds[0], 1e3 * bounds[1]
     return f"{low:.6g} to {high:.6g} {unit}" if low < float("inf") else "without bound"
 
 
 def _figures(thing: Any) -> Figures:
-    """Return the figures of an object by its own method, or its fields."""
+    """Return the values of an object from its method ``_figures``, or its fields."""
     if hasattr(thing, "_figures"):
         return thing._figures()
     shown = [one.name for one in fields(thing) if one.repr and one.name != "name"]
@@ -157,6 +159,6 @@ def _figures(thing: Any) -> Figures:
 
 
 def _cut(text: str) -> str:
-    """Return a text on one line, abbreviated to the longest line allowed."""
+    """Return a text on one line, shortened to the largest length."""
     text = " ".join(text.split())
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ..."

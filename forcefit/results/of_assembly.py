@@ -3,11 +3,19 @@
 from collections.abc import Mapping
 
 from forcefit.results.quantities import count, flag, number, text
-from forcefit.results.records import Content, Each, Either, Listed, Record, record
+from forcefit.results.records import (
+    Content,
+    Each,
+    Either,
+    Listed,
+    Record,
+    Words,
+    record,
+)
 
 _SHARE = number("share")
 _AXIS = ("axis",)
-# parts that several outputs have
+# keys that several outputs have in common
 POSE = record("rx? ry? rz? tx? ty? tz?")
 _POSTURE = record("robot status reason?", pose=POSE)
 INTERVAL = record("probability lower upper undecided?")
@@ -28,14 +36,24 @@ _LINEARISATION = record(
     rotation_=number("rotation, linear minus exact", "rad", *_AXIS),
     translation_=number("translation, linear minus exact", "m", *_AXIS),
 )
+_COUNTS = record(
+    "freedoms platform_freedoms freedoms_drives_locked platform_freedoms_drives_locked "
+    "redundant_constraints drives locked_freedoms overconstraint "
+    "smallest_singular_value local_freedoms actuation_redundancy singular_value_gap"
+)
+MOBILITY = record(
+    "counts_certain singular finite_freedoms words", _COUNTS, near_=_COUNTS,
+    motions=Listed(record(
+        kind=Words(("translation", "turn", "screw")),
+        direction=number("direction of a motion or its axis, base axes", "1", *_AXIS),
+        point_=number("point of the axis, base axes", "m", *_AXIS),
+        pitch_=number("pitch of a screw", "m"),
+    )),
+)  # fmt: skip
 SOLUTION = record(
     "nominal_mismatch remarks load gravity reading? method?", _POSTURE, _SOLVED,
     joints=Each(number("joint coordinate", "rad or m")),
-    mobility=record(
-        "freedoms platform_freedoms freedoms_drives_locked "
-        "platform_freedoms_drives_locked redundant_constraints drives "
-        "locked_freedoms overconstraint smallest_singular_value"
-    ),
+    mobility=MOBILITY,
     zone_=ZONE,
     certificate_=record(
         "closure_residual reference_length clearance_excess duality_gap relative_gap "
@@ -47,7 +65,7 @@ SOLUTION = record(
     worst_error_=record("assumption rotation translation"),
 )  # fmt: skip
 _EXACT = record(
-    "remarks?", _POSTURE,
+    "remarks?", _POSTURE, mobility=MOBILITY,
     energy_="energy", potential_="potential", platform_screw_="platform_screw",
     frames_=_SOLVED.content["frames"], closures_=_SOLVED.content["closures"],
     certificate_=record(
@@ -175,12 +193,25 @@ _STATISTICS = record(
     safety_=number("safety", "1", "link"),
     stress_error_=number("its error", "1", "link"),
     stiffness_=_STIFFNESS_OF_DRAWS, importance_=_IMPORTANCE,
+    capability_=Each(
+        record("limit unit", cpk=_ESTIMATE, ppm=_ESTIMATE)
+    ),
+    worst_case_=Each(
+        record(
+            "unit", reading=text("which worst case"), means=text("its meaning"),
+            attained=number("value attained", ""), bound=number("certified bound", ""),
+            direction=number("direction of the value attained", "1", "axis"),
+            shares=Each(number("part by an error or a clearance", "")),
+            rigid_=number("value attained without any force", ""),
+        )
+    ),
 )  # fmt: skip
 _CLASS = record(
     "name tolerance unit", share=_SHARE,
     scaled_alike=number("with one factor on all tolerances", ""),
     cost=number("cost"), loosest_allowed=number("largest allowed", ""),
     at_loosest=flag("at the largest allowed"),
+    width_=flag("whether it is the full width of a zone, not to each side"),
 )  # fmt: skip
 _VERIFICATION = record(
     "draws verdict confidence", look=count("interim test"),
@@ -236,8 +267,60 @@ _SWEEP = Record(
     ).content,
     closed=False,
 )  # fmt: skip
+_BY_QUANTILE = Each(number("quantile", ""))
+_STEP = record(
+    "platform_screw",
+    name=text("name of the step"), kind=text("kind of the step"),
+    energy=number("energy of all springs, fixtures included", "J"),
+    work=number("work of the step", "J"),
+    load_work=number("work of the loads that act before and after", "J"),
+    lost=number("energy lost by a release", "J"),
+    closing_force=number("largest closing force", "N"),
+    closing_moment=number("largest closing moment", "N m"),
+    closing_wrench=number("closing wrench, axes of the closure or fixture", "N m, N",
+                          "wrench_component"),
+    opening=number("opening before, as far as free motions cannot close it", "rad, m",
+                   "screw"),
+    left_open_=number("opening that the step leaves", "rad, m", "screw"),
+    spring_back_=number("motion of what is released, in its axes", "rad, m", "screw"),
+    reading_=number("reading", "rad or m", "component"),
+    exceeded_=flag("needs more than the allowed force"),
+    adjustment_=number("change of the geometric error", "rad or m", "component"),
+    wrenches=Each(number("wrench locked in afterwards", "N m, N", "wrench_component")),
+)  # fmt: skip
+_STEPS = record(
+    "remarks platform_screw?", _POSTURE, steps=Listed(_STEP),
+    order_=record(
+        objective=Words(("force", "energy", "error")), value=number("value", ""),
+        bound=number("lower bound in any order", ""),
+        given=number("value in the order given", ""), searched=count("states computed"),
+        steps=text("names of the steps", "step"),
+    ),
+    first_energy_=number("energy before the first step", "J"),
+    energy_=number("energy of the assembled machine", "J"),
+    work_=number("work of all steps", "J"), lost_=number("energy lost", "J"),
+    peak_force_=number("largest closing force", "N"),
+    draws_=count("machines"), quantiles_=Each(Each(_BY_QUANTILE)),
+)  # fmt: skip
+_PEAK = record(
+    "time unit?", value=number("largest value", ""), frame_=text("frame of the body")
+)  # fmt: skip
+_PATH = record(
+    "robot status reason? remarks first_frequency periods", output_=text("file"),
+    law=text("law of the motion"), duration=number("path time", "s"),
+    points=count("points"), solved=count("points with a result"),
+    largest_=Each(_PEAK), drives_=Each(_PEAK),
+)  # fmt: skip
 ASSEMBLY: Mapping[str, Content] = {
     "assembly solve": Either((SOLUTION, _EXACT, record("robot", zone=ZONE))),
+    "assembly show": record(
+        "robot remarks", pose=POSE, mobility=MOBILITY,
+        axes=Each(record(
+            at=number("origin of the frame, base axes", "m", *_AXIS),
+            x=number("its x axis, base axes", "1", *_AXIS),
+            z=number("its z axis, base axes", "1", *_AXIS),
+        )),
+    ),
     "assembly error": _ERROR,
     "assembly stiffness": PLATFORM_STIFFNESS,
     "assembly deflection": _DEFLECTION,
@@ -245,6 +328,8 @@ ASSEMBLY: Mapping[str, Content] = {
     "assembly statistics": _STATISTICS,
     "assembly tolerances": _TOLERANCES,
     "assembly sweep": _SWEEP,
+    "assembly steps": _STEPS,
+    "assembly path": _PATH,
     "convert": record(
         "robot left_out", platform=text("platform"), frames=count("frames"),
         closures=count("closures"), files=text("files written", "file"),

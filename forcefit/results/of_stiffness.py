@@ -33,7 +33,7 @@ _MATRICES = number("stiffness", "N m/rad .. N/m", "length", "row", "column")
 _OVER_LENGTHS = number("difference", "1", "length", "row", "column")
 _END_EFFECT = number("end effect, times r / L", "1", "row", "column")
 _STRESS = record("von_mises", place=number("place", "m", "axis"))
-# entries keep what later releases may add
+# later versions may add keys to an entry, and other versions must keep them
 _ENTRY = Record(
     record(
         "stiffness_error", LINK, format=text("format"), key=text("key"),

@@ -26,15 +26,15 @@ class Quantity:
     """One quantity of the results.
 
     Attributes:
-        words: its name in reports and text, without article.
-        unit: SI; ``"1"`` for a pure number, ``"rad, m"`` for the two halves of a screw,
-            empty where the result states its unit.
-        dims: its dimensions; those of :data:`LABELS` have a fixed length.
-        meaning: its definition, where the words are not enough.
-        symbol: its symbol in the paper, if any.
-        kind: of its values.
-        shown: display unit in text, if not SI.
-        digits: significant digits of text.
+        words: its name in reports and texts, without an article.
+        unit: SI unit; ``"1"`` for a number without unit, ``"rad, m"`` for the two
+            halves of a screw, empty if the result states its unit.
+        dims: its dimensions; dimensions in :data:`LABELS` have a fixed length.
+        meaning: its definition, if the words are not sufficient.
+        symbol: its symbol in the paper, empty if the paper has none.
+        kind: type of its values.
+        shown: display unit in texts, if it is not the SI unit.
+        digits: number of significant digits in texts.
     """
 
     words: str
@@ -48,12 +48,12 @@ class Quantity:
 
     @property
     def display_unit(self) -> str:
-        """Unit of its values in text."""
+        """Unit of the values in texts."""
         return self.shown or self.unit
 
     @property
     def attributes(self) -> dict[str, str]:
-        """Attributes of its variable in a NetCDF file."""
+        """Attributes of the NetCDF variable of this quantity."""
         return {"units": self.unit, "long_name": self.meaning or self.words}
 
 
@@ -117,6 +117,23 @@ QUANTITIES: Mapping[str, Quantity] = {
         "smallest singular value of the constraints", meaning="smallest nonzero one of "
         "the constraint matrix, lengths over the robot's size",
     ),
+    "local_freedoms": count(
+        "degrees of freedom of legs alone", meaning="with the platform at rest"
+    ),
+    "actuation_redundancy": count(
+        "redundant drives", meaning="drives minus the degrees of freedom they lock"
+    ),
+    "singular_value_gap": Quantity(
+        "gap of the singular values", meaning="least one that counts over the largest "
+        "that does not, or over rounding; null where none counts",
+    ),
+    "counts_certain": flag("gap of the singular values of at least 100"),
+    "singular": flag("more degrees of freedom than at nearby poses"),
+    "finite_freedoms": count(
+        "degrees of freedom at nearby poses", meaning="0 where the motions at the pose "
+        "are infinitesimal only",
+    ),
+    "words": text("mobility in words"),
     "point": Quantity(
         "point", "m", ("axis",), "at which screws and wrenches are read; base axes for "
         "a stiffness, platform axes for a pose error",
@@ -445,6 +462,37 @@ QUANTITIES: Mapping[str, Quantity] = {
     "rank": count("possible ranks", "bound"),
     "postures": count("postures"),
     "grid": text("grid"),
+    # paths
+    "time": Quantity("time", "s"),
+    "joint_velocity": Quantity(
+        "joint velocity", "rad/s or m/s", ("joint",), "rate of every joint coordinate"
+    ),
+    "joint_acceleration": Quantity(
+        "joint acceleration", "rad/s^2 or m/s^2", ("joint",),
+        "second derivative of every joint coordinate",
+    ),
+    "platform_velocity": Quantity(
+        "platform velocity", "rad/s, m/s", _SCREW, "of the platform's origin, base axes"
+    ),
+    "platform_acceleration": Quantity(
+        "platform acceleration", "rad/s^2, m/s^2", _SCREW,
+        "of the platform's origin, base axes",
+    ),
+    "inertial_screw": Quantity(
+        "deflection by acceleration", "rad, m", _SCREW, "change of the pose error at "
+        "the platform's origin by the accelerations, base axes", shown="mrad, mm"
+    ),
+    "drive_force": Quantity(
+        "drive force", "N m or N", ("drive",),
+        "of each drive on the part that it carries",
+    ),
+    "first_frequency": Quantity(
+        "first natural frequency", "Hz",
+        meaning="least along the path, drives held, without load and gravity",
+    ),
+    "periods": Quantity(
+        "path time in periods", meaning="path time times the first natural frequency"
+    ),
     # measured data and comparisons
     "campaign": text("campaign"),
     "rows": count("rows"),
@@ -474,12 +522,12 @@ QUANTITIES: Mapping[str, Quantity] = {
 
 
 def in_words(key: str) -> str:
-    """Return a key of the results in words; of a key not in the table, itself."""
+    """Return words for a key of the results; without an entry, the key itself."""
     return QUANTITIES[key].words if key in QUANTITIES else key.replace("_", " ")
 
 
 def unit_of(key: str) -> str:
-    """Return SI unit of a key's numbers; empty for pure, mixed and unknown ones."""
+    """Return SI unit of a key; empty for pure numbers, mixed units and unknown keys."""
     unit = QUANTITIES[key].unit if key in QUANTITIES else ""
     mixed = unit == "1" or "," in unit or ".." in unit or " or " in unit
     return "" if mixed else unit

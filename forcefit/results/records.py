@@ -36,7 +36,7 @@ class Record:
 
 @dataclass(frozen=True)
 class Each:
-    """An object whose keys are names, of frames for example, with equal contents."""
+    """An object whose keys are names, such as names of frames, with equal contents."""
 
     content: Content
 
@@ -78,13 +78,13 @@ def record(names: str = "", /, *merged: Record, **content: Content) -> Record:
     """Return a record from names of quantities, other records, and contents.
 
     Args:
-        names: separated by blanks; a ``?`` after a name, or an underscore after a key,
-            marks it as optional.
+        names: names separated by blanks; a question mark after a name, or an underscore
+            after a key, marks it as optional.
         merged: records whose keys are added.
-        content: of other keys.
+        content: contents of other keys.
 
     Returns:
-        The record, keys in this order.
+        The record, with its keys in this order.
 
     Raises:
         KeyError: a name is not in the table.

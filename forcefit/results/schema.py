@@ -1,7 +1,7 @@
 """JSON Schema (draft 2020-12) of outputs and input files, from their records.
 
-Every value of an output but a truth value may be null: for a number that is not finite,
-or a result that a failed computation lacks.
+Every value of an output may be null, except for truth values.  Null means a number that
+is not finite, or a result that a failed computation lacks.
 """
 
 from typing import Any
@@ -26,8 +26,8 @@ def schema_of(content: Content, title: str = "", file: bool = False) -> dict[str
 
     Args:
         content: usually a record.
-        title: of the schema.
-        file: whether of an input file, in TOML, which has no null.
+        title: title of the schema.
+        file: whether the content is an input file in TOML, which has no null.
 
     Returns:
         Plain values.
@@ -39,7 +39,7 @@ def schema_of(content: Content, title: str = "", file: bool = False) -> dict[str
 
 
 def _without_null(schema: Any) -> Any:
-    """Return a schema that allows no null."""
+    """Return a schema that does not allow null."""
     if isinstance(schema, list):
         return [_without_null(one) for one in schema]
     if not isinstance(schema, dict):

@@ -1,6 +1,6 @@
-"""Results as text: the table's quantities, one per line, and tables of numbers.
+"""Results as text: quantities of the table, one for each line, and tables of numbers.
 
-The same lines are the short representation of an object and what a command prints.
+Commands print the same lines that represent an object briefly.
 """
 
 import math
@@ -15,14 +15,14 @@ from forcefit.results.units import FACTORS
 
 
 def value_text(quantity: Quantity | str, value: Any) -> str:
-    """Return a value in the quantity's display unit.
+    """Return a value as text in the display unit of its quantity.
 
     Args:
-        quantity: or its name in the table.
+        quantity: the quantity, or its name in the table.
         value: a number, vector, text or truth value, several of them, or None.
 
     Returns:
-        Text with its unit; ``none`` where there is no such number.
+        Text with its unit; ``none`` if the number does not exist.
     """
     known = QUANTITIES[quantity] if isinstance(quantity, str) else quantity
     if value is None or (isinstance(value, float) and math.isnan(value)):
@@ -57,14 +57,15 @@ def in_unit(value: float, unit: str, digits: int = 4) -> str:
 
 
 def readings_text(sizes: Mapping[str, float | None], digits: int = 4) -> str:
-    """Return the text of errors of readings; unknown ones are left out.
+    """Return errors of readings as text; errors that are not known are omitted.
 
     Args:
-        sizes: ``position`` [m], ``rotation`` [rad], ``normalised`` by sigma.
-        digits: significant ones.
+        sizes: ``position`` [m], ``rotation`` [rad], and ``normalised``, divided by
+            sigma.
+        digits: number of significant digits.
 
     Returns:
-        Such as ``12 um, 30 urad, 1.1 sigma``.
+        Text such as ``12 um, 30 urad, 1.1 sigma``.
     """
     units = {"position": "um", "rotation": "urad", "normalised": "sigma"}
     known = {key: size for key in units if (size := sizes.get(key)) is not None}
@@ -76,15 +77,15 @@ def readings_text(sizes: Mapping[str, float | None], digits: int = 4) -> str:
 
 
 def lines_of(results: Mapping[str, Any], names: str) -> dict[str, str]:
-    """Return the words and values of results.
+    """Return the words and values of quantities in results.
 
     Args:
         results: plain values of a command.
-        names: of quantities, separated by blanks; dots lead into records.  An absent
-            quantity and the status ``ok`` have no line.
+        names: names of quantities, separated by blanks; a dot separates a record from
+            its key.  An absent quantity and the status ``ok`` have no line.
 
     Returns:
-        By the quantities' words.
+        The values as text, by the words of the quantities.
     """
     lines: dict[str, str] = {}
     for path in names.split():
@@ -112,12 +113,13 @@ def forced_lines(assembly: Any) -> dict[str, str]:
 def table_lines(
     head: Sequence[str], rows: Mapping[str, Sequence[Any]], digits: int = 5
 ) -> list[str]:
-    """Return rows of numbers under column heads, aligned.
+    """Return aligned rows of numbers under column heads.
 
     Args:
-        head: head of the row names, then of each column with its unit.
-        rows: numbers, or texts, by name; one that is not finite is a dash.
-        digits: significant ones.
+        head: head of the row names, then the head of each column with its unit.
+        rows: numbers or texts, by name of the row; a number that is not finite is a
+            dash.
+        digits: number of significant digits.
 
     Returns:
         Lines.

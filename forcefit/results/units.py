@@ -1,9 +1,9 @@
-"""Display units: of a page by the size of its numbers, of text by the table."""
+"""Display units: by the size of numbers on pages, by the quantity in text."""
 
 import math
 from dataclasses import dataclass
 
-# SI unit: (least size [SI], shown unit, factor), the coarsest first
+# for each SI unit: (least size [SI], display unit, factor), the largest unit first
 _SHOWN: dict[str, tuple[tuple[float, str, float], ...]] = {
     "m": ((1e-4, "mm", 1e3), (0.0, "µm", 1e6)),
     "rad": ((0.1, "deg", 180 / math.pi), (1e-4, "mrad", 1e3), (0.0, "µrad", 1e6)),
@@ -24,12 +24,12 @@ FACTORS = {
 
 @dataclass(frozen=True)
 class Shown:
-    """How numbers of one SI unit are shown.
+    """Display unit of numbers in one SI unit.
 
     Attributes:
-        unit: SI, empty for a pure number.
-        shown: the unit shown.
-        factor: number shown = factor * number in SI.
+        unit: SI unit, empty for a number without unit.
+        shown: display unit.
+        factor: displayed number = factor * number in SI.
     """
 
     unit: str
@@ -41,11 +41,12 @@ def shown_in(unit: str, size: float = 1.0) -> Shown:
     """Return the display unit for numbers of an SI unit.
 
     Args:
-        unit: SI, such as ``"m"``; empty, ``"1"`` or ``"-"`` for a pure number.
-        size: [unit] of the largest of the numbers.
+        unit: SI unit, such as ``"m"``; empty, ``"1"`` or ``"-"`` for a number without
+            unit.
+        size: [unit] largest of the numbers.
 
     Returns:
-        The unit and its factor; SI where no other unit is usual.
+        The display unit and its factor; the SI unit if no other unit is usual.
     """
     if unit in {"", "1", "-"}:
         return Shown("", "", 1.0)
@@ -58,7 +59,7 @@ def shown_in(unit: str, size: float = 1.0) -> Shown:
 
 
 def number_text(value: float, unit: str = "", digits: int = 4) -> str:
-    """Return the text of a number with its unit; none for NaN."""
+    """Return a number with its unit as text; ``none`` for NaN."""
     if math.isnan(value):
         return "none"
     if math.isinf(value):

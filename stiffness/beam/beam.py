@@ -40,16 +40,16 @@ def beam_compliance(
 
     Args:
         length: [m] from the clamped section to the tip, > 0.
-        section: its section constants.
+        section: constants of the cross-section.
         E: [Pa] Young's modulus, > 0.
         nu: [-] Poisson's ratio, in (-1, 0.5).
-        theory: ``"timoshenko"``, or ``"euler"``, without shear.
-        axis: (3,) any length, from base to tip, in the axes of the result.
-        up: (3,) the section's z, in the same axes; its component along the axis
-            is removed.  Default: y, unless the beam lies along y, then z.
+        theory: ``"timoshenko"``, or ``"euler"`` for bending without shear.
+        axis: (3,) vector of any length from base to tip, in the axes of the result.
+        up: (3,) the section's z axis, in the same axes; its component along the axis is
+            removed.  The default is y, or z for a beam along y.
 
     Returns:
-        (6, 6) [rad/(N m), rad/N, m/(N m), m/N] symmetric positive definite.
+        (6, 6) [rad/(N m), rad/N, m/(N m), m/N] compliance, symmetric positive definite.
 
     Raises:
         BadInput: an argument is out of its range.
@@ -80,7 +80,7 @@ def beam_compliance(
 def _compliance_in_section_axes(
     length: float, section: Section, E: float, nu: float, shear: bool
 ) -> NDArray:
-    """Return the tip compliance in the section's own x, y, z."""
+    """Return the tip compliance in the section's axes x, y, z."""
     G = E / (2 * (1 + nu))
     slope_y, slope_z = length / (E * section.I_y), length / (E * section.I_z)
     C = np.diag([
@@ -103,12 +103,12 @@ def section_axes(axis: ArrayLike, up: ArrayLike | None = None) -> NDArray:
     """Return the axes of a section, as columns x (along the beam), y, z (up).
 
     Args:
-        axis: (3,) any length, from base to tip.
-        up: (3,) the section's z, orthogonalised against the axis.  Default: y, unless
-            the beam lies along y, then z.
+        axis: (3,) vector of any length from base to tip.
+        up: (3,) the section's z axis; its component along the axis is removed.  The
+            default is y, or z for a beam along y.
 
     Returns:
-        (3, 3) proper orthogonal.
+        (3, 3) axes, a proper orthogonal matrix.
 
     Raises:
         BadInput: a vector is not three finite numbers, is zero, or ``up`` lies along
@@ -127,14 +127,14 @@ def section_axes(axis: ArrayLike, up: ArrayLike | None = None) -> NDArray:
 
 
 def unit_vector(name: str, vector: ArrayLike) -> NDArray:
-    """Return the unit vector of a vector given by the user.
+    """Return the unit vector along a vector given by the user.
 
     Args:
         name: name for error messages.
-        vector: (3,) any length but zero.
+        vector: (3,) vector of any length except zero.
 
     Returns:
-        (3,) of length one.
+        (3,) vector of length one.
 
     Raises:
         BadInput: the vector is not three finite numbers, or is zero.

@@ -1,4 +1,4 @@
-r"""Largest von Mises stress in a straight beam, under its tip's wrench and its weight.
+r"""Largest von Mises stress in a straight beam under a tip wrench and its weight.
 
 ========  ==========================================================  ======
 symbol    meaning                                                     unit
@@ -15,9 +15,9 @@ tau       shear stress along y and along z                            Pa
 In a section sigma = N / A + M_y z / I_y - M_z y / I_z.  Without weight, shear forces
 and torsion are equal in all sections and M is linear in x.  The von Mises stress of a
 fibre, sqrt(sigma^2 + 3 tau^2), is then convex in x: its largest value is at the base or
-at the tip, and only these two sections are evaluated.  With weight, forces grow with s
-W / L and moments with s^2 / 2 (e_x x W) / L.  Then 31 sections between are evaluated
-too, and those where the moment about y or z has its extremum.
+at the tip, and only these two sections are evaluated.  With weight, forces increase as
+s W / L and moments as s^2 / 2 (e_x x W) / L.  Then 31 sections between the ends are
+evaluated too, and the sections where the moment about y or z has its extremum.
 """
 
 import math
@@ -29,10 +29,15 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.inputs.table import BadInput
 from stiffness.beam.sections import Section, declared_section
 
-_AROUND = 360  # fibres around a round section; the cosine between two loses 4e-5
-_ACROSS = 33  # fibres along a side; a parabola between two loses 1e-3
-_CHUNK = 2048  # sections per chunk: 2048 x 1089 x 3 numbers are 54 MB
-_ALONG = 33  # sections of a heavy beam; a parabola between two loses 1e-3
+# number of fibres around a round section; the error between two fibres is at most 4e-5
+_AROUND = 360
+# number of fibres along a side; the error of a parabola between two fibres is at most
+# 1e-3
+_ACROSS = 33
+_CHUNK = 2048  # number of sections in a batch: 2048 x 1089 x 3 values are 54 MB
+# number of sections of a heavy beam; the error of a parabola between two is at most
+# 1e-3
+_ALONG = 33
 _SHAPES = "radius (inner_radius), or width and height (wall)"
 
 
@@ -58,18 +63,18 @@ def peak_beam_stress(
     Args:
         section: ``radius`` and optionally ``inner_radius``, or ``width`` (along y) and
             ``height`` (along z) and optionally ``wall`` [m].
-        length: [m] of the beam, >= 0.
-        wrench: (..., 6) [N m, N] at the tip, in the axes of the beam.
+        length: [m] length of the beam, >= 0.
+        wrench: (..., 6) [N m, N] wrench at the tip, in the axes of the beam.
         weight: (3,) or (..., 3) [N] force distributed evenly over the length, in the
             same axes.
 
     Returns:
-        (...) [Pa], and (..., 3) [m] its position, in the axes of the beam from its
-        base.
+        (...) [Pa] largest stress, and (..., 3) [m] its position relative to the base,
+        in the axes of the beam.
 
     Raises:
-        BadInput: the section is given by its constants only, or is invalid; the length
-            or the wrench is invalid.
+        BadInput: the section is given by its constants only or is invalid, or the
+            length or the wrench is invalid.
 
     Sources:
         Timoshenko & Gere, *Mechanics of Materials*, for bending and for shear by
@@ -115,13 +120,13 @@ def peak_beam_stress(
 
 
 def _sections(wrench: NDArray, weight: NDArray, length: float) -> NDArray:
-    """Return the (n, k) [m] distances of sections from the tip, the base's first."""
+    """Return (n, k) [m] distances of sections from the tip; the base is first."""
     ends = np.broadcast_to([length, 0.0], (len(wrench), 2))
     if not weight.any():
         return ends
     between = np.linspace(0, length, _ALONG)[1:-1]
     with np.errstate(divide="ignore", invalid="ignore"):
-        # a moment has its extremum where the force across it is zero
+        # a moment has its extremum where the force in the other direction is zero
         share = -wrench[:, 4:] / weight[:, 1:]
     extrema = length * np.clip(np.nan_to_num(share), 0, 1)
     between = np.broadcast_to(between, (len(wrench), len(between)))
@@ -134,9 +139,9 @@ def _on_sections(
     """Return (n, k, 6) [N m, N] loads on sections at distances s from the tip."""
     on = np.repeat(wrench[:, None], s.shape[1], axis=1)
     share = s / length if length else np.zeros_like(s)
-    # middle: force by half of the weight between tip and section
+    # mean force between tip and section: half of the weight between them is added
     middle = wrench[:, None, 3:] + share[..., None] * weight[:, None] / 2
-    on[..., 1] -= s * middle[..., 2]  # arm x force
+    on[..., 1] -= s * middle[..., 2]  # arm times force
     on[..., 2] += s * middle[..., 1]
     on[..., 3:] += share[..., None] * weight[:, None]
     return on
@@ -149,14 +154,14 @@ def _stresses(influence: NDArray, forces: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
-    """Return fibres of a section and the stresses that moments and forces cause there.
+    """Return the fibres of a section, and their stresses under unit moments and forces.
 
     Args:
         section: see :func:`peak_beam_stress`.
 
     Returns:
         (p, 2) [m] y and z of the fibres, and (p, 3, 6) [1/m^3, 1/m^2] sigma, tau along
-        y and along z there, of each of the moments and forces x, y, z on the section.
+        y and tau along z for each unit moment and force about and along x, y, z.
 
     Raises:
         BadInput: the section is given by its constants only, or is invalid.
@@ -194,7 +199,7 @@ def _bending(section: Section, y: NDArray, z: NDArray) -> NDArray:
 
 
 def _round(section: Section, radius: float, hole: float) -> tuple[NDArray, NDArray]:
-    """Return fibres on the outer circle, along which the shear stress acts."""
+    """Return the fibres on the outer circle; shear acts along the circle."""
     angle = 2 * np.pi * np.arange(_AROUND) / _AROUND
     out = np.column_stack([np.cos(angle), np.sin(angle)])
     along = np.column_stack([-out[:, 1], out[:, 0]])
@@ -202,7 +207,7 @@ def _round(section: Section, radius: float, hole: float) -> tuple[NDArray, NDArr
     influence[:, 1:, 0] = along * radius / section.J
     # V Q / (I b) at the neutral axis: 4/3 of the mean in a bar, 2 in a thin tube
     peak = 4 / 3 * (radius**2 + radius * hole + hole**2) / (radius**2 + hole**2)
-    # along the circle it grows as the sine of the angle from V
+    # along the circle the stress varies as the sine of the angle from V
     influence[:, 1:, 4:] = peak / section.area * along[:, :, None] * along[:, None, :]
     return radius * out, influence
 
@@ -216,7 +221,7 @@ def _rectangle(
     influence = _bending(section, y, z)
     if width <= height:
         tau_y, tau_z = _torsion(y, z, width / 2, height / 2)
-    else:  # a quarter turn about x: the short side lies along z
+    else:  # a quarter turn about x, after which the short side is along z
         tau_z, minus_tau_y = _torsion(z, -y, height / 2, width / 2)
         tau_y = -minus_tau_y
     influence[:, 1, 0], influence[:, 2, 0] = tau_y / section.J, tau_z / section.J
@@ -228,7 +233,7 @@ def _rectangle(
 def _torsion(p: NDArray, q: NDArray, a: float, b: float) -> tuple[NDArray, NDArray]:
     """Return shear [m] along p and q for unit G theta; half sides a <= b along p, q."""
     along_p, along_q = np.zeros_like(p), 2 * p
-    # the terms fall as exp(-n pi (b - |q|) / 2a), on the short sides as 1 / n^2
+    # the terms decrease as exp(-n pi (b - |q|) / 2a), on the short sides as 1 / n^2
     for n in range(1, 400, 2):
         k = n * np.pi / (2 * a)
         factor = 16 * a / np.pi**2 / n**2 * (-1) ** ((n - 1) // 2)
@@ -246,7 +251,7 @@ def _hollow(
     share = np.linspace(-0.5, 0.5, _ACROSS)
     places, influences = [], []
     for turns in range(4):
-        # the right side of a section rotated by quarter turns
+        # the right side of a section that is rotated by quarter turns
         across, up = (width, height) if turns % 2 == 0 else (height, width)
         second = section.I_y if turns % 2 == 0 else section.I_z
         out = np.round([np.cos(turns * np.pi / 2), np.sin(turns * np.pi / 2)])
@@ -255,14 +260,14 @@ def _hollow(
         influence = _bending(section, *where.T)
         b, h = across - wall, up - wall
         around = 2 * (b + h)
-        # Bredt's flow over the wall, and the wall's own twist at its outer face
+        # Bredt's flow over the wall, and the twist of the wall itself at its outer face
         twist = 2 * b * h / around / section.J + wall / section.J
         # V Q / (I b): flange above, then the wall; there is no wall beyond the hole
         inside = np.minimum(np.abs(up * share), up / 2 - wall)
         flange = across * (up**2 - (up - 2 * wall) ** 2) / 8
         Q = flange + wall * ((up / 2 - wall) ** 2 - inside**2)
         parallel = Q / (second * 2 * wall)
-        # a transverse force: shear flow along this side, zero at its middle
+        # shear flow of a transverse force along this side, zero at its middle
         other = section.I_z if turns % 2 == 0 else section.I_y
         crossing = -b / 2 * (up * share) / other
         flow = parallel[:, None] * along + crossing[:, None] * out

@@ -1,14 +1,14 @@
-r"""Beams along a curve: tapered, bent, L-shaped, by integrating compliance.
+r"""Beams along a curve: tapered, bent and L-shaped, by integration of the compliance.
 
-A cantilever carries its tip's wrench through every section, so its compliance is the
-integral of the compliance of its slices, each read at the tip,
+The wrench at the tip of a cantilever acts through every section, so the compliance is
+the integral of the compliance of its slices, each of them read at the tip,
 
     C = integral A(s) c(s) A(s)^T ds,   A(s) = screw_map(p(s) - tip, R(s)),
 
 with c(s) = diag(1/GJ, 1/EI_y, 1/EI_z, 1/EA, 1/GA_y, 1/GA_z) per unit length in the
 section's axes R(s).  This is exact for beams whose radius of curvature is large
-compared with their section.  The theory of thick curved bars and the warping at kinks
-are left out.
+compared with their section.  The theory of thick curved bars and warping at kinks are
+left out.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,11 +31,13 @@ class Piece:
     """A smooth piece of a beam, from t = 0 at its base to t = 1.
 
     Attributes:
-        place: position (3,) [m] at t.
-        tangent: derivative (3,) [m] of the position by t.
-        section: the section at t.
-        up: (3,) the section's z at t, orthogonalised against the tangent; None for
-            the default of :func:`stiffness.beam.beam.section_axes`.
+        place: function of t that returns the position (3,) [m].
+        tangent: function of t that returns the derivative (3,) [m] of the position by
+            t.
+        section: function of t that returns the section.
+        up: function of t that returns the section's z (3,), whose component along the
+            tangent is removed; None for the default of
+            :func:`stiffness.beam.beam.section_axes`.
     """
 
     place: Callable[[float], NDArray]
@@ -50,13 +52,13 @@ def straight_piece(
     section: Section | Callable[[float], Section],
     up: ArrayLike | None = None,
 ) -> Piece:
-    """Return a straight piece, tapered if its section is a function of t.
+    """Return a straight piece, which is tapered if its section is a function of t.
 
     Args:
-        start: (3,) [m].
-        end: (3,) [m].
-        section: constant, or at t from 0 to 1.
-        up: (3,) the section's z.
+        start: (3,) [m] position of the start.
+        end: (3,) [m] position of the end.
+        section: constant section, or a function of t from 0 to 1.
+        up: (3,) the section's z axis.
 
     Returns:
         The piece.
@@ -84,23 +86,25 @@ def arc_piece(
     """Return an arc of a circle; the section's z is the axis of rotation.
 
     Args:
-        start: (3,) [m] its beginning.
-        center: (3,) [m] of the circle.
+        start: (3,) [m] position of the start.
+        center: (3,) [m] centre of the circle.
         turn: (3,) [rad] rotation vector from start to end about the centre.
-        section: constant, or at t from 0 to 1.
+        section: constant section, or a function of t from 0 to 1.
 
     Returns:
         The piece.
 
     Raises:
-        BadInput: the turn is zero, or not normal to the radius.
+        BadInput: the rotation is zero, or its axis is not normal to the radius.
     """
     p, c = np.asarray(start, dtype=float), np.asarray(center, dtype=float)
     angle = np.asarray(turn, dtype=float)
     axis = unit_vector("turn", angle)
     spoke = p - c
     if abs(spoke @ axis) > 1e-9 * np.linalg.norm(spoke):
-        raise BadInput("arc: the axis of the turn must be across the radius")
+        raise BadInput(
+            "arc: found a turn about an axis that is not normal to the radius"
+        )
     return Piece(
         place=lambda t: c + rotation_matrix(t * angle) @ spoke,
         tangent=lambda t: np.cross(angle, rotation_matrix(t * angle) @ spoke),
@@ -112,7 +116,7 @@ def arc_piece(
 def _as_function(
     section: Section | Callable[[float], Section],
 ) -> Callable[[float], Section]:
-    """Return a section as a function of t, constant or not."""
+    """Return a constant or varying section as a function of t."""
     return (lambda t: section) if isinstance(section, Section) else section
 
 
@@ -127,22 +131,22 @@ def curve_compliance(
     """Return the tip compliance of a beam along a curve.
 
     Args:
-        pieces: from base to tip, each beginning where the one before ends.
+        pieces: pieces from base to tip; each begins where the piece before it ends.
         E: [Pa] Young's modulus, > 0.
         nu: [-] Poisson's ratio, in (-1, 0.5).
-        theory: ``"timoshenko"``, or ``"euler"``, without shear.
-        tolerance: [1] of the integral, entries scaled by sqrt(C_ii C_jj).
+        theory: ``"timoshenko"``, or ``"euler"`` for bending without shear.
+        tolerance: [1] error of the integral, for entries scaled by sqrt(C_ii C_jj).
 
     Returns:
-        (6, 6) [rad/(N m) .. m/N] symmetric positive definite, read at the last
-        piece's end, in the axes the pieces are given in.
+        (6, 6) [rad/(N m) .. m/N] compliance, symmetric positive definite, read at the
+        end of the last piece, in the axes of the pieces.
 
     Raises:
-        BadInput: no pieces, a gap between two, an argument out of range, or a section
-            that changes too abruptly to be integrated.
+        BadInput: there are no pieces or a gap between two, an argument is out of its
+            range, or a section changes too abruptly for the integration.
 
     Example:
-        A force at the end of an L of two bars, along the first, bends both:
+        A force at the end of an L of two bars, parallel to the first, bends both:
 
         >>> from stiffness.beam.sections import round_section
         >>> bar = round_section(0.01, nu=0.3)
@@ -177,7 +181,7 @@ def curve_compliance(
         parts, C = 2 * parts, finer
     raise BadInput(
         "curve_compliance: the integral did not converge to a relative error "
-        f"of {tolerance:g}; split the pieces where the section jumps"
+        f"of {tolerance:g}; split pieces where the section changes abruptly"
     )
 
 
@@ -187,8 +191,8 @@ def curve_mass(
     """Return mass, centre and moments of inertia of a beam along a curve.
 
     Args:
-        pieces: base to tip.
-        density: [kg/m^3].
+        pieces: pieces from base to tip.
+        density: [kg/m^3] density.
 
     Returns:
         [kg], (3,) [m], and (3, 3) [kg m^2] about that centre, in the axes the pieces
@@ -215,10 +219,10 @@ def curve_length(pieces: Sequence[Piece]) -> float:
     """Return the length of a beam along its curve.
 
     Args:
-        pieces: straight ones and arcs, base to tip.
+        pieces: straight pieces and arcs, from base to tip.
 
     Returns:
-        [m].
+        The length [m].
     """
     speeds = [
         [np.linalg.norm(piece.tangent((x + 1) / 2)) for x in _POINTS]
@@ -228,7 +232,7 @@ def curve_length(pieces: Sequence[Piece]) -> float:
 
 
 def _check_joined(pieces: Sequence[Piece]) -> None:
-    """Check that each piece begins where the one before ends."""
+    """Check that each piece begins where the piece before it ends."""
     for number, (one, next_one) in enumerate(
         zip(pieces[:-1], pieces[1:], strict=True), start=2
     ):
@@ -237,14 +241,14 @@ def _check_joined(pieces: Sequence[Piece]) -> None:
         if gap > 1e-6 * size:
             raise BadInput(
                 f"curve_compliance: piece {number} begins {gap:.3g} m away from where "
-                "the one before ends"
+                "the piece before it ends"
             )
 
 
 def _integral(
     piece: Piece, tip: NDArray, E: float, nu: float, theory: str, parts: int
 ) -> NDArray:
-    """Return the compliance of one piece, by ten Gauss points in each equal part."""
+    """Return compliance of one piece, by ten Gauss points in each of equal parts."""
     G, shear = E / (2 * (1 + nu)), theory == "timoshenko"
     total = np.zeros((6, 6))
     for first in range(parts):

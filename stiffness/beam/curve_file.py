@@ -1,4 +1,4 @@
-"""Beams along a curve from a file: straight pieces, tapers, arcs."""
+"""Beams along a curve from a file: straight pieces, tapered pieces and arcs."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -10,23 +10,24 @@ from forcefit.inputs.table import BadInput, Table, read_toml
 from stiffness.beam.curve import Piece, arc_piece, straight_piece
 from stiffness.beam.sections import Section, check_section, declared_section
 
-_LARGEST = 1e6  # in SI: larger than any beam
+_LARGEST = 1e6  # largest absolute value in SI units; no beam has a larger one
 
 
 def read_curve(path: Path | str, nu: float) -> list[Piece]:
     """Return the pieces of a beam.
 
     Args:
-        path: TOML with tables ``[[piece]]``.  Each has a ``section``, as in a robot
-            file or with ``wall`` (a box), ``web`` and ``flange`` (an I); if absent,
-            that of the piece before is used.  A straight piece has ``end``, optionally
-            ``up``, and ``tip_section`` if it tapers (its lengths change linearly).  An
-            arc has ``center`` and ``turn``, a rotation vector.  ``start`` [m] belongs
-            to the first piece and is the origin if absent.
-        nu: [-] Poisson's ratio, for the shear factors.
+        path: TOML file with tables ``[[piece]]``.  Each has a ``section``, as in a
+            robot file or with ``wall`` (a box), ``web`` and ``flange`` (an I); if
+            absent, the section of the piece before it is used.  A straight piece has
+            ``end``, optionally ``up``, and ``tip_section`` if it is tapered (its
+            lengths change linearly).  An arc has ``center`` and ``turn``, a rotation
+            vector.  ``start`` [m] belongs to the first piece and is the origin if
+            absent.
+        nu: [-] Poisson's ratio, on which shear factors depend.
 
     Returns:
-        The pieces, base to tip.
+        The pieces from base to tip.
 
     Raises:
         BadInput: the file, a name or a value is invalid.
@@ -43,18 +44,18 @@ def read_curve(path: Path | str, nu: float) -> list[Piece]:
 
 
 def read_pieces(tables: Sequence[Table], start: NDArray, nu: float) -> list[Piece]:
-    """The pieces of a beam from their tables.
+    """Return the pieces of a beam from their tables.
 
     Args:
-        tables: at least one; the keys are those of :func:`read_curve`.
-        start: (3,) [m] where the first one begins.
-        nu: [-] Poisson's ratio, for the shear factors.
+        tables: at least one table, with the keys of :func:`read_curve`.
+        start: (3,) [m] start of the first piece.
+        nu: [-] Poisson's ratio, on which shear factors depend.
 
     Returns:
-        The pieces, base to tip.
+        The pieces from base to tip.
 
     Raises:
-        BadInput: a name or a value is not proper.
+        BadInput: a name or a value is invalid.
     """
     pieces: list[Piece] = []
     section: dict[str, float] | None = None
@@ -104,14 +105,16 @@ def _piece(
 def _tapered(
     part: Table, section: Mapping[str, float], nu: float
 ) -> Section | Callable[[float], Section]:
-    """Return a constant section, or one whose lengths change linearly."""
+    """Return a constant section, or a section whose lengths change linearly."""
     constant = declared_section(section, nu)
     if not part.has("tip_section"):
         return constant
     tip = _section(part, "tip_section")
     if set(tip) != set(section) or "area" in tip:
         raise part.bad(
-            "tip_section", "a taper has lengths of the same names at both ends"
+            "tip_section",
+            "found different lengths at both ends of a tapered piece, "
+            "expected the same names",
         )
     declared_section(tip, nu)
 

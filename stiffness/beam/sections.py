@@ -1,4 +1,4 @@
-"""Sections of beams: round, rectangular, thin-walled, or by their constants.
+"""Sections of beams: round, rectangular, thin-walled, or given by their constants.
 
 ========  ======================================================  =====
 symbol    meaning                                                 unit
@@ -6,7 +6,7 @@ symbol    meaning                                                 unit
 y z       section axes, z up                                      -
 I_y I_z   second moments of area; I_y bends about y               m^4
 J         Saint-Venant's torsion constant                         m^4
-shear_*   factor on the area that resists a force along y, z      1
+shear_*   share of the area that resists a force along y, z       1
 ========  ======================================================  =====
 """
 
@@ -24,12 +24,12 @@ class Section:
     """Constants of a section for a straight beam.
 
     Attributes:
-        area: [m^2].
+        area: [m^2] area.
         I_y: [m^4] second moment of area for bending about y (deflection along z).
-        I_z: [m^4] the same about z.
+        I_z: [m^4] second moment of area for bending about z (deflection along y).
         J: [m^4] torsion constant.
         shear_y: [-] share of the area that resists a force along y.
-        shear_z: [-] the same along z.
+        shear_z: [-] share of the area that resists a force along z.
     """
 
     area: float
@@ -45,7 +45,7 @@ class Section:
 
     @property
     def size(self) -> float:
-        """[m] twice the larger radius of gyration: the radius of a solid round bar."""
+        """[m] twice the larger radius of gyration; for a solid round bar its radius."""
         return 2 * math.sqrt(max(self.I_y, self.I_z) / self.area)
 
 
@@ -65,7 +65,8 @@ def round_section(radius: float, nu: float, inner_radius: float = 0.0) -> Sectio
     Args:
         radius: [m] outer radius, > 0.
         nu: [-] Poisson's ratio, in (-1, 0.5); the shear factor depends on it.
-        inner_radius: [m] of the hole, 0 for a solid bar, < radius.
+        inner_radius: [m] radius of the hole, smaller than ``radius``; 0 for a solid
+            bar.
 
     Returns:
         The section.
@@ -134,17 +135,17 @@ def _rectangle_torsion(width: float, height: float) -> float:
 
 
 def box_section(width: float, height: float, wall: float, nu: float) -> Section:
-    """Return the section of a hollow rectangle of one wall thickness.
+    """Return the section of a hollow rectangle with one wall thickness.
 
     Args:
-        width: [m] outside, along y.
-        height: [m] outside, along z (up).
-        wall: [m] thickness, less than half of either.
+        width: [m] outer width, along y.
+        height: [m] outer height, along z (up).
+        wall: [m] wall thickness, less than half of width and height.
         nu: [-] Poisson's ratio.
 
     Returns:
-        The section; its torsion is that of a closed thin wall with the wall's own
-        twist added, its shear factors those of thin walls.
+        The section.  Its torsion constant is that of a closed thin wall, plus the twist
+        of the wall itself; its shear factors are those of thin walls.
 
     Raises:
         BadInput: a dimension or Poisson's ratio is out of its range.
@@ -173,7 +174,8 @@ def box_section(width: float, height: float, wall: float, nu: float) -> Section:
 
 def _box_shear(along: float, across: float, nu: float) -> float:
     """Return Cowper's shear factor of a thin box, for a force along one side."""
-    m = n = across / along  # flange over web area is the same ratio for equal walls
+    # for equal walls, the ratio of flange to web area is the ratio of the sides
+    m = n = across / along
     top = 10 * (1 + nu) * (1 + 3 * m) ** 2
     plain = 12 + 72 * m + 150 * m**2 + 90 * m**3
     poisson = 11 + 66 * m + 135 * m**2 + 90 * m**3
@@ -187,15 +189,15 @@ def i_section(
     """Return the section of an I-beam with equal flanges, the web along z (up).
 
     Args:
-        width: [m] of the flanges, along y.
-        height: [m] overall, along z.
-        web: [m] thickness, less than the width.
-        flange: [m] thickness, less than half the height.
+        width: [m] width of the flanges, along y.
+        height: [m] total height, along z.
+        web: [m] thickness of the web, less than the width.
+        flange: [m] thickness of a flange, less than half of the height.
         nu: [-] Poisson's ratio.
 
     Returns:
-        The section; torsion is that of an open thin wall (warping free).  The flanges
-        carry shear along y like two rectangles.
+        The section.  Its torsion constant is that of an open thin wall with free
+        warping. The flanges carry shear along y like two rectangles.
 
     Raises:
         BadInput: a dimension or Poisson's ratio is out of its range.
@@ -229,7 +231,7 @@ def i_section(
 
 
 def declared_section(given: Mapping[str, float], nu: float) -> Section:
-    """Return the section of a beam from the numbers that declare it.
+    """Return the section of a beam from the values that declare it.
 
     Args:
         given: ``radius`` and optionally ``inner_radius``; or ``width`` and ``height``
@@ -254,7 +256,7 @@ def declared_section(given: Mapping[str, float], nu: float) -> Section:
 
 
 def check_section(place: str, given: Mapping[str, float]) -> None:
-    """Reject numbers that do not describe a section.
+    """Reject values that do not describe a section.
 
     Args:
         place: name of the key, for the message.
@@ -262,7 +264,7 @@ def check_section(place: str, given: Mapping[str, float]) -> None:
             :func:`stiffness.beam.sections.declared_section`.
 
     Raises:
-        BadInput: a name belongs to no section, a name is missing, or a value is
+        BadInput: a name does not belong to a section, a name is missing, or a value is
             invalid.
     """
     if set(given) in _SECTIONS:
@@ -284,7 +286,7 @@ def check_section(place: str, given: Mapping[str, float]) -> None:
 
 
 def check_material(who: str, E: float, nu: float) -> None:
-    """Reject elastic constants of no isotropic solid.
+    """Reject elastic constants that no isotropic solid can have.
 
     Args:
         who: name of the part, for the message.
@@ -299,7 +301,7 @@ def check_material(who: str, E: float, nu: float) -> None:
 
 
 def check_poisson(who: str, nu: float) -> None:
-    """Reject a Poisson's ratio outside (-1, 0.5), that of no isotropic solid."""
+    """Reject a Poisson's ratio outside (-1, 0.5), which no isotropic solid can have."""
     if not -1.0 < nu < 0.5:
         raise BadInput(f"{who}: nu = {nu:g} must lie between -1.0 and 0.5")
 

@@ -1,5 +1,5 @@
-"""Import and export of links of other finite-element programs.
+"""Import and export of links between forcefit and finite-element programs.
 
-Begin at ``import_link.py``; ``two_interfaces.py`` defines the common matrix of two
-interfaces.
+Begin at ``import_link.py``; ``two_interfaces.py`` defines the matrix of a body between
+two interfaces.
 """

@@ -1,11 +1,11 @@
 """Files of Ansys: Harwell-Boeing matrices, and the degrees of freedom of their rows.
 
-Rows of Ansys' assembled matrices are in an order of its own.  A mapping file gives the
-order.  It is next to the matrix and has its name, with the suffix ``.mapping``:
+Ansys assembles matrices in an internal order of rows.  A mapping file states this
+order. It is next to the matrix and has the same name with the suffix ``.mapping``:
 
 - from ``HBMAT,name,,,ASCII,STIFF,NO,YES``: lines of row, node and label (``UX``..);
 - from ``*VEC,map,I,IMPORT,FULL,file.full,BACK`` and ``*EXPORT,map,MMF,name.mapping``:
-  a Matrix Market vector of the nodes, each with all its degrees of freedom in turn.
+  a Matrix Market vector of the nodes; each has all its degrees of freedom in sequence.
 
 Sources:
     Ansys Command Reference, HBMAT, *EXPORT, *VEC; Duff, Grimes, Lewis (1992), Users'
@@ -22,7 +22,7 @@ from scipy.sparse import coo_array, csr_array, diags_array
 from forcefit.inputs.errors import BadInput, describe, nearest
 from forcefit.inputs.table import read_text
 
-LARGEST = 2_000_000  # largest number of rows
+LARGEST = 2_000_000  # largest accepted number of rows
 LABELS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
 _FORMAT = re.compile(r"\(\s*(?:1P,?)?\s*(\d*)\s*([IEDFG])(\d+)(?:\.\d+\S*)?\s*\)", re.I)
 _NUMBER = re.compile(r"[+-]?\d+(?:\.\d*)?(?:[ED][+-]?\d+)?|[+-]?\.\d+(?:[ED][+-]?\d+)?")
@@ -31,18 +31,19 @@ _NUMBER = re.compile(r"[+-]?\d+(?:\.\d*)?(?:[ED][+-]?\d+)?|[+-]?\.\d+(?:[ED][+-]
 def harwell_boeing(path: Path, text: str) -> csr_array:
     """Read an assembled real matrix; a symmetric one (RSA) is stored as one half.
 
-    SciPy's reader refuses what ``HBMAT`` writes: RSA, right-hand sides, and exponents
-    with a D (SciPy 1.17).
+    SciPy's reader refuses three features that ``HBMAT`` writes: RSA, right-hand sides,
+    and exponents with a D (SciPy 1.17).
 
     Args:
         path: path of the file, for error messages.
         text: text of the file.
 
     Returns:
-        (n, n) with both halves.
+        (n, n) matrix with both halves.
 
     Raises:
-        BadInput: the file is of another kind, or its length differs from its header.
+        BadInput: the file is of a different kind, or its length differs from its
+            header.
     """
     lines = text.split("\n")
     try:
@@ -52,7 +53,9 @@ def harwell_boeing(path: Path, text: str) -> csr_array:
         formats = _FORMAT.findall(lines[3])
         widths = [int(width) for *_, width in formats]
     except (IndexError, ValueError):
-        raise BadInput(f"{path}: no Harwell-Boeing file: its head is cut off") from None
+        raise BadInput(
+            f"{path}: found an incomplete header, expected a Harwell-Boeing file"
+        ) from None
     if kind.upper() not in {"RSA", "RUA"} or len(counts) < 4 or len(formats) < 3:
         raise BadInput(
             f"{path}: found the kind {describe(kind)}, expected RSA or RUA: a real, "
@@ -91,7 +94,7 @@ def both_halves(matrix: csr_array) -> csr_array:
 
 
 def _fields(path: Path, lines: list[str], width: int) -> NDArray:
-    """Return the numbers in fields of one width."""
+    """Return the numbers in fields of a fixed width."""
     words = [
         line[k : k + width].strip()
         for line in lines
@@ -124,7 +127,8 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
         rows, columns, *nodes = (_whole(path, word) for word in words)
         if columns != 1 or len(nodes) != rows or len(set(nodes)) != rows:
             raise BadInput(
-                f"{path}: found {len(set(nodes))} nodes, expected {rows} in one column"
+                f"{path}: found {len(set(nodes))} different nodes, expected one column "
+                f"with {rows} nodes"
             )
         return nodes
     freedoms: dict[int, tuple[int, int]] = {}
@@ -151,7 +155,7 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
 
 
 def _whole(path: Path, word: str) -> int:
-    """Return the number of a row or node."""
+    """Return the integer number of a row or node."""
     if not re.fullmatch("[0-9]{1,12}", word):
         raise BadInput(f"{path}: found {describe(word)}, expected a number of a node")
     return int(word)

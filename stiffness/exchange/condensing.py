@@ -1,4 +1,4 @@
-"""Condensation of a full matrix on two interfaces: nodes, or rigid faces.
+"""Condensation of a full matrix onto two interfaces, which are nodes or rigid faces.
 
 Sources:
     Guyan (1965), Reduction of stiffness and mass matrices, AIAA Journal 3, 380.
@@ -23,31 +23,32 @@ _GRID = re.compile(r"^GRID\*?[\s,]", re.M | re.I)
 _NODE = re.compile(r"^\*NODE\s*(?:,.*)?$", re.M | re.I)
 _WORKBENCH = re.compile(r"Node Number\tX Location \((\w+)\)")
 _LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
-_ON = 1e-6  # relative to the body's size: largest distance of a node on its interface
+# relative to the body's size: largest distance of a node that is on an interface
+_ON = 1e-6
 
 
 def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
     """Return the positions of nodes: lines of number, x, y, z between commas or blanks.
 
     Args:
-        path: the file; lines that begin with ``*`` or ``#`` are ignored.  In a deck of
-            Abaqus or CalculiX the lines after ``*NODE`` are read, of Nastran ``GRID``.
-            In a named selection of Ansys' Workbench the lines below its heading are
-            read; their numbers may have decimal commas.
-        unit: [m] of its lengths.
+        path: file; lines that begin with ``*`` or ``#`` are ignored.  In an input file
+            of Abaqus or CalculiX the lines after ``*NODE`` are read, in one of Nastran
+            the lines ``GRID``. In a named selection of Ansys Workbench the lines below
+            its heading are read; their numbers may have decimal commas.
+        unit: [m] unit of the file's lengths.
 
     Returns:
-        (3,) [m] by number.
+        (3,) [m] positions by number of the node.
 
     Raises:
-        BadInput: a line has another form.
+        BadInput: a line has a different form.
     """
     nodes: dict[int, NDArray] = {}
     text = read_text(path)
     head = _WORKBENCH.match(text)
     if head and abs(_LENGTHS.get(head[1], 0.0) - unit) > 1e-9 * unit:
         raise BadInput(
-            f"{path}: found lengths in {head[1]}, but another --unit; expected "
+            f"{path}: found lengths in {head[1]}, but a different --unit; expected "
             "the same unit"
         )
     for number, words, line in _node_lines(text):
@@ -59,7 +60,7 @@ def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
         if place.shape != (3,) or not np.isfinite(place).all() or node in nodes:
             raise BadInput(
                 f"{path}: line {number}: found {describe(line.strip())}, expected the "
-                "number of another node and its x, y, z"
+                "number of a further node and its x, y, z"
             )
         nodes[node] = unit * place
     if not nodes:
@@ -68,7 +69,7 @@ def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
 
 
 def _node_lines(text: str) -> Iterator[tuple[int, list[str], str]]:
-    """Yield lines with the position of a node: number, number and coordinates, line."""
+    """Yield number of each line with a node, its words (node, x, y, z), the line."""
     if _GRID.search(text):
         yield from _grids(text)
         return
@@ -88,7 +89,7 @@ def _node_lines(text: str) -> Iterator[tuple[int, list[str], str]]:
 
 
 def _grids(text: str) -> Iterator[tuple[int, list[str], str]]:
-    """Yield Nastran's ``GRID``, on one line or, for wide fields, on two."""
+    """Yield Nastran's ``GRID`` lines; with wide fields a node takes two lines."""
     lines = text.split("\n")
     for number, line in enumerate(lines, 1):
         if _GRID.match(line):
@@ -103,21 +104,21 @@ def _grids(text: str) -> Iterator[tuple[int, list[str], str]]:
 def interface_rows(
     matrix: FileMatrix, asked: str, option: str, nodes: Mapping[int, NDArray] | None
 ) -> tuple[NDArray, NDArray, NDArray | None]:
-    """Return the rows of an interface, and their motion for unit screws of it.
+    """Return the rows of an interface, and their motions for its unit screws.
 
     Args:
         matrix: matrix with its degrees of freedom.
-        asked: a node's number, or an interface as in ``stiffness fea``.
+        asked: number of a node, or an interface as in ``stiffness fea``.
         option: name of the option, for messages.
-        nodes: (3,) [m] positions by number, None if unknown.
+        nodes: (3,) [m] positions by number; None if unknown.
 
     Returns:
-        (k,) rows, (k, 6) their motions for unit screws [R T] at the interface's point,
-        and (3,) [m] the point, None if unknown.
+        (k,) rows; (k, 6) their motions for unit screws [R T] at the interface's point;
+        and (3,) [m] that point, None if unknown.
 
     Raises:
-        BadInput: no such node, a node without six degrees of freedom, or an empty
-            interface.
+        BadInput: there is no such node, a node lacks some of its six degrees of
+            freedom, or the interface has no nodes.
     """
     row = {freedom: k for k, freedom in enumerate(matrix.freedoms)}
     if asked.strip().isdigit():
@@ -173,18 +174,18 @@ def _on(interface: Interface, places: NDArray) -> NDArray:
 def condensed(
     matrix: FileMatrix, ends: tuple[tuple[NDArray, NDArray], tuple[NDArray, NDArray]]
 ) -> tuple[NDArray, NDArray]:
-    """Return the matrix of two interfaces; other degrees of freedom are free.
+    """Return the matrix of two interfaces; other degrees of freedom are without load.
 
     Args:
-        matrix: (n, n).
-        ends: rows and motions of base and tip, see :func:`interface_rows`.
+        matrix: (n, n) stiffness matrix.
+        ends: rows and motions of base and tip, from :func:`interface_rows`.
 
     Returns:
-        (12, 12) base first, and (n, 12) the motion of every row for unit screws.
+        (12, 12) matrix, base first, and (n, 12) motions of all rows for unit screws.
 
     Raises:
         BadInput: the interfaces share rows, or other degrees of freedom are not
-            connected.
+            connected to them.
     """
     from stiffness.fem.sparse_solver import solve
 
@@ -216,6 +217,6 @@ def condensed(
                 f"{matrix.file}: found a singular stiffness between the "
                 "interfaces; expected a body in one piece that connects them"
             )
-    # energy of the fields, in which errors of the solution are squared
+    # computed from the energy of the fields, where errors of the solution are squared
     K12 = fields.T @ (K @ fields)
     return (K12 + K12.T) / 2, fields

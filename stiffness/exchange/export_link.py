@@ -1,4 +1,4 @@
-"""``forcefit stiffness export``: a link as the matrix of nodes 1, base, and 2, tip."""
+"""``forcefit stiffness export``: a link as a matrix of nodes 1 (base), 2 (tip)."""
 
 import io
 import json
@@ -14,21 +14,21 @@ from stiffness.exchange.two_interfaces import both_ends
 from stiffness.report.export import PROGRAMS, stiffness_for
 
 FORMATS = ("matrix-market", "abaqus", "calculix", "nastran", "numpy", *PROGRAMS)
-# forcefit's order, rearranged with translations first
+# indices that put translations before rotations at each node
 _FEM = [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]
 
 
 def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
-    """Return K_E and the base's point less the tip's from a link's ``--json`` results.
+    """Return K_E, and the vector from tip to base, of a link's ``--json`` results.
 
     Args:
         path: the JSON file.
 
     Returns:
-        (6, 6) and (3,) [m].
+        K_E (6, 6), and the vector (3,) [m].
 
     Raises:
-        BadInput: the file is not of this kind.
+        BadInput: the file does not hold the results of a link.
     """
     try:
         content = json.loads(read_text(path))
@@ -43,7 +43,7 @@ def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
         ) from None
     if K.shape != (6, 6) or offset.shape != (3,) or not np.isfinite(K).all():
         raise BadInput(f"{path}: stiffness: expected 6 rows of 6 finite numbers")
-    # their products must not overflow
+    # products of these numbers must not overflow
     if not max(np.abs(K).max(), np.abs(offset).max()) < 1e100:
         raise BadInput(
             f"{path}: found numbers above 1e100, expected the stiffness of a "
@@ -55,20 +55,20 @@ def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
 def link_file(
     stiffness: NDArray, base_from_tip: NDArray, to: str, unit: str = "m"
 ) -> bytes:
-    """Return a file's content.
+    """Return the content of a file for another program.
 
     Args:
-        stiffness: (6, 6) K_E at the tip, SI, our order.
-        base_from_tip: (3,) [m].
-        to: one of ``FORMATS``.
+        stiffness: (6, 6) K_E at the tip, in SI units, rotations first.
+        base_from_tip: (3,) [m] vector from tip to base.
+        to: name of the format, one of ``FORMATS``.
         unit: unit of lengths in the file; forces are in N, rotations in rad.
 
     Returns:
-        The content: translations first at each node; for ``exudyn``, ``adams``,
+        The content, with translations first at each node; for ``exudyn``, ``adams`` and
         ``mapdl`` the result of :func:`stiffness.report.export.stiffness_for`.
 
     Raises:
-        BadInput: an unknown format or unit, or a unit with a format that has its own.
+        BadInput: the format or unit is unknown, or the format has a fixed unit.
     """
     for option, value, valid in (("--to", to, FORMATS), ("--unit", unit, LENGTHS)):
         if value not in valid:
@@ -94,7 +94,7 @@ def link_file(
 
 
 def _lower(K: NDArray) -> list[tuple[int, int, float]]:
-    """Return the row, column, value of the lower half, column by column."""
+    """Return row, column and value of each entry of the lower half, by columns."""
     return [(i, j, float(K[i, j])) for j in range(12) for i in range(j, 12)]
 
 
@@ -106,7 +106,7 @@ def _matrix_market(K: NDArray) -> str:
 
 
 def _user_element(K: NDArray) -> str:
-    """Return the text of an Abaqus ``*USER ELEMENT``, four numbers a line."""
+    """Return the text of an Abaqus ``*USER ELEMENT``, with four numbers per line."""
     lines = ["*USER ELEMENT,NODES=2,LINEAR", "** ELEMENT NODES", "** 1, 2",
              "1, 2, 3, 4, 5, 6", "*MATRIX,TYPE=STIFFNESS"]  # fmt: skip
     for i in range(12):

@@ -1,4 +1,4 @@
-"""``forcefit stiffness import``: a link's K_E from another program's matrices."""
+"""``forcefit stiffness import``: K_E of a link from matrices of another program."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -30,12 +30,12 @@ def import_link(
     """Return a link from a matrix of 6, 12 or more degrees of freedom.
 
     Args:
-        path: path of the stiffness, see :mod:`stiffness.exchange.matrix_file`.
-        mass: path of the mass matrix of the same degrees of freedom; None without one.
-        nodes: path of the positions of nodes, needed for interfaces of many nodes;
-            their order is that of rows which the matrix file does not name.
+        path: file of the stiffness matrix, see :mod:`stiffness.exchange.matrix_file`.
+        mass: file of the mass matrix for the same degrees of freedom; None without one.
+        nodes: file with the positions of nodes, needed for interfaces of many nodes.
+            Their order applies to rows that the matrix file does not name.
         base: node, or interface such as ``"z=0"`` [m], that is held.
-        tip: node or interface at which the screw is read.
+        tip: node or interface at which screws are read.
         unit: unit of lengths in all files; forces are in N, rotations in rad.
         order: order of the six degrees of freedom of a node, if the file does not name
             them.
@@ -84,10 +84,10 @@ def import_link(
     strange = [freedom for freedom in heavy.freedoms if freedom not in row]
     if strange or len(heavy.freedoms) < len(row) and not heavy.named:
         raise BadInput(
-            f"{mass}: found other degrees of freedom than in {path}, expected "
-            "the same nodes and directions"
+            f"{mass}: found nodes or directions that {path} does not have, or too "
+            "few; expected the same in both files"
         )
-    # a file of named degrees of freedom leaves out those without mass
+    # a file with named degrees of freedom omits those without mass
     moved = fields[[row[freedom] for freedom in heavy.freedoms]]
     M12 = moved.T @ (heavy.matrix @ moved)
     kilograms, centre, inertia = mass_of_both_ends(M12, link.base - link.tip)
@@ -107,7 +107,7 @@ def _ends(
 
 
 def reordered(matrix: FileMatrix, order: str) -> FileMatrix:
-    """Return the matrix with degrees of freedom named in the order of its file."""
+    """Return the matrix with its degrees of freedom named in the order of the file."""
     if matrix.named or order == ORDERS[0]:
         return matrix
     freedoms = tuple((node, (d + 2) % 6 + 1) for node, d in matrix.freedoms)
@@ -115,16 +115,16 @@ def reordered(matrix: FileMatrix, order: str) -> FileMatrix:
 
 
 def in_metres(matrix: FileMatrix, length: float) -> FileMatrix:
-    """Return the matrix with translations in metres and work in joules.
+    """Return the matrix with translations in metres and energies in joules.
 
     Args:
         matrix: matrix with forces in N, rotations in rad and translations in
             ``length``.
-        length: [m] its unit of length.
+        length: [m] unit of length of the matrix.
 
     Returns:
-        The matrix in SI; for a mass matrix if its unit is consistent (tonnes with mm, N
-        and s).
+        The matrix in SI units; a mass matrix must have a consistent unit (tonnes with
+        mm, N and s).
     """
     turns = np.array([direction > 3 for _, direction in matrix.freedoms])
     scale = np.where(turns, 1.0, 1.0 / length)

@@ -46,13 +46,13 @@ _KINDS = {"STIFFNESS": "stiffness", "MASS": "mass"}
 
 @dataclass(frozen=True, eq=False)
 class FileMatrix:
-    """A symmetric matrix of a file.
+    """A symmetric matrix from a file.
 
     Attributes:
-        file: its name, for messages.
-        matrix: (n, n) with both halves.
-        freedoms: node and direction, 1 to 3 translations and 4 to 6 rotations, of each
-            row.
+        file: name of the file, for messages.
+        matrix: (n, n) matrix with both halves.
+        freedoms: node and direction of each row; directions 1 to 3 are translations, 4
+            to 6 rotations.
         named: whether the file itself names the degrees of freedom.
     """
 
@@ -68,22 +68,23 @@ def read_matrix(
     nodes: Sequence[int] | None = None,
     mapped: Path | str | None = None,
 ) -> FileMatrix:
-    """Return a matrix of a file, whose kind is recognised by its content.
+    """Return a matrix from a file, whose kind is recognised by its content.
 
     Args:
-        path: the file.
-        which: ``"stiffness"`` or ``"mass"``, if the file holds both.
-        nodes: in the order of rows that the file does not name; None: 1, 2, ..
-        mapped: a matrix of the same rows, whose ``.mapping`` is used if this one has
-            none.
+        path: file of the matrix.
+        which: ``"stiffness"`` or ``"mass"``, for a file that holds both.
+        nodes: nodes in the order of rows that the file does not name; None for 1, 2,
+            ...
+        mapped: file of a matrix with the same rows, whose ``.mapping`` is used if this
+            file has none.
 
     Returns:
-        The matrix; rows that the file does not name are three per node of ``nodes``, as
-        for solids, if their number fits, else six.
+        The matrix.  Rows that the file does not name are three per node of ``nodes``,
+        as for solids, if their number agrees, otherwise six.
 
     Raises:
-        BadInput: the file is of no such kind; its matrix is not square, not finite or
-            not symmetric; or it has no degrees of freedom.
+        BadInput: the file is of no known kind; its matrix is not square, finite and
+            symmetric; or it has no degrees of freedom.
     """
     path = Path(path)
     ending = path.suffix.lower()
@@ -115,7 +116,7 @@ def read_matrix(
 
 
 def _mapped(path: Path, n: int) -> list[Freedom]:
-    """Return the degrees of freedom of n rows by a mapping file."""
+    """Return the degrees of freedom of n rows from a mapping file."""
     given = read_mapping(path)
     freedoms: list[Freedom] = []
     each = n // len(given)
@@ -142,7 +143,8 @@ def _checked(
     n = matrix.shape[0]
     if matrix.shape != (n, n) or not n:
         raise BadInput(f"{path}: found {matrix.shape} numbers, expected a square")
-    if not (np.abs(matrix.data) < 1e100).all():  # their products must not overflow
+    # products of these numbers must not overflow
+    if not (np.abs(matrix.data) < 1e100).all():
         raise BadInput(f"{path}: found a number that is not finite, or above 1e100")
     given = freedoms or _in_order(path, n, nodes)
     size = np.sqrt(np.abs(matrix.diagonal()))
@@ -161,7 +163,7 @@ def _checked(
 
 
 def _in_order(path: Path, n: int, nodes: Sequence[int] | None) -> list[Freedom]:
-    """Return the degrees of freedom of n rows without names: three or six a node."""
+    """Return the degrees of freedom of n unnamed rows: three or six for each node."""
     numbers = range(1, n // 6 + 1) if nodes is None else nodes
     for each in (3, 6):
         if n == each * len(numbers):
@@ -176,7 +178,7 @@ def _in_order(path: Path, n: int, nodes: Sequence[int] | None) -> list[Freedom]:
 
 
 def _numpy(path: Path) -> csr_array:
-    """Return a matrix of ``.npy``, or of a sparse ``.npz``; never a pickle."""
+    """Return a matrix from ``.npy``, or from a sparse ``.npz``; pickles are refused."""
     from scipy.sparse import load_npz
 
     try:
@@ -191,9 +193,9 @@ def _numpy(path: Path) -> csr_array:
         raise BadInput(f"{path}: cannot be read: {reason}") from None
     except BadInput:
         raise
-    except Exception as error:  # a damaged archive raises various exceptions
+    except Exception as error:  # a damaged archive may raise any exception
         raise BadInput(
-            f"{path}: no matrix of NumPy or SciPy: {one_line(str(error), 100)}"
+            f"{path}: not a matrix of NumPy or SciPy: {one_line(str(error), 100)}"
         ) from None
 
 
@@ -279,7 +281,7 @@ def _columns(path: Path, text: str) -> tuple[csr_array, list[Freedom] | None]:
 
 
 def _named_by(path: Path, n: int) -> list[Freedom]:
-    """Return degrees of freedom of CalculiX's ``.dof``, ``node.direction`` a row."""
+    """Return degrees of freedom in CalculiX's ``.dof``: ``node.direction`` per row."""
     words = read_text(path).split()
     freedoms: list[Freedom] = []
     for word in words:
@@ -298,7 +300,7 @@ def _named_by(path: Path, n: int) -> list[Freedom]:
 def _from_entries(
     path: Path, entries: dict[tuple[Freedom, Freedom], float]
 ) -> tuple[csr_array, list[Freedom]]:
-    """Return a matrix from the entries of one half or both."""
+    """Return a matrix from the entries of one half or of both halves."""
     freedoms = sorted({freedom for pair in entries for freedom in pair})
     if not freedoms or len(freedoms) > LARGEST:
         raise BadInput(f"{path}: found no entries of a matrix")
@@ -309,8 +311,8 @@ def _from_entries(
 def _of_rows(
     entries: Mapping[tuple[Any, Any], float], row: Mapping[Any, int]
 ) -> csr_array:
-    """Return a matrix from entries by the names of their rows."""
-    # a missing half is the transpose of the other one
+    """Return a matrix from entries whose rows and columns are named."""
+    # a missing half is the transpose of the other half
     whole = {**{(b, a): v for (a, b), v in entries.items()}, **entries}
     i, j = [row[a] for a, _ in whole], [row[b] for _, b in whole]
     shape = (len(row), len(row))

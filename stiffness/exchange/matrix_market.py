@@ -1,4 +1,4 @@
-"""Matrices in Matrix Market files, sparse or full, real, square.
+"""Reader of Matrix Market files: sparse or full, real, square matrices.
 
 Sources:
     Boisvert, Pozo, Remington (1996), The Matrix Market exchange formats, NISTIR 5935.
@@ -24,25 +24,26 @@ _MARKET = (
 def matrix_market(path: Path, text: str) -> csr_array:
     """Read a square matrix.
 
-    SciPy's reader is not used: it reads 4D3 as 4 and an entry "2 1.5 1" as 0.5 in
-    column 1, without an error (SciPy 1.17).  A check of every line before it takes as
-    long as this reader.
+    SciPy's reader is not used, because it reads 4D3 as 4, and an entry "2 1.5 1" as 0.5
+    in column 1, without an error (SciPy 1.17).  A check of every line before it would
+    take as long as this reader.
 
     Args:
         path: path of the file, for error messages.
         text: text of the file.
 
     Returns:
-        (n, n) with both halves of a symmetric one, and where Ansys wrote one half.
+        (n, n) matrix; a missing half is the transpose of the other half.
 
     Raises:
-        BadInput: the file is of another kind, or its length differs from its header.
+        BadInput: the file is of a different kind, or its length differs from its
+            header.
     """
     head, *lines = text.split("\n")
     words = tuple(head.lower().split()[1:])
     if len(words) != 4 or any(w not in k for w, k in zip(words, _MARKET, strict=True)):
         raise BadInput(
-            f"{path}: no Matrix Market file: found {describe(head)}, expected a "
+            f"{path}: found {describe(head)}, expected a "
             "matrix, coordinate or array, real or integer, general or symmetric"
         )
     numbers = _numbers(path, [line for line in lines if not line.startswith("%")])
@@ -69,7 +70,7 @@ def matrix_market(path: Path, text: str) -> csr_array:
             raise BadInput(f"{path}: found {len(rest)} numbers, expected {expected}")
         j, i = np.indices((n, n)) if whole else np.triu_indices(n)  # column by column
         matrix = csr_array(coo_array((rest, (i.ravel(), j.ravel())), shape=(n, n)))
-    # Ansys writes one half, whatever its header says
+    # Ansys writes one half, although its header declares a general matrix
     half = not triu(matrix, 1).nnz or not tril(matrix, -1).nnz
     by_ansys = re.search(r"^%.*ANSYS", text, re.M | re.I)
     return (

@@ -1,8 +1,7 @@
-"""Nastran's bulk data: fields of a line, and matrices by ``DMIG``.
+"""Nastran's bulk data: fields of a line, and matrices given by ``DMIG``.
 
-Fields have eight characters, or sixteen if the first ends in ``*``; or they are
-separated by commas or blanks.  Between commas a line may have more than the eight of a
-card.
+Fields have eight characters, or sixteen if the first field ends in ``*``; or they are
+separated by commas or blanks.  With commas, a line may have more than eight fields.
 
 Sources:
     MSC Nastran Quick Reference Guide: Bulk Data, free and fixed fields; DMIG (form 6
@@ -20,7 +19,7 @@ from stiffness.exchange.real_numbers import real, whole
 Freedom = tuple[int, int]
 Entries = dict[tuple[Freedom, Freedom], float]
 DMIG = re.compile(r"^DMIG[*\s,]", re.M | re.I)
-# meaning of Nastran's own names
+# names that Nastran itself gives to matrices
 _OWN_NAME = re.compile(r"(K4|K|B|M)2?(AAX?|GG|PP|LL|FF)")
 _WHAT = {"K": "stiffness", "M": "mass", "K4": "structural damping",
          "B": "viscous damping"}  # fmt: skip
@@ -30,11 +29,11 @@ def bulk_fields(line: str) -> tuple[str, list[str]]:
     """Return the fields of a line of bulk data.
 
     Args:
-        line: with fields of fixed width, or between commas or blanks.
+        line: line with fields of fixed width, or separated by commas or blanks.
 
     Returns:
-        The first field in capitals, with its ``*``, and the others; four or eight of
-        fixed width, else all.
+        The first field in capitals, with its ``*``, and the other fields; four or eight
+        fields of fixed width, otherwise all.
     """
     if "," in line:
         head, *fields = [word.strip() for word in line.split(",")]
@@ -49,7 +48,7 @@ def bulk_fields(line: str) -> tuple[str, list[str]]:
 
 
 def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
-    """Return the entries of the stiffness or mass matrix among those of a file.
+    """Return the entries of the stiffness or mass matrix in a file.
 
     Args:
         path: path of the file, for error messages.
@@ -57,10 +56,11 @@ def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
         which: ``"stiffness"`` or ``"mass"``.
 
     Returns:
-        Values by the degrees of freedom of row and column, of one half or both.
+        Values by the degrees of freedom of row and column, of one half or both halves.
 
     Raises:
-        BadInput: no matrix or several are of this kind, or it is not square and real.
+        BadInput: no matrix or several are of this kind, or the matrix is not square and
+            real.
     """
     matrices: dict[str, Entries] = {}
     forms: dict[str, str] = {}
@@ -73,7 +73,7 @@ def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
         if head.rstrip("*") == "DMIG":
             name, node, direction = (fields + [""] * 3)[:3]
             entries = matrices.setdefault(name.upper(), {})
-            if node in {"0", ""}:  # the header: form, types
+            if node in {"0", ""}:  # the header states form and types
                 forms[name.upper()], entries = direction, None
                 continue
             column = whole(path, node), max(1, whole(path, direction or "0"))
@@ -94,15 +94,15 @@ def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
 def _terms(
     path: Path | str, fields: list[str], packed: bool
 ) -> list[tuple[Freedom, float]]:
-    """Return rows and values of a column's terms.
+    """Return the rows and values of the terms of a column.
 
-    A term has a node, direction, real part and imaginary part.
+    A term consists of node, direction, real part and imaginary part.
 
     Args:
         path: path of the file, for error messages.
-        fields: fields of a line, after those that name the column.
-        packed: whether fields are separated by blanks, so that no field is empty and
-            there is no imaginary part.
+        fields: fields of a line after the fields that name the column.
+        packed: whether blanks separate the fields, so that no field is empty and there
+            is no imaginary part.
 
     Returns:
         Row and value of each term.
@@ -113,7 +113,7 @@ def _terms(
     """
     terms, waiting = [], list(fields)
     while waiting:
-        if not waiting[0] or waiting[0].startswith(("+", "*")):  # continued
+        if not waiting[0] or waiting[0].startswith(("+", "*")):  # a continuation mark
             waiting.pop(0)
             continue
         if len(waiting) < 3:
@@ -138,7 +138,7 @@ def _terms(
 def _chosen(
     path: Path | str, names: Iterable[str], forms: Mapping[str, str], which: str
 ) -> str:
-    """Return the name of the one stiffness or mass matrix."""
+    """Return the name of the only stiffness or mass matrix."""
     names = list(names)
     initial = {kind: letter for letter, kind in _WHAT.items()}[which]
     found = [name for name in names if forms.get(name, "") in {"1", "6", ""}]
@@ -158,6 +158,6 @@ def _chosen(
 
 
 def _kind(name: str) -> str | None:
-    """Return the kind of matrix that a Nastran name means, else None."""
+    """Return the kind of matrix with a Nastran name; None if it is unknown."""
     match = _OWN_NAME.fullmatch(name)
     return _WHAT[match[1]] if match else None

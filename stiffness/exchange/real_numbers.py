@@ -1,4 +1,4 @@
-"""Numbers as Fortran writes them: exponents without a letter, or with a D."""
+"""Numbers as Fortran writes them: with exponents without a letter, or with a D."""
 
 import re
 from pathlib import Path
@@ -9,14 +9,14 @@ _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]?\d+))?")
 
 
 def real(path: Path | str, word: str) -> float:
-    """Return a number of a file.
+    """Return a number from a file.
 
     Args:
         path: path of the file, for error messages.
-        word: the number, with blanks around it or none.
+        word: text of the number, with or without surrounding blanks.
 
     Returns:
-        Its value.
+        The value of the number.
 
     Raises:
         BadInput: the text is not a number.
@@ -29,17 +29,17 @@ def real(path: Path | str, word: str) -> float:
 
 
 def whole(path: Path | str, word: str) -> int:
-    """Return a whole number of a file.
+    """Return an integer from a file.
 
     Args:
         path: path of the file, for error messages.
-        word: the number, with blanks around it or none.
+        word: text of the number, with or without surrounding blanks.
 
     Returns:
-        Its value.
+        The value of the number.
 
     Raises:
-        BadInput: the text is not a whole number.
+        BadInput: the text is not an integer.
     """
     try:
         return int(word)

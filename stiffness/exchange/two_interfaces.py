@@ -1,10 +1,10 @@
-"""A body between two interfaces: twelve degrees of freedom, six of them rigid.
+"""A body between two interfaces: twelve degrees of freedom, six of them rigid motions.
 
 ======  ============  =======================================================
 symbol  shape         meaning
 ======  ============  =======================================================
 K12     (12, 12)      stiffness of base and tip, [R T] of each
-K       (6, 6)        K_E: the tip's block of it, with the base held
+K       (6, 6)        K_E: the tip's block of K12, with the base held
 X       (6, 6)        rigid motion transferred from base to tip: K12 [s; X s] = 0
 ======  ============  =======================================================
 """
@@ -16,19 +16,20 @@ from forcefit.inputs.errors import BadInput
 from stiffness.link import LinkStiffness, check_definite, inverted
 from stiffness.screws import screw_map, skew
 
-_BALANCED = 1e-5  # relative to its scale: residual due to text of seven digits
-_FARTHEST = 1e6  # [m] largest distance of a base from its tip
+# relative to the scale of K12: residual wrench due to text of seven digits
+_BALANCED = 1e-5
+_FARTHEST = 1e6  # [m] largest accepted distance between base and tip
 
 
 def both_ends(stiffness: ArrayLike, base_from_tip: ArrayLike) -> NDArray:
-    """Return K12 of a link.
+    """Return the matrix K12 of a link.
 
     Args:
         stiffness: (6, 6) K_E at the tip.
-        base_from_tip: (3,) [m] the base's point less the tip's.
+        base_from_tip: (3,) [m] vector from tip to base.
 
     Returns:
-        (12, 12) base first, then tip; in our order.
+        (12, 12) matrix K12: base first, then tip; rotations first at each.
     """
     K = np.asarray(stiffness, dtype=float)
     X = screw_map(base_from_tip)
@@ -45,17 +46,17 @@ def link_of_both_ends(
     """Return the link of a matrix of two interfaces.
 
     Args:
-        K12: (12, 12) in SI, in our order.
+        K12: (12, 12) matrix in SI units, rotations first at each interface.
         who: name of the file, for messages.
-        base: (3,) [m] its point, None to compute it from the matrix.
-        tip: (3,) [m] its point; both or neither.
+        base: (3,) [m] point of the base; None to compute it from the matrix.
+        tip: (3,) [m] point of the tip; both points are given or neither.
 
     Returns:
-        The link; if the points are unknown the tip is the origin.
+        The link; if the points are unknown, the tip is the origin.
 
     Raises:
-        BadInput: K_E is no stiffness, or the body is connected to another one: it has a
-            stiffness against its own rigid motions.
+        BadInput: K_E is not a stiffness, or the body is connected to another body, so
+            that the matrix resists rigid motions.
     """
     K12 = np.asarray(K12, dtype=float)
     K = K12[6:, 6:]
@@ -92,17 +93,18 @@ def link_of_both_ends(
 def mass_of_both_ends(
     M12: ArrayLike, offset: ArrayLike
 ) -> tuple[float, NDArray, NDArray]:
-    """Return the mass, its centre and its moments from a mass matrix of two interfaces.
+    """Return mass, centre and inertia from a mass matrix of two interfaces.
 
     Args:
-        M12: (12, 12) in SI, in our order.
-        offset: (3,) [m] the base's point less the tip's.
+        M12: (12, 12) matrix in SI units, rotations first at each interface.
+        offset: (3,) [m] vector from tip to base.
 
     Returns:
-        [kg], (3,) [m] the centre seen from the tip, (3, 3) [kg m^2] about it.
+        Mass [kg]; centre of mass (3,) [m] relative to the tip; inertia (3, 3) [kg m^2]
+        about the centre.
 
     Raises:
-        BadInput: its mass is not positive.
+        BadInput: the mass is not positive.
     """
     rigid = np.vstack([screw_map(-np.asarray(offset, dtype=float)), np.eye(6)])
     M = rigid.T @ np.asarray(M12, dtype=float) @ rigid

@@ -1,4 +1,4 @@
-"""From tetrahedra to K_E: elements, condensation, error estimate, stress.
+"""K_E from tetrahedra: elements, condensation, error estimate, stress.
 
 Begin at ``fea.py``, which refines until the estimated error is small enough.
 """

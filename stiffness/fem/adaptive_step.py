@@ -1,12 +1,12 @@
 """One step of adaptive refinement: solve, estimate the error, mark, refine.
 
 The error indicator (:mod:`stiffness.fem.error_indicator`) is multiplied by an
-effectivity index: the change of the stiffness in the last refinement over that of the
-indicator.
+effectivity index.  This is the change of the stiffness in the last refinement, divided
+by the change of the indicator.
 
 K_h is an upper bound of the exact stiffness, and the error estimate E bounds the
 difference.  So K lies between K_h - E and K_h.  The middle of this interval is
-returned: its error is at most half as large, on the same mesh.
+returned; its error is at most half as large, on the same mesh.
 """
 
 from collections.abc import Callable, Sequence
@@ -44,7 +44,7 @@ from stiffness.mesh.refine import refine
 from stiffness.mesh.regions import is_jagged
 from stiffness.mesh.solid import Solid
 
-# effectivity index of a first mesh: 0.6 to 1.1 on the training parts of
+# effectivity index of the first mesh; 0.6 to 1.1 was measured on the training parts of
 # benchmarks/evidence/stiffness_random_parts.py
 DEFAULT_EFFECTIVITY = 2.0
 SAFETY_FACTOR = 1.3
@@ -55,14 +55,14 @@ class Level:
     """The solution on one mesh.
 
     Attributes:
-        solid: straight tetrahedra.
-        mesh: cubic elements, parts of the tetrahedra along singular edges.
+        solid: solid of straight tetrahedra.
+        mesh: cubic elements; along singular edges they are parts of the tetrahedra.
         material: (t, 3) lambda [Pa], mu [Pa], density [kg/m^3] of each element.
         solution: condensed stiffness and fields.
-        errors: (s, 6, 6) local error indicators: contribution of each of the solid's
-            tetrahedra to K_h - K, without an effectivity index.
-        geometry_errors: (s, 6, 6) the same for the geometry of curved elements.
-        volume_error: [1] relative, of the elements against the part's.
+        errors: (s, 6, 6) local error indicators: contribution of each tetrahedron of
+            the solid to K_h - K, without an effectivity index.
+        geometry_errors: (s, 6, 6) local errors due to the geometry of curved elements.
+        volume_error: [1] relative difference of the volumes of elements and part.
     """
 
     solid: Solid
@@ -74,7 +74,7 @@ class Level:
     volume_error: float = 0.0
 
     def totals(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Return the (6, 6) stiffness, its indicated error and that of the geometry."""
+        """Return the (6, 6) stiffness, its indicated error and the geometry's error."""
         return (
             self.solution.stiffness,
             self.errors.sum(axis=0),
@@ -92,11 +92,11 @@ def solve_level(
     """Return the stiffness, fields and local error indicators of one mesh.
 
     Args:
-        solid: straight tetrahedra; those that would be inverted when curved, or that
-            touch two singular edges, are bisected first.
-        materials: the first fills the link, later ones where they say.
-        centers: (2, 3) [m] of base and tip.
-        interface: one of ``KINDS``.
+        solid: straight tetrahedra; tetrahedra that would be inverted when curved, or
+            that touch two singular edges, are bisected first.
+        materials: materials; the first fills the link, later ones fill their regions.
+        centers: (2, 3) [m] centres of base and tip.
+        interface: kind of the interfaces, one of ``KINDS``.
         check: function called with the number of unknowns before the solution.
 
     Returns:
@@ -122,13 +122,13 @@ def solve_level(
     indicated = error_matrices(
         mesh, solution.fields, lam, mu, singular, solution.stiffness
     )
-    # at singular edges s_3 is reliable, and tractions overestimate by a factor of 2
+    # at singular edges s_3 is reliable, while tractions overestimate by a factor of 2
     free = np.flatnonzero((mesh.patch > max(ENDS)) & ~singular[mesh.owner])
     residual = np.zeros_like(indicated)
     tractions = traction_errors(mesh, solution.fields, lam, mu, free)
     np.add.at(residual, mesh.owner[free], tractions)
     sizes = 1 / np.diag(solution.stiffness)
-    # the larger of two indicators of one error, inside and at the surface
+    # the larger one of two indicators of the same error, inside and at the surface
     larger = np.einsum("tii,i->t", residual - indicated, sizes) > 0
     indicated[larger] = residual[larger]
     errors, geometry = np.zeros((2, len(solid.cells), 6, 6))
@@ -149,16 +149,16 @@ def solve_level(
 def estimated_error(
     history: Sequence[tuple[NDArray, NDArray, NDArray]],
 ) -> tuple[NDArray, float]:
-    """Estimate the error of the last mesh's stiffness, indicator times effectivity.
+    """Return the estimated error of the last mesh's stiffness.
 
     Args:
         history: totals of the :class:`Level` of each mesh, finest last.
 
     Returns:
-        (6, 6) estimate of K_h minus the exact stiffness, without the geometry's error,
-        and the effectivity index of the worst motion.  This is the change of the
-        stiffness in the last refinement over that of the indicated error, times a
-        safety factor.
+        (6, 6) estimate of K_h minus the exact stiffness, without the error of the
+        geometry, and the effectivity index of the worst motion.  The index is the
+        change of the stiffness in the last refinement over the change of the indicated
+        error, times a safety factor.
     """
     K, indicated, _ = history[-1]
     factors = np.full(6, DEFAULT_EFFECTIVITY)
@@ -168,7 +168,8 @@ def estimated_error(
         effectivity = np.full(6, DEFAULT_EFFECTIVITY)
         np.divide(np.diag(coarse - K), drop, out=effectivity, where=drop > 0)
         factors = SAFETY_FACTOR * np.clip(effectivity, 1.0, 2 * DEFAULT_EFFECTIVITY)
-    # one index per motion, because torsion and bending have errors in different places
+    # one index for each motion, because errors in torsion and bending are at different
+    # places
     root = np.sqrt(factors)
     estimate = np.outer(root, root) * indicated
     worst = int(np.argmax(np.diag(estimate) / np.diag(K)))
@@ -178,20 +179,21 @@ def estimated_error(
 def middle_stiffness(
     K_h: NDArray, E: NDArray, geometry: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the middle of the interval in which the exact stiffness lies.
+    """Return the middle of the interval that contains the exact stiffness.
 
     Args:
-        K_h: (6, 6) of a mesh, an upper bound except for the geometry.
-        E: (6, 6) estimate of its error, positive semidefinite.
+        K_h: (6, 6) stiffness of a mesh, an upper bound except for the error of the
+            geometry.
+        E: (6, 6) estimate of the error of K_h, positive semidefinite.
         geometry: (6, 6) indicated error of the geometry, of either sign.
 
     Returns:
-        (6, 6) K_h - E / 2, or with less of E subtracted if otherwise less than half of
-        K_h remained in a motion, and (6, 6) the size of its error.
+        (6, 6) K_h - E / 2, and (6, 6) the size of its error.  Less of E is subtracted
+        if otherwise less than half of K_h would remain in a motion.
     """
     largest = eigh(scaled(E, K_h), scaled(K_h, K_h), eigvals_only=True)[-1]
     part = 0.5 / max(1.0, largest)
-    # geometry errors of either sign may cancel in K, not in the estimate
+    # geometry errors of either sign may cancel in K, but not in the estimate
     return K_h - part * E, (1 - part) * E + np.abs(geometry)
 
 
@@ -200,8 +202,8 @@ def refine_level(level: Level, growth: float) -> Solid:
 
     Args:
         level: the mesh to refine.
-        growth: factor on the number of elements, before neighbours are bisected for a
-            conforming mesh (with them it is about its square).
+        growth: factor on the number of elements before neighbours are bisected for a
+            conforming mesh; including neighbours, the factor is about its square.
 
     Returns:
         The finer mesh.
@@ -214,7 +216,8 @@ def refine_level(level: Level, growth: float) -> Solid:
     shares = np.maximum(shares, 1e-12 * shares.max())
 
     def halvings(limit: float) -> NDArray:
-        # the error of an element falls as h^4 to h^7: by at least 2^1.5 a bisection
+        # the error of an element decreases as h^4 to h^7, at least by 2^1.5 in each
+        # bisection
         return np.clip(np.round(np.log2(shares) / 1.5 - limit), 0, 6).astype(int)
 
     low, high = -200.0, 200.0

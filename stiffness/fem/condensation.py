@@ -1,11 +1,12 @@
 """Static condensation of a solid on two interfaces, six degrees of freedom each.
 
-``rigid`` (RBE2): every node of an interface moves with its joint, as if bolted to a
-much stiffer part.  ``distributing`` (RBE3): the base is rigid, but the tip's wrench is
-distributed over its interface as tractions that vary linearly.  The interface is free
-to deform, and the tip's screw is the mean motion: the least-squares rigid motion over
-the area.  ``distributing-both`` does the same at the base, so that the stiffness does
-not depend on which end is the tip.  Each is softer than the one before.
+``rigid`` (RBE2): every node of an interface moves with its joint, as if it were bolted
+to a much stiffer part.  ``distributing`` (RBE3): the base is rigid, but the wrench of
+the tip is distributed over its interface as tractions that vary linearly.  This
+interface can deform; the screw of the tip is its mean motion, the least-squares rigid
+motion over the area.  ``distributing-both`` does the same at the base, so that the
+stiffness does not depend on which end is the tip.  Each kind is more compliant than the
+kind before it.
 """
 
 from dataclasses import dataclass, replace
@@ -27,9 +28,9 @@ class Condensed:
     """A link's stiffness on one mesh, and its displacement fields.
 
     Attributes:
-        stiffness: (6, 6) at the tip's centre, base held.
+        stiffness: (6, 6) stiffness at the tip's centre, with the base held.
         fields: (n, 3, 6) [m] displacements for unit screws of the tip.
-        unknowns: size of the system that was solved.
+        unknowns: number of unknowns of the solved system.
         kind: kind of the interfaces, one of ``KINDS``.
     """
 
@@ -49,7 +50,7 @@ def condense(
     """Return the stiffness of a meshed link.
 
     Args:
-        mesh: the tetrahedra; patch 0 is the base, 1 the tip.
+        mesh: tetrahedra; patch 0 is the base, patch 1 the tip.
         lam: (t,) [Pa] Lame's first constant.
         mu: (t,) [Pa] shear modulus.
         centers: (2, 3) [m] centres of base and tip.
@@ -70,11 +71,11 @@ def rigid_motions(points: NDArray, center: NDArray) -> NDArray:
     """Return the displacements of points for unit screws at a centre.
 
     Args:
-        points: (n, 3) [m].
-        center: (3,) [m].
+        points: (n, 3) [m] points.
+        center: (3,) [m] centre of the screws.
 
     Returns:
-        (n, 3, 6).
+        (n, 3, 6) displacements.
     """
     shift = np.broadcast_to(np.eye(3), (len(points), 3, 3))
     return np.concatenate([-skew(points - center), shift], axis=2)
@@ -97,7 +98,7 @@ def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
     flat = fields.reshape(-1, 6)
     loads = -_product(upper, flat)[free]
     flat[free] = solve(upper[free][:, free], loads)
-    # energy of the fields, in which errors of the solution are squared
+    # computed from the energy of the fields, where errors of the solution are squared
     K = flat.T @ _product(upper, flat)
     return Condensed((K + K.T) / 2, fields, int(free.sum()))
 
@@ -123,7 +124,8 @@ def _distributing_both(mesh: Elements, upper: csr_array, centers: NDArray) -> Co
     supports = _isostatic_supports(mesh)
     free = np.ones(len(flat), dtype=bool)
     free[supports] = False
-    # the tip's mean motion relative to the base's; the supports have no reactions
+    # mean motion of the tip relative to that of the base; the supports have no
+    # reactions
     return _from_loads(upper, flat, free)
 
 
@@ -155,7 +157,7 @@ def _distributed_loads(mesh: Elements, patch: int, center: NDArray) -> NDArray:
 
 
 def _isostatic_supports(mesh: Elements) -> NDArray:
-    """Return (6,) fixed unknowns of an isostatic support, at three nodes far apart."""
+    """Return the (6,) fixed unknowns of an isostatic support at three distant nodes."""
     points = mesh.nodes
     first = int(np.argmin(points @ [1.0, 0.3, 0.1]))
     apart = np.linalg.norm(points - points[first], axis=1)
@@ -164,8 +166,8 @@ def _isostatic_supports(mesh: Elements) -> NDArray:
     off = np.linalg.norm(np.cross(points - points[first], line), axis=1)
     third = int(np.argmax(off))
     normal = np.abs(np.cross(points[third] - points[first], line))
-    # the second node is free along the line from the first to it; the third is fixed
-    # only across the plane of the three
+    # the second node can move along the line from the first node; the third node is
+    # fixed only normal to the plane of the three nodes
     second_fixed = [3 * second + d for d in range(3) if d != np.argmax(np.abs(line))]
     third_fixed = 3 * third + int(np.argmax(normal))
     return np.array([*(3 * first + d for d in range(3)), *second_fixed, third_fixed])

@@ -10,9 +10,9 @@ w      quadrature weights times the Jacobian's determinant        (t, q)
 
 An element's m nodes are those of its lattice (:mod:`stiffness.mesh.lagrange`): 20 in a
 cubic tetrahedron, 10 in a quadratic one.  The stiffness is assembled from the scalar
-gradients of all elements together, much faster than from a weak form: K[ai, bj] = sum_q
-w (lam G_ai G_bj + mu G_aj G_bi + mu d_ij G_a . G_b). Straight tetrahedra are integrated
-exactly; curved ones with two more degrees.
+gradients of all elements together, which is much faster than from a weak form: K[ai,
+bj] = sum_q w (lam G_ai G_bj + mu G_aj G_bi + mu d_ij G_a . G_b). Straight tetrahedra
+are integrated exactly; for curved ones the rule is exact to two more degrees.
 """
 
 from collections.abc import Iterator
@@ -35,11 +35,11 @@ from stiffness.mesh.lagrange import (
 from stiffness.mesh.quadrature import quadrature
 from stiffness.mesh.solid import Solid
 
-# cubic: quadratic elements need several times the unknowns for an error of 0.1 %
+# cubic; quadratic elements need several times as many unknowns for an error of 0.1 %
 ORDER = 3
-# derivatives of the barycentric coordinates by the reference element's
+# derivatives of the barycentric coordinates by the coordinates of the reference element
 _COORDINATES = np.vstack([-np.ones(3), np.eye(3)])
-_CHUNK = 3_600_000  # numbers of the elements' matrices per chunk, 30 MB
+_CHUNK = 3_600_000  # number of values of the elements' matrices in a batch, 30 MB
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,12 +48,12 @@ class Elements:
 
     Attributes:
         order: order of the polynomials, 2 or 3.
-        nodes: (n, 3) [m] corners first; those of the boundary on the exact shapes.
+        nodes: (n, 3) [m] nodes, corners first; boundary nodes are on the exact shapes.
         cells: (t, m) nodes of each tetrahedron.
         faces: (f, k) nodes of each boundary triangle.
         patch: (f,) number of each face's patch; 0 is the base interface, 1 the tip.
         owner: (f,) tetrahedron of each boundary triangle.
-        curved: (t,) whether the tetrahedron is curved.
+        curved: (t,) bool, True for a curved tetrahedron.
     """
 
     order: int
@@ -66,15 +66,15 @@ class Elements:
 
 
 class Chunk(NamedTuple):
-    """A chunk of elements and their quadrature.
+    """A batch of elements and their quadrature.
 
     Attributes:
         part: (c,) indices of the elements.
         L: (q, 4) barycentric coordinates of the quadrature points.
         weights: (q,) on the reference element.
         N: (q, m) shape functions.
-        G: (c, q, m, 3) [1/m] their gradients in space.
-        w: (c, q) [m^3] weights in space.
+        G: (c, q, m, 3) [1/m] gradients of the shape functions in space.
+        w: (c, q) [m^3] quadrature weights in space.
     """
 
     part: NDArray
@@ -93,7 +93,7 @@ def isoparametric(
     Args:
         solid: the straight tetrahedra.
         order: order of the polynomials, 2 or 3.
-        parts: pieces of the tetrahedra, which become the elements.
+        parts: parts of the tetrahedra, each of which becomes an element.
 
     Returns:
         The elements.
@@ -102,7 +102,7 @@ def isoparametric(
     cells, count = numbered(parts.corners, order)
     nodes = np.zeros((count, 3))
     L = (lattice(order) / order) @ parts.places
-    # there are few different cuts: all parts with the same cut are treated together
+    # there are few different cuts, so all parts with the same cut are treated together
     cuts = parts.places.reshape(len(L), 16)
     _, first, cut = np.unique(cuts, axis=0, return_index=True, return_inverse=True)
     for k, example in enumerate(first):
@@ -110,7 +110,8 @@ def isoparametric(
         N, _ = shape_functions(order, L[example])
         corners = whole.nodes[whole.cells[parts.parent[members]]]
         nodes[cells[members]] = np.einsum("na,tax->tnx", N, corners)
-    # a part's face is on the boundary if it lies in a boundary face of its tetrahedron
+    # a face of a part is on the boundary if it is within a boundary face of its
+    # tetrahedron
     faces, patch, owner = [], [], []
     for side, on in zip(FACES, face_nodes(order), strict=True):
         for other, missing in enumerate((3, 2, 1, 0)):
@@ -132,11 +133,11 @@ def isoparametric(
 
 
 def integration(mesh: Elements, some: NDArray | None = None) -> Iterator[Chunk]:
-    """Yield the quadrature of the elements, in chunks.
+    """Yield the quadrature of the elements, in batches.
 
     Args:
         mesh: the tetrahedra.
-        some: (t,) bool, the elements chosen; all if absent.
+        some: (t,) bool, True for selected elements; all elements if absent.
 
     Yields:
         A :class:`Chunk`.
@@ -155,7 +156,7 @@ def integration(mesh: Elements, some: NDArray | None = None) -> Iterator[Chunk]:
 
 
 def _chunks(members: NDArray, nodes: int) -> Iterator[NDArray]:
-    """Yield groups of elements whose matrices fit the memory of a chunk."""
+    """Yield groups of elements whose matrices fit into the memory of a batch."""
     step = max(1, _CHUNK // (9 * nodes**2))
     for first in range(0, len(members), step):
         yield members[first : first + step]
@@ -197,7 +198,7 @@ def gradients_on_faces(
 
 
 def _jacobians(dN: NDArray, corners: NDArray) -> NDArray:
-    """Return the (c, q, 3, 3) derivatives of position, reference coordinates first."""
+    """Return (c, q, 3, 3) derivatives of position; reference coordinates are first."""
     q, m, _ = dN.shape
     flat = dN.transpose(0, 2, 1).reshape(3 * q, m) @ corners
     return np.asarray(flat.reshape(len(corners), q, 3, 3)).swapaxes(2, 3)
@@ -294,7 +295,8 @@ def assemble(mesh: Elements, lam: NDArray, mu: NDArray) -> csr_array:
         block = np.where(swapped[part, None], turned, block)
         place = position[part].ravel()
         for k in range(9):
-            # not bincount: its sums span all pairs between the chunk's first and last
+            # np.bincount would allocate sums for all pairs between the batch's first
+            # and last
             np.add.at(values[k], place, block[:, k].ravel())
     return _upper(values, code // count, code % count, int(count))
 
@@ -305,7 +307,7 @@ def _node_blocks(
     """Yield indices (c,) of elements and stiffness (c, 9, p) of pairs a, b of nodes."""
     L, weights = quadrature(2 * (mesh.order - 1))
     _, dN = shape_functions(mesh.order, L)
-    # integrals of products of derivatives in a straight element's own coordinates
+    # integrals of products of derivatives in the coordinates of a straight element
     own = np.einsum("q,qpx,qpy->xyp", weights, dN[:, a], dN[:, b]).reshape(9, -1)
     for part in _chunks(np.flatnonzero(~mesh.curved), dN.shape[1]):
         corners = mesh.nodes[mesh.cells[part, :4]]
@@ -323,7 +325,7 @@ def _node_blocks(
 
 
 def _hooke(S: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
-    """Return the (c, 9, p) lam S_ij + mu S_ji + mu d_ij S_kk of S (c, 3, 3, p)."""
+    """Return (c, 9, p) lam S_ij + mu S_ji + mu d_ij S_kk for S (c, 3, 3, p)."""
     m = mu[:, None, None, None]
     block = lam[:, None, None, None] * S + m * S.swapaxes(1, 2)
     block[:, range(3), range(3)] += m[:, 0] * np.trace(S, axis1=1, axis2=2)[:, None]
@@ -334,7 +336,8 @@ def _upper(values: NDArray, row: NDArray, column: NDArray, count: int) -> csr_ar
     """Return the upper triangle from blocks (9, k) of nodes' pairs, row by row."""
     start = np.searchsorted(row, np.arange(count + 1))
     width = np.diff(start)
-    # a node's own block comes first: its second row lacks one entry, its third two
+    # a node's diagonal block is first: its second row lacks one entry, its third row
+    # two
     indptr = np.zeros(3 * count + 1, dtype=np.int32)
     lengths = np.stack([3 * width, 3 * width - 1, 3 * width - 2], axis=1)
     indptr[1:] = np.cumsum(lengths.ravel())

@@ -1,19 +1,21 @@
 r"""A posteriori error indicator of a finite element stiffness, element by element.
 
 The stiffness of cubic elements is too large by the energy of the discretisation error.
-Their stresses are quadratic.  In every element they are split into the best linear part
-and a remainder, and the linear part into its mean and a remainder.  s_3 and s_2 are the
-energies of these two remainders.  If an error e falls with the polynomial degree p as
-p^-b, the decay s_3 / s_2 = (e_2 - e_3) / (e_1 - e_2) determines b.  With b follows the
-ratio e_3 / (e_2 - e_3) of the remaining error to s_3: nearly zero in a smooth field,
-one and more otherwise.  For elements on a singular edge it is set to 1.2.
+The stresses of these elements are quadratic.  In every element they are split into the
+best linear part and a remainder, and the linear part into its mean and a remainder.
+s_3 and s_2 are the energies of these two remainders.  If an error e decreases with the
+polynomial degree p as p^-b, the decay s_3 / s_2 = (e_2 - e_3) / (e_1 - e_2) determines
+b.  From b follows the ratio e_3 / (e_2 - e_3) of the remaining error to s_3: nearly
+zero in a smooth field, one and more otherwise.  For elements on a singular edge it is
+set to 1.2.
 
 At the free edge of a twisted plate the stresses change direction within a boundary
-layer of a third of the wall.  An element much wider than the wall does not resolve it.
-There s_2, dominated by the plate's linear stresses, makes the field look smooth, but
-residual tractions t remain on the free surface.  A surface wave of half wavelength l,
-the smallest height of the face, balances them and decays as exp(-pi x / l).  Its
-energy, the integral of t^2 / (2 mu) l / pi, is used if it is larger.
+layer of a third of the wall.  An element that is much wider than the wall does not
+resolve this layer.  Its s_2, dominated by the plate's linear stresses, suggests a
+smooth field, but residual tractions t remain on the free surface.  A surface wave of
+half wavelength l, the smallest height of the face, balances these tractions and decays
+as exp(-pi x / l).  Its energy, the integral of t^2 / (2 mu) l / pi, is used if it is
+larger.
 
 The indicator does not contain the error of the geometry, the distance of curved
 elements from their shapes: see :func:`geometry_errors`.
@@ -34,12 +36,13 @@ from stiffness.surface.primitives import Plane, Shape
 from stiffness.surface.true_surface import TrueSurface
 
 VOIGT = np.array([[0, 0], [1, 1], [2, 2], [1, 2], [0, 2], [0, 1]])
-_SAME_MODULUS = 1e-6  # relative difference
-_CHUNK = 1024  # number of faces per chunk
+_SAME_MODULUS = 1e-6  # relative difference of two moduli that count as equal
+_CHUNK = 1024  # number of faces in a batch
 # ratio of the remaining error e_3 to the indicator s_3 at a singular edge,
 # calibrated on the example links in meshes/
 _SINGULAR_SHARE = 1.2
-# remaining error over s_3 as a function of s_3 / s_2, for rates from p^-0.1 to p^-40
+# ratio of the remaining error to s_3, as a function of s_3 / s_2, for rates from p^-0.1
+# to p^-40
 _RATES = np.geomspace(40.0, 0.1, 400)
 _DECAY = (2**-_RATES - 3**-_RATES) / (1 - 2**-_RATES)
 _REMAINDER = np.minimum(3**-_RATES / (2**-_RATES - 3**-_RATES), 3.0)
@@ -57,15 +60,15 @@ def error_matrices(
 
     Args:
         mesh: cubic tetrahedra.
-        fields: (n, 3, k) [m] displacements of the unit cases.
+        fields: (n, 3, k) [m] displacements of k unit load cases.
         lam: (t,) [Pa] Lame's first constant.
         mu: (t,) [Pa] shear modulus.
-        singular: (t,) whether an element touches a singular edge.
-        stiffness: (k, k) stiffness of the unit cases, which makes their energies
-            comparable.
+        singular: (t,) bool, True for an element that touches a singular edge.
+        stiffness: (k, k) stiffness of the load cases, by which their energies are
+            scaled.
 
     Returns:
-        (t, k, k) [unit of the stiffness]; their sum estimates K_h - K.
+        (t, k, k) [unit of the stiffness] contributions, whose sum estimates K_h - K.
     """
     errors = np.zeros((len(mesh.cells), *stiffness.shape))
     for part, L, weights, _, G, w in integration(mesh):
@@ -95,13 +98,13 @@ def traction_errors(
 
     Args:
         mesh: the tetrahedra.
-        fields: (n, 3, k) [m] displacements of the unit cases.
+        fields: (n, 3, k) [m] displacements of k unit load cases.
         lam: (t,) [Pa] Lame's first constant.
         mu: (t,) [Pa] shear modulus.
         free: (f,) indices of boundary triangles without loads.
 
     Returns:
-        (f, k, k) [unit of the stiffness].
+        (f, k, k) [unit of the stiffness] energies.
     """
     cases = fields.shape[2]
     errors = np.zeros((len(free), cases, cases))
@@ -121,7 +124,7 @@ def traction_errors(
 
 
 def _smallest_height(mesh: Elements, faces: NDArray) -> NDArray:
-    """Return the (f,) [m] smaller of triangles' heights and their elements' depths."""
+    """Return (f,) [m] the smaller of a triangle's height and its element's depth."""
     a, b, c = np.moveaxis(mesh.nodes[mesh.faces[faces, :3]], 1, 0)
     across = np.cross(b - a, c - a)
     twice = np.linalg.norm(across, axis=1)
@@ -140,24 +143,24 @@ def geometry_errors(
     mu: NDArray,
     surface: TrueSurface | None = None,
 ) -> NDArray:
-    """Return the error of the stiffness because elements deviate from the exact shapes.
+    """Return the error of the stiffness due to deviations from the exact shapes.
 
     Args:
         mesh: the tetrahedra.
         shapes: shapes of the patches.
-        fields: (n, 3, k) [m] displacements of the unit cases.
+        fields: (n, 3, k) [m] displacements of k unit load cases.
         lam: (t,) [Pa] Lame's first constant.
         mu: (t,) [Pa] shear modulus.
-        surface: surface for patches that meet others smoothly, since an element may lie
-            across their border; if absent, each face is compared with its own patch's
-            shape.
+        surface: surface for patches that meet others smoothly, because an element may
+            be on both sides of their border; if absent, each face is compared with the
+            shape of its own patch.
 
     Returns:
-        (f, k, k) [unit of the stiffness] share of each boundary triangle: the energy
-        density times the distance to the shape, to first order.
+        (f, k, k) [unit of the stiffness] contribution of each boundary triangle: the
+        energy density times the distance to the shape, to first order.
 
     Sources:
-        Hadamard (1908): the energy's derivative when a free surface moves.
+        Hadamard (1908): derivative of the energy when a free surface moves.
     """
     cases = fields.shape[2]
     errors = np.zeros((len(mesh.faces), cases, cases))
@@ -194,18 +197,20 @@ def material_errors(
     mu: NDArray,
     shear_at: Callable[[NDArray], NDArray],
 ) -> NDArray:
-    """Return the error of the stiffness by elements across a face between materials.
+    """Return the error of the stiffness due to elements that contain two materials.
 
     Args:
         mesh: the tetrahedra.
-        fields: (n, 3, k) [m] displacements of the unit cases.
+        fields: (n, 3, k) [m] displacements of k unit load cases.
         lam: (t,) [Pa] Lame's first constant.
         mu: (t,) [Pa] shear modulus.
-        shear_at: shear modulus (n,) [Pa] of the link at points (n, 3) [m].
+        shear_at: function that returns the shear modulus (n,) [Pa] at points (n, 3)
+            [m].
 
     Returns:
-        (t, k, k) [unit of the stiffness] positive where an element is too stiff: the
-        energy of its part in another material, times the ratio of the moduli.
+        (t, k, k) [unit of the stiffness] contributions, positive where an element is
+        too stiff: the energy of its part in the other material, times the ratio of the
+        moduli.
     """
     cases = fields.shape[2]
     errors = np.zeros((len(mesh.cells), cases, cases))
@@ -213,7 +218,8 @@ def material_errors(
         places = np.einsum("qa,tax->tqx", N, mesh.nodes[mesh.cells[part]])
         own = mu[part][:, None]
         true = shear_at(places.reshape(-1, 3)).reshape(w.shape)
-        # tractions are continuous across the face; the softer side has more energy
+        # tractions are continuous across the face, so the more compliant side has more
+        # energy
         ratio = np.maximum(own / true, true / own)
         sign = np.where(own > true, 1.0, -1.0) * (np.abs(ratio - 1) > _SAME_MODULUS)
         some = np.flatnonzero(sign.any(axis=1))

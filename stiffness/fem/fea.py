@@ -1,8 +1,8 @@
-"""A link's stiffness from its surface, by finite elements, with its error.
+"""A link's stiffness from its surface by finite elements, with an error estimate.
 
-A surface is meshed into tetrahedra, and these yield a stiffness and an estimate of its
-error (:mod:`stiffness.fem.adaptive_step`).  The elements that contribute most are
-refined until the required accuracy is reached or the budget is used.
+A surface is meshed into tetrahedra, from which a stiffness and an estimate of its error
+are computed (:mod:`stiffness.fem.adaptive_step`).  The elements that contribute most to
+the error are refined until the required accuracy is reached or the budget is used.
 """
 
 import logging
@@ -48,18 +48,19 @@ from stiffness.surface.patches import (
 from stiffness.surface.surface import Surface, read_surface
 
 _LOG = logging.getLogger("forcefit.finite_elements")
-_SETUP = 2.0  # [s] time of a solution that does not depend on its mesh
-_MESHER = 0.6  # share of the budget's seconds for the mesher; the solver has the others
+_SETUP = 2.0  # [s] time of a solution that does not depend on the mesh
+# share of the budget's seconds for the mesher; the rest is for the solver
+_MESHER = 0.6
 
 
 @dataclass(frozen=True)
 class Budget:
-    """Limits of the cost of a solution.
+    """Limits of the computing cost of a solution.
 
     Attributes:
-        seconds: [s] after which no finer mesh is begun.
-        unknowns: [-] of the largest system; the memory grows with it.
-        levels: [-] largest number of meshes, with the first.
+        seconds: [s] time after which no finer mesh is begun.
+        unknowns: [-] largest number of unknowns, on which the memory depends.
+        levels: [-] largest number of meshes, including the first one.
     """
 
     seconds: float = 300.0
@@ -69,14 +70,14 @@ class Budget:
 
 @dataclass(frozen=True)
 class FemOptions:
-    """Options of the solution of a link: accuracy, interfaces, cost.
+    """Options of the solution of a link: accuracy, interfaces and cost.
 
     Attributes:
-        accuracy: [-] required largest error, entries scaled by sqrt(K_ii K_jj).
+        accuracy: [-] required error, for entries scaled by sqrt(K_ii K_jj).
         interface: ``"rigid"``, ``"distributing"`` (the tip) or ``"distributing-both"``,
             see :mod:`stiffness.fem.condensation`.
-        budget: limits of the cost.
-        cache: folder of meshes; the user's cache if absent.
+        budget: limits of the computing cost.
+        cache: folder of meshes; the user's cache folder if absent.
     """
 
     accuracy: float = 0.005
@@ -100,11 +101,11 @@ _STANDARD = FemOptions()
 
 @dataclass(frozen=True, eq=False)
 class MeshedLink:
-    """A link solved on its finest mesh, for stresses besides the stiffness.
+    """A link solved on its finest mesh, from which stresses can be computed.
 
     Attributes:
-        link: the stiffness, with error, mesh report, mass.
-        level: the finest mesh, its stiffness, fields and materials.
+        link: the stiffness, with error, report on the mesh, and mass.
+        level: the finest mesh with its stiffness, fields and materials.
         centers: (2, 3) [m] centres of the base and the tip interface.
     """
 
@@ -124,19 +125,19 @@ def mesh_link(
     unit: str = "m",
     options: FemOptions = _STANDARD,
 ) -> LinkStiffness:
-    """Return the stiffness of a link of one material, from a surface file.
+    """Return the stiffness of a link of one material from a surface file.
 
     Args:
         surface: file of the closed surface (STL, OBJ, PLY, VTK, MSH, STEP).
-        base: the held interface, in metres, in the surface's axes.
+        base: the held interface, in metres, in the axes of the surface.
         tip: the interface that moves.
-        material: material of the link; without a density mass and inertia are left out.
+        material: material of the link; without a density it has no mass and inertia.
         unit: unit of the surface file's coordinates.
         options: options of the solution.
 
     Returns:
-        The stiffness at the tip's centre, in the surface's axes; its ``mesh`` says
-        whether the required accuracy was ``reached``.
+        The stiffness at the tip's centre, in the axes of the surface.  Its ``mesh``
+        states whether the required accuracy was ``reached``.
 
     Raises:
         BadInput: the file or an interface is invalid.
@@ -164,17 +165,17 @@ def solve_link(
         surface: surface of the link.
         base: the held interface.
         tip: the interface that moves.
-        materials: the first fills the link, later ones fill their regions; or one for
-            each solid of a STEP file.
+        materials: materials; the first fills the link, later ones fill their regions;
+            or one for each solid of a STEP file.
         options: options of the solution.
-        point_masses: added to mass, centre and inertia.
+        point_masses: point masses that are added to mass, centre and inertia.
 
     Returns:
         The link and its finest mesh.
 
     Raises:
-        BadInput: an interface is invalid, the two share an edge, there is no material,
-            or a solid with a material does not exist.
+        BadInput: an interface is invalid, both interfaces share an edge, there is no
+            material, or a solid named by a material does not exist.
     """
     start, busy = time.monotonic(), _processor_seconds()
     check_materials(materials)
@@ -203,14 +204,14 @@ def solve_bar(
     """Solve a straight bar of unit length along z to a required accuracy.
 
     Args:
-        section: its lengths relative to the bar's, see
+        section: lengths of the section relative to the bar's length, see
             :func:`stiffness.mesh.straight_bar.straight_bar`.
         material: material of the bar.
         options: options of the solution; no mesher runs.
 
     Returns:
-        The bar and its finest mesh; base at z = 0, tip at z = 1, its section's y and z
-        along x and y.
+        The bar and its finest mesh.  The base is at z = 0, the tip at z = 1; the
+        section's y and z are along x and y.
     """
     centers = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     first, start = straight_bar(section), time.monotonic()
@@ -226,18 +227,18 @@ def _refined(
     start: float,
     pace: float = 1.0,
 ) -> tuple[Level, NDArray, NDArray, dict[str, Any]]:
-    """Solve on finer meshes until the error is small enough, or the budget used.
+    """Solve on finer meshes until the error is small enough or the budget is used.
 
     Args:
-        first: the mesh to begin with.
-        materials: the first fills the link, later ones fill their regions.
-        centers: (2, 3) [m] of the base and the tip interface.
+        first: mesh to begin with.
+        materials: materials; the first fills the link, later ones fill their regions.
+        centers: (2, 3) [m] centres of base and tip.
         options: options of the solution.
         start: [s] time from which the budget's seconds count.
         pace: [-] present slowness of this machine, relative to an idle one.
 
     Returns:
-        The finest mesh, the (6, 6) stiffness, the size of its error, the cost.
+        The finest mesh, the (6, 6) stiffness, the size of its error, and the cost.
     """
     accuracy, interface, budget = options.accuracy, options.interface, options.budget
     begun = time.monotonic()
@@ -250,7 +251,7 @@ def _refined(
     while True:
         E, factor = estimated_error(history)
         K, error = middle_stiffness(history[-1][0], E, history[-1][2])
-        # a relative volume error may cause the same relative error of K, in every
+        # a relative error of the volume may cause the same relative error of K in every
         # motion
         error = error + level.volume_error * np.diag(np.diag(K))
         worst = float(np.abs(scaled(error, K)).max())
@@ -281,7 +282,7 @@ def _refined(
 
 
 def interface_center(surface: Surface, interface: Interface, name: str) -> NDArray:
-    """Return the point at which an interface's screws are read.
+    """Return the point at which the screws of an interface are read.
 
     Args:
         surface: surface of the link.
@@ -289,7 +290,7 @@ def interface_center(surface: Surface, interface: Interface, name: str) -> NDArr
         name: base or tip, for messages.
 
     Returns:
-        (3,) [m] the given point of a disc or a bore, the area's centroid of a plane.
+        (3,) [m] given point of a disc or a bore; centroid of the area of a plane.
 
     Raises:
         BadInput: no part of the surface lies on the interface.
@@ -300,7 +301,7 @@ def interface_center(surface: Surface, interface: Interface, name: str) -> NDArr
     areas = np.linalg.norm(surface.normals()[members], axis=1)
     corners = surface.points[surface.triangles[members]]
     center = np.average(corners.mean(axis=1), axis=0, weights=areas)
-    # single precision of STL: exactly onto the requested plane
+    # STL has single precision, so the centre is moved onto the requested plane
     height = (center - interface.point) @ interface.direction
     center = center - height * interface.direction
     return np.where(np.abs(center) < 1e-12 * surface.diagonal, 0.0, center)
@@ -313,21 +314,21 @@ def first_mesh(
     budget: Budget,
     cache: Path | str | None = None,
 ) -> Solid:
-    """Return a coarse mesh to refine from, fine enough for the part's walls.
+    """Return a coarse mesh to refine from that resolves the part's walls.
 
     Args:
         surface: surface of the link.
         base: the held interface.
         tip: the interface that moves.
-        budget: its seconds limit the mesher.
-        cache: folder of meshes; the user's cache if absent.
+        budget: budget, whose seconds limit the mesher.
+        cache: folder of meshes; the user's cache folder if absent.
 
     Returns:
         The solid.
 
     Raises:
-        BadInput: an interface has no part of the surface.
-        MeshFailed: three attempts gave no usable mesh, or the time is up.
+        BadInput: no part of the surface is on an interface.
+        MeshFailed: three attempts gave no usable mesh, or the time is used up.
     """
     wall = 2 * surface.volume / surface.area / surface.diagonal
     envelope, edge = min(2e-3, wall / 8), 0.1 * surface.diagonal
@@ -361,17 +362,17 @@ def first_mesh(
 
 
 def _pace(unknowns: int, seconds: float) -> float:
-    """Return the slowness of a solution relative to the expected cost; at least 1."""
+    """Return the time of a solution relative to the expected time, at least 1."""
     return max(1.0, (seconds - _SETUP) / expected_cost(unknowns)[1])
 
 
 def _processor_seconds() -> float:
-    """Return the processor time [s] of this process and of finished child processes."""
+    """Return processor time [s] of this process and its finished child processes."""
     return sum(os.times()[:4])
 
 
 def _pace_so_far(elapsed: float, busy: float) -> float:
-    """Return elapsed over processor time, at least 1."""
+    """Return the ratio of elapsed time to processor time, at least 1."""
     # short times are unreliable; Windows does not count the mesher's time
     if elapsed < _SETUP or os.name == "nt":
         return 1.0
@@ -381,7 +382,7 @@ def _pace_so_far(elapsed: float, busy: float) -> float:
 def _refuse_cost(
     unknowns: int, budget: Budget, spent: float, pace: float = 1.0
 ) -> None:
-    """Reject a first mesh whose solution the budget does not allow."""
+    """Reject a first mesh whose solution exceeds the budget."""
     memory, seconds = expected_cost(unknowns)
     seconds *= pace
     if unknowns > budget.unknowns or spent + seconds > budget.seconds:
@@ -397,7 +398,7 @@ def _wanted_growth(
     history: Sequence[tuple[NDArray, ...]], sizes: Sequence[int], excess: float
 ) -> float:
     """Return the factor on the number of elements that divides the error by excess."""
-    rate = 1.3  # of convergence in the number of elements; 2 for a smooth field
+    rate = 1.3  # rate of convergence in the number of elements; 2 for a smooth field
     if len(history) > 1:
         before, now = (np.max(np.diag(e) / np.diag(K)) for K, e, _ in history[-2:])
         measured = math.log(max(before / now, 1.0)) / math.log(sizes[-1] / sizes[-2])
@@ -408,8 +409,8 @@ def _wanted_growth(
 def _affordable_mesh(
     level: Level, growth: float, budget: Budget, start: float, pace: float = 1.0
 ) -> Solid | None:
-    """Return a finer mesh within the budget, with the wanted growth of elements."""
-    part = growth**0.55 - 1  # neighbours add about as many elements again
+    """Return a finer mesh within the budget, with the requested growth of elements."""
+    part = growth**0.55 - 1  # neighbours add about as many elements
     solid = refine_level(level, 1 + part)
     added = len(solid.cells) / len(level.solid.cells) - 1
     if not 0.85 < added / (growth - 1) < 1.08:

@@ -14,8 +14,8 @@ class PointMass:
     """A point mass on the link, without stiffness.
 
     Attributes:
-        mass: [kg].
-        place: (3,) [m] in the mesh's axes.
+        mass: [kg] mass.
+        place: (3,) [m] position in the mesh's axes.
     """
 
     mass: float
@@ -29,11 +29,12 @@ def mass_properties(
 
     Args:
         mesh: the tetrahedra.
-        density: (t,) [kg/m^3] of each element.
-        point_masses: added to the elements.
+        density: (t,) [kg/m^3] density of each element.
+        point_masses: point masses that are added to the elements.
 
     Returns:
-        [kg], (3,) [m] the centre, (3, 3) [kg m^2] about the centre; zeros without mass.
+        Mass [kg], centre of mass (3,) [m], inertia (3, 3) [kg m^2] about the centre;
+        zeros without mass.
     """
     origin = mesh.nodes.mean(axis=0)
     mass, first, second = 0.0, np.zeros(3), np.zeros((3, 3))

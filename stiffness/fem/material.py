@@ -1,4 +1,4 @@
-"""Materials of a link, and their regions."""
+"""Materials of a link and their regions."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -21,13 +21,13 @@ class Material:
     Attributes:
         E: [Pa] Young's modulus.
         nu: [-] Poisson's ratio.
-        density: [kg/m^3], 0 for a link without mass.
+        density: [kg/m^3] density; 0 for a link without mass.
         where: function that selects the points (n, 3) [m], in the mesh's axes, of this
-            material; for an element, the last material that contains its centre
-            applies.
-        faces: faces of its region; the mesh is cut along them.
-        solid: name of the solid of a STEP file with this material, or ``one+other``, in
-            place of ``where`` and ``faces``.
+            material.  The material of an element is the last one whose region contains
+            its centre.
+        faces: faces of the region, along which the mesh is cut.
+        solid: name of the solid of a STEP file with this material, or ``one+other``;
+            replaces ``where`` and ``faces``.
     """
 
     E: float
@@ -46,19 +46,19 @@ class Material:
 def material_of_elements(
     mesh: Elements, materials: Sequence[Material], cut_region: NDArray | None = None
 ) -> NDArray:
-    """Return the material of each element, taken at its centre.
+    """Return the material of each element, evaluated at its centre.
 
     Args:
         mesh: the tetrahedra.
-        materials: the first fills the link, later ones fill their regions.
-        cut_region: (t,) region of each element, among those whose faces the mesh was
-            cut along; None if it was not cut.
+        materials: materials; the first fills the link, later ones fill their regions.
+        cut_region: (t,) region of each element, among the regions along whose faces the
+            mesh was cut; None if it was not cut.
 
     Returns:
         (t, 3) lambda [Pa], mu [Pa] and density [kg/m^3].
 
     Raises:
-        BadInput: there is no material, or the first does not fill the link.
+        BadInput: there is no material, or the first one does not fill the link.
     """
     check_materials(materials)
     centers = mesh.nodes[mesh.cells[:, :4]].mean(axis=1)
@@ -73,8 +73,8 @@ def material_at(points: NDArray, materials: Sequence[Material]) -> NDArray:
     """Return the material at points of a link.
 
     Args:
-        points: (n, 3) [m].
-        materials: the first fills the link, later ones fill their regions.
+        points: (n, 3) [m] points.
+        materials: materials; the first fills the link, later ones fill their regions.
 
     Returns:
         (n, 3) lambda [Pa], mu [Pa] and density [kg/m^3].
@@ -83,15 +83,15 @@ def material_at(points: NDArray, materials: Sequence[Material]) -> NDArray:
 
 
 def _constants(materials: Sequence[Material]) -> NDArray:
-    """Return the (m, 3) lambda [Pa], mu [Pa] and density [kg/m^3]."""
+    """Return the (m, 3) lambda [Pa], mu [Pa] and density [kg/m^3] of materials."""
     return np.array([(*lame(m.E, m.nu), m.density) for m in materials])
 
 
 def regions_of(materials: Sequence[Material]) -> tuple[Region, ...]:
-    """Return the regions of the materials after the first.
+    """Return the regions of all materials except the first.
 
     Args:
-        materials: the first fills the link, later ones fill their regions.
+        materials: materials; the first fills the link, later ones fill their regions.
 
     Returns:
         The regions; later ones have precedence.
@@ -113,7 +113,7 @@ def check_materials(materials: Sequence[Material]) -> None:
         materials: materials of a link.
 
     Raises:
-        BadInput: there is none.
+        BadInput: there is no material.
     """
     if not materials:
-        raise BadInput("materials: at least one is needed")
+        raise BadInput("materials: found none, expected at least one")

@@ -1,4 +1,4 @@
-"""Regions of materials that are given by the solids of a STEP file."""
+"""Regions of materials that are given as solids of a STEP file."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,17 +19,17 @@ from stiffness.surface.triangle_graph import TriangleGraph
 def placed_materials(
     surface: Surface, materials: Sequence[Material]
 ) -> tuple[Material, ...]:
-    """Assign their regions to the materials of solids.
+    """Assign the regions of solids to the materials that name these solids.
 
     Args:
         surface: surface of the link, with its solids.
-        materials: the first fills the link, or each solid has one.
+        materials: materials; the first fills the link, or each solid has one.
 
     Returns:
-        The materials, none of which names a solid any more.
+        The materials with regions; none of them names a solid any more.
 
     Raises:
-        BadInput: the surface has no such solid, solids overlap, or one has no material.
+        BadInput: there is no such solid, solids overlap, or a solid has no material.
     """
     named = [material for material in materials if material.solid]
     if not named:
@@ -53,20 +53,20 @@ def placed_materials(
         if lacking:
             raise BadInput(
                 f"{surface.name}: solid {quoted(lacking[0])} has no material; "
-                "expected one of its own, or a first material for the whole "
+                "expected a material of this solid, or a first material for the whole "
                 "link"
             )
     placed = [
         _placed(solids, names, material) if material.solid else material
         for names, material in zip(members, materials, strict=True)
     ]
-    # each solid has a material: the first one has all that later ones do not take
+    # if each solid has a material, the first one fills what later ones leave
     first = replace(materials[0], solid="") if materials[0].solid else materials[0]
     return first, *placed[1:]
 
 
 def _members(name: str, solids: FilledSolids, material: Material) -> tuple[str, ...]:
-    """Return the names of the solids of a material."""
+    """Return the names of the solids to which a material belongs."""
     text = material.solid
     names = (text,) if text in solids.names or not text else tuple(text.split("+"))
     for one in names if text else ():

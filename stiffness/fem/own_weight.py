@@ -13,15 +13,15 @@ from stiffness.link import inverted
 
 
 def with_own_weight(solved: MeshedLink) -> MeshedLink:
-    """Add displacement fields of the link's own weight to those of its tip's motions.
+    """Add displacement fields due to the link's own weight to its solution.
 
     Args:
-        solved: on its finest mesh, with a density.
+        solved: link solved on its finest mesh, with a density.
 
     Returns:
-        The same link whose solution has nine fields (n, 3, 9): for unit screws of the
-        tip [m], and [m per m/s^2] for unit gravity along x, y and z, the base held and
-        the tip free.
+        The same link, whose solution has nine fields (n, 3, 9): [m] for unit screws of
+        the tip, and [m per m/s^2] for unit gravity along x, y and z, with the base held
+        and the tip free.
 
     Raises:
         BadInput: the link has no density, or both interfaces are distributing.
@@ -46,7 +46,8 @@ def with_own_weight(solved: MeshedLink) -> MeshedLink:
     upper = assemble(mesh, lam, mu)
     flat[free] = solve(upper[free][:, free], loads.reshape(-1, 3)[free])
     fields = flat.reshape(-1, 3, 3)
-    if held.kind == "rigid":  # with the tip free, its support does work on its motions
+    # with a free tip, the weight does work on the tip's motions
+    if held.kind == "rigid":
         at_tip = np.einsum("nxk,nxg->kg", held.fields, loads)
         fields = fields + held.fields @ (inverted(held.stiffness) @ at_tip)
     both = np.concatenate([held.fields, fields], axis=2)

@@ -1,4 +1,4 @@
-"""Parts of a link as text: boxes and solids of another material, added masses."""
+"""Parts of a link given as text: boxes and solids of another material, point masses."""
 
 from functools import partial
 
@@ -22,19 +22,19 @@ _MASS = '"1.5/0,0,0.452", kilograms and a place in metres'
 
 
 def parse_part(option: str, text: str) -> Material:
-    """Return a material inside a box, or of solids of a STEP file, from text.
+    """Return a material within a box, or of solids of a STEP file, from text.
 
     Args:
         option: name of the option, for the error message.
-        text: ``x=a..b,y=a..b,z=a..b/young=..,poisson=..,density=..``, where axes not
-            named are unbounded, or ``solid=one+other/young=..``; the density may be
-            left out.
+        text: ``x=a..b,y=a..b,z=a..b/young=..,poisson=..,density=..``, where omitted
+            axes are unbounded, or ``solid=one+other/young=..``; the density is
+            optional.
 
     Returns:
         The material.
 
     Raises:
-        BadInput: the text is not of this form.
+        BadInput: the text does not have this form.
     """
     region, slash, constants = text.rpartition("/")
     values = parse_assignments([constants], option) if slash else {}
@@ -56,7 +56,7 @@ def parse_part(option: str, text: str) -> Material:
 
 
 def _box(option: str, text: str, region: str) -> tuple[NDArray, NDArray]:
-    """Return lower and upper corner of a box, infinite on axes that are not named."""
+    """Return lower and upper corner of a box, infinite along omitted axes."""
     low, high = np.full(3, -np.inf), np.full(3, np.inf)
     for part in region.split(","):
         axis, _, span = (word.strip() for word in part.partition("="))
@@ -93,10 +93,10 @@ def scaled_part(text: str, factor: float) -> str:
 
     Args:
         text: text of :func:`parse_part`.
-        factor: [1].
+        factor: [1] factor on the modulus.
 
     Returns:
-        The same part, its modulus times the factor.
+        Text of the same part, with its modulus multiplied by the factor.
     """
     region, _, constants = text.rpartition("/")
     values = parse_assignments([constants], "part")
@@ -109,13 +109,13 @@ def parse_mass(option: str, text: str) -> PointMass:
 
     Args:
         option: name of the option, for the error message.
-        text: the text.
+        text: mass and position.
 
     Returns:
-        The mass.
+        The point mass.
 
     Raises:
-        BadInput: the text is not of this form.
+        BadInput: the text does not have this form.
     """
     mass, _, place = text.partition("/")
     weight, point = comma_numbers(mass), comma_numbers(place)

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, csr_matrix, triu
 from scipy.sparse.linalg import splu
 
-# PARDISO's iparm: the defaults of symmetric matrices; 8: no iterative refinement, since
-# the solution's error is squared in the energy; 24: two-level factorisation, which
-# saves an eighth of the time; 37: rows whose patterns agree to 90 %, such as the three
-# of a node, form one block, which halves the analysis
+# PARDISO's iparm: defaults for symmetric matrices, except 8: no iterative refinement,
+# because the error of the solution is squared in the energy; 24: two-level
+# factorisation, which saves an eighth of the time; 37: rows whose patterns agree to 90
+# %, such as the three rows of a node, form one block, which halves the time of the
+# analysis
 _SETTINGS = {1: 1, 2: 2, 8: 0, 10: 8, 18: -1, 24: 1, 37: -90}
 
 
@@ -32,7 +33,7 @@ def solver_name() -> str:
     """Return the name of the solver on this machine, ``"PARDISO"`` or ``"SuperLU"``."""
     if find_spec("pypardiso") is None:
         return "SuperLU"
-    # pypardiso searches MKL in every folder of Python, which takes seconds per solver
+    # pypardiso would search for MKL in every folder of Python, which takes seconds
     if library := _mkl():
         os.environ.setdefault("PYPARDISO_MKL_RT", library)
     try:
@@ -61,14 +62,15 @@ def solve(upper: csr_array, loads: NDArray, solver: str | None = None) -> NDArra
 
     Args:
         upper: (n, n) upper triangle of a symmetric positive definite matrix K.
-        loads: (n, k).
-        solver: ``"PARDISO"`` or ``"SuperLU"``; the best one installed if absent.
+        loads: (n, k) right-hand sides.
+        solver: ``"PARDISO"`` or ``"SuperLU"``; by default the faster one that is
+            installed.
 
     Returns:
-        (n, k).
+        (n, k) solutions.
 
     Raises:
-        FactorisationFailed: the matrix is singular, or memory ran out.
+        FactorisationFailed: the matrix is singular, or the memory is insufficient.
     """
     if (solver or solver_name()) == "PARDISO":
         return _solve_with_pardiso(upper, loads)
@@ -81,7 +83,7 @@ def solve(upper: csr_array, loads: NDArray, solver: str | None = None) -> NDArra
             options={"SymmetricMode": True},
         )
     except (RuntimeError, MemoryError) as error:
-        raise FactorisationFailed(f"SuperLU gave up: {error}") from error
+        raise FactorisationFailed(f"SuperLU failed: {error}") from error
     return factor.solve(np.asfortranarray(loads))
 
 
@@ -101,19 +103,19 @@ def _solve_with_pardiso(upper: csr_array, loads: NDArray) -> NDArray:
             solver.factorize(matrix)
             return np.asarray(solver.solve(matrix, np.asfortranarray(loads)))
     except Exception as error:
-        raise FactorisationFailed(f"PARDISO gave up: {error}") from error
+        raise FactorisationFailed(f"PARDISO failed: {error}") from error
     finally:
         solver.free_memory(everything=True)
 
 
 def expected_cost(unknowns: int) -> tuple[float, float]:
-    """Return the rough cost of a mesh, from measured ones of 40 k to 850 k unknowns.
+    """Return the approximate cost of a mesh, measured for 40 k to 850 k unknowns.
 
     Args:
-        unknowns: rows of the matrix.
+        unknowns: number of rows of the matrix.
 
     Returns:
-        Memory [byte] and time [s] on two cores of a common machine.
+        Memory [byte], and time [s] on two cores of a common computer.
     """
     share = unknowns / 400e3
     memory, seconds = 3.8e9 * share**1.1, 20.0 * share**1.4

@@ -1,10 +1,11 @@
 """Stress in a link under a wrench at its tip.
 
-Stresses superpose, so six fields are enough, one for each component of the wrench.  At
-the edge of a rigid interface the elastic solution is singular: the peak there grows
-without bound as the mesh is refined and has no meaning.  So stresses are reported only
-at some distance from the interfaces, one interface radius by default, and the report
-says so.  The stress within that distance, and the effect of a real joint, are left out.
+Stresses superpose, so six fields are sufficient, one for each component of the wrench.
+At the edge of a rigid interface the elastic solution is singular: the peak grows
+without bound as the mesh is refined, and has no meaning.  So stresses are reported only
+from a certain distance to the interfaces, one interface radius by default, and the
+report states this distance.  The stress within that distance, and the effect of a real
+joint, are left out.
 """
 
 from collections.abc import Mapping
@@ -33,21 +34,21 @@ from stiffness.fem.stress_error import (
 )
 from stiffness.link import inverted
 
-_CHUNK = 4096  # elements per chunk: 4096 x 20 x 36 numbers are 24 MB
+_CHUNK = 4096  # number of elements in a batch: 4096 x 20 x 36 values are 24 MB
 
 
 @dataclass(frozen=True, eq=False)
 class StressSource:
-    """The mesh of a stress field.
+    """The mesh from which a stress field was computed.
 
     Attributes:
-        level: the solved mesh, of n nodes by
+        level: the solved mesh with n nodes, numbered by
             :func:`stiffness.fem.stress_error.nodes_by_material`.
-        far: (n,) bool, nodes far enough from the interfaces.
-        singular: (n,) bool, nodes on re-entrant edges without a fillet.
-        faceted: (n,) bool, nodes on a surface of no recognised shape.
-        left_out: (n,) bool, nodes left out because the mesh does not follow the surface
-            there.
+        far: (n,) bool, True for nodes far enough from the interfaces.
+        singular: (n,) bool, True for nodes on re-entrant edges without a fillet.
+        faceted: (n,) bool, True for nodes on a surface of no recognised shape.
+        left_out: (n,) bool, True for nodes where the mesh does not follow the surface;
+            their stresses are not reported.
     """
 
     level: Level
@@ -62,16 +63,16 @@ class StressInfluence:
     """Stresses of unit tip wrenches at the nodes of a mesh, away from interfaces.
 
     Attributes:
-        places: (p, 3) [m] nodes, in the link's axes.
+        places: (p, 3) [m] positions of the nodes, in the link's axes.
         influence: (p, 6, 6) [Pa/(N m), Pa/N] stress xx yy zz yz xz xy for each
             component of the tip's wrench.  If the link was solved under its own weight
-            (:func:`stiffness.fem.own_weight.with_own_weight`), (p, 9, 6), the last
-            three [Pa per m/s^2] for gravity; a wrench then has nine numbers, with
-            gravity's components last.
+            (:func:`stiffness.fem.own_weight.with_own_weight`), it is (p, 9, 6) and the
+            last three rows [Pa per m/s^2] are for gravity; a wrench then has nine
+            components, gravity last.
         away: [m] smallest distance of these nodes from an interface.
-        reentrant_edges: whether some of the nodes lie on re-entrant edges without a
+        reentrant_edges: whether some of the nodes are on re-entrant edges without a
             fillet, where the elastic stress is singular too.
-        source: the mesh of the stresses; without it errors are unknown.
+        source: mesh of the stresses; without it errors are unknown.
     """
 
     places: NDArray
@@ -84,7 +85,7 @@ class StressInfluence:
 
     @property
     def region(self) -> str:
-        """Description of the nodes in words."""
+        """Description of the evaluated nodes."""
         words = (
             f"{len(self.places)} nodes at least {self.away:.4g} m away from both "
             "interfaces, whose clamped edges are singular"
@@ -97,8 +98,8 @@ class StressInfluence:
             )
         if self.source is not None and self.source.left_out.any():
             words += (
-                f"; {self.source.left_out.sum()} nodes left out, where the mesh does "
-                "not follow the part's surface"
+                f"; {self.source.left_out.sum()} nodes are left out, where the mesh "
+                "does not follow the part's surface"
             )
         return words
 
@@ -109,7 +110,7 @@ class StressInfluence:
             wrench: (6,) [N m, N] at the tip, in the link's axes.
 
         Returns:
-            (p, 6) [Pa] xx yy zz yz xz xy.
+            (p, 6) [Pa] stresses xx yy zz yz xz xy.
         """
         return np.einsum("pws,w->ps", self.influence, np.asarray(wrench, dtype=float))
 
@@ -120,20 +121,21 @@ class StressInfluence:
             wrench: (6,) [N m, N] at the tip, in the link's axes.
 
         Returns:
-            [Pa] and (3,) [m].
+            Largest stress [Pa], and its position (3,) [m].
         """
         values = von_mises(self.stresses(wrench))
         worst = int(np.argmax(values))
         return float(values[worst]), self.places[worst]
 
     def peak_error(self, wrench: ArrayLike) -> float:
-        """Return the estimated error of the peak stress of a tip wrench, by the mesh.
+        """Return estimated error of the peak stress of a tip wrench due to the mesh.
 
         Args:
             wrench: (6,) [N m, N] at the tip, in the link's axes.
 
         Returns:
-            [Pa] infinite where the stress is singular, NaN if the mesh is unknown.
+            [Pa] error; infinite where the stress is singular, NaN if the mesh is
+            unknown.
         """
         if self.source is None:
             return float("nan")
@@ -149,7 +151,7 @@ class StressInfluence:
         return estimated_error(level, motion, node, zone, self.source.left_out)
 
     def relative_error(self) -> float:
-        """Return largest estimated relative error of the six unit wrenches' peaks."""
+        """Return the largest relative error of the peaks of six unit wrenches."""
         unit = np.eye(6, self.influence.shape[1])
         return max(self.peak_error(w) / self.peak(w)[0] for w in unit)
 
@@ -160,14 +162,15 @@ class PeakStress:
 
     Attributes:
         wrench: (6,) [N m, N] at the tip, in the link's axes.
-        von_mises: [Pa].
+        von_mises: [Pa] the peak stress.
         error: [Pa] estimated error of the mesh; infinite where the stress is singular.
         place: (3,) [m] position of the peak.
-        region: description of the points evaluated, in words.
+        region: description of the evaluated points.
         away: [m] smallest distance of these points from an interface.
-        beam: [Pa] and (3,) [m] by the beam formula, between the sections at this
-            distance from base and tip; None without a section.
-        beam_whole: [Pa] by the beam formula over the whole length; NaN without.
+        beam: [Pa] peak stress and (3,) [m] its position by the beam formula, between
+            the sections at this distance from base and tip; None without a section.
+        beam_whole: [Pa] peak stress by the beam formula over the whole length; NaN
+            without a section.
     """
 
     wrench: NDArray
@@ -189,27 +192,28 @@ def peak_stress(
     away: float | None = None,
     gravity: ArrayLike | None = None,
 ) -> PeakStress:
-    """Return largest von Mises stress of a tip wrench, and that by the beam formula.
+    """Return the peak stress of a tip wrench, by elements and by the beam formula.
 
     Args:
         solved: result of :func:`stiffness.fem.fea.solve_link`.
         wrench: (6,) [N m, N] at the tip, in the link's axes.
-        section: section of a straight beam from base to tip, as for
+        section: section of a straight beam from base to tip, in the form of
             :func:`stiffness.beam.beam_stress.peak_beam_stress`.
-        up: (3,) the section's z, in the link's axes.
+        up: (3,) the section's z axis, in the link's axes.
         away: [m] distance from the interfaces; one interface radius if absent.
-        gravity: (3,) [m/s^2] in the link's axes, for its own weight.
+        gravity: (3,) [m/s^2] in the link's axes, for the link's own weight.
 
     Returns:
-        The peak, its place and region.
+        The peak stress, with its position and region.
 
     Raises:
-        BadInput: no node is so far away, the section has no formula, or gravity acts on
-            a link without a density.
+        BadInput: no node has this distance, the section has no formula, or gravity acts
+            on a link without a density.
     """
     w = np.asarray(wrench, dtype=float)
     if section is not None:
-        peak_beam_stress(section, 0.0, np.zeros(6))  # refused before the work
+        # invalid sections are refused before the long computation
+        peak_beam_stress(section, 0.0, np.zeros(6))
     field, acting = stress_influence(solved, away), w
     if gravity is not None:
         field = stress_influence(with_own_weight(solved), away)
@@ -230,7 +234,8 @@ def peak_stress(
     whole, _ = peak_beam_stress(section, length, in_beam, weight)
     near_tip = in_beam.copy()
     near_tip[:3] += np.cross([field.away, 0, 0], in_beam[3:])
-    beyond = weight * field.away / length  # of the piece that is not evaluated
+    # weight of the end piece that is not evaluated
+    beyond = weight * field.away / length
     near_tip[:3] += np.cross([field.away / 2, 0, 0], beyond)
     near_tip[3:] += beyond
     rest = length - 2 * field.away
@@ -253,15 +258,15 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     """Return the stresses of the six unit tip wrenches of a solved link.
 
     Args:
-        solved: result of :func:`stiffness.fem.fea.solve_link`; where two materials
-            meet, a node counts once for each.
+        solved: result of :func:`stiffness.fem.fea.solve_link`; a node between two
+            materials counts once for each material.
         away: [m] distance from the interfaces; one interface radius if absent.
 
     Returns:
-        The influence.
+        The stresses of unit wrenches.
 
     Raises:
-        BadInput: no node is so far away.
+        BadInput: no node has this distance.
     """
     from scipy.spatial import cKDTree
 
@@ -271,7 +276,7 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     distance = max(radii) if away is None else away
     clamped = np.unique(mesh.faces[mesh.patch <= 1])
     gap = cKDTree(mesh.nodes[clamped]).query(mesh.nodes[node])[0]
-    far = gap >= distance * (1 - 1e-9)  # with nodes at just that distance
+    far = gap >= distance * (1 - 1e-9)  # includes nodes at exactly this distance
     if not far.any():
         raise BadInput(
             f"stress: found no node {distance:.4g} m away from the interfaces; "
@@ -301,7 +306,7 @@ def _peaks_on_facets(field: StressInfluence, wrench: NDArray) -> bool:
 
 def _motions(level: Level) -> NDArray:
     """Return (k, k) motions of the tip's unit wrenches and, if solved, of gravity."""
-    # from the fields' own stiffness, so they balance the wrench exactly
+    # computed from the stiffness of the fields, so that they balance the wrench exactly
     motions = np.eye(level.solution.fields.shape[2])
     motions[:6, :6] = inverted(level.solution.stiffness)
     return motions

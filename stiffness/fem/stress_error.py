@@ -1,12 +1,13 @@
-r"""Estimated error of a peak stress, from the disagreement of elements around it.
+r"""Estimated error of a peak stress, from differences between elements around it.
 
-Stresses of neighbouring elements differ at their common nodes by about the mesh's
-error; their mean is the stress at a node.  The estimate is a root mean square of the
-largest deviations from the mean, times a factor.  It is taken at the nodes of the
-elements at the peak, and at all nodes where the stress is nearly as large.  The factor
-is needed because the peak is the largest of many values with errors.  Where the mesh
-does not follow the part's surface stresses are left out; larger ones there add to the
-error.  Where the stress is singular there is neither a value nor an error.
+Stresses of neighbouring elements differ at their common nodes by about the error of the
+mesh; their mean is the stress at a node.  The estimate is the root mean square of the
+largest deviations from the mean, times a factor.  It is computed over the nodes of the
+elements at the peak, and over all nodes where the stress is nearly as large.  The
+factor is needed because the peak is the largest of many values with errors.  Where the
+mesh does not follow the part's surface, stresses are left out; larger stresses at such
+nodes are added to the error.  Where the stress is singular there is neither a value nor
+an error.
 
 Sources:
     Zienkiewicz & Zhu (1987), A simple error estimator, for recovered stresses as the
@@ -27,25 +28,25 @@ from stiffness.surface.facets import Facets
 if TYPE_CHECKING:
     from stiffness.fem.adaptive_step import Level
 
-# error of a peak over the disagreement around it: at most 1.6 for 9 shouldered bars in
-# tension, torsion and bending on their first meshes, 0.3 in the median
+# ratio of the error of a peak to the differences around it: at most 1.6, and 0.3 in the
+# median, for 9 shouldered bars in tension, torsion and bending on their first meshes
 SAFETY_FACTOR = 1.6
-# patches that meet at a smaller angle form a smooth surface
+# cosine of the largest angle at which two patches form a smooth surface
 _SMOOTH = np.cos(np.radians(5.0))
-# distance from the shape, relative to a face's size, above which a face does not follow
-# it; cubic faces follow a fillet to 1e-4
+# distance from the shape, relative to the size of a face, above which the face does not
+# follow the shape; cubic faces follow a fillet to 1e-4
 _OFF = 5e-3
 ZONE = 0.9  # relative to the peak: smallest stress that counts as nearly as large
 
 
 def von_mises(stress: ArrayLike) -> NDArray:
-    """Return the equivalent stress.
+    """Return the von Mises equivalent stress.
 
     Args:
-        stress: (..., 6) [Pa] xx yy zz yz xz xy.
+        stress: (..., 6) [Pa] components xx yy zz yz xz xy.
 
     Returns:
-        (...) [Pa].
+        (...) [Pa] equivalent stress.
     """
     s = np.asarray(stress, dtype=float)
     x, y, z, yz, xz, xy = np.moveaxis(s, -1, 0)
@@ -59,11 +60,11 @@ def element_stresses(level: "Level", members: NDArray, motion: NDArray) -> NDArr
     Args:
         level: a solved mesh.
         members: (c,) indices of elements.
-        motion: (6,) or (6, k) [rad, m] screws of the tip; (9, ...) with gravity
-            [m/s^2] where the solution has the fields of the link's own weight.
+        motion: (6,) or (6, k) [rad, m] screws of the tip; (9, ...) with gravity [m/s^2]
+            if the solution has the fields of the link's own weight.
 
     Returns:
-        (c, nodes, k, 6) [Pa] xx yy zz yz xz xy, k = 1 for one screw.
+        (c, nodes, k, 6) [Pa] stresses xx yy zz yz xz xy; k = 1 for one screw.
     """
     mesh = level.mesh
     fields = level.solution.fields @ np.reshape(motion, (len(motion), -1))
@@ -85,13 +86,13 @@ def element_stresses(level: "Level", members: NDArray, motion: NDArray) -> NDArr
 
 
 def nodes_by_material(level: "Level") -> tuple[NDArray, NDArray]:
-    """Number the nodes of each material separately: stresses jump between them.
+    """Return node numbers that differ between materials, because stresses jump there.
 
     Args:
         level: a solved mesh of n nodes.
 
     Returns:
-        (t, k) numbers of the elements' nodes, and (m,) the node of each number; m is n
+        (t, k) number of each element's nodes, and (m,) the node of each number; m is n
         for a link of one material.
     """
     cells, constants = level.mesh.cells, level.material[:, :2]
@@ -109,15 +110,15 @@ def estimated_error(
     """Return the estimated error of a peak stress.
 
     Args:
-        level: a solved mesh of n nodes, by :func:`nodes_by_material`.
+        level: a solved mesh of n nodes, numbered by :func:`nodes_by_material`.
         motion: (6,) [rad, m] screw of the tip.
-        node: index of the peak.
-        zone: (n,) bool, nodes where the stress is nearly as large.
-        left_out: (n,) bool, nodes where it may be larger, but the mesh is off the
-            surface.
+        node: number of the node with the peak.
+        zone: (n,) bool, True for nodes where the stress is nearly as large.
+        left_out: (n,) bool, True for nodes where the stress may be larger, but the mesh
+            does not follow the surface.
 
     Returns:
-        [Pa].
+        [Pa] error.
     """
     mean, largest = _means_and_deviations(level, motion)
     cells, _ = nodes_by_material(level)
@@ -141,20 +142,20 @@ def _means_and_deviations(level: "Level", motion: NDArray) -> tuple[NDArray, NDA
 
 
 def on_inner_edges(level: "Level") -> NDArray:
-    """Return nodes of elements at re-entrant edges or between materials.
+    """Return the nodes of elements at re-entrant edges or between materials.
 
     Args:
         level: a solved mesh of n nodes.
 
     Returns:
-        (n,) bool, whether an element of the node touches an edge at which the shapes
-        meet at an angle, without a fillet, or at which two materials meet at the
+        (n,) bool, True if an element of the node touches an edge at which the shapes
+        meet at an angle without a fillet, or at which two materials meet at the
         surface.
     """
     edges, cells = singular_edges(level.solid, ()), level.mesh.cells
     on = np.zeros(len(level.mesh.nodes), dtype=bool)
     if len(edges):
-        # coarse faces of a fillet meet at an angle, its shapes do not
+        # coarse faces of a fillet meet at an angle, although the shapes do not
         on[edges[_meet_at_an_angle(level, edges)]] = True
     if level.solid.region is not None:
         on[edges_between(level.solid, level.solid.region)] = True
@@ -189,9 +190,9 @@ def off_shapes(level: "Level") -> NDArray:
         level: a solved mesh of n nodes.
 
     Returns:
-        (n,) nodes of elements with a node off its patch's shape by more than 0.5 % of
-        its face's size (an element that would be inverted there was straightened), and
-        of their neighbours.
+        (n,) bool, True for nodes of elements with a node off its patch's shape by more
+        than 0.5 % of the face's size (elements that would be inverted were
+        straightened), and for nodes of their neighbours.
     """
     mesh = level.mesh
     off = np.zeros(len(mesh.nodes), dtype=bool)
@@ -215,7 +216,7 @@ def on_facets(level: "Level") -> NDArray:
         level: a solved mesh of n nodes.
 
     Returns:
-        (n,) whether facets were taken as smooth there.
+        (n,) bool, True where facets were taken as smooth.
     """
     mesh, shapes = level.mesh, level.solid.shapes
     lifted = np.array([isinstance(shape, Facets) for shape in shapes], dtype=bool)

@@ -1,9 +1,9 @@
-"""Stiffness and consistent mass of a meshed link for motions of both its ends.
+"""Stiffness and consistent mass of a meshed link for motions of both ends.
 
-Both ends are rigid and free to move.  Between them the solid follows without inertia of
-its own (Guyan), so that the mass is exact for rigid motions, and as accurate as a
-beam's cubic for bending.  A motion of the base is a motion of the whole link minus the
-resulting motion of the tip, so the fields with the base held suffice.
+Both ends are rigid and free to move.  Between them the solid follows statically
+(Guyan), so the mass is exact for rigid motions, and as accurate as a beam's cubic for
+bending.  A motion of the base is a rigid motion of the link minus the resulting motion
+of the tip, so the fields with the base held are sufficient.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from stiffness.screws import screw_map
 
 @dataclass(frozen=True, eq=False)
 class TwoEnds:
-    """A link with two rigid ends; rows of base then tip, each read at its centre.
+    """A link with two rigid ends; rows of the base, then of the tip, at their centres.
 
     Attributes:
         stiffness: (12, 12) [N m/rad .. N/m]; zero for rigid motions.
@@ -34,10 +34,10 @@ def two_ends(solved: MeshedLink) -> TwoEnds:
     """Condense a meshed link onto both its ends.
 
     Args:
-        solved: on its finest mesh.
+        solved: link solved on its finest mesh.
 
     Returns:
-        Its stiffness and mass, in the mesh's axes.
+        Stiffness and mass of the link, in the mesh's axes.
 
     Sources:
         Guyan (1965), Reduction of stiffness and mass matrices.
@@ -47,7 +47,7 @@ def two_ends(solved: MeshedLink) -> TwoEnds:
     if held.kind != "rigid":
         held = condense(mesh, constants[:, 0], constants[:, 1], solved.centers)
     base, tip = solved.centers
-    # motion of the tip relative to the rigid motion of the base
+    # motion of the tip relative to the rigid motion that the base causes
     against = np.hstack([-screw_map(base - tip), np.eye(6)])
     K = against.T @ held.stiffness @ against
     fields = np.einsum("nik,kj->nij", held.fields, against)

@@ -1,11 +1,11 @@
 """Nodes of a solid's elements, on the exact shapes of its boundary.
 
-The nodes of straight elements lie on their lattices.  Those on the boundary's edges are
-moved onto the shapes of their patches.  Inner faces follow their edges, and the
-boundary's faces are then moved onto their own shapes.  The mesh is conforming, and the
-geometry's error is that of interpolating the shapes.  Cubic edges and faces are
-interpolated at points where the error has zero mean: a volume's error falls with the
-sixth power of h.
+The nodes of straight elements are on their lattices.  Nodes on the edges of the
+boundary are moved onto the shapes of their patches.  Inner faces follow their edges,
+and the faces of the boundary are then moved onto their shapes.  The mesh is conforming,
+and the error of the geometry is the error of interpolating the shapes.  Cubic edges and
+faces are interpolated at points where this error has zero mean, so the error of a
+volume decreases with the sixth power of h.
 """
 
 from collections.abc import Callable
@@ -28,22 +28,26 @@ from stiffness.mesh.refine import refine
 from stiffness.mesh.solid import Solid, node_patches, on_shapes
 from stiffness.surface.primitives import Shape
 
-_LARGEST_MOVE = 0.05  # largest motion of a node, relative to the part's size
-_INVERTED = 0.05  # smallest over largest Jacobian determinant of an element
-_PASSES = 3  # largest number of passes that bisect inverted elements
-_SAMPLE = 0.2128543571118083  # solves 9 t^3 - 10 t^2 + 3.6 t = 0.4: two of three L
+_LARGEST_MOVE = 0.05  # relative to the part's size: largest displacement of a node
+# ratio of smallest to largest Jacobian determinant of an element, below which it is
+# inverted
+_INVERTED = 0.05
+_PASSES = 3  # largest number of passes in which inverted elements are bisected
+# solution of 9 t^3 - 10 t^2 + 3.6 t = 0.4: value of two of three coordinates L
+_SAMPLE = 0.2128543571118083
 
 
 @dataclass(frozen=True, eq=False)
 class CurvedElements:
-    """A solid's elements on curved geometry.
+    """Elements of a solid with curved geometry.
 
     Attributes:
-        cells: (t, m) nodes of each tetrahedron, its corners in rising order.
+        cells: (t, m) nodes of each tetrahedron, with its corners in increasing order.
         nodes: (n, 3) [m].
         patch: (t, 4) patch of each face, in the order of ``FACES``; -1 inside.
-        curved: (t,) whether an element is not straight.
-        inverted: (t,) whether its Jacobian changed sign, so that it was straightened.
+        curved: (t,) bool, True for an element that is not straight.
+        inverted: (t,) bool, True if the Jacobian changed sign, so that it was
+            straightened.
     """
 
     cells: NDArray
@@ -61,7 +65,7 @@ def curved_elements(solid: Solid, order: int) -> CurvedElements:
         order: order of the elements, 2 or 3.
 
     Returns:
-        The elements; inverted ones are straightened in steps.
+        The elements; inverted elements are straightened in steps.
     """
     corners = np.sort(solid.cells, axis=1)
     cells, count = numbered(corners, order)
@@ -104,15 +108,15 @@ def curved_elements(solid: Solid, order: int) -> CurvedElements:
 
 
 def patches_of_cells(faces: NDArray, patch: NDArray, corners: NDArray) -> NDArray:
-    """Return the patches of tetrahedra's faces.
+    """Return the patch of each face of tetrahedra.
 
     Args:
-        faces: (f, 3) corners of the triangles that are on patches.
-        patch: (f,) their numbers.
-        corners: (t, 4) the tetrahedra's corners in rising order.
+        faces: (f, 3) corners of the triangles on patches.
+        patch: (f,) patch numbers of these triangles.
+        corners: (t, 4) corners of the tetrahedra in increasing order.
 
     Returns:
-        (t, 4) in the order of ``FACES``; -1 for a face that is on no patch.
+        (t, 4) patches in the order of ``FACES``; -1 for a face on no patch.
     """
     if not len(faces):
         return np.full((len(corners), 4), -1)
@@ -135,10 +139,10 @@ def refine_inverted(solid: Solid, order: int) -> Solid:
 
     Args:
         solid: straight tetrahedra.
-        order: order of the elements to be made of them.
+        order: order of the elements that will be made from them.
 
     Returns:
-        The solid, finer where a wall is thin compared with its curvature.
+        The solid with finer elements where a wall is thin compared with its curvature.
     """
     for _ in range(_PASSES):
         inverted = curved_elements(solid, order).inverted
@@ -151,25 +155,26 @@ def refine_inverted(solid: Solid, order: int) -> Solid:
 def _cubic_edges(
     ends: NDArray, pairs: NDArray, moved_nodes: Callable[[NDArray, NDArray], NDArray]
 ) -> NDArray:
-    """Return (t, 6, 2, 3) displacements of edges' nodes, which lie at their thirds."""
-    # interpolated at the Lobatto points, where a cubic's error against an arc has zero
-    # mean, then evaluated at the thirds
+    """Return (t, 6, 2, 3) displacements of edge nodes, at the thirds of edges."""
+    # interpolated at the Lobatto points, where the error of a cubic against an arc has
+    # zero mean, then evaluated at the thirds of the edge
     s = (1 + np.array([-1, 1]) / np.sqrt(5)) / 2
     places = np.zeros((int(pairs.max()) + 1, 3))
     places[pairs] = ends[:, :, :1] + s[:, None] * (ends[:, :, 1:] - ends[:, :, :1])
     moved = (moved_nodes(places, pairs) - places)[pairs]
-    # a displacement is s (1 - s) (c_0 + c_1 (2 s - 1)); s (1 - s) = 1 / 5, then 2 / 9
+    # the displacement is s (1 - s) (c_0 + c_1 (2 s - 1)); s (1 - s) is 1 / 5, then 2 /
+    # 9
     c_0 = 5 / 2 * (moved[:, :, 1] + moved[:, :, 0])
     c_1 = 5 / 2 * np.sqrt(5) * (moved[:, :, 1] - moved[:, :, 0])
     return 2 / 9 * np.stack([c_0 - c_1 / 3, c_0 + c_1 / 3], axis=2)
 
 
 def _face_nodes_by_edges(moved: NDArray) -> NDArray:
-    """Return (t, 4, 3) displacement of face nodes from those (t, 20, 3) of edges."""
-    # along an edge it is L_a L_b (c_0 + c_1 (L_b - L_a)), extended over the faces: at a
-    # face's middle each of its edges adds c_0 / 9
+    """Return (t, 4, 3) displacements of face nodes, from (t, 20, 3) of edge nodes."""
+    # along an edge the displacement is L_a L_b (c_0 + c_1 (L_b - L_a)), extended over
+    # the faces; at the middle of a face each of its edges adds c_0 / 9
     carried = np.zeros((len(moved), 4, 3))
-    # at thirds L_a L_b is 2 / 9: c_0 is the mean of the two nodes' times 9 / 2
+    # at the thirds L_a L_b is 2 / 9, so c_0 is the mean of the two nodes times 9 / 2
     mean = moved[:, 4:16].reshape(-1, 6, 2, 3).mean(axis=2)
     for f, face in enumerate(FACES):
         around = [np.isin(edge, face).all() for edge in EDGES]
@@ -180,10 +185,10 @@ def _face_nodes_by_edges(moved: NDArray) -> NDArray:
 def _cubic_faces(
     corners: NDArray, patch: NDArray, shapes: tuple[Shape | None, ...], reach: float
 ) -> NDArray:
-    """Return (f, 3) displacements of faces' middle nodes; other nodes are in place."""
-    # interpolated at three points.  There the cubic that agrees with the quartic x^2, x
-    # = L_1 L_2 + L_2 L_3 + L_3 L_1, along the edges also has its integral, so that the
-    # error of a shape has zero mean
+    """Return (f, 3) displacements of faces' middle nodes; other nodes are final."""
+    # interpolated at three points; there the cubic that equals the quartic x^2, with x
+    # = L_1 L_2 + L_2 L_3 + L_3 L_1, along the edges also has the integral of x^2, so
+    # that the error of a shape has zero mean
     L = np.full((3, 3), _SAMPLE) + (1 - 3 * _SAMPLE) * np.eye(3)
     N, _ = shape_functions(3, L)
     places = N @ corners
@@ -198,7 +203,7 @@ def _cubic_faces(
 def _straightened(
     straight: NDArray, curved: NDArray, cells: NDArray, order: int
 ) -> tuple[NDArray, NDArray]:
-    """Return curved nodes, straightened in steps at inverted elements, and which."""
+    """Return curved nodes, straightened in steps at inverted elements; and these."""
     nodes = curved.copy()
     suspects = np.flatnonzero((curved != straight)[cells].any(axis=(1, 2)))
     places = np.concatenate([quadrature(6)[0], lattice(order) / order])
@@ -214,7 +219,7 @@ def _straightened(
             break
         inverted[bad] = True
         touched = np.unique(cells[bad])
-        # straight elements are never inverted: the loop ends
+        # straight elements are never inverted, so the loop ends
         kept = 0.5 if step < 4 else 0.0
         nodes[touched] += (1 - kept) * (straight - nodes)[touched]
     return nodes, inverted

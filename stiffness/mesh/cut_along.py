@@ -1,9 +1,9 @@
 """A mesh cut along the smooth outline of an interface.
 
-The mesher keeps only sharp edges.  Where an interface continues in a fillet, mesh
-triangles lie across the outline, and the interface would be too wide or too narrow by
-parts of them.  Corners near the outline count as corners on it, and the edges that
-still cross it are split there.
+The mesher keeps only sharp edges.  Where an interface continues in a fillet, triangles
+of the mesh cross the outline, and the interface would be too wide or too narrow by
+parts of them.  Corners near the outline are moved onto it, and edges that still cross
+it are split.
 """
 
 from dataclasses import replace
@@ -16,20 +16,21 @@ from stiffness.mesh.solid import Solid
 from stiffness.mesh.split_crossing import split_crossing
 from stiffness.surface.smooth_outline import SmoothOutline
 
-# of the shortest edge at a corner: nearer corners are moved onto the outline
+# relative to the shortest edge at a corner: distance within which it is moved onto the
+# outline
 _NEAR = 0.3
-_REACH = 0.005  # relative to the part's size: largest motion of a corner
+_REACH = 0.005  # relative to the part's size: largest displacement of a corner
 
 
 def cut_along(solid: Solid, outline: SmoothOutline) -> Solid:
-    """Split a mesh so that no boundary triangle lies across an outline.
+    """Split a mesh so that no boundary triangle crosses an outline.
 
     Args:
-        solid: boundary corners near the surface, on its shapes or not yet.
+        solid: solid whose boundary corners are near the surface or on its shapes.
         outline: outline of an interface.
 
     Returns:
-        The solid; its triangles at the outline belong to the side on which they lie.
+        The solid; each triangle at the outline belongs to the patch on its side.
     """
 
     def crossing(finer: Solid, on: NDArray, ends: NDArray) -> tuple[NDArray, NDArray]:
@@ -40,12 +41,12 @@ def cut_along(solid: Solid, outline: SmoothOutline) -> Solid:
 
 
 def _members(solid: Solid, outline: SmoothOutline) -> NDArray:
-    """Return the (f,) boundary triangles of the two patches."""
+    """Return the (f,) boundary triangles of the two patches at the outline."""
     return np.isin(solid.patch, outline.patches)
 
 
 def _boundary_edges(solid: Solid, outline: SmoothOutline) -> NDArray:
-    """Return the (k, 2) edges of the two patches' triangles, in order."""
+    """Return the (k, 2) edges of the triangles of both patches, in increasing order."""
     faces = solid.faces[_members(solid, outline)]
     pairs = np.sort(faces[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
     return np.unique(pairs, axis=0)
@@ -74,7 +75,7 @@ def _corners_on(solid: Solid, outline: SmoothOutline) -> NDArray:
 def _crossing_edges(
     solid: Solid, outline: SmoothOutline, on: NDArray, ends: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return (e,) whether an edge crosses the outline, and at which share of it."""
+    """Return (e,) bool: edges that cross the outline; and the shares of crossing."""
     pairs = _boundary_edges(solid, outline)
     index = np.searchsorted(
         edge_code(ends, len(on)), edge_code(pairs, len(on))
@@ -94,7 +95,7 @@ def _crossing_edges(
 
 
 def _sides(solid: Solid, outline: SmoothOutline, on: NDArray) -> NDArray:
-    """Return (f,) patches, with triangles at the outline assigned by their side."""
+    """Return (f,) patches; triangles at the outline are assigned by their side."""
     patch = solid.patch.copy()
     near = np.flatnonzero(_members(solid, outline) & on[solid.faces].any(axis=1))
     corners = solid.points[solid.faces[near]]

@@ -1,8 +1,8 @@
-"""A mesh cut along a face inside a link, plane or curved.
+"""Cutting of a mesh along a plane or curved face inside a link.
 
 Tetrahedra that are too large to follow a curved face are bisected first.  Corners near
-the face are moved onto it, the edges that still cross it are split there.  The cut runs
-a little beyond the face's border, so that what lies across the border is cut as well.
+the face are moved onto it, and edges that still cross it are split.  The cut continues
+a little beyond the border of the face, so that tetrahedra on the border are cut too.
 """
 
 from dataclasses import dataclass, replace
@@ -22,15 +22,18 @@ from stiffness.mesh.split_crossing import one_of_each, split_crossing
 from stiffness.surface.facets import Facets
 from stiffness.surface.primitives import Plane, Shape, project
 
-_NEAR = 0.3  # relative to its shortest edge: a nearer corner is moved onto the face
-_REACH = 0.005  # relative to the part's size: largest motion of a corner
-# least volume of a tetrahedron after motion of its corners, relative to before
+# relative to a corner's shortest edge: distance within which it is moved onto the face
+_NEAR = 0.3
+_REACH = 0.005  # relative to the part's size: largest displacement of a corner
+# smallest ratio of a tetrahedron's volumes after and before its corners are moved
 _LEAST = 0.2
-# relative to the part's size: a corner on the face; shapes are known to 2e-6
+# relative to the part's size: distance of a corner that is on the face; shapes are
+# accurate to 2e-6
 ON_FACE = 1e-6
-_TURN = np.cos(np.radians(35.0))  # largest rotation of a curved face along an edge
-_PASSES = 12  # most rounds of bisection of too large tetrahedra
-_HALVINGS = 12  # bisections of an edge, to find where it crosses a curved face
+# cosine of the largest rotation of a curved face's normal along an edge
+_TURN = np.cos(np.radians(35.0))
+_PASSES = 12  # largest number of passes in which too large tetrahedra are bisected
+_HALVINGS = 12  # number of bisections to find where an edge crosses a curved face
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,21 +42,21 @@ class CutFace:
 
     Attributes:
         shape: shape of the face.
-        facets: facets of the face; None for the whole shape.
+        facets: facets of the face; None if it is the whole shape.
     """
 
     shape: Shape
     facets: Facets | None = None
 
     def is_near(self, points: NDArray, reach: NDArray) -> NDArray:
-        """Find points near the face.
+        """Return which points are near the face.
 
         Args:
-            points: (n, 3) [m].
-            reach: (n,) [m].
+            points: (n, 3) [m] points.
+            reach: (n,) [m] largest distance of each point.
 
         Returns:
-            (n,) whether the face is no further away than that.
+            (n,) bool, True for a point within its distance of the face.
         """
         near = np.abs(self.shape.signed(points)[0]) <= reach
         if self.facets is not None and near.any():
@@ -68,7 +71,7 @@ def faces_inside(cells: NDArray) -> tuple[NDArray, NDArray]:
         cells: (t, 4).
 
     Returns:
-        (f, 3) corners and (f, 2) the tetrahedra.
+        (f, 3) corners of each face, and (f, 2) its two tetrahedra.
     """
     faces = np.sort(cells[:, FACES].reshape(-1, 3), axis=1)
     order = np.lexsort(faces.T)
@@ -78,14 +81,14 @@ def faces_inside(cells: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def face_code(corners: NDArray, points: int) -> NDArray:
-    """Return a number of each triangle, from its corners.
+    """Return a number for each triangle, which depends only on its set of corners.
 
     Args:
-        corners: (..., 3), in any order.
+        corners: (..., 3) corners in any order.
         points: number of points of the mesh.
 
     Returns:
-        (...) one number for each set of three.
+        (...) numbers.
     """
     total = np.int64(points)
     a, b, c = np.moveaxis(np.sort(corners, axis=-1), -1, 0)
@@ -96,11 +99,11 @@ def cut(solid: Solid, face: CutFace) -> Solid:
     """Cut a mesh along a face.
 
     Args:
-        solid: any solid.
-        face: inside it.
+        solid: solid to be cut.
+        face: face inside the solid.
 
     Returns:
-        The solid; the triangles on the face are among its ``inner`` ones.
+        The solid; its ``inner`` triangles include those on the face.
     """
     if not isinstance(face.shape, Plane):
         solid = _resolved(solid, face)
@@ -113,14 +116,14 @@ def cut(solid: Solid, face: CutFace) -> Solid:
 
 
 def without_chords(solid: Solid) -> Solid:
-    """Split edges that join two corners of a curved face but are not on it.
+    """Split edges that join two corners of a curved face but are not on the face.
 
     Args:
         solid: solid with its ``inner`` triangles.
 
     Returns:
-        The solid; no tetrahedron has two sides on a curved face, between which it
-        would be flat once they are curved.
+        The solid.  No tetrahedron has two sides on a curved face, because it would
+        become flat when these sides are curved.
     """
     for number in np.unique(solid.inner_patch):
         if isinstance(solid.shapes[number], Plane):
@@ -166,7 +169,7 @@ def _resolved(solid: Solid, face: CutFace) -> Solid:
 def _crossing(
     solid: Solid, face: CutFace, on: NDArray, ends: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return (e,) whether edges cross the face, and at which share of the edge."""
+    """Return (e,) bool: edges that cross the face; and the share where they cross."""
     value = np.where(on, 0.0, face.shape.signed(solid.points)[0])
     low, high = value[ends].T
     across = low * high < 0
@@ -177,7 +180,7 @@ def _crossing(
     found = _share_of_crossing(face.shape, start, end, low[across], high[across])
     share[across] = found
     if face.facets is not None:
-        # an edge of a tetrahedron that the face runs through is no further away
+        # the edges of tetrahedra that the face intersects are near the face
         _, of_cell = edges_of(solid.cells, len(solid.points))
         length = np.linalg.norm(np.diff(solid.points[ends], axis=1)[:, 0], axis=1)
         reach = np.zeros(len(ends))
@@ -192,7 +195,7 @@ def _crossing(
 def _share_of_crossing(
     shape: Shape, start: NDArray, end: NDArray, low: NDArray, high: NDArray
 ) -> NDArray:
-    """Return (e,) share of edges where they cross a shape, by bisection and secant."""
+    """Return (e,) shares at which edges cross a shape, by bisection and secant."""
     left, right = np.zeros(len(low)), np.ones(len(low))
     for _ in range(0 if isinstance(shape, Plane) else _HALVINGS):
         middle = (left + right) / 2
@@ -205,13 +208,13 @@ def _share_of_crossing(
 
 
 def _with_cut(solid: Solid, on: NDArray, face: CutFace) -> Solid:
-    """Return a solid with the triangles on a face among those inside it."""
+    """Return a solid whose inner triangles include those on a face."""
     number, count = len(solid.shapes), len(solid.points)
     solid = replace(solid, shapes=(*solid.shapes, face.shape))
     faces, owners = faces_inside(solid.cells)
     size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     known = face_code(solid.inner, count)
-    for _ in range(2):  # corners that come onto the face when others are moved
+    for _ in range(2):  # corners may come onto the face when others are moved
         value = face.shape.signed(solid.points)[0]
         on |= np.abs(value) < ON_FACE * size
         side = np.sign(np.where(on, 0.0, value)[solid.cells].sum(axis=1))
@@ -225,7 +228,7 @@ def _with_cut(solid: Solid, on: NDArray, face: CutFace) -> Solid:
 
 
 def _onto(solid: Solid, face: CutFace) -> tuple[Solid, NDArray]:
-    """Return the corners near a face moved onto it, and which lie on it."""
+    """Return the solid with corners near a face moved onto it, and which are on it."""
     size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     height = np.abs(face.shape.signed(solid.points)[0])
     ends, _ = edges_of(solid.cells, len(solid.points))
@@ -237,7 +240,8 @@ def _onto(solid: Solid, face: CutFace) -> tuple[Solid, NDArray]:
         np.maximum.at(longest, ends[:, k], length)
     near = height < reach
     near[near] = face.is_near(solid.points[near], longest[near])
-    near |= height < ON_FACE * size  # beyond the face, where the cut runs on
+    # also beyond the border of the face, where the cut continues
+    near |= height < ON_FACE * size
     target, on = _targets(solid, face.shape, near, reach, ON_FACE * size)
     already, before = on & (height < ON_FACE * size), solid.volumes()
     while True:
@@ -251,8 +255,8 @@ def _onto(solid: Solid, face: CutFace) -> tuple[Solid, NDArray]:
 def _targets(
     solid: Solid, shape: Shape, near: NDArray, reach: NDArray, close: float
 ) -> tuple[NDArray, NDArray]:
-    """Return (n, 3) [m] positions of corners near a shape on it, and which can move."""
-    # corners of the boundary or of other faces inside stay on their shapes
+    """Return (n, 3) [m] target positions of corners near a shape, and (n,) movable."""
+    # corners on the boundary or on other inner faces must stay on their shapes
     target, on = solid.points.copy(), np.zeros(len(near), dtype=bool)
     free = near.copy()
     groups = [(key, group[near[group]]) for key, group in corner_groups(solid)]

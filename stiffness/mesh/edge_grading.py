@@ -1,16 +1,17 @@
-r"""Thin elements along the edges where stress is singular.
+r"""Layers of thin elements along the edges at which the stress is singular.
 
 Near an edge that is clamped on one side and free on the other, or near a re-entrant
-edge of the part, strains grow like r^(a - 1) with a below 1.  There polynomials on
+edge of the part, strains increase as r^(a - 1) with a < 1.  There, polynomials on
 elements of one size converge slowly, whatever their degree.  A layer of elements that
-is thin across the edge and as long as its neighbours along it costs little and removes
-most of that error.
+is thin across the edge, and as long as its neighbours along it, costs little and
+removes most of the error.
 
 A tetrahedron with an edge on a singular edge is cut at the same share of its other
-edges, measured from there.  It becomes a wedge along the edge and a remainder.  One
-with a corner there becomes a small tetrahedron and a remainder.  Neighbours cut their
-common face at the same points.  The cuts are made in the coordinates of the curved
-element, so that thin layers follow a round edge.
+edges, measured from the singular edge.  It becomes a wedge along the edge and a
+remainder.  A tetrahedron with only a corner on a singular edge becomes a small
+tetrahedron and a remainder.  Neighbours cut their common face at the same points.  The
+cuts are made in the coordinates of the curved element, so that thin layers follow a
+round edge.
 """
 
 from dataclasses import dataclass
@@ -29,15 +30,18 @@ from stiffness.mesh.regions import Region, material_edges
 from stiffness.mesh.solid import Solid, moved_onto_shapes
 
 ENDS = (0, 1)  # patches of base and tip; distributed tractions end at their outlines
-LAYER_SHARE = 0.25  # layer thickness over element size; 0.15 to 0.3 are as accurate
-_PASSES = 100  # passes that split joining edges; 3 to 12 suffice for meshes/
-_REENTRANT = np.cos(np.radians(35.0))  # a flatter re-entrant edge is hardly singular
-# edges that are cut where a corner or an edge is singular; singular corners come first
+# ratio of layer thickness to element size; 0.15 to 0.3 are equally accurate
+LAYER_SHARE = 0.25
+# largest number of passes that split joining edges; 3 to 12 suffice for meshes/
+_PASSES = 100
+# cosine of 35 degrees: a flatter re-entrant edge is hardly singular
+_REENTRANT = np.cos(np.radians(35.0))
+# edges that are cut at a singular corner or edge; singular corners are first
 _CUT_EDGES = {1: [[0, 1], [0, 2], [0, 3]], 2: [[0, 2], [0, 3], [1, 2], [1, 3]]}
-# parts by corners, 0 to 3, and cuts in this order, from 4 on.  A small tetrahedron and
-# a prism, or two prisms; each prism becomes three tetrahedra by the diagonals that
-# start at its sides' smallest numbers, so that neighbours agree (Dompierre et al.
-# 1999).  Corners' numbers increase and cuts' numbers follow them: the diagonals are the
+# Parts, by corners 0 to 3 and by cuts in the order above from 4: a small tetrahedron
+# and a prism, or two prisms.  Each prism becomes three tetrahedra by the diagonals that
+# start at the smallest number of each side, so that neighbours agree (Dompierre et al.
+# 1999). Corner numbers increase and cut numbers follow them, so the diagonals are the
 # same in all tetrahedra.
 _PARTS = {
     1: np.array([[0, 4, 5, 6], [1, 3, 2, 6], [1, 6, 2, 5], [1, 6, 5, 4]]),
@@ -53,11 +57,11 @@ class Parts:
     """A solid's tetrahedra cut into smaller ones.
 
     Attributes:
-        corners: (t, 4) numbers of the parts' corners, rising in each row; below the
-            solid's count they are its own.
+        corners: (t, 4) numbers of the parts' corners, increasing in each row; numbers
+            below the solid's count are corners of the solid.
         places: (t, 4, 4) barycentric coordinates of the corners in their parent
-            tetrahedron, whose own corners are taken in rising order.
-        parent: (t,) the tetrahedron of the solid that contains each part.
+            tetrahedron, whose corners are in increasing order.
+        parent: (t,) tetrahedron of the solid that contains each part.
     """
 
     corners: NDArray
@@ -76,19 +80,19 @@ def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
     """Return the edges of a solid at which stresses are singular.
 
     Args:
-        solid: any solid.
+        solid: solid with patches.
         held: patches that are clamped or loaded.
 
     Returns:
-        (e, 2) corners: the clamped patches' outlines, and the re-entrant edges
-        between patches that meet at more than 215 degrees.
+        (e, 2) corners of the edges: outlines of the clamped patches, and re-entrant
+        edges between patches that meet at more than 215 degrees.
     """
     count = len(solid.points)
     pairs = np.sort(solid.faces[:, [[0, 1], [1, 2], [0, 2]]], axis=2)
     code = edge_code(pairs, count).ravel()
     order = np.argsort(code, kind="stable")
     code, owner = code[order], order // 3
-    # two bodies touch at an edge of four faces: any pairing of its faces is valid
+    # two bodies that touch have an edge with four faces, of which any pairing is valid
     code, left, right = code[::2], owner[::2], owner[1::2]
     border = solid.patch[left] != solid.patch[right]
     clamped = np.isin(solid.patch[left], held) | np.isin(solid.patch[right], held)
@@ -108,12 +112,12 @@ def graded_edges(
     """Return singular edges, and edges between materials at the boundary.
 
     Args:
-        solid: any solid.
+        solid: solid with patches.
         held: patches that are clamped or loaded.
         regions: regions of the link.
 
     Returns:
-        (e, 2) corners.
+        (e, 2) corners of the edges.
     """
     both = (singular_edges(solid, held), material_edges(solid, regions))
     return np.unique(np.concatenate(both), axis=0) if len(both[1]) else both[0]
@@ -122,16 +126,16 @@ def graded_edges(
 def split_joining_edges(
     solid: Solid, held: tuple[int, ...], regions: tuple[Region, ...] = ()
 ) -> Solid:
-    """Split edges that join singular edges.
+    """Split the edges that join two singular edges.
 
     Args:
-        solid: any solid.
+        solid: solid with patches.
         held: patches that are clamped or loaded.
         regions: regions of the link.
 
     Returns:
-        A solid whose tetrahedra have at most a corner or an edge on the singular
-        edges; most of them, if a part needs more than a hundred passes.
+        A solid whose tetrahedra each have at most one corner or one edge on the
+        singular edges; a few have more if more than a hundred passes would be needed.
     """
     settled = False
     for _ in range(_PASSES):
@@ -142,7 +146,7 @@ def split_joining_edges(
         ends, of_cell = edges_of(solid.cells, count)
         joining = touched[ends].all(axis=1)
         rank = length_ranks(solid.points, ends)
-        # a triangle of only singular edges: its longest edge is split as well
+        # of a triangle with three singular edges, the longest edge is split too
         triangle = joining[of_cell].sum(axis=1) > 2
         longest = np.where(joining, rank, -1)[of_cell].argmax(axis=1)
         longest = of_cell[np.arange(len(of_cell)), longest]
@@ -154,7 +158,7 @@ def split_joining_edges(
                 return solid
             solid, settled = moved_onto_shapes(solid), True
             continue
-        # first an edge that is the longest joining edge of all its tetrahedra
+        # edges that are the longest joining edge of all their tetrahedra are first
         rank[~joining] = -1
         highest = rank[of_cell].max(axis=1)
         own = rank[of_cell] == np.maximum(highest, 0)[:, None]
@@ -173,23 +177,23 @@ def layered(
     """Cut a layer of thin parts along the singular edges.
 
     Args:
-        solid: solid of :func:`split_joining_edges`.
+        solid: result of :func:`split_joining_edges`.
         held: patches that are clamped or loaded.
-        share: share of each edge, from its singular end: thickness of the layer.
+        share: thickness of the layer, as a share of each edge from its singular end.
         regions: regions of the link.
 
     Returns:
-        The parts; tetrahedra that touch no singular edge stay whole.
+        The parts; tetrahedra that touch no singular edge remain whole.
     """
     parts = whole_elements(solid)
     count = len(solid.points)
     touched = np.zeros(count, dtype=bool)
     touched[graded_edges(solid, held, regions)] = True
-    # if a tetrahedron touches several edges, its corners get no graded layer
+    # corners of tetrahedra that touch several singular edges get no graded layer
     while (several := touched[parts.corners].sum(axis=1) > 2).any():
         touched[parts.corners[several]] = False
     on = touched[parts.corners]
-    # singular corners come first; the orientation does not matter
+    # singular corners are first; the orientation does not matter
     order = np.argsort(~on, axis=1, kind="stable")
     corners = np.take_along_axis(parts.corners, order, axis=1)
     places = np.take_along_axis(parts.places, order[:, :, None], axis=1)

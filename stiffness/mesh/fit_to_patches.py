@@ -1,4 +1,4 @@
-"""A mesh of the surface's envelope, fitted to the surface's patches."""
+"""Fitting of a mesh to the patches of a surface."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,26 +14,26 @@ from stiffness.surface.true_surface import TrueSurface
 
 
 class MeshFailed(BadInput):
-    """The mesher made no usable mesh of a valid surface."""
+    """Error: the mesher made no usable mesh of a valid surface."""
 
 
 def fit_to_patches(
     points: NDArray, cells: NDArray, surface: Surface, patches: Patches
 ) -> Solid:
-    """Assign boundary triangles to patches; project corners onto the exact shapes.
+    """Assign boundary triangles to patches, and project corners onto the exact shapes.
 
     Args:
-        points: (n, 3) [m].
+        points: (n, 3) [m] corners of the mesh.
         cells: (t, 4) tetrahedra of either orientation.
         surface: the surface that was meshed.
-        patches: its patches and shapes.
+        patches: patches of the surface, with their shapes.
 
     Returns:
-        The solid; moves of corners that would invert a tetrahedron are shortened.
+        The solid; corners are moved less if they would invert a tetrahedron.
 
     Raises:
-        MeshFailed: the mesh differs from the part: its volume by more than 2 %, by the
-            number of holes, or an interface has no face.
+        MeshFailed: the mesh differs from the part by more than 2 % of the volume or by
+            the number of holes, or an interface has no face.
     """
     points, cells = _positive_cells(points, cells)
     faces = boundary_faces(cells)
@@ -52,7 +52,7 @@ def fit_to_patches(
         )
     if (least := float(element_quality(solid).min())) <= 0:
         raise MeshFailed(f"{surface.name}: an element is inverted, quality {least:.2g}")
-    # a hole in a thin wall changes the volume little and the stiffness much
+    # a hole in a thin wall changes the volume little but the stiffness much
     holes, expected = (euler_characteristic(f) for f in (faces, surface.triangles))
     if holes != expected:
         raise MeshFailed(
@@ -66,7 +66,7 @@ def fit_to_patches(
 
 
 def _positive_cells(points: NDArray, cells: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the points that are used, and cells reoriented to positive volume."""
+    """Return the used points, and the cells reoriented to positive volume."""
     used, cells = np.unique(cells, return_inverse=True)
     points, cells = points[used], cells.reshape(-1, 4)
     a, b, c, d = np.moveaxis(points[cells], 1, 0)
@@ -78,7 +78,7 @@ def _positive_cells(points: NDArray, cells: NDArray) -> tuple[NDArray, NDArray]:
 def _nearest_patch(
     points: NDArray, faces: NDArray, surface: Surface, patches: Patches
 ) -> NDArray:
-    """Return patch of each boundary face: the nearest one of about the same normal."""
+    """Return the patch of each boundary face: the nearest one with a similar normal."""
     import pyvista
 
     mesh = pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)

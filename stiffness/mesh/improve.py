@@ -1,9 +1,9 @@
 """Improvement of badly shaped tetrahedra: corners moved, inner edges split.
 
-Corners moved onto the part's shapes may flatten tetrahedra.  This happens most where
-two shapes meet tangentially and all corners of a tetrahedron lie on the boundary.  An
-inner edge of such a tetrahedron is split, and corners are moved, on their shapes or
-inside, to where the worst tetrahedron around them is best.
+When corners are moved onto the part's shapes, tetrahedra may become flat.  This happens
+most where two shapes meet tangentially and all corners of a tetrahedron are on the
+boundary.  An inner edge of such a tetrahedron is split, and corners are moved, on their
+shapes or inside, to the position where the worst tetrahedron around them is best.
 
 Source: Freitag & Ollivier-Gooch (1997), local optimisation of the worst element.
 """
@@ -28,9 +28,12 @@ from stiffness.mesh.solid import (
 from stiffness.mesh.split_crossing import one_of_each
 from stiffness.surface.primitives import project
 
-POOR = 0.08  # lower quality of a tetrahedron is improved; pytetwild's are better
+# quality below which a tetrahedron is improved; those of pytetwild are better
+POOR = 0.08
 _ROUNDS = 4
-_STEPS = 10  # steps of a corner's search; a step without improvement is halved
+# number of steps in the search for a corner's position; without improvement a step is
+# halved
+_STEPS = 10
 _DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 
 
@@ -38,16 +41,16 @@ def fitted(solid: Solid, limit: float | None = None) -> Solid:
     """Move corners onto their shapes, and improve tetrahedra that become flat.
 
     Args:
-        solid: its corners may be off the shapes of their patches.
-        limit: [-] quality below which tetrahedra are improved; :data:`POOR` if absent,
-            or less if the solid's own are worse.
+        solid: solid whose corners may be off the shapes of their patches.
+        limit: [-] quality below which tetrahedra are improved; by default :data:`POOR`,
+            or less if the solid's own tetrahedra are worse.
 
     Returns:
-        The solid, with more tetrahedra where some had to be split.  Where this fails,
-        corners stay off their shapes, as :func:`moved_onto_shapes` leaves them.
+        The solid, with more tetrahedra if some had to be split.  If this fails, some
+        corners remain off their shapes, as in :func:`moved_onto_shapes`.
     """
     least = float(element_quality(solid).min())
-    # elements of a structured bar are long on purpose
+    # elements of a structured bar are long by design
     good = solid.surface is None or least > POOR / 4
     poor = limit or (min(POOR, least / 2) if good else POOR)
     target = corners_on_shapes(solid)
@@ -103,7 +106,7 @@ def _relaxed(solid: Solid, limit: float) -> Solid:
 def _best_place(
     solid: Solid, points: NDArray, star: NDArray, corner: int, key: tuple[int, ...]
 ) -> NDArray:
-    """Return the (3,) [m] position of a corner with the best worst tetrahedron."""
+    """Return (3,) [m] position of a corner that is best for its worst tetrahedron."""
     place = points[corner]
     around = points[star]
     mine = star == corner

@@ -5,14 +5,14 @@ symbol meaning                                                    shape
 ====== ========================================================== ==========
 L      barycentric coordinates of points                          (q, c)
 N      shape functions at the points                              (q, m)
-dN     their derivatives, L_1 .. L_(c-1) independent              (q, m, c-1)
+dN     derivatives of N, with L_1 .. L_(c-1) as variables          (q, m, c-1)
 ====== ========================================================== ==========
 
-c is 4 for a tetrahedron, 3 for a triangle.  The lattice of degree p holds all points
-whose coordinates are multiples of 1 / p: corners first, then along the edges, in the
-faces, inside.  An element's corners are always in rising order of their numbers, so
-that two elements have the nodes of a common edge or face in the same order.  Half of
-the elements are therefore left-handed.
+c is 4 for a tetrahedron, 3 for a triangle.  The lattice of degree p consists of all
+points whose coordinates are multiples of 1 / p: corners first, then along the edges, in
+the faces, inside.  The corners of an element are always in increasing order of their
+numbers, so that two elements have the nodes of a common edge or face in the same order.
+Half of the elements are therefore left-handed.
 """
 
 from functools import lru_cache
@@ -47,7 +47,7 @@ def lattice(degree: int, corners: int = 4) -> NDArray:
 
 
 def _partitions(total: int, parts: int) -> list[tuple[int, ...]]:
-    """Return the ways to split a total into positive parts; the first falls slowest."""
+    """Yield the ways to split a total into positive parts; the first varies slowest."""
     if parts == 1:
         return [(total,)]
     return [
@@ -88,14 +88,14 @@ def shape_functions(degree: int, L: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def numbered(corners: NDArray, degree: int) -> tuple[NDArray, int]:
-    """Return the numbers of lattice points, equal for points that elements share.
+    """Return numbers of lattice points, equal for points that elements share.
 
     Args:
-        corners: (t, 4) numbers of the corners, rising in each row.
+        corners: (t, 4) numbers of the corners, increasing in each row.
         degree: degree of the polynomials.
 
     Returns:
-        (t, m) numbers, the corners' own first, and their count.
+        (t, m) numbers, corners first, and the total number of points.
     """
     total = int(corners.max()) + 1
     parts = [corners]
@@ -126,7 +126,8 @@ def face_nodes(degree: int) -> NDArray:
         degree: degree of the polynomials.
 
     Returns:
-        (4, k) one row for each of ``FACES``, in the order of a triangle's lattice.
+        (4, k) lattice points; one row for each of ``FACES``, in the order of a
+        triangle's lattice.
     """
     whole = [tuple(point) for point in lattice(degree)]
     rows = []

@@ -1,11 +1,11 @@
 """Tetrahedra from surfaces, with exact interfaces and curved faces.
 
-Pytetwild makes the tetrahedra, in a separate process with a time limit, from a surface
-with fewer triangles (:mod:`stiffness.surface.decimate`).  The mesh's boundary follows
-the surface only to within an envelope.  So every boundary triangle is assigned to a
-patch of the surface, and the nodes are projected onto the patches' exact shapes. Meshes
-are cached by their input, because pytetwild is slow and never makes the same mesh
-twice.
+Pytetwild makes the tetrahedra from a surface with fewer triangles
+(:mod:`stiffness.surface.decimate`), in a separate process with a time limit.  The
+boundary of the mesh follows the surface only to within an envelope.  So every boundary
+triangle is assigned to a patch of the surface, and the nodes are projected onto the
+exact shapes of the patches. Meshes are cached by their input, because pytetwild is slow
+and never makes the same mesh twice.
 """
 
 import hashlib
@@ -34,9 +34,10 @@ from stiffness.surface.surface import Surface, read_surface
 __all__ = ["Interface", "Solid", "mesh_solid", "parse_interface", "read_surface"]
 
 _WORKER = Path(__file__).with_name("mesh_worker.py")
-# makes meshes reproducible; absent where the C++ library is not GNU's
+# library that makes meshes reproducible; available only with the GNU C++ library
 _SAME_NUMBERS = Path(__file__).with_name("same_random_numbers.so")
-_FORMAT = 4  # version of the cached meshes; increased when their content changes
+# version of the format of cached meshes, increased when their content changes
+_FORMAT = 4
 
 
 def mesh_solid(
@@ -50,27 +51,26 @@ def mesh_solid(
     cache: Path | str | None = None,
     patches: Patches | None = None,
 ) -> Solid:
-    """Return the tetrahedra of a surface, from the cache if meshed before.
+    """Return the tetrahedra of a surface, from the cache if it was meshed before.
 
     Args:
         surface: surface of the link.
         base: the held interface.
         tip: the loaded interface.
-        edge: [m] wanted length of edges; a 20th of the diagonal if absent.
-        envelope: [-] share of the diagonal by which the mesher may deviate from a
-            surface with fewer triangles, which itself deviates from this one by as
-            much.
-        time_limit: [s] for the mesher.
-        cache: folder; that of :func:`forcefit.inputs.cache_folder.cache_folder` if
-            absent.
-        patches: patches of the surface and these interfaces; computed if absent.
+        edge: [m] requested length of edges; by default a twentieth of the diagonal.
+        envelope: [-] largest deviation of the mesh from a surface with fewer triangles,
+            relative to the diagonal; that surface deviates from this one by as much.
+        time_limit: [s] largest time of the mesher.
+        cache: folder of meshes; by default
+            :func:`forcefit.inputs.cache_folder.cache_folder`.
+        patches: patches of the surface with these interfaces; computed if absent.
 
     Returns:
         The solid.
 
     Raises:
-        BadInput: an interface has no part of the surface.
-        MeshFailed: the mesher ran out of time or made no mesh.
+        BadInput: no part of the surface is on an interface.
+        MeshFailed: the mesher exceeded its time or made no mesh.
     """
     patches = patches or find_patches(surface, base, tip)
     edge = surface.diagonal / 20 if edge is None else edge
@@ -98,7 +98,7 @@ def _from_cache(path: Path) -> tuple[NDArray, NDArray] | None:
 
 
 def _to_cache(path: Path, points: NDArray, cells: NDArray) -> None:
-    """Write a mesh completely or not at all; a full or read-only disk is no error."""
+    """Write a mesh completely or not at all; a full or read-only disk is ignored."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(path) as part, part.open("wb") as file:
@@ -116,12 +116,12 @@ def _tetrahedralize(
         given, made = Path(folder, "surface.npz"), Path(folder, "mesh.npz")
         points, triangles = coarser_surface(surface, envelope * surface.diagonal)
         np.savez(given, points=points, triangles=triangles, settings=[edge, envelope])
-        # -P: modules of the current folder must not replace others of the same name
+        # -P prevents that modules in the current folder replace others of the same name
         command = [sys.executable, "-P", str(_WORKER), str(given), str(made)]
         if _SAME_NUMBERS.exists():
             command.append(str(_SAME_NUMBERS))
         try:
-            # the mesher leaves a file in its current folder
+            # the mesher writes a file to its current folder
             run = subprocess.run(
                 command,
                 timeout=time_limit,

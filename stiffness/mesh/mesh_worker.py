@@ -1,8 +1,8 @@
-"""Process of the mesher: pytetwild on a stored surface.
+"""Process in which pytetwild meshes a stored surface.
 
 ``python stiffness/mesh/mesh_worker.py SURFACE.npz MESH.npz [LIBRARY]``
 
-The library is built from ``same_random_numbers.cpp``.
+LIBRARY is built from ``same_random_numbers.cpp``.
 """
 
 import ctypes
@@ -12,8 +12,8 @@ from types import ModuleType
 
 import numpy as np
 
-# of the mesher's optimisation.  Simple parts need fewer; where walls meet at acute
-# angles its goal is never reached, while ten passes are as good as eighty
+# largest number of passes of the mesher's optimisation; simple parts need fewer, and
+# where walls meet at acute angles twelve passes are as good as eighty
 _PASSES = 12
 
 
@@ -21,15 +21,16 @@ def main(given: Path, made: Path, library: str | None = None) -> None:
     """Read a surface and its settings, write points and cells.
 
     Args:
-        given: ``points`` (n, 3) [m], ``triangles`` (m, 3), ``settings``: edge length
-            [m] and envelope as a share of the diagonal.
-        made: ``points`` (n, 3) [m] and ``cells`` (t, 4).
-        library: if given, the same surface and settings yield the same mesh.
+        given: file with ``points`` (n, 3) [m], ``triangles`` (m, 3) and ``settings``:
+            edge length [m], and envelope as a share of the diagonal.
+        made: file with ``points`` (n, 3) [m] and ``cells`` (t, 4).
+        library: library with which the same surface and settings give the same mesh.
     """
-    if library is not None:  # before the mesher: the first definition is used
+    # loaded before the mesher, because the first definition is used
+    if library is not None:
         ctypes.CDLL(library, mode=ctypes.RTLD_GLOBAL)
-    # pytetwild imports pyvista, half a second, to add a method to its classes: here it
-    # finds an empty module
+    # pytetwild imports pyvista, which takes half a second, only to add a method to its
+    # classes; an empty module replaces it here
     sys.modules["pyvista"] = ModuleType("pyvista")
     import pytetwild
 

@@ -1,9 +1,9 @@
 """Local refinement of tetrahedra by longest-edge bisection (Rivara).
 
-An edge is split only when it is the longest of every tetrahedron around it, so the mesh
-stays conforming at every step.  Otherwise neighbours are split first.  Boundary
-triangles are split with their tetrahedra and keep their patch.  New corners are moved
-onto the patch's shape.
+An edge is split only if it is the longest edge of every tetrahedron around it, so the
+mesh is conforming after every step.  Otherwise neighbours are split first.  Boundary
+triangles are split together with their tetrahedra and keep their patch.  New corners
+are moved onto the shape of the patch.
 """
 
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ class Refined:
 
     Attributes:
         solid: the finer solid.
-        parent: (t,) index of the coarser tetrahedron that contains each.
+        parent: (t,) index of the coarser tetrahedron that contains each tetrahedron.
     """
 
     solid: Solid
@@ -34,7 +34,7 @@ def refine(solid: Solid, halvings: NDArray) -> Refined:
     """Bisect tetrahedra as requested, and neighbours for a conforming mesh.
 
     Args:
-        solid: to refine.
+        solid: solid to refine.
         halvings: (t,) number of times each tetrahedron's volume is halved.
 
     Returns:
@@ -57,18 +57,19 @@ def split_edges(
     split: NDArray,
     places: NDArray | None = None,
 ) -> tuple[Solid, NDArray]:
-    """Split edges and the tetrahedra at them, at most one edge per tetrahedron.
+    """Split edges and their tetrahedra, at most one edge of each tetrahedron.
 
     Args:
-        solid: to refine; new corners are not yet moved onto its shapes.
-        ends: (e, 2) of :func:`edges_of`.
-        of_cell: (t, 6) of :func:`edges_of`.
-        split: (e,) whether an edge is to be split.
-        places: (k, 3) [m] of the new corners; the edges' middles if absent.
+        solid: solid to refine; new corners are not yet moved onto its shapes.
+        ends: (e, 2) corners of all edges, from :func:`edges_of`.
+        of_cell: (t, 6) edges of each tetrahedron, from :func:`edges_of`.
+        split: (e,) bool, True for edges to split.
+        places: (k, 3) [m] positions of the new corners; by default the middles of the
+            edges.
 
     Returns:
-        The solid, and the tetrahedra (r,) that were halved: their first halves keep
-        their indices, the second halves are appended in this order.
+        The solid, and the tetrahedra (r,) that were halved.  Their first halves keep
+        their indices; the second halves are appended in this order.
     """
     count = len(solid.points)
     middle = np.full(len(ends), -1)
@@ -106,10 +107,11 @@ def edges_of(cells: NDArray, points: int) -> tuple[NDArray, NDArray]:
 
     Args:
         cells: (t, 4) corners.
-        points: number of corners in all.
+        points: total number of corners.
 
     Returns:
-        Ends (e, 2), the smaller number first, in order; the edges (t, 6) of each cell.
+        Corners (e, 2) of the edges, in increasing order; and the edges (t, 6) of each
+        cell.
     """
     ends = np.sort(cells[:, EDGES].reshape(-1, 2), axis=1)
     code, index = np.unique(edge_code(ends, points), return_inverse=True)
@@ -122,10 +124,10 @@ def edge_code(ends: NDArray, points: int) -> NDArray:
 
     Args:
         ends: (..., 2) corners.
-        points: number of corners in all.
+        points: total number of corners.
 
     Returns:
-        (...) ; pairs in order have rising numbers.
+        (...) numbers, which increase with the order of the pairs.
     """
     return np.asarray(ends[..., 0] * np.int64(points) + ends[..., 1])
 
@@ -138,7 +140,8 @@ def length_ranks(points: NDArray, ends: NDArray) -> NDArray:
         ends: (e, 2) corners.
 
     Returns:
-        (e,) rank of each edge, 0 for the shortest; of equal ones the first is lower.
+        (e,) rank of each edge, 0 for the shortest; of equal edges the first has the
+        lower rank.
     """
     length = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
     rank = np.empty(len(ends), dtype=int)
@@ -147,15 +150,15 @@ def length_ranks(points: NDArray, ends: NDArray) -> NDArray:
 
 
 def chosen_by_all(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
-    """Return the edges that all tetrahedra around them choose.
+    """Return the edges that are chosen by all tetrahedra around them.
 
     Args:
-        of_cell: (t, 6) of :func:`edges_of`.
-        chosen: one edge of each tetrahedron that chooses.
+        of_cell: (t, 6) edges of each tetrahedron, from :func:`edges_of`.
+        chosen: edge chosen by each tetrahedron that chooses one.
         edges: number of edges.
 
     Returns:
-        (e,) booleans.
+        (e,) bool.
     """
     around = np.bincount(of_cell.ravel(), minlength=edges)
     return np.asarray(around == np.bincount(chosen, minlength=edges))
@@ -164,7 +167,7 @@ def chosen_by_all(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
 def _terminal_edges(
     points: NDArray, ends: NDArray, of_cell: NDArray, wanted: NDArray
 ) -> NDArray:
-    """Return (e,) edges to split now: longest of all their cells, near wanted cells."""
+    """Return (e,) edges to split now: longest in all their cells, near wanted cells."""
     rank = length_ranks(points, ends)
     longest = np.take_along_axis(
         of_cell, rank[of_cell].argmax(axis=1)[:, None], axis=1
@@ -180,7 +183,7 @@ def _terminal_edges(
 
 
 def _halved(cells: NDArray, middle: NDArray, pairs: NDArray) -> tuple[NDArray, NDArray]:
-    """Return cells with a split edge as two, second ones appended; and indices."""
+    """Return cells with split edges as two cells each, seconds appended; indices."""
     row, which = np.nonzero(middle >= 0)
     new = middle[row, which]
     first, second = cells[row].copy(), cells[row].copy()

@@ -1,7 +1,7 @@
 """Regions of different materials, and a mesh cut along the faces between them.
 
 Known faces, such as planes of a box or faces between two solids, become faces of
-tetrahedra.  In later steps their corners stay on their shapes.
+tetrahedra.  In later steps their corners stay on the shapes of these faces.
 """
 
 from collections.abc import Callable
@@ -23,18 +23,19 @@ from stiffness.mesh.lagrange import FACES
 from stiffness.mesh.refine import edge_code
 from stiffness.mesh.solid import Solid
 
-_POOR = 0.2  # quality of tetrahedra that stay valid when they follow a curved face
-# relative to a piece's volume in one region: then the whole piece belongs to it
+_POOR = 0.2  # quality from which tetrahedra remain valid when they follow a curved face
+# share of a piece's volume in one region, from which on the whole piece belongs to it
 _AGREED = 0.9
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Region of a link with one material.
+    """Region of a link that consists of one material.
 
     Attributes:
-        where: function that selects the points (n, 3) [m] in it.
-        faces: along which the mesh is cut; a region without faces follows the elements.
+        where: function that selects the points (n, 3) [m] in the region.
+        faces: faces along which the mesh is cut; without faces the region consists of
+            elements.
     """
 
     where: Callable[[NDArray], NDArray]
@@ -45,8 +46,8 @@ def region_of_cells(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
     """Return the region of each tetrahedron.
 
     Args:
-        solid: any solid.
-        regions: later ones have precedence.
+        solid: straight tetrahedra.
+        regions: regions; later ones have precedence.
 
     Returns:
         (t,) 1 for the first region, and so on; 0 outside all.
@@ -58,13 +59,13 @@ def region_of_cells(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
 def region_of_places(
     places: NDArray, regions: tuple[Region, ...], cut_region: NDArray | None
 ) -> NDArray:
-    """Return the region of places inside tetrahedra.
+    """Return the region of points inside tetrahedra.
 
     Args:
-        places: (n, 3) [m].
-        regions: later ones have precedence.
-        cut_region: (n,) region of the tetrahedron at each position, among the regions
-            whose faces the mesh was cut along; None if it was not cut.
+        places: (n, 3) [m] points.
+        regions: regions; later ones have precedence.
+        cut_region: (n,) region of the tetrahedron at each point, among the regions
+            along whose faces the mesh was cut; None if it was not cut.
 
     Returns:
         (n,) 1 for the first region, and so on; 0 outside all.
@@ -81,11 +82,12 @@ def cut_by_regions(solid: Solid, regions: tuple[Region, ...]) -> Solid:
     """Cut a mesh so that regions' faces are faces of tetrahedra.
 
     Args:
-        solid: any solid.
+        solid: straight tetrahedra.
         regions: regions of the link.
 
     Returns:
-        The solid, with the region of each tetrahedron and the triangles between them.
+        The solid with the region of each tetrahedron, and with the triangles between
+        regions.
     """
     if not any(region.faces for region in regions):
         return solid
@@ -107,14 +109,14 @@ def cut_by_regions(solid: Solid, regions: tuple[Region, ...]) -> Solid:
 
 
 def is_jagged(solid: Solid, regions: tuple[Region, ...]) -> bool:
-    """Return whether a face between regions runs through tetrahedra.
+    """Return whether tetrahedra contain a face between regions.
 
     Args:
-        solid: any solid.
+        solid: straight tetrahedra.
         regions: regions of the link.
 
     Returns:
-        True if a region has no faces, or cutting along them failed.
+        True if a region has no faces, or if cutting along the faces failed.
     """
     if not regions:
         return False
@@ -126,14 +128,14 @@ def is_jagged(solid: Solid, regions: tuple[Region, ...]) -> bool:
 
 
 def material_edges(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
-    """Return boundary edges between two regions, at which stresses are singular.
+    """Return the boundary edges between two regions, where stresses are singular.
 
     Args:
-        solid: any solid.
+        solid: straight tetrahedra.
         regions: regions of the link.
 
     Returns:
-        (e, 2) corners.
+        (e, 2) corners of the edges.
     """
     if not regions:
         return np.zeros((0, 2), dtype=int)
@@ -144,11 +146,11 @@ def edges_between(solid: Solid, region: NDArray) -> NDArray:
     """Return the edges of the boundary at which two regions meet.
 
     Args:
-        solid: any solid.
-        region: (t,) of each tetrahedron.
+        solid: straight tetrahedra.
+        region: (t,) region of each tetrahedron.
 
     Returns:
-        (e, 2) corners.
+        (e, 2) corners of the edges.
     """
     count = len(solid.points)
     label = region[_owners(solid)]
@@ -170,7 +172,7 @@ def _owners(solid: Solid) -> NDArray:
 
 
 def _places_inside(solid: Solid) -> NDArray:
-    """Return (t, 3) [m] positions in tetrahedra, away from the faces of cuts."""
+    """Return (t, 3) [m] points inside tetrahedra, away from cut faces."""
     on = np.zeros(len(solid.points), dtype=bool)
     on[solid.inner] = True
     off = ~on[solid.cells]
@@ -180,7 +182,7 @@ def _places_inside(solid: Solid) -> NDArray:
 
 
 def _pieces(solid: Solid) -> NDArray:
-    """Return the (t,) piece of each tetrahedron; cuts separate the pieces."""
+    """Return the (t,) piece of each tetrahedron, where cuts separate the pieces."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -194,7 +196,7 @@ def _pieces(solid: Solid) -> NDArray:
 
 
 def _between_regions(solid: Solid) -> Solid:
-    """Keep exactly the cuts between two regions."""
+    """Return the solid with only those cuts that separate two regions."""
     assert solid.region is not None
     faces, owners = faces_inside(solid.cells)
     one, other = solid.region[owners].T

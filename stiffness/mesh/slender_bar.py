@@ -1,8 +1,9 @@
-"""Meshes of slender and thin-walled straight bars, recognised from their surfaces.
+"""Meshes of slender and thin-walled straight bars recognised from their surfaces.
 
-The mesher makes elements as wide as they are long.  For a rod a thousand times as long
-as thick, or a tube with a wall of a hundredth of its radius, it needs minutes or does
-not end.  Extruded from their sections such bars need a few thousand elements.
+The mesher makes elements that are as wide as long.  It needs minutes, or does not end,
+for a rod that is a thousand times as long as thick or for a tube whose wall is a
+hundredth of its radius.  Extruded from their sections, such bars need a few thousand
+elements.
 """
 
 import math
@@ -19,13 +20,16 @@ from stiffness.surface.primitives import Cone, Plane, Shape
 from stiffness.surface.surface import Surface
 from stiffness.surface.true_surface import TrueSurface
 
-_SLENDER = 50.0  # length over the section's width, of a slender bar
-_THIN = 0.04  # wall over width of a thin-walled section; for a tube over its diameter
-_LAYERS = 60.0  # number of element layers along a bar, without those at its ends
-# length of a layer over the section's width, for a bar that is not slender
+# ratio of length to width of the section from which on a bar is slender
+_SLENDER = 50.0
+# ratio of wall to width (for a tube, to diameter) below which a section is thin-walled
+_THIN = 0.04
+_LAYERS = 60.0  # number of element layers along a bar, without the layers at its ends
+# ratio of the length of a layer to the width of the section, for a bar that is not
+# slender
 _LONGEST = 2.0
-_PARALLEL = 1e-6  # [rad]
-_SAME = 1e-6  # relative to the length: difference of two positions that agree
+_PARALLEL = 1e-6  # [rad] largest angle of parallel directions
+_SAME = 1e-6  # relative to the length: largest difference of two positions that agree
 _SAME_VOLUME = 1e-3
 
 
@@ -38,11 +42,12 @@ def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | No
         tip: the loaded interface.
 
     Returns:
-        A mesh to refine from, in the surface's axes; None if the link is no round bar,
-        tube, rectangle or box between base and tip, or is neither slender nor thin.
+        A mesh to refine from, in the axes of the surface; None if the link is not a
+        round bar, tube, rectangle or box between base and tip, or is neither slender
+        nor thin-walled.
 
     Raises:
-        BadInput: an interface has no part of the surface.
+        BadInput: no part of the surface is on an interface.
     """
     if base.kind == "bore" or tip.kind == "bore":
         return None
@@ -53,7 +58,7 @@ def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | No
         return None
     along = (surface.points - base.point) @ axis
     off = np.minimum(np.abs(along), np.abs(along - length))
-    # all corners of a bar are at its ends: a cheaper test than recognising shapes
+    # all corners of a bar are at its ends; this test is faster than recognising shapes
     if off.max() > 10 * _SAME * length:
         return None
     patches = find_patches(surface, base, tip)
@@ -109,7 +114,7 @@ def _round_section(
 def _angular_section(
     planes: list[Plane], axis: NDArray
 ) -> tuple[dict[str, float], NDArray, NDArray] | None:
-    """Return the section of a rectangle, or of a box of one wall thickness."""
+    """Return the section of a rectangle, or of a box with one wall thickness."""
     first = planes[0].normal
     second = np.cross(axis, first)
     middle = np.mean([plane.point for plane in planes], axis=0)
@@ -133,7 +138,7 @@ def _angular_section(
 
 
 def _wall(lengths: dict[str, float]) -> float:
-    """Return the thinnest wall [m]; infinite in a solid section."""
+    """Return the smallest wall thickness [m]; infinite for a solid section."""
     if "radius" in lengths:
         inner = lengths.get("inner_radius")
         return math.inf if inner is None else lengths["radius"] - inner
@@ -152,7 +157,7 @@ def _area(lengths: dict[str, float]) -> float:
 
 
 def _placed(bar: Solid, frame: NDArray, foot: NDArray, length: float) -> Solid:
-    """Return a bar of unit length along z, rotated, scaled and moved."""
+    """Return a bar of unit length along z after rotation, scaling and translation."""
 
     def moved(shape: Shape | None) -> Shape | None:
         if isinstance(shape, Plane):

@@ -1,4 +1,4 @@
-"""A link as straight tetrahedra, and its corners moved onto the exact shapes."""
+"""A link as straight tetrahedra, with its corners on the exact shapes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -11,7 +11,8 @@ from stiffness.mesh.lagrange import EDGES
 from stiffness.surface.primitives import Shape, project
 from stiffness.surface.true_surface import TrueSurface
 
-FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward orientation
+# corners of each face, in outward orientation
+FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,16 +20,17 @@ class Solid:
     """A link as tetrahedra with straight edges, and the shapes of its boundary.
 
     Attributes:
-        points: (n, 3) [m] corners, on the exact shapes where those are known.
-        cells: (t, 4) corners of tetrahedra, of positive volume.
-        faces: (f, 3) corners of boundary triangles, outward.
+        points: (n, 3) [m] corners; they are on the exact shapes where these are known.
+        cells: (t, 4) corners of tetrahedra with positive volume.
+        faces: (f, 3) corners of boundary triangles, in outward orientation.
         patch: (f,) number of each face's patch; 0 is the base interface, 1 the tip.
-        shapes: shapes of the patches; None leaves a patch's nodes unchanged.
-        walls: walls by pair of an interface and a patch that continues it smoothly, the
-            wall on their common line, see :mod:`stiffness.surface.smooth_outline`.
-        surface: surface to be approximated; None if its patches' shapes suffice.
-        inner: (k, 3) corners of triangles inside, between regions of the link.
-        inner_patch: (k,) index of the shape of each of them.
+        shapes: shape of each patch; None leaves the nodes of a patch unchanged.
+        walls: for a pair of an interface and a patch that continues it smoothly, the
+            wall through their common line, see :mod:`stiffness.surface.smooth_outline`.
+        surface: surface to approximate; None if the shapes of the patches are
+            sufficient.
+        inner: (k, 3) corners of triangles inside the link, between regions.
+        inner_patch: (k,) index of the shape of each inner triangle.
         region: (t,) region of each tetrahedron, see :mod:`stiffness.mesh.regions`; None
             if the mesh was not cut.
     """
@@ -55,27 +57,27 @@ class Solid:
 def meeting_shapes(
     solid: Solid, key: tuple[int, ...], points: NDArray
 ) -> tuple[Shape, ...]:
-    """Return the shapes on which corners must lie.
+    """Return the shapes on which corners must be.
 
     Args:
-        solid: any solid.
-        key: the patches of the corners; none for inner corners.
-        points: (n, 3) [m] the corners' places.
+        solid: straight tetrahedra.
+        key: the patches of the corners; empty for inner corners.
+        points: (n, 3) [m] positions of the corners.
 
     Returns:
-        The patches' shapes, or their replacement where two meet smoothly.
+        The shapes of the patches, or the replacement where two patches meet smoothly.
     """
     return _meeting_shapes(key, solid.shapes, solid.walls, points) if key else ()
 
 
 def corner_groups(solid: Solid) -> list[tuple[tuple[int, ...], NDArray]]:
-    """Return the corners of a solid that must lie on shapes.
+    """Return the corners of a solid that must be on shapes, grouped by shapes.
 
     Args:
-        solid: any solid.
+        solid: straight tetrahedra.
 
     Returns:
-        As :func:`node_patches`, for the boundary and for faces between regions.
+        Groups as in :func:`node_patches`, for the boundary and faces between regions.
     """
     faces = np.concatenate([solid.faces, solid.inner])
     patch = np.r_[solid.patch, solid.inner_patch]
@@ -89,7 +91,7 @@ def _meeting_shapes(
     points: NDArray,
 ) -> tuple[Shape, ...]:
     """Return the shapes whose intersection contains points of some patches."""
-    # tangent shapes do not determine their common line; the wall on it does
+    # tangent shapes do not determine their common line; the wall through it does
     standing = {pair: wall for pair, wall in walls.items() if set(pair) <= set(key)}
     replaced = {other for _, other in standing}
     known = [s for p in key if p not in replaced and (s := shapes[p]) is not None]
@@ -100,7 +102,7 @@ def _meeting_shapes(
 
 
 def _tangent(one: Shape | None, other: Shape, points: NDArray) -> bool:
-    """Return whether two shapes have the same normal near some points."""
+    """Return whether two shapes have the same normal at points."""
     if one is None:
         return False
     along = np.einsum("ni,ni->n", one.signed(points)[1], other.signed(points)[1])
@@ -114,7 +116,8 @@ def element_quality(solid: Solid) -> NDArray:
         solid: straight tetrahedra.
 
     Returns:
-        (t,) [-] 1 for a regular one, 0 for a flat one, negative for an inverted one.
+        (t,) [-] 1 for a regular tetrahedron, 0 for a flat one, negative for an inverted
+        one.
     """
     return tetrahedra_quality(solid.points[solid.cells])
 
@@ -123,10 +126,10 @@ def tetrahedra_quality(corners: NDArray) -> NDArray:
     """Return the quality of tetrahedra: 6 sqrt(2) volume over the cubed rms edge.
 
     Args:
-        corners: (t, 4, 3) [m].
+        corners: (t, 4, 3) [m] positions of the corners.
 
     Returns:
-        (t,) [1].
+        (t,) [1] quality.
     """
     i, j = EDGES.T
     mean_square = np.sum((corners[:, i] - corners[:, j]) ** 2, axis=2).mean(axis=1)
@@ -139,10 +142,10 @@ def boundary_faces(cells: NDArray) -> NDArray:
     """Return the faces that belong to one tetrahedron only.
 
     Args:
-        cells: (t, 4) of positive volume.
+        cells: (t, 4) corners of tetrahedra with positive volume.
 
     Returns:
-        (f, 3) outward.
+        (f, 3) corners of the faces, in outward orientation.
     """
     faces = cells[:, FACES].reshape(-1, 3)
     key = np.sort(faces, axis=1)
@@ -161,10 +164,10 @@ def node_patches(
     Args:
         nodes: number of nodes.
         members: (f, k) nodes of each boundary face.
-        patch: (f,) the faces' patches.
+        patch: (f,) patch of each face.
 
     Returns:
-        Pairs of a set of patches and the nodes that lie on exactly those.
+        Pairs of a set of patches, and the nodes that are on exactly these patches.
     """
     pairs = np.column_stack([members.ravel(), np.repeat(patch, members.shape[1])])
     pairs = np.unique(pairs, axis=0)
@@ -186,14 +189,14 @@ def on_shapes(
     """Return the points moved onto the shapes of their patches.
 
     Args:
-        points: (n, 3) [m].
+        points: (n, 3) [m] points.
         groups: points by their patches.
         shapes: shapes of the patches.
         reach: [m] largest motion of a point.
-        walls: walls of a :class:`Solid`; none if absent.
+        walls: walls as in :class:`Solid`; none if absent.
 
     Returns:
-        (n, 3) [m].
+        (n, 3) [m] positions.
     """
     moved = points.copy()
     for key, group in groups:
@@ -209,11 +212,11 @@ def corners_on_shapes(solid: Solid) -> NDArray:
     """Return the positions of a solid's corners on its shapes.
 
     Args:
-        solid: its corners may be off the shapes of their patches.
+        solid: solid whose corners may be off the shapes of their patches.
 
     Returns:
-        (n, 3) [m], boundary corners projected unless that is farther than a hundredth
-        of the part's size.
+        (n, 3) [m] positions; boundary corners are projected unless their distance
+        exceeds a hundredth of the part's size.
     """
     size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     groups = corner_groups(solid)
@@ -221,10 +224,10 @@ def corners_on_shapes(solid: Solid) -> NDArray:
 
 
 def moved_onto_shapes(solid: Solid) -> Solid:
-    """Move corners onto their shapes; shorten moves that invert tetrahedra.
+    """Move corners onto their shapes; reduce moves that would invert tetrahedra.
 
     Args:
-        solid: its corners may be off the shapes of their patches.
+        solid: solid whose corners may be off the shapes of their patches.
 
     Returns:
         The solid with its corners moved.

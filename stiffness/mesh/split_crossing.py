@@ -18,14 +18,14 @@ def split_crossing(
     """Split edges of a mesh where they cross a surface.
 
     Args:
-        solid: to split.
-        on: (n,) whether a corner is on the surface.
-        crossing: function of a solid, its corners on the surface and its edges (e, 2);
-            it returns which edges cross the surface, and at which share of their
+        solid: solid to split.
+        on: (n,) bool, True for a corner on the surface.
+        crossing: function of a solid, its corners on the surface and its edges (e, 2).
+            It returns which edges cross the surface, and at which share of their
             length.
 
     Returns:
-        The solid, and which of its corners are on the surface.
+        The solid, and (n,) bool: its corners on the surface.
     """
     for _ in range(_PASSES):
         ends, of_cell = edges_of(solid.cells, len(solid.points))
@@ -41,14 +41,14 @@ def split_crossing(
 
 
 def one_of_each(wanted: NDArray, of_cell: NDArray) -> NDArray:
-    """Return the edges to split together: at most one of each tetrahedron.
+    """Return the edges to split together: at most one edge of each tetrahedron.
 
     Args:
-        wanted: (e,) bool, edges to be split.
+        wanted: (e,) bool, True for edges to be split.
         of_cell: (t, 6) edges of each tetrahedron.
 
     Returns:
-        (e,) bool, a part of them, at least one if any is wanted.
+        (e,) bool, True for a part of these edges; at least one if any is wanted.
     """
     order = np.where(wanted, np.arange(len(wanted), 0, -1), 0)
     first = of_cell[np.arange(len(of_cell)), order[of_cell].argmax(axis=1)]

@@ -1,11 +1,12 @@
 """Tetrahedra of straight bars from their sections, without a mesher.
 
-A section of triangles is extruded along z in layers.  The layers are thin at both ends,
-which are held, and longer between them, where the field is a beam's.  The prism of a
-triangle and a layer is split into three tetrahedra.  The diagonal of each side starts
-at its smallest number, so that neighbours split their common side alike (Dompierre et
-al. 1999).  One element spans a wall of any thickness.  Elements that are long along the
-bar and around a tube number thousands, while a mesher of equal edges needs millions.
+A triangulated section is extruded along z in layers.  The layers are thin at both ends,
+which are held, and thicker between them, where the field is that of a beam.  The prism
+of a triangle and a layer is split into three tetrahedra.  The diagonal of each side
+starts at the smallest corner number, so that neighbours split their common side alike
+(Dompierre et al. 1999).  One element spans a wall of any thickness.  Elements that are
+long along the bar and around a tube are only some thousands, while a mesher with equal
+edges needs millions.
 """
 
 import math
@@ -18,21 +19,24 @@ from stiffness.mesh.solid import Solid, boundary_faces
 from stiffness.surface.primitives import Cone, Plane, Shape
 
 _AROUND = 8  # smallest number of elements around a full circle
-_OFF = 0.008  # largest distance of arc and chord, in lengths: limits refinement
-_IN_WALL = 1.0  # squared angle of an element over wall by radius: chords stay inside
-_FLAT = 4.0  # largest width of an element over its height, in a section
+# largest distance between arc and chord in units of length, which limits refinement
+_OFF = 0.008
+# largest squared angle of an element, relative to wall over radius: chords stay inside
+_IN_WALL = 1.0
+_FLAT = 4.0  # largest ratio of width to height of an element in a section
 _GROWTH = 2.0  # ratio of the thicknesses of consecutive layers
-_LONGEST = 2.0  # thickness of the longest layer, in widths of the section
+_LONGEST = 2.0  # thickness of the thickest layer, in widths of the section
 _UP = np.array([0.0, 0.0, 1.0])
 
 
 def straight_bar(section: Mapping[str, float], longest: float = _LONGEST) -> Solid:
-    """Return a bar of unit length along z, its section's y and z along x and y.
+    """Return a bar of unit length along z; its section's y and z are along x and y.
 
     Args:
-        section: lengths of :func:`stiffness.beam.sections.declared_section`, per length
-            of the bar.
-        longest: thickness of the longest layer, in widths of the section.
+        section: lengths in the form of
+            :func:`stiffness.beam.sections.declared_section`, relative to the length of
+            the bar.
+        longest: thickness of the thickest layer, in widths of the section.
 
     Returns:
         A mesh to refine from: patch 0 at z = 0, patch 1 at z = 1.
@@ -61,14 +65,14 @@ def straight_bar(section: Mapping[str, float], longest: float = _LONGEST) -> Sol
 
 
 def _thinnest(section: Mapping[str, float]) -> float:
-    """Return the smallest thickness of a section."""
+    """Return the smallest wall thickness of a section."""
     if "radius" in section:
         return section["radius"] - section.get("inner_radius", 0.0)
     return min(section.values())
 
 
 def _heights(first: float, longest: float) -> NDArray:
-    """Return heights from 0 to 1, in layers that grow from both ends to the middle."""
+    """Return heights from 0 to 1 of layers whose thickness increases to the middle."""
     steps = [min(first, 0.25)]
     while sum(steps) < 0.5:
         steps.append(min(_GROWTH * steps[-1], longest))
@@ -127,7 +131,7 @@ def _angular(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
 
 
 def _divided(cuts: NDArray, longest: float) -> NDArray:
-    """Return the cuts with further ones between, no farther apart than ``longest``."""
+    """Return the cuts with additional ones, so that no gap exceeds ``longest``."""
     parts = [
         np.linspace(low, high, math.ceil((high - low) / longest - 1e-9) + 1)[:-1]
         for low, high in zip(cuts, cuts[1:], strict=False)
@@ -138,10 +142,10 @@ def _divided(cuts: NDArray, longest: float) -> NDArray:
 def _sides(
     section: Mapping[str, float], corners: NDArray
 ) -> tuple[NDArray, tuple[Shape | None, ...]]:
-    """Return the side (f,) of each face (f, 3, 3), and the sides' shapes."""
+    """Return the side (f,) on which each face (f, 3, 3) is, and the shapes of sides."""
     if "radius" in section:
         radii = [r for r in (section["radius"], section.get("inner_radius")) if r]
         off = np.linalg.norm(corners[:, 0, :2], axis=1)[:, None] - radii
         return np.abs(off).argmin(axis=1), tuple(Cone(0 * _UP, _UP, r) for r in radii)
-    # sides across x and across y are flat, and meet at an edge
+    # sides normal to x and sides normal to y are flat and meet at an edge
     return np.ptp(corners[:, :, :2], axis=1).argmin(axis=1), (None, None)

@@ -1,14 +1,15 @@
-"""A beam against finite elements: the difference, and its physical part.
+"""Comparison of a beam with finite elements: the difference and its physical part.
 
-A beam's section warps and contracts freely; a rigid face prevents it.  The ends of a
-solid link are therefore stiffer than the beam, by about what a beam shorter by a fixed
-share of its radius would be: K / K_beam = 1 + c r / L, whose c depends on the section
-and on Poisson's ratio only.  It vanishes as the link grows slender; a difference that
-does not vanish is an error of one of the two models.
+A beam's section warps and contracts freely; a rigid face prevents this.  The ends of a
+solid link are therefore stiffer than those of the beam.  The effect is that of a beam
+shorter by a fixed share of its radius: K / K_beam = 1 + c r / L, where c depends only
+on the section and on Poisson's ratio.  The difference vanishes as the link becomes
+slender; a difference that does not vanish is an error of one of the two models.
 
-The commonest one is a section whose width and height are swapped, or a missing ``up``:
-the beam is then turned about its own axis.  The beam is therefore also compared at
-turns of 90 degrees, and a turn with much better agreement is reported.
+The most common error is a section with exchanged width and height, or a missing ``up``:
+the beam is then rotated about its axis.  The beam is therefore also compared after
+rotations by multiples of 90 degrees, and a rotation with much better agreement is
+reported.
 """
 
 from dataclasses import dataclass
@@ -21,20 +22,22 @@ from forcefit.results.display import html_table, short_repr
 from stiffness.link import LinkStiffness, scaled
 from stiffness.screws import rotation_matrix, screw_map
 
-_MUCH_BETTER = 0.25  # largest share of the difference that a better turn leaves
-_TURNS = (90, 180, 270)  # [deg]
+# largest ratio of the remaining to the original difference for a reported rotation
+_MUCH_BETTER = 0.25
+_TURNS = (90, 180, 270)  # [deg] rotations of the beam about its axis that are tried
 
 
 @dataclass(frozen=True, eq=False)
 class LinkComparison:
-    """One link by a beam formula and by finite elements.
+    """One link computed by a beam formula and by finite elements.
 
     Attributes:
-        beam: by the formula.
-        fea: by finite elements, same tip and axes.
+        beam: link by the beam formula.
+        fea: link by finite elements, with the same tip and axes.
         difference: (6, 6) [1] fea minus beam, scaled by sqrt(K_ii K_jj) of the beam.
-        length: [m] base to tip, along the beam.
-        size: [m] of the section: radius of gyration times 2, the radius of a round bar.
+        length: [m] length from base to tip along the beam.
+        size: [m] size of the section: twice the radius of gyration, for a round bar its
+            radius.
     """
 
     beam: LinkStiffness
@@ -47,19 +50,20 @@ class LinkComparison:
 
     @property
     def slenderness(self) -> float:
-        """Length over the section's size, L / r."""
+        """Ratio L / r of the length to the size of the section."""
         return self.length / self.size
 
     @property
     def end_effect(self) -> NDArray:
-        """(6,) [1] c of ``K_ii / K_ii of the beam = 1 + c r / L``."""
+        """(6,) [1] c in ``K_ii / K_ii of the beam = 1 + c r / L``."""
         return np.diag(self.difference) * self.slenderness
 
     @property
     def better_turn(self) -> tuple[int, float]:
-        """The turn of the beam about base to tip that agrees much better.
+        """Rotation of the beam about the line from base to tip that agrees much better.
 
-        Its angle [deg], 0 if there is none, and the largest remaining difference [1].
+        The angle [deg], or 0 if there is none, and the largest remaining difference
+        [1].
         """
         worst = float(np.abs(self.difference).max())
         axis = self.fea.tip - self.fea.base
@@ -70,7 +74,7 @@ class LinkComparison:
             for angle in _TURNS
         }
         noise = 2 * self.fea.relative_error_estimate
-        # of turns that differ by mesh error and rounding only, the smallest
+        # the smallest of rotations whose difference is due to mesh error and rounding
         least = min(remaining.values()) + noise + 1e-9 * worst
         best = min(angle for angle in remaining if remaining[angle] <= least)
         better = remaining[best] < _MUCH_BETTER * worst and worst > noise
@@ -78,13 +82,14 @@ class LinkComparison:
 
     @property
     def explanation(self) -> str:
-        """The difference in words."""
+        """Description of the difference."""
         angle, remaining = self.better_turn
         if angle:
             worst = 100 * np.abs(self.difference).max()
-            swap = "" if angle == 180 else ", or width and height swapped"
+            swap = "" if angle == 180 else ", or exchanged width and height"
             return (
-                f"The beam's axes look swapped: turned by {angle} degrees about base "
+                f"The beam's axes seem to be exchanged: rotated by {angle} degrees "
+                "about base "
                 f"to tip it would differ by {100 * remaining:.3g} % at most, not "
                 f"{worst:.3g} %.  Expected another up{swap}."
             )
@@ -105,7 +110,7 @@ class LinkComparison:
 
 
 def _turned_difference(comparison: LinkComparison, rotation: NDArray) -> float:
-    """Return [1] largest difference from the beam turned about the tip by a vector."""
+    """Return the [1] largest difference from the beam rotated about its tip."""
     axis = rotation / np.linalg.norm(comparison.fea.tip - comparison.fea.base)
     A = screw_map(np.zeros(3), rotation_matrix(axis))
     K = A @ comparison.beam.stiffness @ A.T
@@ -121,10 +126,10 @@ def compare_link(
     """Compare two stiffnesses of one link.
 
     Args:
-        beam: by formula.
-        fea: by finite elements, read at the same tip in the same axes.
-        size: [m] of the section, the radius of a round bar.
-        length: [m] of the beam; from base to tip if absent.
+        beam: link by the beam formula.
+        fea: link by finite elements, read at the same tip in the same axes.
+        size: [m] size of the section; for a round bar its radius.
+        length: [m] length of the beam; by default from base to tip.
 
     Returns:
         The comparison.
@@ -146,13 +151,13 @@ def compare_link(
 
 
 def entries_that_matter(stiffness: NDArray) -> list[tuple[int, int]]:
-    """Return upper entries of a stiffness above a thousandth of their scale.
+    """Return the upper entries of a stiffness above one thousandth of their scale.
 
     Args:
-        stiffness: (6, 6).
+        stiffness: (6, 6) stiffness.
 
     Returns:
-        Rows and columns.
+        Rows and columns of these entries.
     """
     matters = np.abs(np.triu(scaled(stiffness, stiffness))) > 1e-3
     return [(int(i), int(j)) for i, j in zip(*np.nonzero(matters), strict=True)]

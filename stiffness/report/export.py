@@ -11,7 +11,7 @@ from forcefit.inputs.table import BadInput, nearest
 from stiffness.report.library import Entry
 from stiffness.screws import SCREW
 
-# ours is [R T] / [m f]; all of these put translations and forces first
+# programs that put translations and forces first; here the order is [R T] / [m f]
 PROGRAMS = ("exudyn", "adams", "mapdl")
 _SWAPPED = [3, 4, 5, 0, 1, 2]
 
@@ -20,29 +20,29 @@ def translations_first(matrix: ArrayLike) -> NDArray:
     """Return a stiffness or compliance in the order [T R] / [f m].
 
     Args:
-        matrix: (6, 6) in our order.
+        matrix: (6, 6) matrix in the order [R T] / [m f].
 
     Returns:
-        (6, 6).
+        (6, 6) rearranged matrix.
     """
     return np.asarray(matrix, dtype=float)[np.ix_(_SWAPPED, _SWAPPED)]
 
 
 def stiffness_for(program: str, stiffness: ArrayLike, name: str = "link") -> str:
-    """Return K_E as another program reads it, SI units.
+    """Return K_E as text for another program, in SI units.
 
     Args:
-        program: ``"exudyn"``: ``stiffness`` of a RigidBodySpringDamper; ``"adams"``:
-            the K matrix of a FIELD statement; ``"mapdl"``: a MATRIX27 stiffness, lower
-            triangle of nodes I (base, at the same place) and J (tip).
-        stiffness: (6, 6) in our order.
-        name: of the link, for comments.
+        program: ``"exudyn"`` for ``stiffness`` of a RigidBodySpringDamper; ``"adams"``
+            for the K matrix of a FIELD statement; ``"mapdl"`` for a MATRIX27 stiffness,
+            lower triangle of the nodes I (base, at the same place) and J (tip).
+        stiffness: (6, 6) K_E in the order [R T] / [m f].
+        name: name of the link, for comments.
 
     Returns:
-        Text.
+        The text.
 
     Raises:
-        BadInput: an unknown program.
+        BadInput: the program is unknown.
     """
     if program not in PROGRAMS:
         raise BadInput(f'program: unknown "{program}"{nearest(program, PROGRAMS)}')
@@ -52,7 +52,7 @@ def stiffness_for(program: str, stiffness: ArrayLike, name: str = "link") -> str
         body = ",\n    ".join(f"[{row}]" for row in rows)
         return f"# {name}: order [TX TY TZ RX RY RZ]\nstiffness = [\n    {body}]\n"
     if program == "adams":
-        # K(i, j) column by column, as FIELD's KMATRIX lists it
+        # column by column, in the order of FIELD's KMATRIX
         columns = ",\n, ".join(", ".join(f"{v:.12e}" for v in column) for column in K.T)
         return f"! {name}: order X Y Z AX AY AZ\n, KMATRIX = {columns}\n"
     both = np.block([[K, -K], [-K, K]])
@@ -66,10 +66,10 @@ def stiffness_for(program: str, stiffness: ArrayLike, name: str = "link") -> str
 
 
 def library_csv(entries: Sequence[Entry]) -> str:
-    """Return a library as a table: per entry parameters, then the upper half of K.
+    """Return a library as a table: parameters of each entry, then the upper half of K.
 
     Args:
-        entries: of one library.
+        entries: entries of one library.
 
     Returns:
         CSV text with a header.

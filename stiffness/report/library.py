@@ -1,8 +1,9 @@
 """Libraries of link stiffnesses on disk, with their provenance.
 
-A library is a folder with one JSON file per entry.  An entry holds the stiffness, its
-error, the mesh, the parameters and material it was made for, the geometry's digest, the
-program's version and the date.  :mod:`stiffness.report.library_build` makes them.
+A library is a folder with one JSON file for each entry.  An entry holds the stiffness
+and its error, the mesh, the parameters and the material, the digest of the geometry,
+the version of the program and the date.  :mod:`stiffness.report.library_build` makes
+entries.
 """
 
 import itertools
@@ -29,12 +30,12 @@ class Entry:
     """A stored link.
 
     Attributes:
-        key: its name in the library.
-        stiffness: (6, 6) at the tip, in the link's axes.
+        key: name of the entry in the library.
+        stiffness: (6, 6) stiffness at the tip, in the link's axes.
         stiffness_error: (6, 6) estimate of the error of the stiffness.
-        tip: (3,) [m].
-        parameters: lengths [m] and material it was made for, by name.
-        about: everything stored.
+        tip: (3,) [m] position of the tip.
+        parameters: lengths [m] and material constants of the link, by name.
+        about: the whole content of the file.
     """
 
     key: str
@@ -52,7 +53,7 @@ def read_entry(path: Path | str, key: str) -> Entry:
 
     Args:
         path: the library's folder.
-        key: the entry's.
+        key: name of the entry.
 
     Returns:
         The entry.
@@ -62,7 +63,7 @@ def read_entry(path: Path | str, key: str) -> Entry:
     """
     path = Path(path)
     if not os.path.isdir(path):
-        raise BadInput(f"{path}: no library there; expected a folder of entries")
+        raise BadInput(f"{path}: found no library, expected a folder of entries")
     file = path / f"{key}.json"
     if Path(key).name != key or not os.path.isfile(file):
         known = [p.stem for p in sorted(path.glob("*.json"))]
@@ -110,7 +111,7 @@ def read_compliance(path: Path | str, key: str) -> NDArray:
 
     Args:
         path: the library's folder.
-        key: the entry's.
+        key: name of the entry.
 
     Returns:
         (6, 6) [rad/(N m) .. m/N].
@@ -125,44 +126,44 @@ def read_library(path: Path | str) -> list[Entry]:
     """Read all entries of a library, in the order of their keys.
 
     Args:
-        path: the folder.
+        path: folder of the library.
 
     Returns:
-        The entries.
+        The entries in the order of their keys.
 
     Raises:
-        BadInput: there is no library, nothing in it, or a damaged entry.
+        BadInput: there is no library, it is empty, or an entry is damaged.
     """
     path = Path(path)
     files = sorted(path.glob("*.json")) if os.path.isdir(path) else []
     if not files:
-        raise BadInput(f"{path}: no library there; expected a folder of entries")
+        raise BadInput(f"{path}: found no library, expected a folder of entries")
     return [_entry(file) for file in files]
 
 
 def look_up(
     entries: Sequence[Entry], wanted: Mapping[str, float], family: str = ""
 ) -> tuple[NDArray, NDArray]:
-    """Return the stiffness at wanted parameters, interpolated between a grid's entries.
+    """Return the stiffness at given parameters, interpolated between entries of a grid.
 
-    Logarithms of the diagonal and the scaled rest are interpolated by polynomials of
-    logarithms of the parameters, through up to four neighbours along each axis: links'
-    stiffnesses are nearly powers of their lengths.
+    Logarithms of the diagonal, and the scaled other entries, are interpolated by
+    polynomials of the logarithms of the parameters, through up to four neighbours along
+    each axis. Stiffnesses of links are nearly powers of their lengths.
 
     Args:
-        entries: a full grid.
-        wanted: a value of every parameter; of one that has a single value in the grid
-            it may be left out.
-        family: of parts by their surface; without one the grid of a shape, or the only
-            family there is.
+        entries: entries of a full grid.
+        wanted: value of every parameter; a parameter with a single value in the grid
+            may be omitted.
+        family: name of a family of parts given by surfaces; if absent, the grid of a
+            shape, or the only family.
 
     Returns:
-        (6, 6) stiffness, and (6, 6) estimate of its error: the change on leaving out
-        the farthest entry used along each axis, plus the entries' own errors.
+        (6, 6) stiffness, and (6, 6) estimate of its error: the change if the farthest
+        entry along each axis is left out, plus the errors of the entries.
 
     Raises:
-        BadInput: a parameter is unknown, missing or outside the grid, or the entries
-            do not fill a grid.
+        BadInput: a parameter is unknown, missing or outside the grid, or the entries do
+            not fill a grid.
     """
     entries = _grid_of(entries, family)
     names = list(entries[0].parameters)
@@ -234,7 +235,7 @@ def _interpolated(
     at: Sequence[float],
     most: Sequence[int],
 ) -> NDArray:
-    """Return tensor product of Lagrange's polynomials through the nearest values."""
+    """Return the tensor product of Lagrange polynomials through the nearest values."""
     chosen, weights = [], []
     for axis, value, count in zip(axes, at, most, strict=True):
         near = sorted(axis, key=lambda v: abs(np.log(v / value)))[: max(count, 1)]

@@ -1,6 +1,6 @@
-"""A library of links built from a file: a grid of one shape, and parts by surface.
+"""Building of a library of links from a file: a grid of one shape, parts by surface.
 
-Entries are written whole or not at all, so a build can be interrupted, resumed and
+An entry is written completely or not at all, so a build can be interrupted, resumed and
 shared.
 """
 
@@ -34,12 +34,12 @@ class Spec:
     """Content of a library to build.
 
     Attributes:
-        folder: of the library.
-        shape: of all entries.
+        folder: folder of the library.
+        shape: shape of all entries of the grid.
         method: ``"beam"`` or ``"fea"``.
         grid: values of each parameter: lengths [m], ``young`` [Pa], ...
-        accuracy: required relative error of finite elements.
-        links: parts given by their surface, in addition to the grid or instead of it.
+        accuracy: required relative error of the finite elements.
+        links: parts given by their surfaces, in addition to the grid or instead of it.
     """
 
     folder: Path
@@ -64,12 +64,12 @@ def read_spec(path: Path | str) -> Spec:
     """Read a build file.
 
     Args:
-        path: TOML with ``library`` and ``accuracy``; ``shape``, ``method`` and a table
-            ``grid`` of lists of numbers; tables ``[[link]]`` of parts given by their
-            surface; the grid, the links, or both.
+        path: TOML file with ``library`` and ``accuracy``.  It has ``shape``, ``method``
+            and a table ``grid`` of lists of numbers, or tables ``[[link]]`` of parts
+            given by their surfaces, or both.
 
     Returns:
-        The spec; the folder is relative to the file.
+        The content; the folder is relative to the file.
 
     Raises:
         BadInput: the file, a name or a value is invalid.
@@ -134,11 +134,11 @@ def entry_key(spec: Spec, point: Mapping[str, float]) -> str:
     """Return the name of an entry, unique to its parameters.
 
     Args:
-        spec: of its library.
-        point: its parameters.
+        spec: content of the library.
+        point: parameters of the entry.
 
     Returns:
-        Such as ``round-fea-length0.4-radius0.02-young6e+10-poisson0.3``.
+        The name, such as ``round-fea-length0.4-radius0.02-young6e+10-poisson0.3``.
     """
     values = "-".join(f"{name}{value:.9g}" for name, value in point.items())
     return f"{spec.shape}-{spec.method}-{values}"
@@ -153,11 +153,12 @@ def build_library(
 
     Args:
         spec: content of the library.
-        workers: processes.
-        update: called with entries done and wanted.
+        workers: number of processes.
+        update: called with the number of finished entries and the number of all
+            entries.
 
     Returns:
-        Files of all entries of the spec.
+        Files of all entries of the library.
 
     Raises:
         BadInput: the folder cannot be made, or an entry cannot be computed.
@@ -191,7 +192,7 @@ def build_library(
 
 
 def _make_folder(folder: Path, write: bool = True) -> None:
-    """Make the folder of a library; without ``write`` only check that one can."""
+    """Make the folder of a library; without ``write`` only check the possibility."""
     try:
         made = [one for one in (folder, *folder.parents) if not one.exists()]
         folder.mkdir(parents=True, exist_ok=True)
@@ -203,7 +204,7 @@ def _make_folder(folder: Path, write: bool = True) -> None:
 
 
 def _key(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> str:
-    """Return the name of an entry of the grid or of a surface."""
+    """Return the name of an entry of the grid, or of a part given by its surface."""
     if isinstance(wanted, SurfaceLink):
         return wanted.name
     return entry_key(spec, wanted)
@@ -238,7 +239,7 @@ def _make_entry(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> None:
 
 
 def _solve_point(spec: Spec, point: dict[str, float]) -> tuple[LinkStiffness, str]:
-    """Return the link of one point, and its geometry's digest."""
+    """Return the link at one point of the grid, and the digest of its geometry."""
     lengths, E, nu = _lengths(point), point["young"], point["poisson"]
     tip = np.array([0.0, 0.0, lengths["length"]])
     if spec.method == "beam":
@@ -260,7 +261,7 @@ def _solve_point(spec: Spec, point: dict[str, float]) -> tuple[LinkStiffness, st
 
 
 def _program() -> str:
-    """Return the name and version of this program."""
+    """Return name and version of this program."""
     try:
         return f"forcefit {version('forcefit')}"
     except PackageNotFoundError:

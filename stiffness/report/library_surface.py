@@ -1,8 +1,8 @@
-"""Library entries of parts given by their surface: single ones, and families.
+"""Library entries of parts given by their surfaces: single parts and families.
 
-A family is a table of files and their sizes, between which ``look_up`` interpolates.
+A family is a table of files and sizes, between which ``look_up`` interpolates.
 
-An entry is computed again when the content of its surface file or another setting
+An entry is computed again if the content of its surface file or another setting has
 changed.
 """
 
@@ -27,22 +27,23 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 @dataclass(frozen=True)
 class SurfaceLink:
-    """A part of a library to build.
+    """A part given by its surface, for a library.
 
     Attributes:
-        name: its key in the library.
-        surface: file, relative to the build file's folder or absolute.
-        base: the held interface, as written.
-        tip: the interface that moves.
+        name: name of the entry in the library.
+        surface: surface file, relative to the folder of the build file or absolute.
+        base: text of the held interface.
+        tip: text of the interface that moves.
         young: [Pa] Young's modulus.
         poisson: [-] Poisson's ratio.
-        density: [kg/m^3], 0 leaves mass and inertia out.
-        unit: of the surface file.
+        density: [kg/m^3] density; 0 leaves out mass and inertia.
+        unit: unit of the surface file.
         interface: one of :data:`stiffness.fem.condensation.KINDS`.
         accuracy: [1] required relative error of every entry of K.
-        family: of parts that differ in their sizes, empty for a single part.
-        sizes: [m] of a part of a family, by name.
-        parts: of another material, as on the command line.
+        family: name of a family of parts that differ in their sizes; empty for a single
+            part.
+        sizes: [m] sizes of a part of a family, by name.
+        parts: texts of parts of another material, as on the command line.
     """
 
     name: str
@@ -61,15 +62,15 @@ class SurfaceLink:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Sizes and material, as entries of a grid state them."""
+        """Sizes and material constants, in the form of a grid's entries."""
         given = dict(self.sizes) | {"young": self.young, "poisson": self.poisson}
         return given | ({"density": self.density} if self.density else {})
 
     def request(self) -> dict[str, Any]:
-        """Return all that the entry depends on, with the surface file's digest.
+        """Return all data on which the entry depends, with the surface file's digest.
 
         Returns:
-            Plain values, equal for equal settings.
+            Plain values, which are equal for equal settings.
 
         Raises:
             BadInput: the surface file cannot be read.
@@ -94,7 +95,7 @@ class SurfaceLink:
         """Return the link by finite elements.
 
         Returns:
-            The stiffness at the tip's centre, in the surface's axes.
+            The stiffness at the tip's centre, in the axes of the surface.
 
         Raises:
             BadInput: the surface or an interface is not usable.
@@ -122,13 +123,13 @@ def read_surface_links(root: Table, accuracy: float) -> tuple[SurfaceLink, ...]:
 
     Args:
         root: the file's table.
-        accuracy: of links that do not state one.
+        accuracy: required accuracy of links that do not state one.
 
     Returns:
         The links, in order.
 
     Raises:
-        BadInput: a rule is broken, a file is missing, or a name is given twice.
+        BadInput: a value is invalid, a file is missing, or a name is given twice.
     """
     links: dict[str, SurfaceLink] = {}
     for table in root.tables("link"):
@@ -148,7 +149,7 @@ def read_surface_links(root: Table, accuracy: float) -> tuple[SurfaceLink, ...]:
 
 
 def _add(links: dict[str, SurfaceLink], link: SurfaceLink, table: Table) -> None:
-    """Add a link; refuse a name that another one has."""
+    """Add a link; reject a name that another link has."""
     if link.name in links:
         found = f"found {quoted(link.name)} twice, expected other names"
         raise table.bad("name", found)
@@ -182,12 +183,13 @@ def _link(table: Table, surface: Path, accuracy: float) -> SurfaceLink:
 
 
 def family_of(common: SurfaceLink, file: Path) -> list[SurfaceLink]:
-    """Return the parts of one kind: a CSV table of their files and sizes.
+    """Return the parts of a family: a CSV table of their files and sizes.
 
     Args:
-        common: what all have in common, by the family's name; its interfaces may name
-            sizes in braces, such as ``"z={length}"``.
-        file: a column ``surface``, from the table's folder, and one for each size [m].
+        common: keys that all parts share, with the name of the family; interfaces may
+            name sizes in braces, such as ``"z={length}"``.
+        file: table with a column ``surface``, relative to its folder, and a column for
+            each size [m].
 
     Returns:
         A link for each row.
@@ -252,11 +254,11 @@ def is_current(file: Path, link: SurfaceLink) -> bool:
     """Return whether an entry exists and was computed with the present settings.
 
     Args:
-        file: of the entry.
+        file: file of the entry.
         link: the requested link.
 
     Returns:
-        False also for a file that is damaged.
+        The answer; False also for a damaged file.
 
     Raises:
         BadInput: the surface file cannot be read.

@@ -1,4 +1,4 @@
-"""Plots of stiffnesses; a function takes a result and returns a figure."""
+"""Figures of stiffnesses; each function takes a result and returns a figure."""
 
 from typing import TYPE_CHECKING
 
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 
 def plot_comparison(comparison: LinkComparison) -> "Figure":
-    """Plot K_E by finite elements and by a beam, and their difference, by entry.
+    """Return a figure of K_E by finite elements and by a beam, and of their difference.
 
     Args:
-        comparison: of one link by two methods.
+        comparison: comparison of one link by two methods.
 
     Returns:
         The figure: a pair of bars for each significant entry, and a map of differences.
@@ -54,7 +54,7 @@ def plot_comparison(comparison: LinkComparison) -> "Figure":
 
 
 def _plot_entries(axes: "Axes", links: "Sequence[LinkStiffness]") -> None:
-    """Plot entries larger than a thousandth of their scale, as bars of each link."""
+    """Plot the entries above one thousandth of their scale, as bars for each link."""
     entries = entries_that_matter(links[0].stiffness)
     width = 0.8 / len(links)
     for k, link in enumerate(links):
@@ -72,10 +72,10 @@ def _plot_entries(axes: "Axes", links: "Sequence[LinkStiffness]") -> None:
 
 
 def plot_slenderness(sweep: SlendernessSweep) -> "Figure":
-    """Plot the difference of finite elements and beam over L / r, with the fit.
+    """Return a figure of the difference of elements and beam over L / r, with the fit.
 
     Args:
-        sweep: one section at several lengths.
+        sweep: comparisons of one section at several lengths.
 
     Returns:
         The figure: a curve for each significant entry, with error bars of the meshes.
@@ -87,7 +87,7 @@ def plot_slenderness(sweep: SlendernessSweep) -> "Figure":
     ratio = sweep.slenderness
     fine = np.geomspace(ratio.min(), ratio.max(), 200)
     errors = [100 * c.fea.relative_error_estimate for c in sweep.comparisons]
-    # entries of a round section come in pairs: the second would hide the first
+    # entries of a round section come in pairs, of which the second would hide the first
     plotted: list[tuple[int, int]] = []
     for entry in entries_that_matter(sweep.comparisons[0].beam.stiffness):
         c, d = sweep.end_effect[entry], sweep.second[entry]
@@ -120,18 +120,18 @@ def plot_stress(
     section: "Mapping[str, float] | None" = None,
     up: ArrayLike | None = None,
 ) -> "Figure":
-    """Plot the von Mises stress of one wrench from base to tip.
+    """Return a figure of the von Mises stress of one wrench from base to tip.
 
     Args:
-        everywhere: the influence at all nodes, also at the interfaces.
-        peak: of the wrench.
-        base: (3,) [m].
-        tip: (3,) [m].
-        section: of a beam to plot too.
-        up: (3,) the section's z.
+        everywhere: stresses of unit wrenches at all nodes, also at the interfaces.
+        peak: peak stress of the wrench.
+        base: (3,) [m] position of the base.
+        tip: (3,) [m] position of the tip.
+        section: section of a beam whose stress is plotted too.
+        up: (3,) the section's z axis.
 
     Returns:
-        The figure: a dot for each node, the beam's largest stress in each section as a
+        A dot for each node, and the largest stress in each section of the beam as a
         line; the evaluated region is white.
     """
     from matplotlib.figure import Figure

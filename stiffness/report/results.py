@@ -48,7 +48,7 @@ def comparison_results(comparison: LinkComparison) -> dict[str, Any]:
     """Return the object that ``--json`` writes for a beam and finite elements.
 
     Args:
-        comparison: of one link by two methods.
+        comparison: comparison of one link by two methods.
 
     Returns:
         Both links, their difference entry by entry, and its explanation.
@@ -69,7 +69,7 @@ def sweep_results(sweep: "SlendernessSweep") -> dict[str, Any]:
     """Return the object that ``--json`` writes for a sweep over slenderness.
 
     Args:
-        sweep: one section at several lengths.
+        sweep: comparisons of one section at several lengths.
 
     Returns:
         Both stiffnesses at each length, their differences, and the explanation.
@@ -95,10 +95,11 @@ def stress_results(peak: "PeakStress") -> dict[str, Any]:
     """Return the object that ``--json`` writes for the peak stress of a wrench.
 
     Args:
-        peak: by finite elements, and by the beam formula if a section is known.
+        peak: peak stress by finite elements, and by the beam formula for a known
+            section.
 
     Returns:
-        Values, places and the region they are from.
+        Stresses, their positions and the evaluated region.
     """
     results: dict[str, Any] = {
         "wrench": peak.wrench,
@@ -166,7 +167,7 @@ def comparison_text(comparison: LinkComparison) -> str:
     """Return a comparison of beam and finite elements as text.
 
     Args:
-        comparison: of one link by two methods.
+        comparison: comparison of one link by two methods.
 
     Returns:
         Lines of text.
@@ -188,7 +189,7 @@ def sweep_text(sweep: "SlendernessSweep") -> str:
     """Return a sweep over slenderness as text.
 
     Args:
-        sweep: one section at several lengths.
+        sweep: comparisons of one section at several lengths.
 
     Returns:
         Lines of text.
@@ -213,7 +214,8 @@ def stress_text(peak: "PeakStress") -> str:
     """Return the peak stress of a wrench as text.
 
     Args:
-        peak: by finite elements, and by the beam formula if a section is known.
+        peak: peak stress by finite elements, and by the beam formula for a known
+            section.
 
     Returns:
         Lines of text.
@@ -232,7 +234,7 @@ def stress_text(peak: "PeakStress") -> str:
 
 
 def _stress_error(peak: "PeakStress") -> str:
-    """Return a stress's estimated error, or why there is none."""
+    """Return the estimated error of a stress, or the reason why there is none."""
     if not math.isfinite(peak.error):
         return "none, the peak lies on an inner edge where stress has no finite value"
     share = peak.error / peak.von_mises if peak.von_mises else 0.0
@@ -246,10 +248,10 @@ def _megapascals(stress: float, place: NDArray) -> str:
 
 
 def matrix_text(stiffness: NDArray) -> str:
-    """Return a stiffness with its rows and columns named.
+    """Return a stiffness as text, with named rows and columns.
 
     Args:
-        stiffness: (6, 6).
+        stiffness: (6, 6) stiffness.
 
     Returns:
         Lines of text.
@@ -258,7 +260,7 @@ def matrix_text(stiffness: NDArray) -> str:
 
 
 def _matrix(matrix: NDArray, form: str) -> list[str]:
-    """Return the lines of a 6 by 6 matrix, rounding noise as zero."""
+    """Return the lines of a 6 by 6 matrix, with rounding noise shown as zero."""
     head = "   " + "".join(f"{name:>14}" for name in SCREW)
     noise = 1e-12 * np.abs(matrix).max()
     rows = np.where(np.abs(matrix) < noise, 0.0, matrix)

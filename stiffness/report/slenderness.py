@@ -1,13 +1,13 @@
-r"""Beam and finite elements over slenderness: the end effect and its decay.
+r"""Comparison of beam and finite elements over slenderness: the end effect.
 
-The same section at several lengths.  A rigid face keeps the section from warping and
-contracting over a distance that the section sets, not the length, so that the link is
-as stiff as a beam shorter by that much:
+One section is compared at several lengths.  A rigid face keeps the section from warping
+and contracting over a distance that depends on the section and not on the length, so
+the link is as stiff as a beam that is shorter by a fixed length:
 
     K / K_beam = 1 + c r / L + d (r / L)^2.
 
-c depends on the section, the interfaces and Poisson's ratio; the residual of the two
-terms should be no more than the meshes' error.
+c depends on the section, the interfaces and Poisson's ratio.  The residual of the two
+terms should not exceed the error of the meshes.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -34,13 +34,13 @@ _SHAPES = {
 
 @dataclass(frozen=True, eq=False)
 class SlendernessSweep:
-    """One section at several lengths, by beam and by finite elements.
+    """One section at several lengths, by beam theory and by finite elements.
 
     Attributes:
-        comparisons: of beam and finite elements, shortest first.
+        comparisons: comparisons of beam and finite elements, shortest link first.
         end_effect: (6, 6) [1] c, for K scaled by sqrt(K_ii K_jj) of the beam.
         end_effect_error: (6, 6) [1] error of c due to the meshes' estimated errors.
-        second: (6, 6) [1] d.
+        second: (6, 6) [1] coefficient d of the second-order term.
         residual: (n, 6, 6) [1] differences minus the fit.
     """
 
@@ -54,12 +54,12 @@ class SlendernessSweep:
 
     @property
     def slenderness(self) -> NDArray:
-        """(n,) L / r of each comparison."""
+        """(n,) slenderness L / r of each comparison."""
         return np.array([c.slenderness for c in self.comparisons])
 
     @property
     def explanation(self) -> str:
-        """The end effect, in words."""
+        """Description of the end effect."""
         c, error = np.diag(self.end_effect), np.diag(self.end_effect_error)
         turns, shifts = (" ".join(f"{v:.3f}" for v in part) for part in (c[:3], c[3:]))
         left = 100 * np.abs(self.residual).max()
@@ -85,21 +85,22 @@ def sweep_slenderness(
     """Compare a section's beam and solid at several lengths.
 
     Args:
-        section: ``radius`` and perhaps ``inner_radius``, or ``width`` and ``height``
-            and perhaps ``wall`` [m].
+        section: ``radius`` and optionally ``inner_radius``, or ``width`` and ``height``
+            and optionally ``wall`` [m].
         E: [Pa] Young's modulus.
         nu: [-] Poisson's ratio.
-        ratios: L / r, two or more, r as in
+        ratios: two or more values of L / r, with r as in
             :attr:`stiffness.beam.sections.Section.size`.
-        accuracy: [1] required relative error of finite elements.
-        interface: of the solid's ends.
-        update: called with lengths done and wanted.
+        accuracy: [1] required relative error of the finite elements.
+        interface: kind of the interfaces of the solid.
+        update: called with the number of finished lengths and the number of all
+            lengths.
 
     Returns:
         The comparisons and the fit.
 
     Raises:
-        BadInput: a section of another kind, or fewer than two lengths.
+        BadInput: the section has a different kind, or there are fewer than two lengths.
     """
     from stiffness.fem.fea import FemOptions, solve_link
     from stiffness.fem.material import Material
@@ -138,7 +139,7 @@ def fit_end_effect(comparisons: Sequence[LinkComparison]) -> SlendernessSweep:
     """Fit c and d of K / K_beam = 1 + c r / L + d (r / L)^2.
 
     Args:
-        comparisons: of one section at two or more lengths.
+        comparisons: comparisons of one section at two or more lengths.
 
     Returns:
         The comparisons with the fit.

@@ -1,4 +1,4 @@
-"""A part's surface: read, checked, divided at its two interfaces.
+"""Surface of a part: reading, checks, and division at its two interfaces.
 
-Begin at ``surface.py``; ``interface.py`` defines where a part is held and moved.
+Begin at ``surface.py``; ``interface.py`` defines the faces that are held and moved.
 """

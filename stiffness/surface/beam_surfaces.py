@@ -1,4 +1,4 @@
-"""Surfaces of common link shapes, from a few lengths; the axis is z, the base at 0."""
+"""Surfaces of common link shapes from lengths; the axis is z, with the base at 0."""
 
 from collections.abc import Mapping
 
@@ -10,7 +10,7 @@ from stiffness.beam.curve import Piece, straight_piece
 from stiffness.beam.sections import Section, declared_section, round_section
 from stiffness.surface.surface import Surface, check_surface
 
-# lengths of each shape; an optional length has a default
+# names of the lengths of each shape, with the default of an optional length
 SHAPES: dict[str, dict[str, float | None]] = {
     "round": {"length": None, "radius": None},
     "tube": {"length": None, "radius": None, "inner_radius": None},
@@ -22,14 +22,14 @@ _FACETS = 64
 
 
 def check_shape(shape: str, lengths: Mapping[str, float]) -> None:
-    """Reject an unknown shape, or names of lengths that it lacks.
+    """Reject an unknown shape, or unknown names of lengths.
 
     Args:
         shape: one of ``SHAPES``.
-        lengths: lengths by name [m].
+        lengths: lengths [m] by name.
 
     Raises:
-        BadInput: an unknown name, a missing one, or one that is not > 0.
+        BadInput: a name is unknown or missing, or a length is not > 0.
     """
     if shape not in SHAPES:
         raise BadInput(f'shape: unknown "{shape}"{nearest(shape, SHAPES)}')
@@ -43,11 +43,11 @@ def check_shape(shape: str, lengths: Mapping[str, float]) -> None:
             given = f"found {lengths[name]:g}" if name in lengths else "missing"
             raise BadInput(f"{shape}: {name}: {given}, expected a length > 0 [m]")
     if shape == "tube" and lengths["inner_radius"] >= lengths["radius"]:
-        raise BadInput("tube: inner_radius must be smaller than radius")
+        raise BadInput("tube: found inner_radius >= radius, expected a smaller one")
     if shape == "box" and 2 * lengths["wall"] >= min(
         lengths["width"], lengths["height"]
     ):
-        raise BadInput("box: wall must leave a hole")
+        raise BadInput("box: found a wall that leaves no hole, expected a thinner one")
 
 
 def shape_surface(shape: str, lengths: Mapping[str, float]) -> Surface:
@@ -55,10 +55,10 @@ def shape_surface(shape: str, lengths: Mapping[str, float]) -> Surface:
 
     Args:
         shape: one of ``SHAPES``.
-        lengths: lengths by name [m].
+        lengths: lengths [m] by name.
 
     Returns:
-        The surface; its facets' corners lie on the exact shape.
+        The surface; the corners of its facets are on the exact shape.
 
     Raises:
         BadInput: the shape or a length is invalid.
@@ -67,7 +67,7 @@ def shape_surface(shape: str, lengths: Mapping[str, float]) -> Surface:
     L = lengths["length"]
     if shape in {"rectangle", "box"}:
         corner = np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]]) / 2
-        # the height is along y: `up` of a beam along z
+        # the height is along y, which is ``up`` of a beam along z
         sides = np.array([lengths["width"], lengths["height"]])
         hole = corner * (sides - 2 * lengths["wall"]) if shape == "box" else None
         return _prism(corner * sides, corner * sides, L, shape, hole)
@@ -111,15 +111,15 @@ def _prism(
 
 
 def shape_beam(shape: str, lengths: Mapping[str, float], nu: float) -> list[Piece]:
-    """Return the same shape as a beam along z, height along y.
+    """Return the shape as a beam along z, with its height along y.
 
     Args:
         shape: one of ``SHAPES``.
-        lengths: lengths by name [m].
-        nu: [-] Poisson's ratio, for the shear factors.
+        lengths: lengths [m] by name.
+        nu: [-] Poisson's ratio, on which shear factors depend.
 
     Returns:
-        Its one piece.
+        The only piece of the beam.
 
     Raises:
         BadInput: the shape or a length is invalid.

@@ -1,8 +1,9 @@
-"""A surface with fewer triangles for the mesher, whose time grows with their number.
+"""A surface with fewer triangles for the mesher, whose time depends on their number.
 
-Long thin triangles, which CAD programs make for bars and bores, cost pytetwild most
+Long thin triangles, which CAD programs make for bars and bores, cost pytetwild much
 time, because it cuts its first tetrahedra along all of them.  Corners of the mesh are
-later projected onto the part's exact shapes, so the mesher's surface may be coarser.
+later projected onto the part's exact shapes, so the surface for the mesher may be
+coarser.
 """
 
 import numpy as np
@@ -11,23 +12,25 @@ from numpy.typing import NDArray
 from stiffness.surface.surface import Surface, directed_edges, signed_volume
 
 _VOLUME = 0.01  # accepted relative difference of the enclosed volumes
-_PARTS = 0.01 * 1.4 ** np.arange(13)  # shares of the triangles, tried in this order
+# shares of the number of triangles, tried in this order
+_PARTS = 0.01 * 1.4 ** np.arange(13)
 
 
 def coarser_surface(surface: Surface, tolerance: float) -> tuple[NDArray, NDArray]:
-    """Return the coarsest surface within a tolerance, of a dozen attempts.
+    """Return the coarsest surface within a tolerance that a dozen attempts find.
 
     Args:
-        surface: closed.
-        tolerance: [m] largest distance of either from the other, evaluated at the
-            surface's corners and at the coarser one's corners, edges and centres.
+        surface: closed surface.
+        tolerance: [m] largest distance between both surfaces, evaluated at the corners
+            of the given surface, and at the corners, edge middles and centres of the
+            coarser one.
 
     Returns:
-        Points (n, 3) [m] and triangles (m, 3) of a closed surface of the same genus and
-        a volume within 1 %; those of the surface itself if no attempt succeeds.
+        Points (n, 3) [m] and triangles (m, 3) of a closed surface with the same genus
+        and a volume within 1 %; those of the given surface if no attempt succeeds.
 
     Sources:
-        Garland & Heckbert (1997) for the quadric decimation, as VTK has it.
+        Garland & Heckbert (1997) for the quadric decimation, as implemented in VTK.
     """
     import pyvista
 
@@ -57,25 +60,25 @@ def coarser_surface(surface: Surface, tolerance: float) -> tuple[NDArray, NDArra
 
 
 def _distance(mesh: object, points: NDArray) -> float:
-    """Return the distance [m] of the point farthest from a mesh."""
+    """Return the [m] distance of the point that is farthest from a mesh."""
     _, near = mesh.find_closest_cell(points, return_closest_point=True)  # type: ignore[attr-defined]
     return float(np.linalg.norm(near - points, axis=1).max())
 
 
 def _closed(triangles: NDArray) -> bool:
-    """Return whether every edge has two triangles."""
+    """Return whether every edge belongs to two triangles."""
     edges = np.sort(directed_edges(triangles), axis=1)
     return bool((np.unique(edges, axis=0, return_counts=True)[1] == 2).all())
 
 
 def euler_characteristic(triangles: NDArray) -> int:
-    """Return corners less edges plus triangles: 2 - 2 genus for each closed shell.
+    """Return corners minus edges plus triangles: 2 - 2 genus for each closed shell.
 
     Args:
         triangles: (m, 3) corners.
 
     Returns:
-        The characteristic, the sum over all shells.
+        The characteristic, summed over all shells.
     """
     edges = np.sort(directed_edges(triangles), axis=1)
     corners = len(np.unique(triangles))

@@ -1,9 +1,9 @@
-"""A curved patch of no known shape, smoothed by Phong tessellation.
+"""A curved patch of unknown shape, smoothed by Phong tessellation.
 
-Between the corners a facet is lifted by half of the mean of the projections onto the
-corners' tangent planes (Boubekeur & Alexa 2008, Phong tessellation).  Along each edge
-the smaller of the two projections is used.  On an arc of half-angle a the error is a^4
-of the radius, while it is a^2 for a flat facet.
+Between its corners a facet is lifted by half of the mean of the projections onto the
+tangent planes of the corners (Boubekeur & Alexa 2008, Phong tessellation).  Along each
+edge the smaller of the two projections is used.  On an arc of half-angle a, the error
+is a^4 of the radius, while it is a^2 for a flat facet.
 """
 
 from dataclasses import dataclass, field
@@ -21,8 +21,8 @@ class Facets:
 
     Attributes:
         points: (n, 3) [m].
-        triangles: (m, 3) indices, outward.
-        normals: (n, 3) unit normals at the points, computed from this patch alone.
+        triangles: (m, 3) indices of points, in outward orientation.
+        normals: (n, 3) unit normals at the points, computed from this patch only.
     """
 
     points: NDArray
@@ -38,7 +38,7 @@ class Facets:
         object.__setattr__(self, "normals", self._corner_normals())
 
     def _corner_normals(self) -> NDArray:
-        """Return normals at corners: the facets', weighted by their angles."""
+        """Return normals at corners: the mean of facet normals, weighted by angles."""
         facing = area_vectors(self.points, self.triangles)
         facing /= np.maximum(np.linalg.norm(facing, axis=1), 1e-300)[:, None]
         corners = self.points[self.triangles]
@@ -52,7 +52,7 @@ class Facets:
         return total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
 
     def edge_lifts(self, edges: NDArray) -> NDArray:
-        """Return (e,) [m] lifts at the middles of edges (e, 2), by its end planes."""
+        """Return (e,) [m] lifts at the middles of edges (e, 2), from end planes."""
         rises = _rises(self.points[edges], self.normals[edges], limited=False)
         return np.asarray(np.linalg.norm(rises, axis=1) / 4)
 
@@ -84,9 +84,9 @@ class Facets:
 
 
 def _rises(corners: NDArray, normals: NDArray, limited: bool) -> NDArray:
-    """Return (e, 3) [m] 4 times the lifts of edges' middles, by planes at corners."""
-    # limited to the smaller one if the planes at both ends differ, and to zero if one
-    # rises and one falls: there a flat side meets a fillet
+    """Return (e, 3) [m] 4 times the lifts at edge middles, from corner planes."""
+    # limited to the smaller lift if the planes at both ends differ, and to zero if the
+    # lifts have different signs, which occurs where a flat side meets a fillet
     along = corners[:, 0] - corners[:, 1]
     heights = np.stack([
         np.einsum("ei,ei->e", sign * along, normals[:, k])

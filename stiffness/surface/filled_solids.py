@@ -1,4 +1,4 @@
-"""Solids of a STEP file that form one link, and the faces between them."""
+"""Solids of a STEP file that together form one link, and the faces between them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class FilledSolids:
-    """Touching solids, with the triangles around each.
+    """Touching solids and their triangles.
 
     Attributes:
         names: names of the solids.
-        points: (n, 3) [m].
-        triangles: (m, 3) indices of points; two solids that touch have the same ones.
-        sides: (m, 2) the solids on both sides, by their index in ``names``; -1 outside.
-        overlaps: pairs of solids that overlap, one line each.
+        points: (n, 3) [m] corners.
+        triangles: (m, 3) indices of points; solids that touch share triangles.
+        sides: (m, 2) index in ``names`` of the solid on each side; -1 outside.
+        overlaps: descriptions of pairs of solids that overlap.
     """
 
     names: tuple[str, ...]
@@ -26,13 +26,14 @@ class FilledSolids:
     overlaps: tuple[str, ...] = ()
 
     def around(self, members: Sequence[str]) -> tuple[NDArray, NDArray]:
-        """Return the boundary of some of the solids.
+        """Return the boundary of selected solids.
 
         Args:
-            members: their names.
+            members: names of the solids.
 
         Returns:
-            (k, 3) triangles around them, and (k,) whether each is inside the link.
+            (k, 3) triangles around them, and (k,) bool, True for a triangle inside the
+            link.
         """
         chosen = [number for number, name in enumerate(self.names) if name in members]
         one, other = (np.isin(side, chosen) for side in self.sides.T)

@@ -1,4 +1,4 @@
-"""Interfaces of a link and its joints: a plane of its surface, a disc, a bore."""
+"""Interfaces between a link and its joints: a plane of the surface, a disc, a bore."""
 
 import math
 from collections.abc import Mapping
@@ -12,7 +12,8 @@ from forcefit.inputs.table import BadInput, describe, nearest
 from stiffness.beam.beam import unit_vector
 from stiffness.screws import UNIT_VECTORS
 
-_FARTHEST = 1e6  # [m] largest coordinate or radius: much larger squares overflow
+# [m] largest accepted coordinate or radius, so that squares do not overflow
+_FARTHEST = 1e6
 _EXPECTED = '"z=0.452", "bore=px,py,pz/ax,ay,az/r", a table {plane, radius} or {bore}'
 
 
@@ -21,12 +22,12 @@ class Interface:
     """The part of a link's surface that a joint holds, in the mesh's axes.
 
     Attributes:
-        kind: ``"plane"``: all of the surface on a plane; ``"disc"``: the part of the
-            plane within a radius of the point; ``"bore"``: a cylindrical seat.
-        point: (3,) [m] on the plane; the disc's centre; or, on the bore's axis, the
-            point at which screws are read.
+        kind: ``"plane"`` for the whole surface on a plane; ``"disc"`` for the part of
+            the plane within a radius of the point; ``"bore"`` for a cylindrical seat.
+        point: (3,) [m] point on the plane; centre of the disc; or the point on the axis
+            of the bore at which screws are read.
         direction: (3,) unit normal of the plane, or axis of the bore.
-        radius: [m] of the disc or the bore; infinite for a plane.
+        radius: [m] radius of the disc or the bore; infinite for a plane.
     """
 
     kind: str
@@ -57,13 +58,13 @@ class Interface:
         return f"{self.kind}={p}/{d}{radius}"
 
     def distance(self, points: ArrayLike) -> NDArray:
-        """Return the distance of points from the interface's plane or cylinder.
+        """Return the distance of points from the plane or cylinder of the interface.
 
         Args:
-            points: (..., 3) [m].
+            points: (..., 3) [m] points.
 
         Returns:
-            (...) [m] >= 0.
+            (...) [m] distances, >= 0.
         """
         offset = np.asarray(points, dtype=float) - self.point
         along = offset @ self.direction
@@ -74,14 +75,14 @@ class Interface:
 
 
 def parse_interface(text: object, place: str = "interface") -> Interface:
-    """Return an interface from its text, as on the command line or in a robot file.
+    """Return an interface from text in the form of the command line or a robot file.
 
     Args:
         text: ``"z=0.452"`` (also x, y), ``"bore=px,py,pz/ax,ay,az/r"``,
             ``"disc=px,py,pz/nx,ny,nz/r"``, ``"plane=px,py,pz/nx,ny,nz"``, or a table
             ``{plane = {point, normal}, radius}`` or ``{bore = {point, axis, radius}}``.
-            All in metres, in the mesh's axes.
-        place: name of the option or key, for the message.
+            All lengths are in metres, in the mesh's axes.
+        place: name of the option or key, for messages.
 
     Returns:
         The interface.
@@ -100,7 +101,7 @@ def parse_interface(text: object, place: str = "interface") -> Interface:
 
 
 def _from_text(text: str) -> Interface:
-    """Return an interface from one line of text."""
+    """Return an interface from text."""
     kind, equals, value = (part.strip() for part in text.partition("="))
     parts = [comma_numbers(part) for part in value.split("/")]
     lengths = [len(part) for part in parts]

@@ -1,7 +1,7 @@
 """Reader of Wavefront OBJ files: points and polygons.
 
-Texture coordinates, normals, groups and materials do not define the shape.  They are
-not read, so faces may refer to absent ones.
+Texture coordinates, normals, groups and materials do not define the shape and are not
+read, so faces may refer to absent ones.
 """
 
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ def read_obj(path: Path) -> tuple[NDArray, list[list[int]]]:
         path: path of an existing file.
 
     Returns:
-        (n, 3) points in the file's unit, and the corner indices of each polygon.
+        (n, 3) points in the unit of the file, and the corner indices of each polygon.
 
     Raises:
         BadInput: a line is invalid, or a face has a corner that is not among the
@@ -46,8 +46,8 @@ def read_obj(path: Path) -> tuple[NDArray, list[list[int]]]:
         wrong = [k for k in face if not 0 <= k < len(points)]
         if wrong:
             raise BadInput(
-                f"{path}:{number}: found a face of point {wrong[0] + 1}, expected 1 "
-                f"to {len(points)}"
+                f"{path}:{number}: found point {wrong[0] + 1} in a face, expected "
+                f"points 1 to {len(points)}"
             )
         if len(face) < 3:
             raise BadInput(f"{path}:{number}: found a face of {len(face)} points")
@@ -55,7 +55,7 @@ def read_obj(path: Path) -> tuple[NDArray, list[list[int]]]:
 
 
 def _statements(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Yield numbers of lines and their words; a backslash continues a line."""
+    """Yield line numbers and the words of each line; a backslash continues a line."""
     text = path.read_bytes().removeprefix(b"\xef\xbb\xbf").decode("latin-1")
     words: list[str] = []
     for number, line in enumerate(text.split("\n"), 1):
@@ -67,6 +67,6 @@ def _statements(path: Path) -> Iterator[tuple[int, list[str]]]:
 
 
 def _corner(word: str, points: int) -> int:
-    """Return the index of a corner: from 1, or negative from the last point so far."""
+    """Return the index of a corner, stated from 1 or, if negative, from the end."""
     index = int(word.partition("/")[0])
     return index - 1 if index >= 0 else points + index

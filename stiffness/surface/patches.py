@@ -1,4 +1,4 @@
-"""Segmentation of a surface into smooth patches, each with its exact shape."""
+"""Segmentation of a surface into smooth patches with their exact shapes."""
 
 from dataclasses import dataclass
 
@@ -19,9 +19,9 @@ class Patches:
     """The patch of each triangle of a surface, and their shapes.
 
     Attributes:
-        patch: (m,) number of each triangle's patch; 0 is the base interface, 1 the tip.
-        shapes: shapes of each patch; lifted facets where no simpler one is known.
-        outlines: outlines of the interfaces, where the surface continues smoothly.
+        patch: (m,) patch number of each triangle; 0 is the base interface, 1 the tip.
+        shapes: shape of each patch; lifted facets where no simpler shape is known.
+        outlines: outlines of the interfaces at which the surface continues smoothly.
     """
 
     patch: NDArray
@@ -33,7 +33,7 @@ def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
     """Divide a surface at its sharp edges, and recognise the shapes.
 
     Args:
-        surface: the link's.
+        surface: surface of the link.
         base: the held interface.
         tip: the loaded interface.
 
@@ -41,7 +41,8 @@ def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
         The patches.
 
     Raises:
-        BadInput: an interface has no part of the surface, or both have the same part.
+        BadInput: no part of the surface is on an interface, or both interfaces are the
+            same.
     """
     patch = np.full(len(surface.triangles), -1)
     shapes: list[Shape] = []
@@ -62,7 +63,7 @@ def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
 def _outlines(
     graph: TriangleGraph, patch: NDArray, shapes: list[Shape]
 ) -> list[SmoothOutline]:
-    """Return outlines at which an interface meets another patch smoothly."""
+    """Return the outlines at which an interface meets another patch smoothly."""
     one, other = patch[graph.left], patch[graph.right]
     smooth = (graph.cosine > SHARP) & (one != other)
     found = []
@@ -83,10 +84,10 @@ def interface_shape(interface: Interface) -> Shape:
     """Return the plane or cylinder of an interface.
 
     Args:
-        interface: plane, disc or bore.
+        interface: a plane, disc or bore.
 
     Returns:
-        Its shape.
+        The shape of the interface.
     """
     if interface.kind == "bore":
         return Cone(interface.point, interface.direction, interface.radius)
@@ -94,16 +95,16 @@ def interface_shape(interface: Interface) -> Shape:
 
 
 def refuse_common_edges(surface: Surface, base: Interface, tip: Interface) -> None:
-    """Reject rigid interfaces that share an edge: their stiffness has no finite value.
+    """Reject rigid interfaces that share an edge, where the stiffness is infinite.
 
     Args:
-        surface: the link's.
+        surface: surface of the link.
         base: the held interface.
         tip: the loaded interface.
 
     Raises:
-        BadInput: the interfaces share an edge, or an interface has no part of the
-            surface.
+        BadInput: the interfaces share an edge, or no part of the surface is on an
+            interface.
     """
     codes: list[NDArray] = []
     for name, interface in (("base", base), ("tip", tip)):
@@ -125,15 +126,16 @@ def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:
     """Return the triangles of a surface that lie on an interface.
 
     Args:
-        surface: the link's.
-        interface: plane, disc or bore.
+        surface: surface of the link.
+        interface: a plane, disc or bore.
         name: base or tip, for messages.
 
     Returns:
         (k,) indices of triangles.
 
     Raises:
-        BadInput: there are none, or a disc's outline runs through triangles.
+        BadInput: there are no such triangles, or the outline of a disc crosses
+            triangles.
     """
     near = 1e-5 * surface.diagonal
     if interface.kind == "bore":

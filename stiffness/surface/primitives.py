@@ -1,11 +1,12 @@
-"""Smooth shapes that are recognised in a surface's patches.
+"""Smooth shapes that are recognised in the patches of a surface.
 
-A faceted surface is thinner than the part it approximates.  Its vertices lie on the
-true surface.  So a patch whose vertices all lie on a plane, a cone (cylinders
-included), a sphere or a torus is replaced by this shape, and the mesh's nodes are moved
-onto it.
+A faceted surface is thinner than the part that it approximates, while its vertices are
+on the true surface.  So a patch whose vertices are all on a plane, a cone (or
+cylinder), a sphere or a torus is replaced by this shape, and the nodes of the mesh are
+moved onto it.
 
-Every shape has ``signed(points)``: distances (n,) [m] and their gradients (n, 3).
+Every shape has ``signed(points)``, which returns signed distances (n,) [m] and their
+gradients (n, 3).
 """
 
 from collections.abc import Callable
@@ -16,15 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 S = TypeVar("S", bound="Shape")
-# residual evaluations of a fit, and of one that may still succeed
+# largest number of residual evaluations of a fit, and of a fit that may still succeed
 _CALLS = (25, 100)
-_MAY_FIT = 0.02  # relative to the points' size: largest residual of such a fit
-_FITS = 1e-9  # relative to the points' size: residual of a shape that fits
-_TINY = 1e-300  # keeps a division at a shape's own axis finite
+# relative to the points' size: largest residual of a fit that may still succeed
+_MAY_FIT = 0.02
+_FITS = 1e-9  # relative to the points' size: largest residual of a shape that fits
+_TINY = 1e-300  # avoids a division by zero on the axis of a shape
 
 
 class Shape(Protocol):
-    """A surface that points can be projected onto."""
+    """A surface onto which points can be projected."""
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
         """Return signed distances (n,) [m] and unit gradients (n, 3)."""
@@ -33,7 +35,7 @@ class Shape(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """Points x with normal . (x - point) = 0."""
+    """Plane of all points x with normal . (x - point) = 0."""
 
     point: NDArray
     normal: NDArray
@@ -46,7 +48,7 @@ class Plane:
 
 @dataclass(frozen=True, eq=False)
 class Cone:
-    """Radius + slope * t about an axis, t along it; with slope 0 a cylinder."""
+    """Cone of radius + slope * t at position t along an axis."""
 
     point: NDArray
     axis: NDArray
@@ -67,7 +69,7 @@ class Cone:
 
 @dataclass(frozen=True, eq=False)
 class Sphere:
-    """Points at one distance from a centre."""
+    """Sphere: all points at one distance from a centre."""
 
     point: NDArray
     radius: float
@@ -81,7 +83,7 @@ class Sphere:
 
 @dataclass(frozen=True, eq=False)
 class Torus:
-    """Points at one distance (``tube``) from a circle about an axis."""
+    """Torus: all points at one distance (``tube``) from a circle about an axis."""
 
     point: NDArray
     axis: NDArray
@@ -100,22 +102,23 @@ class Torus:
 
 
 def project(points: NDArray, shapes: tuple[Shape, ...]) -> NDArray:
-    """Return the points projected onto one shape, or onto the intersection of several.
+    """Return points projected onto one shape, or onto the intersection of several.
 
     Args:
         points: (n, 3) [m] near the shapes.
-        shapes: one to three, or more if they share a point.
+        shapes: one to three shapes, or more if they share a point.
 
     Returns:
-        (n, 3) [m], by Newton's method; each step is the shortest that removes all
-        distances to first order.
+        (n, 3) [m] points, by Newton's method; each step is the shortest that removes
+        all distances to first order.
     """
     points = points.copy()
     for _ in range(12):
         pairs = [shape.signed(points) for shape in shapes]
         distances = np.stack([d for d, _ in pairs], axis=1)
         gradients = np.stack([g for _, g in pairs], axis=1)
-        # tangent shapes: the cutoff drops directions in which they are inconsistent
+        # for tangent shapes the cutoff removes directions in which they are
+        # inconsistent
         inverse = np.linalg.pinv(gradients, rcond=0.05)
         step = np.einsum("nij,nj->ni", inverse, distances)
         points -= step
@@ -169,7 +172,7 @@ def fit_cone(points: NDArray, normals: NDArray) -> Cone:
 
     Args:
         points: (n, 3) [m].
-        normals: (k, 3) facet normals, the first guess of the axis.
+        normals: (k, 3) facet normals, which give the first estimate of the axis.
 
     Returns:
         The cone.
@@ -189,14 +192,14 @@ def fit_cone(points: NDArray, normals: NDArray) -> Cone:
 
 
 def fit_torus(points: NDArray, normals: NDArray) -> Torus:
-    """Return the torus nearest to points that cover a part of it.
+    """Return the torus nearest to points on a part of it.
 
     Args:
         points: (n, 3) [m].
-        normals: (k, 3) facet normals; not used beyond orientation.
+        normals: (k, 3) facet normals, used for the orientation only.
 
     Returns:
-        The torus with the smallest residual among three first guesses of its axis.
+        The torus with the smallest residual among three first estimates of its axis.
     """
     center = points.mean(axis=0)
     size = float(np.ptp(points, axis=0).max())
@@ -224,7 +227,7 @@ def fit_torus(points: NDArray, normals: NDArray) -> Torus:
 def _refined_fit(
     shape: Callable[[NDArray], S], start: NDArray, points: NDArray, size: float
 ) -> S:
-    """Return the shape with the least squared residuals, by nonlinear least squares."""
+    """Return the shape of least squared residuals, by nonlinear least squares."""
     from scipy.optimize import least_squares
 
     if len(points) < len(start):

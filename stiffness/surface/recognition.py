@@ -1,9 +1,9 @@
 """Recognition of planes, cones, spheres and tori in a faceted surface.
 
-A part between sharp edges is one shape, or several that meet tangentially. Candidates
-are fitted to a few facets around a seed.  A candidate is accepted if connected facets
-lie on it, and if these are facets of a curved shape: corners of a few flat faces of
-different widths may lie on a circle too.
+A part between sharp edges is one shape, or several shapes that meet tangentially.
+Candidates are fitted to a few facets around a seed.  A candidate is accepted if
+connected facets are on it and are facets of a curved shape.  The second condition is
+needed because corners of a few flat faces of different widths may be on a circle too.
 """
 
 from collections.abc import Callable
@@ -22,33 +22,35 @@ from stiffness.surface.primitives import (
 )
 from stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
-# largest number of failed seeds of a part: for shapes from strips, for any shape
+# largest number of seeds of a part that may fail: for shapes from strips, for any shape
 _MISSES = (60, 20)
 # accepted relative difference of facets' areas, and of their evenness
 _CONGRUENT = 1e-6
-_CONE = 10  # least number of points that identify a cone
-# slope below which a cone is a cylinder, for which seven points suffice
+_CONE = 10  # smallest number of points that identify a cone
+# slope below which a cone is a cylinder, for which seven points are sufficient
 _CYLINDER = 1e-4
-_FEW = 12  # least number of flat faces of a faceted curve
-_STEP = 2e-3  # [rad] between two angles that count as different
-_MANY = 5  # number of different angles above which points lie on a circle
-_EVEN = 0.75  # least share of the widest facet that counts as equally wide
-# times the usual lift of a part's facets: above it a face or edge is straight
+_FEW = 12  # smallest number of flat faces of a faceted curve
+_STEP = 2e-3  # [rad] smallest difference of two angles that count as different
+_MANY = 5  # number of different angles from which on points are on a circle
+# smallest width, relative to the widest facet, of a facet that counts as equally wide
+_EVEN = 0.75
+# lift relative to a part's median lift, above which a face or edge is straight
 _LIFT = 4.0
-_RULING = 2.0  # times the usual lift: above it an edge is a ruling, not a bent edge
-_NO_LIFT = 0.01  # times the usual lift: below it an edge is straight as well
+# relative to the median lift: above it an edge is a ruling, not a curved edge
+_RULING = 2.0
+_NO_LIFT = 0.01  # relative to the median lift: below it an edge is straight as well
 
 
 def recognise(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]]:
     """Return the shapes of a smooth part.
 
     Args:
-        graph: graph of the surface.
-        part: (k,) triangles between sharp edges.
+        graph: triangle graph of the surface.
+        part: (k,) triangles of the part between sharp edges.
 
     Returns:
-        Triangles and shape of each patch: one shape for the whole part, or the shapes
-        recognised in it; the other triangles are flat, or lifted facets.
+        Triangles and shape of each patch.  There is one shape for the whole part, or
+        several recognised shapes; the remaining triangles are flat, or lifted facets.
     """
     shape = fitted_shape(graph, part)
     if shape is not None and graph.fits(shape, part).all():
@@ -70,7 +72,7 @@ def recognise(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]
 
 
 class _Lifts:
-    """Lifts that the edges of a part would have if it were one curved shape."""
+    """Lifts of the edges of a part as if it were one curved shape."""
 
     def __init__(self, graph: TriangleGraph, part: NDArray) -> None:
         self._facets = graph.lifted(part)
@@ -80,30 +82,30 @@ class _Lifts:
         self._usual = max(float(np.median(self._facets.lifts())), 1e-300)
 
     def share(self, edges: NDArray) -> float:
-        """Return the median lift of edges (e, 2) relative to the part's usual one."""
+        """Return median lift of edges (e, 2), relative to the part's median lift."""
         own = self._facets.edge_lifts(self._place[edges])
         return float(np.median(own)) / self._usual
 
 
 def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape | None:
-    """Return the simplest shape on which a part's corners lie as those of its facets.
+    """Return the simplest shape whose facets a part's corners can be.
 
     Args:
-        graph: graph of the surface.
+        graph: triangle graph of the surface.
         part: (k,) triangles.
-        kinds: number of plane, cone, sphere and torus that are tried.
+        kinds: number of kinds that are tried, in the order plane, cone, sphere, torus.
 
     Returns:
-        The shape; None if no shape fits, or too few corners identify it.
+        The shape; None if no shape fits, or there are too few corners to identify one.
     """
     points = graph.points[np.unique(graph.triangles[part])]
     normals = graph.normals[part]
-    # a few corners decide whether a shape is fitted to all of them
+    # with a few corners it is decided whether a shape is fitted to all of them
     few = points[:: max(1, len(points) // 50)]
     tries: list[tuple[Callable[[NDArray, NDArray], Shape], int]] = [
         (fit_plane, 3),
         (fit_cone, 7),
-        (fit_sphere, 9),  # eight corners of a four-sided frustum lie on a sphere
+        (fit_sphere, 9),  # the eight corners of a four-sided frustum are on a sphere
         (fit_torus, 12),
     ]
     for fit, least in tries[:kinds]:
@@ -121,14 +123,14 @@ def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape |
 
 
 def _lies_on(shape: Shape, points: NDArray, graph: TriangleGraph) -> bool:
-    """Return whether points are on a shape, to the tolerance of the surface."""
+    """Return whether points are on a shape, within the tolerance of the surface."""
     return bool(np.abs(shape.signed(points)[0]).max() < graph.tolerance)
 
 
 def _is_faceted(shape: Shape, points: NDArray) -> bool:
     """Return whether points on a shape are corners of facets along its curvature."""
     # a circle passes through the corners of any two flat faces that meet, and of three
-    # symmetric ones: three facets as wide as the widest are needed, or many facets
+    # symmetric ones; so three facets as wide as the widest are needed, or many facets
     if not isinstance(shape, Cone | Torus):
         return True
     offset = points - shape.point
@@ -150,7 +152,7 @@ def _even(angles: NDArray) -> bool:
     """Return whether there are many different angles, or three equally wide steps."""
     angles = np.sort(angles)
     gaps = np.diff(np.r_[angles, angles[0] + 2 * np.pi])
-    if gaps[-1] > _STEP:  # the longest gap lies outside an arc that is not closed
+    if gaps[-1] > _STEP:  # the largest gap is outside an arc that is not closed
         widest = int(np.argmax(gaps))
         outside = gaps[widest] > 1.5 * np.sort(gaps)[-2]
         gaps = np.delete(gaps, widest) if outside else gaps
@@ -183,7 +185,7 @@ def _pieces(
         if not shapes and not strips:
             missed.append(seed)
             if misses == most and (kinds := _kinds(missed, order, area)) is not None:
-                # facets congruent with failed seeds, as around a shaft, come last
+                # facets congruent with failed seeds, as around a shaft, are tried last
                 order, misses, missed = np.where(kinds, order - 2.0, order), 0, []
         if shapes:
             best = max(shapes, key=lambda s: float(graph.areas[s[0]].sum()))
@@ -193,7 +195,7 @@ def _pieces(
 
 
 def _kinds(missed: list[int], order: NDArray, area: NDArray) -> NDArray | None:
-    """Return (m,) facets congruent with failed seeds; None if these are many."""
+    """Return (m,) bool: facets congruent with failed seeds; None if these are many."""
     kinds = np.zeros(len(order), dtype=bool)
     count = 0
     for seed in missed:
@@ -208,7 +210,7 @@ def _kinds(missed: list[int], order: NDArray, area: NDArray) -> NDArray | None:
 def _evenness(
     graph: TriangleGraph, inside: NDArray, flat: NDArray, area: NDArray
 ) -> NDArray:
-    """Return the (m,) least ratio of a face's area to its neighbours', at most 1."""
+    """Return the (m,) smallest ratio of a face's area to its neighbours', at most 1."""
     touch = inside[graph.left] & inside[graph.right] & (graph.cosine > SHARP)
     left, right = graph.left[touch], graph.right[touch]
     ratio = np.minimum(area[left], area[right]) / np.maximum(area[left], area[right])
@@ -224,7 +226,7 @@ def _evenness(
 def _shapes_around(
     graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int, strips: bool
 ) -> list[tuple[NDArray, Shape]]:
-    """Return shapes of facets around a seed, with the connected facets on them."""
+    """Return the shapes of facets around a seed, with the connected facets on them."""
     part = np.flatnonzero(inside)
     if strips:
         near = [ring(graph, inside, flat, seed, 0), _chain(graph, inside, flat, seed)]
@@ -254,8 +256,8 @@ def _is_proper(
 def _is_straight(
     graph: TriangleGraph, lifts: _Lifts, piece: NDArray, shape: Cone
 ) -> bool:
-    """Return whether a cone's rulings are straight, not facets of a bent shape."""
-    # two rings of corners on any surface of revolution lie on a cone
+    """Return whether a cone's rulings are straight, not facets of a curved shape."""
+    # two rings of corners on any surface of revolution are on a cone
     inside = np.zeros(len(graph.triangles), dtype=bool)
     inside[piece] = True
     both = np.flatnonzero(inside[graph.left] & inside[graph.right])
@@ -273,17 +275,17 @@ def _is_straight(
 def ring(
     graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int, rings: int
 ) -> NDArray:
-    """Return a seed's flat face, grown by rings of faces that meet it smoothly.
+    """Return a seed's flat face, with rings of faces that meet it smoothly.
 
     Args:
-        graph: graph of the surface.
-        inside: (m,) triangles that may be taken.
+        graph: triangle graph of the surface.
+        inside: (m,) bool, True for triangles that may be included.
         flat: (m,) number of each triangle's flat face.
         seed: a triangle.
         rings: number of rings.
 
     Returns:
-        (k,) triangles.
+        (k,) triangles of the faces.
     """
     members = inside & (flat == flat[seed])
     touch = inside[graph.left] & inside[graph.right] & (graph.cosine > SHARP)
@@ -296,7 +298,7 @@ def ring(
 
 def _chain(graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int) -> NDArray:
     """Return a seed's flat face and two on each side, across the longest edges."""
-    # strips of a cylinder or a cone are adjacent in this way, whatever is at their ends
+    # strips of a cylinder or a cone are adjacent in this way, whatever their ends are
     touch = inside[graph.left] & inside[graph.right] & (graph.cosine > SHARP)
     left, right = flat[graph.left[touch]], flat[graph.right[touch]]
     length = np.linalg.norm(np.diff(graph.points[graph.ends[touch]], axis=1), axis=2)
@@ -316,9 +318,9 @@ def _chain(graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int) -> N
 
 
 def _flat_or_lifted(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]]:
-    """Return a part of no known shape: single flat faces, and lifted facets."""
-    # facets of a curved surface have lifts of similar size, because programs that make
-    # them keep a tolerance; one with a much larger lift is a flat face that meets a
+    """Return a part of unknown shape as single flat faces and lifted facets."""
+    # facets of a curved surface have similar lifts, because programs that make them
+    # keep a tolerance; a facet with a much larger lift is a flat face that meets a
     # fillet
     flat = graph.flat_faces(part)
     faces = np.unique(flat[part])

@@ -1,8 +1,8 @@
 """Outline of an interface where the surface continues without a sharp edge.
 
-Where a held face ends in a fillet, the two shapes touch along a line that their
-equations do not determine well.  The wall through the outline, normal to the face,
-determines it: face and wall meet at a right angle.
+Where a held face ends in a fillet, both shapes touch along a line that their equations
+do not determine well.  The wall through the outline, normal to the face, determines
+this line, because face and wall meet at a right angle.
 """
 
 from dataclasses import dataclass
@@ -13,21 +13,23 @@ from numpy.typing import NDArray
 from stiffness.surface.facets import Facets
 from stiffness.surface.primitives import Shape, fit_cone, fit_plane
 
-_CORNER = np.cos(np.radians(35.0))  # of an outline: sharper corners are kept
-_ON_WALL = 1e-5  # relative to the outline's size: distance that counts as on the wall
-_CIRCLE = 10  # least number of corners that distinguish a circle from a polygon
+# cosine of the largest angle of an outline's corner that is smoothed
+_CORNER = np.cos(np.radians(35.0))
+# relative to the outline's size: largest distance of a point on the wall
+_ON_WALL = 1e-5
+_CIRCLE = 10  # smallest number of corners that distinguish a circle from a polygon
 
 
 @dataclass(frozen=True, eq=False)
 class SmoothOutline:
-    """Part of an interface's outline at which one other patch begins smoothly.
+    """Part of an interface's outline at which one other patch continues smoothly.
 
     Attributes:
         patches: numbers of the interface and of the other patch.
         wall: surface through the outline, normal to the interface.
-        ends: (e, 2, 3) [m] the outline's edges.
-        side: 1 where the wall's signed distance is positive outside the interface,
-            else -1.
+        ends: (e, 2, 3) [m] ends of the outline's edges.
+        side: 1 if the wall's signed distance is positive outside the interface, else
+            -1.
     """
 
     patches: tuple[int, int]
@@ -36,11 +38,11 @@ class SmoothOutline:
     side: float
 
     def outside(self, points: NDArray) -> NDArray:
-        """Return (n,) [m] distance of points (n, 3) from the wall, negative inside."""
+        """Return (n,) [m] distances of points (n, 3) from the wall, negative inside."""
         return self.side * self.wall.signed(points)[0]
 
     def distance(self, points: NDArray) -> NDArray:
-        """Return (n,) [m] distance of points (n, 3) from the nearest of the edges."""
+        """Return the (n,) [m] distances of points (n, 3) from the nearest edge."""
         start, along = self.ends[:, 0], self.ends[:, 1] - self.ends[:, 0]
         square = np.maximum(np.einsum("ei,ei->e", along, along), 1e-300)
         nearest = np.full(len(points), np.inf)
@@ -55,17 +57,17 @@ class SmoothOutline:
 def smooth_outline(
     points: NDArray, edges: NDArray, normals: NDArray, patches: tuple[int, int]
 ) -> SmoothOutline:
-    """Return the outline of some edges, with its wall.
+    """Return the outline along given edges, with its wall.
 
     Args:
         points: (n, 3) [m].
-        edges: (e, 2) points, counterclockwise around the interface.
+        edges: (e, 2) indices of points, counterclockwise around the interface.
         normals: (e, 3) unit normals of the interface's triangles at the edges.
         patches: numbers of the interface and of the other patch.
 
     Returns:
-        The outline; its wall is a plane or a cone if one fits, else as faceted as the
-        outline.
+        The outline; its wall is a plane or a cone if one fits, otherwise it has the
+        facets of the outline.
     """
     ends = points[edges]
     along = ends[:, 1] - ends[:, 0]
@@ -79,7 +81,7 @@ def smooth_outline(
 
 
 def _wall(points: NDArray, edges: NDArray, normals: NDArray, outward: NDArray) -> Shape:
-    """Return the plane or cone through the edges, normal to the face, else facets."""
+    """Return the plane, cone or faceted wall through the edges, normal to the face."""
     size = float(np.linalg.norm(np.ptp(points[edges.ravel()], axis=0)))
     across = size * normals[:, None]  # at both ends of an edge
     standing = np.concatenate([points[edges] + across, points[edges] - across])
@@ -96,7 +98,7 @@ def _wall(points: NDArray, edges: NDArray, normals: NDArray, outward: NDArray) -
 def _faceted_wall(
     ends: NDArray, edges: NDArray, across: NDArray, outward: NDArray
 ) -> Facets:
-    """Return two triangles at each edge; edges at a corner do not share points."""
+    """Return two triangles at each edge; edges do not share points at a corner."""
     corners = np.concatenate([ends - across, ends + across], axis=1)
     label = np.arange(4 * len(ends)).reshape(-1, 4)
     begins = {int(start): k for k, start in enumerate(edges[:, 0])}

@@ -1,4 +1,4 @@
-"""STEP files, read by gmsh: their solids, and fine triangles of them.
+"""STEP files, read by gmsh: names of solids, and fine triangles.
 
 A damaged file can crash gmsh and its process, so these functions run in a separate
 process (:mod:`stiffness.surface.surface_worker`).
@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from forcefit.inputs.packages import naming_packages
 from forcefit.inputs.table import BadInput, nearest, quoted
 
-_FACETS = 48  # facets around a full circle
-# relative to a solid's volume: a smaller overlap is rounding of the file
+_FACETS = 48  # number of facets around a full circle
+# relative to a solid's volume: a smaller overlap is rounding in the file
 _TOUCHING = 1e-6
-_ALL, _AND = "*", "+"  # all solids of a file; several solids as one
+_ALL, _AND = "*", "+"  # marks in a name: all solids of a file; several solids as one
 
 
 def read_solids(path: Path) -> tuple[list[str], list[float], list[list[float]]]:
@@ -29,7 +29,7 @@ def read_solids(path: Path) -> tuple[list[str], list[float], list[list[float]]]:
         path: path of the file.
 
     Returns:
-        Names; volumes [m^3]; lower and upper corner of each box [m].
+        Names; volumes [m^3]; lower and upper corner of each bounding box [m].
 
     Raises:
         BadInput: the file cannot be read, or gmsh is not installed.
@@ -43,7 +43,7 @@ def read_solids(path: Path) -> tuple[list[str], list[float], list[list[float]]]:
 
 @contextmanager
 def _gmsh_model(path: Path) -> Generator[Any, None, None]:
-    """Provide gmsh's model of a STEP file, in metres."""
+    """Provide the gmsh model of a STEP file, in metres."""
     try:
         with naming_packages(f"{path}: STEP", "export the surface as STL"):
             import gmsh
@@ -51,7 +51,7 @@ def _gmsh_model(path: Path) -> Generator[Any, None, None]:
         gmsh.initialize(interruptible=False)
     except BadInput:
         raise
-    except Exception as error:  # gmsh's Python file without its library
+    except Exception as error:  # the Python file of gmsh may exist without its library
         raise BadInput(
             f"{path}: STEP needs the package gmsh, which does not start: {error}"
         ) from None
@@ -61,7 +61,8 @@ def _gmsh_model(path: Path) -> Generator[Any, None, None]:
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _FACETS)
         try:
             gmsh.open(str(path))
-        except Exception as error:  # gmsh's only class for files that it refuses
+        # gmsh raises only this class for files that it refuses
+        except Exception as error:
             raise BadInput(f"{path}: not a readable STEP file") from error
         yield gmsh.model
     finally:
@@ -70,14 +71,14 @@ def _gmsh_model(path: Path) -> Generator[Any, None, None]:
 
 @dataclass(frozen=True, eq=False)
 class StepTriangles:
-    """Triangles of the chosen solids, which share those between them.
+    """Triangles of the chosen solids, which share the triangles between them.
 
     Attributes:
-        points: (n, 3) [m].
+        points: (n, 3) [m] corners.
         triangles: (m, 3) indices of points.
-        sides: (m, 2) the solids on both sides, by their index in ``names``; -1 outside.
-        names: names of the solids; none if the file's faces belong to no solid.
-        overlaps: pairs of solids that overlap, one line each.
+        sides: (m, 2) index in ``names`` of the solid on each side; -1 outside.
+        names: names of the solids; empty if the file's faces belong to no solid.
+        overlaps: descriptions of pairs of solids that overlap.
     """
 
     points: NDArray
@@ -88,19 +89,19 @@ class StepTriangles:
 
 
 def read_step(path: Path, solid: str) -> StepTriangles:
-    """Return fine triangles of solids of a STEP file, in metres by its own unit.
+    """Return fine triangles of solids of a STEP file, converted to metres.
 
     Args:
         path: path of the file.
-        solid: its name, ``one+other`` of several or ``*`` of all as one; may be empty
-            where the file holds one.
+        solid: name of a solid, ``one+other`` for several or ``*`` for all as one; it
+            may be empty if the file holds one solid.
 
     Returns:
-        The triangles, also those between two solids.
+        The triangles, including those between two solids.
 
     Raises:
-        BadInput: the file cannot be read, no such solid, they do not touch, or gmsh is
-            not installed.
+        BadInput: the file cannot be read, there is no such solid, solids do not touch,
+            or gmsh is not installed.
     """
     with _gmsh_model(path) as model:
         chosen = chosen_solids(model, path, solid)
@@ -144,15 +145,15 @@ def chosen_solids(model: Any, path: Path, solid: str) -> dict[str, int]:
     """Return the chosen solids.
 
     Args:
-        model: gmsh's, of the file.
+        model: gmsh model of the file.
         path: path of the file, for error messages.
-        solid: see :func:`read_step`; required if there are several.
+        solid: see :func:`read_step`; required if the file has several solids.
 
     Returns:
-        Their tags by name; none if the file's faces belong to no solid.
+        Tags of the solids by name; empty if the file's faces belong to no solid.
 
     Raises:
-        BadInput: no such solid, or none is chosen of several.
+        BadInput: there is no such solid, or none of several is chosen.
     """
     solids = _solids(model)
     several = list(solids) if solid == _ALL else solid.split(_AND)
@@ -173,10 +174,10 @@ def chosen_solids(model: Any, path: Path, solid: str) -> dict[str, int]:
 
 
 def sides(model: Any, owners: Mapping[int, int]) -> dict[int, tuple[int, int]]:
-    """Return the faces of solids, and the solids on both sides.
+    """Return the faces of solids, and the solids on both sides of each face.
 
     Args:
-        model: gmsh's.
+        model: gmsh model of the file.
         owners: number of the solid that each volume belongs to.
 
     Returns:

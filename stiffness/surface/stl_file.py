@@ -1,4 +1,4 @@
-"""Reader of STL files, text and binary, in NumPy alone.
+"""Reader of STL files in text and binary form, with NumPy only.
 
 The reader accepts what other programs accept: keywords in capitals, a last line that is
 cut or missing, bytes after the last triangle, a count of triangles that was not filled
@@ -15,19 +15,20 @@ from forcefit.inputs.table import BadInput, describe
 
 _HEAD = 84  # bytes of a binary file before its triangles: header text and count
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("tag", "<u2")])
-_UNKNOWN_COUNTS = (0, 2**32 - 1)  # of writers that do not fill in the count
-# the name of a solid: up to its first facet or the end of the line
+# counts of triangles that programs write if they do not fill in the count
+_UNKNOWN_COUNTS = (0, 2**32 - 1)
+# the name of a solid ends at its first facet or at the end of the line
 _NAME = re.compile(rb"(?im)^[ \t]*(?:end)?solid\b.*?(?=\bfacet\s+normal\b|\r|\n|\Z)")
 
 
 def read_stl(path: Path) -> tuple[NDArray, NDArray]:
-    """Return the points and triangles of an STL file; no points are merged.
+    """Return the points and triangles of an STL file; equal points are not merged.
 
     Args:
         path: path of an existing file.
 
     Returns:
-        (3 m, 3) points in the file's unit and (m, 3) indices of them.
+        (3 m, 3) points in the unit of the file, and (m, 3) indices of these points.
 
     Raises:
         BadInput: the file is not STL, or ends within a triangle.
@@ -45,7 +46,7 @@ def _count(content: bytes) -> int:
 
 
 def _is_text(content: bytes) -> bool:
-    """Return whether a file is text; a binary header may also begin with solid."""
+    """Return whether a file is text; a binary header may also begin with "solid"."""
     size = _HEAD + _TRIANGLE.itemsize * _count(content)
     if len(content) >= _HEAD and len(content) == size:
         return False

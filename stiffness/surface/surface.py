@@ -1,4 +1,4 @@
-"""A link's surface from a file: read, checked, and repaired with a report."""
+"""A link's surface from a file, after checks and repairs, which are reported."""
 
 import hashlib
 import math
@@ -16,23 +16,25 @@ from stiffness.surface.surface_files import STEP, named_solid, read_triangles
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 UNITS |= {"in": 0.0254, "inch": 0.0254, "ft": 0.3048}
 FORMATS = (".stl", ".obj", ".ply", ".vtk", ".vtp", ".msh", ".step", ".stp")
-_LARGEST_LINK = 20.0  # [m] largest diagonal; a larger one means a wrong unit
-_SMALLEST_LINK = 1e-3  # [m]
+# [m] largest accepted diagonal; a larger one indicates a wrong unit
+_LARGEST_LINK = 20.0
+_SMALLEST_LINK = 1e-3  # [m] smallest accepted diagonal
 _STATED = "stated in the file"
-# mean number of vertices within 1e-7 of the size of each; memory grows with it
+# accepted mean number of vertices within 1e-7 of the size from each, which limits
+# memory
 _CROWD = 100
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A closed surface of triangles seen counterclockwise from outside.
+    """A closed surface of triangles, counterclockwise when seen from outside.
 
     Attributes:
-        points: (n, 3) [m].
+        points: (n, 3) [m] corners.
         triangles: (m, 3) indices of points.
         name: name of the file, for messages.
-        repairs: the repairs made, in words.
-        solids: solids of a STEP file that has several.
+        repairs: descriptions of the repairs.
+        solids: solids of a STEP file with several solids; None otherwise.
     """
 
     points: NDArray
@@ -44,7 +46,7 @@ class Surface:
     __repr__, _repr_html_ = short_repr, html_table
 
     def normals(self) -> NDArray:
-        """Return the (m, 3) [m^2] outward normals, as long as the triangles' areas."""
+        """Return (m, 3) [m^2] outward normals; their lengths are the areas."""
         return area_vectors(self.points, self.triangles)
 
     @property
@@ -59,7 +61,7 @@ class Surface:
 
     @property
     def diagonal(self) -> float:
-        """[m] of the bounding box."""
+        """[m] diagonal of the bounding box."""
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
     def digest(self) -> str:
@@ -70,28 +72,28 @@ class Surface:
 
 
 def area_vectors(points: NDArray, triangles: NDArray) -> NDArray:
-    """Return the normals of triangles, as long as their areas.
+    """Return the normals of triangles, whose lengths are the areas.
 
     Args:
         points: (n, 3) [m].
         triangles: (m, 3) indices.
 
     Returns:
-        (m, 3) [m^2].
+        (m, 3) [m^2] normals.
     """
     a, b, c = np.moveaxis(points[triangles], 1, 0)
     return np.cross(b - a, c - a) / 2
 
 
 def signed_volume(points: NDArray, triangles: NDArray) -> float:
-    """Return the volume inside a closed surface, negative when it is inside out.
+    """Return the volume inside a closed surface, negative if it is inside out.
 
     Args:
         points: (n, 3) [m].
         triangles: (m, 3) indices.
 
     Returns:
-        [m^3].
+        [m^3] volume.
     """
     origin = points.mean(axis=0)
     a, b, c = np.moveaxis(points[triangles] - origin, 1, 0)
@@ -99,19 +101,19 @@ def signed_volume(points: NDArray, triangles: NDArray) -> float:
 
 
 def directed_edges(triangles: NDArray) -> NDArray:
-    """Return the edges of triangles, each in the direction in which its triangle runs.
+    """Return the edges of triangles, each in the direction of its triangle.
 
     Args:
         triangles: (m, 3) indices.
 
     Returns:
-        (3 m, 2) indices; three rows a triangle.
+        (3 m, 2) indices of points; three rows for each triangle.
     """
     return triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
 
 
 def read_surface(path: Path | str, unit: str = "m") -> Surface:
-    """Read a surface and refuse one that bounds no solid.
+    """Read a surface; reject one that does not enclose a solid.
 
     Args:
         path: STL, OBJ, PLY, VTK, VTP, MSH, or STEP if gmsh is installed;
@@ -120,10 +122,10 @@ def read_surface(path: Path | str, unit: str = "m") -> Surface:
             its own unit, which is used.
 
     Returns:
-        The surface in metres, closed and outward.
+        The surface in metres, closed and oriented outward.
 
     Raises:
-        BadInput: the file cannot be read, or holds no single closed surface of a
+        BadInput: the file cannot be read, or does not hold one closed surface of a
             plausible size.
     """
     if unit not in UNITS:
@@ -140,7 +142,7 @@ def read_surface(path: Path | str, unit: str = "m") -> Surface:
 def _read_triangles(
     path: Path, solid: str
 ) -> tuple[NDArray, NDArray, FilledSolids | None]:
-    """Return the points and triangles of a file, in its unit, and its solids."""
+    """Return the points and triangles of a file in its unit, and its solids."""
     if path.suffix.lower() not in FORMATS:
         hint = nearest(path.suffix, FORMATS)
         raise BadInput(f"{path}: unknown kind of surface file{hint}")
@@ -162,15 +164,15 @@ def check_surface(
         points: (n, 3) [m].
         triangles: (m, 3) indices.
         name: name for error messages.
-        unit: the stated unit, for messages.
+        unit: stated unit, for messages.
 
     Returns:
-        The surface: vertices merged, degenerate triangles dropped, oriented outward.
+        The surface: vertices merged, degenerate triangles removed, oriented outward.
 
     Raises:
         BadInput: the surface is empty, not finite, of an implausible size, open,
-            self-intersecting, of several bodies, or has edges shared by more than two
-            triangles.
+            self-intersecting or of several bodies, or more than two triangles share an
+            edge.
     """
     if len(triangles) == 0:
         raise BadInput(f"{name}: holds no triangles")
@@ -198,14 +200,14 @@ def check_surface(
 
 
 def _place(point: NDArray) -> str:
-    """Return a point for a message."""
+    """Return a point as text for a message."""
     return "(" + ", ".join(f"{v:.4g}" for v in point) + ") m"
 
 
 def _check_coordinates(
     points: NDArray, triangles: NDArray, name: str, unit: str
 ) -> None:
-    """Reject coordinates that are not finite, or a size that shows a wrong unit."""
+    """Reject coordinates that are not finite, and a size that shows a wrong unit."""
     used = points[np.unique(triangles)]
     wrong = ~np.isfinite(used).all(axis=1)
     if wrong.any():
@@ -222,7 +224,7 @@ def _check_coordinates(
 def _merge(
     points: NDArray, triangles: NDArray, name: str
 ) -> tuple[NDArray, NDArray, list[str]]:
-    """Merge coincident vertices; drop triangles without area."""
+    """Merge coincident vertices, and remove triangles without area."""
     repairs = []
     used, triangles = np.unique(triangles, return_inverse=True)
     points, triangles = points[used], triangles.reshape(-1, 3)
@@ -232,7 +234,8 @@ def _merge(
 
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     tree, near = cKDTree(points), 1e-7 * size
-    if tree.count_neighbors(tree, near) > _CROWD * len(points):  # too many to list
+    # there are too many pairs to list them
+    if tree.count_neighbors(tree, near) > _CROWD * len(points):
         raise BadInput(
             f"{name}: most of its {len(points)} vertices are less than "
             f"{near:.2g} m apart in a part of {size:.4g} m; check the unit and "
@@ -279,7 +282,11 @@ def _orient(
 ) -> tuple[NDArray, list[str]]:
     """Orient all triangles outward; reject several bodies."""
     triangles, shell, flipped = orient_shells(triangles)
-    repairs = [f"{flipped} triangles turned to agree with the rest"] if flipped else []
+    repairs = (
+        [f"{flipped} triangles reoriented to agree with their neighbours"]
+        if flipped
+        else []
+    )
     shells = [triangles[shell == k] for k in range(shell.max() + 1)]
     volumes = np.array([signed_volume(points, part) for part in shells])
     main = int(np.argmax(np.abs(volumes)))
@@ -296,7 +303,7 @@ def _orient(
         if (volumes[k] < 0) != cavity:
             shells[k] = part[:, ::-1]
             what = "a cavity was" if cavity else "the surface was"
-            repairs.append(f"{what} inside out and has been turned")
+            repairs.append(f"{what} inside out and has been reoriented")
     return np.concatenate(shells), repairs
 
 
@@ -307,7 +314,8 @@ def orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
         triangles: (m, 3) indices of points.
 
     Returns:
-        The triangles, (m,) the shell of each, and the number reoriented.
+        The triangles, (m,) the shell of each triangle, and the number of reoriented
+        triangles.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order, connected_components
@@ -316,9 +324,10 @@ def orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
     directed = directed_edges(triangles)
     owner = np.repeat(np.arange(count), 3)
     order = np.lexsort(np.sort(directed, axis=1).T)
-    first, second = order[::2], order[1::2]  # a closed surface: edges come in pairs
+    first, second = order[::2], order[1::2]  # edges of a closed surface come in pairs
     left, right = owner[first], owner[second]
-    same = directed[first, 0] == directed[second, 0]  # neighbours that disagree
+    # neighbours with different orientations
+    same = directed[first, 0] == directed[second, 0]
     ends = (np.r_[left, right], np.r_[right, left])
     graph = coo_array((np.r_[same, same] + 1.0, ends), (count, count)).tocsr()
     shells, shell = connected_components(graph, directed=False)
@@ -339,7 +348,7 @@ def orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
 
 
 def _inside(point: NDArray, points: NDArray, triangles: NDArray) -> bool:
-    """Return whether a surface encloses a point (its solid angle is 4 pi)."""
+    """Return whether a surface encloses a point, at which its solid angle is 4 pi."""
     a, b, c = np.moveaxis(points[triangles] - point, 1, 0)
     la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
     top = np.einsum("ij,ij->i", a, np.cross(b, c))

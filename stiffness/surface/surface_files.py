@@ -1,7 +1,7 @@
 """Readers of surface files.
 
 STL is read here.  The other kinds need VTK, meshio or gmsh.  A damaged file can crash
-these with their process, so they run in a separate process
+these packages and their process, so they run in a separate process
 (:mod:`stiffness.surface.surface_worker`).
 """
 
@@ -26,14 +26,14 @@ _TIME_LIMIT = 300.0  # [s] time limit of a reader; gmsh takes 1 s for 35 000 tri
 
 
 def named_solid(path: Path | str) -> tuple[Path, str]:
-    """Return a surface file, and the chosen solid of a STEP file.
+    """Return a surface file and the chosen solid of a STEP file.
 
     Args:
         path: path of a file, or ``part.step#name``; ``part.step#one+other`` or
-            ``part.step#*`` of several solids as one.
+            ``part.step#*`` for several solids as one.
 
     Returns:
-        The file, and the name; empty if none is given.
+        The file, and the name of the solid; empty if none is given.
     """
     file, mark, name = str(path).rpartition("#")
     if mark and Path(file).suffix.lower() in STEP:
@@ -44,15 +44,15 @@ def named_solid(path: Path | str) -> tuple[Path, str]:
 def read_triangles(
     path: Path | str, solid: str = ""
 ) -> tuple[NDArray, NDArray, FilledSolids | None]:
-    """Return points and triangles of a surface file, in its unit; STEP in metres.
+    """Return points and triangles of a surface file in its unit; STEP in metres.
 
     Args:
         path: an existing file of a known kind.
         solid: name of one of several solids of a STEP file.
 
     Returns:
-        (n, 3) points and (m, 3) indices of points, and the solids they bound if a STEP
-        file has several.
+        (n, 3) points and (m, 3) indices of points, and the solids that they bound if a
+        STEP file has several.
 
     Raises:
         BadInput: the content does not match the file's suffix, or the package that
@@ -82,7 +82,7 @@ class StepSolid:
 
     Attributes:
         name: name after ``#``, as in ``part.step#name``.
-        volume: [m^3].
+        volume: [m^3] volume.
         low: (3,) [m] lower corner of the bounding box.
         high: (3,) [m] upper corner of the bounding box.
     """
@@ -100,10 +100,10 @@ def step_solids(path: Path | str) -> list[StepSolid]:
         path: path of the file.
 
     Returns:
-        The solids in the file's order, converted to metres.
+        The solids in the order of the file, converted to metres.
 
     Raises:
-        BadInput: the file cannot be read, holds no solid, or gmsh is not installed.
+        BadInput: the file cannot be read, it holds no solid, or gmsh is not installed.
     """
     read = _in_own_process("solids", Path(path))
     if not len(read["names"]):
@@ -117,11 +117,11 @@ def step_solids(path: Path | str) -> list[StepSolid]:
 
 
 def _in_own_process(wanted: str, path: Path, solid: str = "") -> dict[str, NDArray]:
-    """Return arrays from a reader that may crash, hang or exhaust the memory."""
+    """Return arrays from a reader that may crash, not end, or exhaust the memory."""
     kind = path.suffix[1:].upper()
     with tempfile.TemporaryDirectory(prefix="forcefit-") as folder:
         made = Path(folder, "read.npz")
-        # -P: modules of the current folder must not replace others of the same name
+        # -P prevents that modules in the current folder replace others of the same name
         module = "stiffness.surface.surface_worker"
         command = [sys.executable, "-P", "-m", module, wanted, str(path), str(made)]
         search = {"PYTHONPATH": os.pathsep.join(sys.path)}

@@ -1,9 +1,9 @@
-"""Readers that may crash their process: VTK, meshio and gmsh on a user's file.
+"""Process in which VTK, meshio and gmsh read a user's file, because they may crash.
 
 ``python -m stiffness.surface.surface_worker triangles|solids FILE READ.npz [SOLID]``
 
-:mod:`stiffness.surface.surface_files` runs this in a separate process; a damaged file
-ends only that one.
+:mod:`stiffness.surface.surface_files` runs this module in a separate process, so a
+damaged file ends only that process.
 """
 
 import sys
@@ -20,15 +20,16 @@ from stiffness.surface.step_file import read_solids, read_step
 
 
 def main(wanted: str, path: Path, made: Path, solid: str = "") -> None:
-    """Read a file and write the requested data, or why it is refused.
+    """Read a file, and write the requested data or the reason for refusal.
 
     Args:
-        wanted: "triangles", or "solids" of a STEP file.
+        wanted: "triangles", or "solids" for a STEP file.
         path: path of an existing file.
-        made: ``points`` (n, 3) and ``faces`` (m, 3), of STEP also ``sides`` (m, 2),
-            ``names`` and ``overlaps``, see
-            :class:`stiffness.surface.step_file.StepTriangles`; or ``names`` (n,),
-            ``volumes`` (n,) and ``boxes`` (n, 6); or ``refused``, one line.
+        made: output file with ``points`` (n, 3) and ``faces`` (m, 3), for STEP also
+            ``sides`` (m, 2), ``names`` and ``overlaps``, see
+            :class:`stiffness.surface.step_file.StepTriangles`; or with ``names`` (n,),
+            ``volumes`` (n,) and ``boxes`` (n, 6); or with ``refused``, one line of
+            text.
         solid: name of one of several solids of a STEP file.
     """
     _limit_memory()
@@ -51,7 +52,7 @@ def _solids(path: Path) -> dict[str, Any]:
 
 
 def _triangles(path: Path, solid: str) -> dict[str, Any]:
-    """Return the points and triangles, and for STEP the data of its faces."""
+    """Return points and triangles, and for STEP the data of the faces."""
     if path.suffix.lower() in {".step", ".stp"}:
         step = read_step(path, solid)
         return {
@@ -67,7 +68,7 @@ def _triangles(path: Path, solid: str) -> dict[str, Any]:
 
 
 def _limit_memory() -> None:
-    """Limit the memory, so that a file with an excessive size fails here alone."""
+    """Limit the memory of this process, so that excessive sizes fail here."""
     try:
         import os
         import resource
@@ -77,7 +78,7 @@ def _limit_memory() -> None:
         if hard == resource.RLIM_INFINITY or hard > memory:
             resource.setrlimit(resource.RLIMIT_AS, (memory, hard))
     except (ImportError, ValueError, OSError):
-        return  # no such limit on this system
+        return  # this system has no such limit
 
 
 def _with_vtk(path: Path) -> tuple[NDArray, NDArray]:
@@ -90,7 +91,7 @@ def _with_vtk(path: Path) -> tuple[NDArray, NDArray]:
 
 
 def _obj(path: Path) -> tuple[NDArray, NDArray]:
-    """Return an OBJ file; VTK splits its polygons into triangles, also concave ones."""
+    """Return an OBJ file's surface; VTK splits polygons into triangles."""
     import pyvista
 
     points, faces = read_obj(path)
@@ -101,7 +102,7 @@ def _obj(path: Path) -> tuple[NDArray, NDArray]:
 
 
 def _check_points(path: Path, mesh: Any) -> None:
-    """Reject cells with points that do not exist, on which VTK's filters crash."""
+    """Reject cells with points that do not exist, which would crash VTK's filters."""
     import pyvista
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
@@ -115,13 +116,13 @@ def _check_points(path: Path, mesh: Any) -> None:
         wrong = used[(used < 0) | (used >= mesh.n_points)]
         if len(wrong):
             raise BadInput(
-                f"{path}: found a cell of point {wrong[0] + 1}, expected 1 to "
+                f"{path}: found point {wrong[0] + 1} in a cell, expected points 1 to "
                 f"{mesh.n_points}"
             )
 
 
 def _boundary(path: Path, mesh: Any) -> tuple[NDArray, NDArray]:
-    """Return points and triangles of a VTK mesh, or of its volume's boundary."""
+    """Return points and triangles of a VTK mesh, or of the boundary of its volume."""
     import pyvista
 
     _check_points(path, mesh)
@@ -133,7 +134,7 @@ def _boundary(path: Path, mesh: Any) -> tuple[NDArray, NDArray]:
 
 
 def _msh(path: Path) -> tuple[NDArray, NDArray]:
-    """Return gmsh's MSH 2.2 or 4.1: surface elements, else the volume's boundary."""
+    """Return a gmsh MSH 2.2 or 4.1 file: surface elements, or the volume's boundary."""
     import meshio
     import pyvista
 

@@ -1,4 +1,4 @@
-"""A surface's triangles with their neighbours, and its smooth and flat parts."""
+"""Triangles of a surface with their neighbours; its smooth and flat parts."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,10 +7,12 @@ from stiffness.surface.facets import Facets
 from stiffness.surface.primitives import Shape
 from stiffness.surface.surface import Surface, directed_edges
 
-SHARP = np.cos(np.radians(35.0))  # a sharper edge separates two patches
-# relative to the part's size: points nearer are on a shape; STL leaves 1e-7
+# cosine of 35 degrees: a sharper edge separates two patches
+SHARP = np.cos(np.radians(35.0))
+# relative to the part's size: largest distance of a point on a shape; STL rounds to
+# 1e-7
 _ON_SHAPE = 2e-6
-# largest number of seeds on one surface; other triangles keep their facets
+# largest number of seeds on one surface; remaining triangles keep their facets
 _TRIES = 500
 
 
@@ -34,7 +36,7 @@ class TriangleGraph:
         )
 
     def connected_parts(self, members: NDArray, bend: float) -> NDArray:
-        """Return component of each member; cut where the cosine is below ``bend``."""
+        """Return component of each member; edges with a cosine below ``bend`` cut."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
@@ -46,14 +48,14 @@ class TriangleGraph:
         return connected_components(graph, directed=False)[1]
 
     def smooth_parts(self, members: NDArray) -> list[NDArray]:
-        """Return the indices of the triangles of each part between sharp edges."""
+        """Return the indices of the triangles in each part between sharp edges."""
         label = self.connected_parts(members, SHARP)
         return [
             np.flatnonzero(members & (label == k)) for k in np.unique(label[members])
         ]
 
     def directed(self, edges: NDArray, owner: NDArray) -> NDArray:
-        """Return (e, 2) ends of edges, in the direction of the triangle."""
+        """Return the (e, 2) ends of edges in the direction of the owner triangle."""
         ends = self.ends[edges]
         first = (self.triangles[owner] == ends[:, :1]).argmax(axis=1)
         follows = self.triangles[owner, (first + 1) % 3] == ends[:, 1]
@@ -66,12 +68,12 @@ class TriangleGraph:
         return self.connected_parts(inside, 1 - 1e-10)
 
     def lifted(self, part: NDArray) -> Facets:
-        """Return a part of no known shape as lifted facets."""
+        """Return a part of unknown shape as lifted facets."""
         used, index = np.unique(self.triangles[part], return_inverse=True)
         return Facets(self.points[used], index.reshape(-1, 3))
 
     def fits(self, shape: Shape, part: NDArray) -> NDArray:
-        """Return which triangles of a part lie on a shape, by corners and direction."""
+        """Return which triangles of a part are on a shape, by corners and normals."""
         corners = self.points[self.triangles[part]].reshape(-1, 3)
         distances = np.abs(shape.signed(corners)[0]).reshape(-1, 3).max(axis=1)
         centers = corners.reshape(-1, 3, 3).mean(axis=1)

@@ -1,7 +1,7 @@
 """The exact surface that the facets of a file approximate, and a mesh's error.
 
-The shape of a patch continues beyond its border, where it meets the next one smoothly.
-A point of a mesh's boundary is compared with the patch of the nearest facet.
+The shape of a patch continues beyond its border where it meets the next patch smoothly.
+A point on the boundary of a mesh is compared with the patch of the nearest facet.
 """
 
 from functools import cached_property
@@ -15,8 +15,8 @@ from stiffness.surface.patches import Patches
 from stiffness.surface.surface import Surface
 from stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
-_UNSURE = 0.3  # share of the lift of facets of no known shape that counts as uncertain
-# points on a triangle, exact to degree 4 (Dunavant 1985): two triples
+_UNSURE = 0.3  # uncertain share of the lift of facets of unknown shape
+# coordinates of six points on a triangle, exact to degree 4 (Dunavant 1985)
 _NEAR, _FAR = 0.445948490915965, 0.091576213509771
 _PLACES = np.concatenate([np.full((3, 3), a) + (1 - 3 * a) * np.eye(3)
                           for a in (_NEAR, _FAR)])  # fmt: skip
@@ -27,9 +27,9 @@ class TrueSurface:
     """Facets with their recognised shapes.
 
     Attributes:
-        volume: [m^3] inside the shapes.
-        unsure_volume: [m^3] part of it that depends on the smoothing of facets of no
-            known shape.
+        volume: [m^3] volume inside the shapes.
+        unsure_volume: [m^3] part of the volume that depends on the smoothing of facets
+            of unknown shape.
     """
 
     def __init__(self, surface: Surface, patches: Patches) -> None:
@@ -41,7 +41,7 @@ class TrueSurface:
 
     @cached_property
     def tangent(self) -> NDArray:
-        """(p,) bool, whether a patch meets another one without a sharp edge."""
+        """(p,) bool, True for a patch that meets another patch without a sharp edge."""
         graph, patch = TriangleGraph(self._surface), self._patches.patch
         one, other = patch[graph.left], patch[graph.right]
         smooth = (graph.cosine > SHARP) & (one != other)
@@ -57,14 +57,14 @@ class TrueSurface:
         return pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)
 
     def outside(self, points: NDArray, normals: NDArray) -> NDArray:
-        """Return the distance of points of a mesh's boundary from the surface.
+        """Return distances of points of a mesh's boundary from the surface.
 
         Args:
             points: (n, 3) [m].
-            normals: (n, 3) outward normals of the mesh there.
+            normals: (n, 3) outward normals of the mesh at these points.
 
         Returns:
-            (n,) [m], negative inside.
+            (n,) [m] distances, negative inside.
         """
         cell = np.atleast_1d(self._mesh.find_closest_cell(points))
         patch = self._patches.patch[cell]
@@ -77,7 +77,7 @@ class TrueSurface:
         return away
 
     def _volumes_between(self) -> NDArray:
-        """Return (p,) [m^3] volumes between the facets of each patch and its shape."""
+        """Return (p,) [m^3] volumes between the facets and the shape of each patch."""
         surface, patches = self._surface, self._patches
         areas = surface.normals()
         volumes = np.zeros(len(patches.shapes))

@@ -30,7 +30,7 @@ from validation.assumptions.validity import (
 from validation.crosscheck.spread_weight import energy_between_ends
 from validation.multibody.simulation import without_clearance
 
-_NOT_MESHED = "not computed without meshes; add --solids"
+_NOT_MESHED = "not computed, because it needs meshes of the links; add --solids"
 NOTHING = "nothing to compare: without errors and load no model deforms"
 
 
@@ -42,17 +42,18 @@ def assumption_costs(
 ) -> dict[str, Cost | str]:
     """Return the costs of all assumptions at one posture.
 
-    Closures are compared without clearances, where the pose is unique.
+    Closures are compared without clearances, because the pose is then unique.
 
     Args:
         posture: the robot's configuration.
         load: (6,) [N m, N] on the platform at its origin, base axes, or by component,
             ``{"fz": -50}``.
         gravity: (3,) [m/s^2] base axes; none if absent.
-        solids: whether beams are meshed, which takes some seconds for each shape.
+        solids: whether beams are compared with meshed solids, which takes some seconds
+            for each cross-section.
 
     Returns:
-        For each assumption its error, or the reason why it is not known.
+        Mapping from each assumption to its error, or to the reason why it is not known.
     """
     load = None if load is None else given_load(load)
     tight = replace(posture, robot=without_clearance(posture.robot))
@@ -74,13 +75,13 @@ def assumption_costs(
 
 
 class _NotApplicable(Exception):
-    """Error: the robot does not make an assumption, or its error is not computed."""
+    """Error: the robot does not use an assumption, or its error is not computed."""
 
 
 def _pieces_cost(
     posture: Posture, load: ArrayLike | None, gravity: ArrayLike | None
 ) -> Cost:
-    """Return the error of beams that are one spring each."""
+    """Return the error of replacing each beam by one spring."""
     if not any(isinstance(frame.link, BeamLink) for frame in posture.robot.frames):
         raise _NotApplicable("no beam")
     unloaded = load is None and gravity is None and not driven(posture.robot)
@@ -92,32 +93,32 @@ def _pieces_cost(
 def _weight_cost(
     posture: Posture, gravity: ArrayLike | None, load: ArrayLike | None
 ) -> Cost:
-    """Return the error of weights that act at the links' ends."""
+    """Return the error of placing the weight of a link at its two ends."""
     if gravity is None or not energy_between_ends(posture, gravity):
-        raise _NotApplicable("no gravity, or no beam with a density")
+        raise _NotApplicable("there is no gravity, or no beam has a density")
     return spread_cost(posture, gravity, load)
 
 
 def _solid_cost(posture: Posture, load: ArrayLike | None, solids: bool) -> Cost:
-    """Return the error of beams compared with solids."""
+    """Return the error of beam theory, in comparison with solid finite elements."""
     beams = [f for f in posture.robot.frames if isinstance(f.link, BeamLink)]
     if beams and not solids:
         raise _NotApplicable(_NOT_MESHED)
     meshed = {frame.name: solid_link(frame) for frame in beams}
     stiffness = {name: s.condensed for name, s in meshed.items() if s is not None}
     if not stiffness:
-        raise _NotApplicable("no beam has a known shape")
+        raise _NotApplicable("no beam has a known cross-section")
     return link_cost(posture, stiffness, load)
 
 
 def stiffness_costs(
     postures: Sequence[Posture], solids: bool = False
 ) -> PlatformCosts | str:
-    """Return errors of the platform's stiffness with beams that act at their ends.
+    """Return the errors of the platform's stiffness that are due to beam theory.
 
     Args:
-        postures: at least one, all of one robot.
-        solids: whether links are meshed.
+        postures: configurations of one robot, at least one.
+        solids: whether the links are meshed.
 
     Returns:
         The errors, or the reason why they are not known.

@@ -1,4 +1,4 @@
-"""Pins held in two bushes each, instead of bounds of translation and tilt.
+"""Pins held in two bushes each, instead of independent bounds of translation and tilt.
 
 The paper bounds a pin's radial clearance |(TX, TY)| <= c and its tilt |(RX, RY)| <= t
 independently.  A pin in two bushes of clearance c, at z = +-h with h = c / t, is
@@ -6,11 +6,11 @@ bounded by the position of its axis there:
 
     |(TX + h RY, TY - h RX)| <= c   and   |(TX - h RY, TY + h RX)| <= c,
 
-These are two circular bounds again, in other coordinates: a pin translated by c cannot
-tilt.  The paper's bounds with half the clearances are inside the bushes' bounds; these
-are inside the paper's bounds.  So the energy with bushes is at least that with the
-paper's bounds, and at most that with half the clearance.  The zone's margin is at most
-doubled.
+These are again two circular bounds, in other coordinates: a pin that is translated by c
+cannot tilt.  The paper's bounds with half the clearances imply the bushes' bounds, and
+the bushes' bounds imply the paper's.  So the energy with bushes is at least the energy
+with the paper's bounds, and at most the energy with half the clearances.  The bushes at
+most double the zone margin.
 """
 
 from dataclasses import replace
@@ -26,16 +26,17 @@ from assembly.linear.reference.energy import solve_with
 
 
 def bush_joints(joints: VirtualJoints) -> VirtualJoints:
-    """Return two bushes for every pin that has both radial clearance and tilt.
+    """Return virtual joints with each pin of radial and tilt clearance as two bushes.
 
     Args:
         joints: virtual joints with the paper's bounds.
 
     Returns:
-        The virtual joints with the bushes' columns instead of the paper's.
+        The virtual joints, with the columns of the bushes instead of the paper's
+        columns.
     """
     cones = joints.cones.copy()
-    # each column of a bounded clearance has one entry, its bound
+    # each column of a bounded clearance has one entry: the inverse of its bound
     rows = np.abs(joints.cones).argmax(axis=0)
     column = {int(row): k for k, row in enumerate(rows)}
     for i in range(len(joints.robot.frames)):
@@ -55,12 +56,11 @@ def solve_bushes(posture: Posture, load: ArrayLike | None = None) -> Assembly:
     """Return the assembly of least energy with pins in two bushes each.
 
     Args:
-        posture: the robot's configuration; bounds of the motions of passive joints are
-            left out.
+        posture: the robot's configuration; the limits of passive joints are ignored.
         load: (6,) [N m, N] on the platform at its origin, base axes.
 
     Returns:
-        The assembly; its ``clearance_excess`` compares with the paper's bounds.
+        The assembly.  Its ``clearance_excess`` is computed with the paper's bounds.
 
     Raises:
         CannotAssemble: no motion of the virtual joints can close a closure.

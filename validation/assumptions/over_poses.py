@@ -21,12 +21,13 @@ class CostsOverPoses:
     """Errors of all assumptions at the poses that the robot reaches.
 
     Attributes:
-        robot: robot with its errors.
-        asked: required components of each of the k poses [m or rad].
-        unreached: (k,) reason why the robot does not reach a pose; empty if it does.
-        costs: for each of the r reached poses, an assumption's error or why it is not
-            known.
-        platform: errors of the platform's stiffness at them, or why they are not known.
+        robot: robot with its geometric errors.
+        asked: required pose components of each of the k poses [m or rad].
+        unreached: (k,) reason why the robot cannot reach a pose; empty if it can.
+        costs: for each of the r reached poses, each assumption's error or the reason
+            why it is not known.
+        platform: errors of the platform's stiffness at the reached poses, or the reason
+            why they are not known.
     """
 
     robot: Robot
@@ -39,7 +40,7 @@ class CostsOverPoses:
 
     @property
     def reached(self) -> tuple[Mapping[str, float], ...]:
-        """(r,) required components of the reached poses."""
+        """(r,) required pose components of the reached poses."""
         return tuple(
             asked
             for asked, why in zip(self.asked, self.unreached, strict=True)
@@ -70,15 +71,15 @@ def costs_over_poses(
     """Return the errors of all assumptions at many poses.
 
     Args:
-        robot: robot with its errors.
+        robot: robot with its geometric errors.
         targets: poses or joint coordinates.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes; none if absent.
-        solids: whether links are meshed, once for all poses.
+        solids: whether the links are meshed; they are meshed once for all poses.
         progress: called after each pose with the number done and the total.
 
     Returns:
-        The errors.
+        The errors of all assumptions at every pose.
 
     Raises:
         BadInput: the closures do not hold in the home pose, or a surface is not usable.

@@ -1,9 +1,10 @@
-r"""Errors of the platform's stiffness with links as beams that act at their ends.
+r"""Errors of the platform's stiffness that are due to links modelled as beams.
 
-Four models of one robot at many postures, clearances at zero, without errors:
+Four models of one robot are compared at many postures, with clearances held at zero and
+without geometric errors:
 
 ==============  ==================================================================
-model           its links
+model           stiffness of the links
 ==============  ==================================================================
 beams           virtual joints with the K_E that the robot declares
 meshed          virtual joints with K_E by finite elements, ends held rigidly
@@ -12,11 +13,12 @@ solids          the finite elements themselves, both ends free to move: the
 spread          virtual joints with K_E of the same mesh, wrenches spread over ends
 ==============  ==================================================================
 
-The results of meshed and solids must agree to rounding: condensation is exact where
-joints hold the ends rigidly.  The difference of spread from meshed is the error of that
-assumption: real seats are between the two.  A difference is the largest relative one of
-the compliance along any wrench, which depends on no choice of point or length. Links do
-not change with the pose: they are meshed once, and a pose needs milliseconds.
+The results of meshed and solids must agree to rounding, because condensation is exact
+where joints hold the ends rigidly.  The difference between spread and meshed is the
+error of rigid ends; a real seat is between the two.  A difference is the largest
+relative difference of the compliance over all directions of the wrench, which depends
+on no choice of point or length.  Links do not change with the pose, so they are meshed
+once; a pose needs milliseconds.
 """
 
 from collections.abc import Mapping, Sequence
@@ -34,7 +36,8 @@ from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from stiffness.screws import screw_map
 from validation.assumptions.solid_links import SolidLink, solid_links
 
-_RANK = 1e-9  # relative to the largest singular value: smaller ones count as zero
+# relative to the largest singular value; smaller singular values count as zero
+_RANK = 1e-9
 
 
 class NoSolids(Exception):
@@ -48,14 +51,16 @@ class PlatformCosts:
     Rows are NaN where the platform has a motion without stiffness.
 
     Attributes:
-        beams: (k,) [-] beams compared with solids.
-        meshed: (k,) [-] meshed K_E compared with solids; the error of rounding.
-        ends: (k,) [-] rigid ends compared with wrenches spread over the ends.
-        by_link: (k,) [-] one link as a beam compared with all links as solids; the link
-            with the largest error first.
-        left: links without a shape, which all models take as declared.
-        mesh_error: [-] estimate of the largest error of a solid's K_E, entries over
-            sqrt(K_ii K_jj); smaller differences may be errors of the mesh.
+        beams: (k,) [-] difference between beams and solids.
+        meshed: (k,) [-] difference between meshed K_E and solids, which is due to
+            rounding.
+        ends: (k,) [-] difference between rigid ends and wrenches spread over the ends.
+        by_link: (k,) [-] difference between a robot with one link as a beam and one
+            with all links as solids, by link; largest first.
+        left: names of the links without a shape; all models use their declared
+            stiffness.
+        mesh_error: [-] estimate of the largest error of a solid's K_E, each entry
+            divided by sqrt(K_ii K_jj); smaller differences may be due to the mesh.
     """
 
     beams: NDArray
@@ -67,10 +72,10 @@ class PlatformCosts:
 
 
 def platform_costs(postures: Sequence[Posture]) -> PlatformCosts:
-    """Compare the platform's stiffness by beams and by solids.
+    """Compare the platform's stiffness with beams and with solids.
 
     Args:
-        postures: at least one, all of one robot.
+        postures: configurations of one robot, at least one.
 
     Returns:
         The relative errors at each pose.
@@ -112,7 +117,7 @@ def platform_costs(postures: Sequence[Posture]) -> PlatformCosts:
 def _compliances(
     postures: Sequence[Posture], stiffness: Mapping[str, NDArray]
 ) -> NDArray:
-    """Return (k, 6, 6) compliances by virtual joints, some links with another K_E."""
+    """Return (k, 6, 6) compliances by virtual joints, with some K_E replaced."""
     links = {name: MatrixLink(K) for name, K in stiffness.items()}
     robot = postures[0].robot.with_links({**links})
     linked = [replace(posture, robot=robot) for posture in postures]
@@ -120,7 +125,7 @@ def _compliances(
 
 
 def _differences(C: NDArray, other: NDArray) -> NDArray:
-    """Return the (k,) largest relative differences; NaN where either is not known."""
+    """Return (k,) largest relative differences; NaN where a compliance is not known."""
     known = np.isfinite(C).all(axis=(1, 2)) & np.isfinite(other).all(axis=(1, 2))
     values = np.full(len(C), np.nan)
     for i in np.flatnonzero(known):
@@ -129,14 +134,14 @@ def _differences(C: NDArray, other: NDArray) -> NDArray:
 
 
 def difference(C: NDArray, other: NDArray) -> float:
-    """Return the largest relative difference of two compliances along any wrench.
+    """Return the largest relative difference of two compliances over all wrenches.
 
     Args:
         C: (6, 6) symmetric, positive semidefinite.
         other: (6, 6) reference compliance.
 
     Returns:
-        [-] the largest of abs(w.C w / w.C_other w - 1) over wrenches w.
+        [-] the largest of abs(w.C w / w.C_other w - 1) over all wrenches w.
     """
     size = np.sqrt(np.diag(other))
     size = np.where(size > 0.0, size, 1.0)
@@ -155,8 +160,9 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
     ends.
 
     Args:
-        posture: the robot's configuration; clearances are held at zero.
-        solids: solids by frame; other links are springs with their K_E.
+        posture: the robot's configuration; clearances are fixed at zero.
+        solids: solid of each frame; the links of other frames are springs with their
+            K_E.
 
     Returns:
         (6, 6) [rad/(N m) .. m/N] at the platform's origin, base axes.
@@ -186,7 +192,7 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
     springs = int(other.sum())
     K[:springs, :springs] = np.eye(springs)
     for i, solid in zip(rows, solids.values(), strict=True):
-        # the motion of the frame's own joint is added beyond the end of the solid
+        # the joint of the frame itself moves the part beyond the solid's end
         own = steps[i].copy()
         own[:, :first] = 0.0
         turn = T[i, :3, :3] @ solid.turn
@@ -202,7 +208,7 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
 
 
 def _closed(robot: Robot, ends: NDArray) -> NDArray:
-    """Return the motions that keep the closures closed, as orthonormal columns."""
+    """Return orthonormal columns: the motions that keep the closures closed."""
     pairs = [
         ends[robot.index(one)] - ends[robot.index(two)] for one, two in robot.closures
     ]
@@ -217,7 +223,7 @@ def _closed(robot: Robot, ends: NDArray) -> NDArray:
 
 
 def _loaded(K: NDArray, basis: NDArray, platform: NDArray) -> NDArray:
-    """Return (6, 6) compliance of the platform, without the motions of no stiffness."""
+    """Return the platform's (6, 6) compliance, without motions of no stiffness."""
     H, moved = basis.T @ K @ basis, platform @ basis
     size = np.sqrt(np.diag(H))
     size[size == 0.0] = 1.0

@@ -1,4 +1,4 @@
-"""Plots of the assumptions' errors; functions take a result and return a figure."""
+"""Figures of the assumptions' errors."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -12,23 +12,23 @@ from validation.assumptions.report import COMPARED
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_BARS = 12  # most links shown; the errors of the others are smaller
+_BARS = 12  # largest number of links shown; links with smaller errors are omitted
 
 
 def platform_cost_figure(
     costs: PlatformCosts, asked: Sequence[Mapping[str, float]], robot: str
 ) -> "Figure":
-    """Return a figure of the platform's errors over poses, and of the links' parts.
+    """Return figure of the errors of the platform's stiffness and of each link's share.
 
     Args:
         costs: errors at k poses.
-        asked: (k,) required components of each pose [m or rad].
+        asked: (k,) required pose components of each pose [m or rad].
         robot: name of the robot.
 
     Returns:
-        Lines over the one component that changes, or over the numbers of the poses;
-        bars of the links' median and largest errors.  For one pose there are only the
-        bars.
+        Curves of the errors over the pose component that changes, or over the numbers
+        of the poses; bars of each link's median and largest error.  For one pose there
+        are only the bars.
     """
     from matplotlib.figure import Figure
 
@@ -45,7 +45,7 @@ def platform_cost_figure(
             x = np.array([one[changes[0]] for one in asked])
         for name, line in (("beams", ".-"), ("ends", "x:")):
             panels[0].plot(x, 100 * getattr(costs, name), line, label=COMPARED[name])
-        panels[0].set(xlabel=plot_label(label), ylabel="largest along any wrench [%]")
+        panels[0].set(xlabel=plot_label(label), ylabel="largest over all wrenches [%]")
         panels[0].set_ylim(bottom=0.0, top=1.1 * panels[0].get_ylim()[1])
         panels[0].legend()
     links = list(costs.by_link)[:_BARS][::-1]

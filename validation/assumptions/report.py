@@ -13,11 +13,11 @@ from validation.assumptions.over_poses import CostsOverPoses
 from validation.assumptions.platform_cost import PlatformCosts
 from validation.assumptions.validity import ENERGY_LIMIT, POSITION_LIMIT, Cost
 
-# models compared by each figure of the platform's compliance
+# the two models whose difference each error of the platform's compliance measures
 COMPARED = {
     "beams": "beams, not solids",
     "meshed": "meshed K_E, not solids",
-    "ends": "rigid ends, not wrenches spread over them",
+    "ends": "rigid ends, compared with wrenches spread over them",
 }
 _LIMITS = {"position": POSITION_LIMIT, "energy": ENERGY_LIMIT}
 _NAMED = 3  # largest number of links named in the text
@@ -25,7 +25,7 @@ _Pose = Mapping[str, float]
 
 
 def costs_table(costs: CostsOverPoses) -> dict[str, Any]:
-    """Return the errors at one pose [rad], [m], [-], or the reason for none."""
+    """Return errors at one pose [rad], [m], [-], or the reason why they are unknown."""
     return {
         "robot": costs.robot.name, "pose": costs.asked[0], "limits": _LIMITS,
         **_at(costs, 0),
@@ -33,7 +33,7 @@ def costs_table(costs: CostsOverPoses) -> dict[str, Any]:
 
 
 def over_poses_table(costs: CostsOverPoses) -> dict[str, Any]:
-    """Return the errors at every pose, and their median and largest values."""
+    """Return the errors at every pose, and their median and largest value."""
     poses: list[dict[str, Any]] = []
     for asked, why in zip(costs.asked, costs.unreached, strict=True):
         row: dict[str, Any] = {"asked": asked, "status": "ok"}
@@ -64,7 +64,7 @@ def _at(costs: CostsOverPoses, i: int) -> dict[str, Any]:
 
 
 def _values(cost: Cost | str) -> dict[str, Any]:
-    """Return one error, or the reason why there is none."""
+    """Return one error as plain values, or the reason why it is unknown."""
     if isinstance(cost, str):
         return {"reason": cost}
     values = {k: v for k, v in vars(cost).items() if v is not None}
@@ -72,7 +72,7 @@ def _values(cost: Cost | str) -> dict[str, Any]:
 
 
 def _platform(costs: PlatformCosts, shown: Callable[[NDArray], Any]) -> dict[str, Any]:
-    """Return errors of the platform's compliance [-], largest along any wrench."""
+    """Return the errors of the platform's compliance [-], largest over all wrenches."""
     return {
         "compliance": {name: shown(getattr(costs, name)) for name in COMPARED},
         "by_link": {name: shown(values) for name, values in costs.by_link.items()},
@@ -92,7 +92,7 @@ def _spread(values: NDArray, where: Sequence[_Pose]) -> dict[str, Any]:
 
 
 def _summary(costs: CostsOverPoses, name: str) -> dict[str, Any]:
-    """Return one assumption's errors over the poses, and reasons for missing ones."""
+    """Return assumption's errors over all poses, and reasons where they are unknown."""
     pairs = [
         (asked, at[name]) for asked, at in zip(costs.reached, costs.costs, strict=True)
     ]
@@ -107,7 +107,7 @@ def _summary(costs: CostsOverPoses, name: str) -> dict[str, Any]:
 
 
 def costs_text(costs: CostsOverPoses) -> str:
-    """Return the errors at one pose, a line each."""
+    """Return the errors at one pose as text, one line for each assumption."""
     lines = [f"{costs.robot.name}: errors due to the model's assumptions"]
     for name, cost in costs.costs[0].items():
         if isinstance(cost, str):
@@ -127,7 +127,7 @@ def costs_text(costs: CostsOverPoses) -> str:
 
 
 def over_poses_text(costs: CostsOverPoses) -> str:
-    """Return the errors over all poses: a line each, median, largest, and its pose."""
+    """Return a line for each assumption: median and largest error, and its pose."""
     count = len(costs.reached)
     lines = [
         f"{costs.robot.name}: errors due to the model's assumptions over {count} of "
@@ -158,13 +158,13 @@ def _energy_text(share: float) -> str:
 
 
 def _platform_lines(over: CostsOverPoses) -> list[str]:
-    """Return lines on the platform's compliance; of many poses median and largest."""
+    """Return lines on the platform's compliance: one pose, or median and largest."""
     costs = over.platform
     if isinstance(costs, str):
         return [f"{'stiffness by solids':>30}: {costs}"]
     many = len(costs.beams) > 1
     lines = [
-        "compliance of the platform, largest difference along any wrench"
+        "compliance of the platform, largest difference over all wrenches"
         + (": median and largest" if many else ":")
     ]
     rows = {text: getattr(costs, name) for name, text in COMPARED.items()}

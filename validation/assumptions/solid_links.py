@@ -1,9 +1,9 @@
-"""Links as solids of cubic finite elements, free at both rigid ends.
+"""Links as solids of cubic finite elements, with both rigid ends free to move.
 
-A beam's solid is a straight bar of its section.  In units of its length and modulus it
-depends only on the section's proportions and Poisson's ratio, so links of one shape are
-solved once.  K_E does not change with the pose.  Virtual joints hold the ends rigidly;
-the stiffness with wrenches spread over the ends is computed too.
+A beam's solid is a straight bar with the beam's section.  In units of its length and
+modulus it depends only on the proportions of the section and on Poisson's ratio, so
+links of one shape are solved once.  K_E does not change with the pose.  Virtual joints
+hold the ends rigidly; K_E with wrenches spread over the ends is computed too.
 """
 
 from collections.abc import Mapping
@@ -22,9 +22,9 @@ from stiffness.fem.material import Material
 from stiffness.fem.two_ends import two_ends
 from stiffness.link import scaled
 
-_KEPT = 32  # most shapes in the cache
+_KEPT = 32  # largest number of shapes in the cache
 _OPTIONS = FemOptions(
-    # the error of the mesh's own K_E is then below 1e-3 of sqrt(K_ii K_jj)
+    # at this accuracy the error of the mesh's own K_E is below 1e-3 of sqrt(K_ii K_jj)
     accuracy=5e-4,
     budget=Budget(seconds=40.0, unknowns=250_000),
 )
@@ -35,13 +35,13 @@ class SolidLink:
     """A link as a solid, in the axes of its mesh.
 
     Attributes:
-        ends: (12, 12) [N m/rad .. N/m] wrenches that hold unit screws of base and tip,
-            each at the centre of its end.
+        ends: (12, 12) [N m/rad .. N/m] wrenches at the centres of base and tip that
+            cause unit screws of both.
         distributing: (6, 6) K_E at the tip with wrenches spread over both ends.
         span: (3,) [m] vector from base to tip.
         turn: (3, 3) rotation from the mesh's axes to the frame's.
-        error: [-] estimate of the largest error of the mesh's K_E, entries over
-            sqrt(K_ii K_jj).
+        error: [-] estimate of the largest error of the mesh's K_E, each entry divided
+            by sqrt(K_ii K_jj).
     """
 
     ends: NDArray
@@ -52,12 +52,12 @@ class SolidLink:
 
     @property
     def condensed(self) -> NDArray:
-        """(6, 6) K_E at the frame in its axes, with the base held."""
+        """(6, 6) K_E at the frame, in its axes, with the base fixed."""
         return self._in_frame(self.ends[6:, 6:])
 
     @property
     def spread(self) -> NDArray:
-        """(6, 6) K_E at the frame in its axes, with wrenches spread over both ends."""
+        """(6, 6) K_E at the frame, in its axes, with wrenches spread over both ends."""
         return self._in_frame(self.distributing)
 
     def _in_frame(self, K: NDArray) -> NDArray:
@@ -69,11 +69,11 @@ def solid_link(frame: Frame) -> SolidLink | None:
     """Return a frame's link as a solid.
 
     Args:
-        frame: any frame.
+        frame: frame of a robot.
 
     Returns:
-        The solid; None for a link without a shape: no link, a matrix, a link of a
-        library, or a beam given by the constants of its section.
+        The solid; None if the frame has no link, or a link without a shape (a matrix, a
+        link of a library, a beam given by the constants of its section).
 
     Raises:
         BadInput: a mesh was not solved when the robot was loaded, or cannot be made.
@@ -110,10 +110,10 @@ def solid_links(robot: Robot) -> Mapping[str, SolidLink]:
     """Return the links of a robot that have a shape, as solids.
 
     Args:
-        robot: any robot.
+        robot: robot whose meshes have been solved.
 
     Returns:
-        The solids by frame.
+        Mapping from the frame's name to the solid.
 
     Raises:
         BadInput: a mesh was not solved when the robot was loaded, or cannot be made.
@@ -124,7 +124,7 @@ def solid_links(robot: Robot) -> Mapping[str, SolidLink]:
 
 def _mesh_error(solved: MeshedLink) -> float:
     """Return the [-] estimate of the largest error of the mesh's own K_E."""
-    # the link's K_E is the middle of an interval; the mesh's own is its upper end
+    # link.stiffness is the middle of an interval; the mesh's own K_E is its upper end
     K = solved.link.stiffness
     above = np.abs(scaled(solved.level.solution.stiffness - K, K))
     return float((above + solved.link.relative_errors).max())
@@ -132,13 +132,13 @@ def _mesh_error(solved: MeshedLink) -> float:
 
 @lru_cache(maxsize=_KEPT)
 def _bar(shape: tuple[tuple[str, float], ...], poisson: float) -> MeshedLink:
-    """Return the solved bar of unit length and modulus."""
+    """Return the solved bar with length 1 and modulus 1."""
     return solve_bar(dict(shape), Material(1.0, poisson), _OPTIONS)
 
 
 @lru_cache(maxsize=_KEPT)
 def _stiffnesses(solved: MeshedLink) -> tuple[NDArray, NDArray]:
-    """Return K between both ends, and K_E with wrenches spread over both."""
+    """Return stiffness between both ends, and K_E with wrenches spread over both."""
     lam, mu = solved.level.material[:, :2].T
     kind = "distributing-both"
     spread = condense(solved.level.mesh, lam, mu, solved.centers, kind).stiffness

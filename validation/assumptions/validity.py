@@ -1,9 +1,9 @@
 """The error of each assumption of the virtual-joint model at a posture.
 
-Each of five assumptions is compared with a model that differs only by it:
+Each of five assumptions is compared with a model that does not make it:
 
 ==================  ==================================================================
-assumption          instead of
+assumption          compared with
 ==================  ==================================================================
 linear closures     closures that hold with finite motions, :mod:`assembly.exact.exact`
 beams               solids with held ends, by finite elements
@@ -12,13 +12,13 @@ disc and cone       a pin in two bushes, :mod:`validation.assumptions.bushes`
 one spring a beam   the same beam in ever more pieces, finite motions
 ==================  ==================================================================
 
-An error is a difference of the platform's pose and a relative difference of the energy.
-It is significant above one per cent or 20 um, the accuracy required of the paper's
-robot. If neither model stores energy or moves the platform, there is nothing to
-compare.
+The error of an assumption is a difference of the platform's pose and a relative
+difference of the energy.  It is significant above one per cent or 20 um, which is the
+accuracy required of the paper's robot.  If neither model stores energy or moves the
+platform, there is nothing to compare.
 
-Poses are compared at the solution of least energy.  Where no load acts on a clearance
-the pose of least energy is not unique; see ``docs/validity.md``.
+Poses are compared at the solution of least energy.  Where no load acts on a clearance,
+this pose is not unique; see ``docs/validity.md``.
 """
 
 import math
@@ -37,19 +37,20 @@ from validation.crosscheck.limits import FLOOR, HALVES, energy_floor
 from validation.crosscheck.spread_weight import energy_between_ends
 
 POSITION_LIMIT = 20e-6  # [m] required accuracy of the paper's robot
-ENERGY_LIMIT = 0.01  # [-] relative error of the energy that is significant
+ENERGY_LIMIT = 0.01  # [-] smallest significant relative error of the energy
 
 
 @dataclass(frozen=True)
 class Cost:
-    """The error of an assumption; NaN where both models give only rounding errors.
+    """Error of an assumption; NaN where both models differ only by rounding errors.
 
     Attributes:
         rotation: [rad] error of the platform's orientation.
-        position: [m] error of the position of its origin.
-        energy: [-] error of the elastic energy, relative to that of the better model.
-        pieces: number of pieces of every beam with errors below the limits; None for
-            other assumptions.
+        position: [m] error of the position of the platform's origin.
+        energy: [-] error of the elastic energy, relative to the energy of the better
+            model.
+        pieces: number of pieces of every beam at which the errors are below the limits;
+            None for other assumptions.
     """
 
     rotation: float
@@ -71,16 +72,17 @@ class Cost:
 def cost_between(
     model: Assembly, better: Assembly | ExactAssembly, missing: float = 0.0
 ) -> Cost:
-    """Return the difference of a solution from a better one.
+    """Return the difference between a solution and a more accurate one.
 
     Args:
         model: solution with the assumption.
         better: solution without the assumption.
-        missing: [J] energy of the better model that neither solution contains.
+        missing: [J] energy of the better model that is contained in neither solution.
 
     Returns:
-        The error.  Without loads, energies below 1e-6 of the energy without clearances
-        are taken as that: inside an assembly zone both are rounding errors.
+        The error.  Without loads, an energy below 1e-6 of the energy without clearances
+        is replaced by that limit: inside an assembly zone both energies are rounding
+        errors.
     """
     energy = better.energy + missing
     least = 0.0 if model.frame_loads else 1e-6 * model.energy_without_clearance
@@ -101,7 +103,7 @@ def cost_between(
 
 
 def closure_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
-    """Return error of closures linear in the screws, compared with finite motions.
+    """Return the error of linearised closures, compared with finite motions.
 
     Args:
         posture: the robot's configuration.
@@ -123,11 +125,11 @@ def link_cost(
     stiffness: Mapping[str, NDArray],
     load: ArrayLike | None = None,
 ) -> Cost:
-    """Return error of links as beams, compared with given stiffnesses.
+    """Return the error of beam theory, compared with given link stiffnesses.
 
     Args:
         posture: the robot's configuration.
-        stiffness: reference K_E (6, 6) [N m/rad .. N/m] by frame.
+        stiffness: reference K_E (6, 6) [N m/rad .. N/m] by name of the frame.
         load: (6,) [N m, N] on the platform at its origin, base axes.
 
     Returns:
@@ -145,10 +147,10 @@ def link_cost(
 def spread_cost(
     posture: Posture, gravity: ArrayLike, load: ArrayLike | None = None
 ) -> Cost:
-    """Return error of weights that act at the links' ends.
+    """Return the error of placing the weights of links at their ends.
 
-    The equivalents at the ends, :mod:`assembly.linear.load`, do not change the pose;
-    they lack the energy that the beams store between their ends.
+    The equivalent loads at the ends, :mod:`assembly.linear.load`, cause the correct
+    pose; they lack the energy that beams store between their ends.
 
     Args:
         posture: the robot's configuration.
@@ -167,7 +169,7 @@ def spread_cost(
 
 
 def bush_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
-    """Return error of the paper's bounds, compared with pins in two bushes.
+    """Return the error of the paper's bounds, compared with pins in two bushes.
 
     Args:
         posture: the robot's configuration.
@@ -186,11 +188,11 @@ def bush_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
 def pieces_cost(
     posture: Posture, load: ArrayLike | None = None, gravity: ArrayLike | None = None
 ) -> Cost:
-    """Return error of a beam as one spring, compared with many pieces.
+    """Return the error of a beam as one spring, compared with many pieces.
 
-    The error of n pieces falls as 1 / n^2 (``docs/proofs.md``).  The solutions of one
-    and two pieces give the limit of many, and the number of pieces with errors below
-    the limits.
+    The error of n pieces decreases as 1 / n^2 (``docs/proofs.md``).  The solutions with
+    one and two pieces determine the limit for many pieces, and the number of pieces
+    with errors below the limits.
 
     Args:
         posture: the robot's configuration.

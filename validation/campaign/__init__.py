@@ -1,4 +1,4 @@
-"""Measured data: the folder, read and checked.
+"""Reading and checking of measured data (campaigns).
 
 Begin at ``campaign.py``; the format is ``docs/campaigns.md``.
 """

@@ -1,4 +1,4 @@
-"""Measured deviations of a machine, one row a measurement, with checks."""
+"""Measured deviations of a machine, one row for each measurement, with checks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -10,7 +10,7 @@ from assembly.model.robot import Robot
 from forcefit.results.display import Figures, html_table, short_repr
 from forcefit.results.text import in_unit
 
-# components of a deviation, in a screw's order
+# components of a deviation, in the order of a screw
 READING = ("rx", "ry", "rz", "tx", "ty", "tz")
 LOAD = ("mx", "my", "mz", "fx", "fy", "fz")
 
@@ -19,38 +19,45 @@ LOAD = ("mx", "my", "mz", "fx", "fy", "fz")
 class Campaign:
     """Measured deviations of a machine, in the order of the file.
 
-    R rows, one per measurement; n frames.  It exists only if the nominal robot can
-    reach every commanded configuration.
+    The campaign has R rows, one for each measurement; the robot has n frames.  A
+    campaign exists only if the nominal robot can reach every commanded configuration.
 
     Attributes:
-        name: name of the campaign, that of its folder.
-        robot: robot as declared.
-        ids: R labels, unique.
-        coordinates: (R, n) [rad or m] of every joint, nominal closure solved.
-        transforms: (R, n, 4, 4) frames seen from the base, without imperfections.
-        mismatch: (R,) [rad, m] nominal closure error (rounded files); it is ignored.
-        commanded: ``"joints"`` or ``"pose"``, as in the file.
+        name: name of the campaign's folder.
+        robot: the declared robot.
+        ids: R unique labels.
+        coordinates: (R, n) [rad or m] of every joint, for the nominal robot with closed
+            closures.
+        transforms: (R, n, 4, 4) poses of the frames in the base frame, without
+            imperfections.
+        mismatch: (R,) [rad, m] nominal closure error due to rounded robot files; it is
+            ignored.
+        commanded: kind of the file's commands, ``"joints"`` or ``"pose"``.
         loads: (R, 6) [N m, N] on the platform at the reference point, base axes.
         measured: (R, 6) [rad, m] rx ry rz tx ty tz at the reference point, base axes;
-            NaN is not measured.
-        sigma: (R, 6) [rad, m] one standard deviation of each reading, NaN only where
-            nothing was measured and none is stated.
-        covariates: (R,) each, by name without ``cov.``.
-        reference_point: (3,) [m] the point that was measured, platform axes.
+            NaN where not measured.
+        sigma: (R, 6) [rad, m] standard deviation of each reading; NaN only where
+            nothing was measured and no standard deviation is stated.
+        covariates: (R,) values by name of the covariate, without ``cov.``.
+        reference_point: (3,) [m] measured point, platform axes.
         registration: ``"known"``, or ``"unknown"`` if the pose of the measuring device
             is unknown.
-        configuration: (R,) number of the commanded configuration, from 0 by first use.
-        repeat: (R,) number of the configuration under one load, from 0 by first use:
-            rows with the same number are repeats.
-        session: (R,) names of sessions; None if the file has none.
-        motion_units: ``rad`` or ``m`` of covariates that are measured motions, by name.
-        points: (3,) [m] by name, further points measured, platform axes.
-        per_session: names of further effects that may differ from session to session.
-        partial: (R,) by name, further covariates that some sessions lack: NaN there.
-        point: (R,) names of the points read, ``""`` for the reference point; None if
-            all rows read that.  A row of the file becomes a row for each point.
+        configuration: (R,) number of the commanded configuration, counted from 0 by
+            first use.
+        repeat: (R,) number of the pair of configuration and load, counted from 0 by
+            first use; rows with the same number are repeats.
+        session: (R,) name of each row's session; None if the file has none.
+        motion_units: ``rad`` or ``m``, by name of the covariate that is a measured
+            motion.
+        points: (3,) [m] further measured points by name, platform axes.
+        per_session: names of additional effects that may differ between sessions.
+        partial: (R,) values by name of further covariates; NaN in sessions without
+            them.
+        point: (R,) name of the measured point, ``""`` for the reference point; None if
+            all rows measure the reference point.  A row of the file becomes one row for
+            each point.
         common: (R, 6, k) [rad, m] noise that all readings of one row of the file share,
-            in addition to that of ``sigma``: change of each reading per standard
+            in addition to the noise of ``sigma``: change of each reading per standard
             deviation of k independent numbers, drawn once for the row; None if there is
             none.
     """
@@ -81,7 +88,7 @@ class Campaign:
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
     def _figures(self) -> Figures:
-        """Return the size of the campaign, and its noise."""
+        """Return lines about the size of the campaign and its noise."""
         cells, sizes = self.cells, []
         for unit, part in (("urad", slice(3)), ("um", slice(3, 6))):
             sigma = self.sigma[:, part][cells[:, part]]
@@ -125,25 +132,25 @@ class Campaign:
 
     @property
     def cells(self) -> NDArray:
-        """(R, 6) bool, True where measured."""
+        """(R, 6) bool, True for a measured component."""
         return np.isfinite(self.measured)
 
     @property
     def not_measured(self) -> list[str]:
-        """Components of a reading that no row has measured."""
+        """Names of the components that no row has measured."""
         seen = zip(READING, self.cells.T, strict=True)
         return [name for name, cells in seen if not cells.any()]
 
     @property
     def sessions(self) -> tuple[str, ...]:
-        """Names of its sessions in the order of first use; empty without sessions."""
+        """Names of the sessions in the order of first use; empty without sessions."""
         return (
             () if self.session is None else tuple(dict.fromkeys(self.session.tolist()))
         )
 
     @property
     def targets(self) -> NDArray:
-        """(R, 3) [m] the points read in the rows, platform axes."""
+        """(R, 3) [m] measured point of each row, platform axes."""
         if self.point is None:
             return np.broadcast_to(self.reference_point, (len(self), 3))
         places = {**self.points, "": self.reference_point}
@@ -151,7 +158,7 @@ class Campaign:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """R labels of rows of the file, common to rows that read points of one."""
+        """R labels of the file's rows; the points of one row have the same label."""
         if self.point is None:
             return self.ids
         pairs = zip(self.ids, self.point.tolist(), strict=True)
@@ -159,13 +166,13 @@ class Campaign:
 
     @property
     def measured_at_once(self) -> NDArray:
-        """(R,) int, equal for rows that read several points of one row of a file."""
+        """(R,) int, equal for the points of one row of the file."""
         number = dict[str, int]()
         rows = [number.setdefault(label, len(number)) for label in self.labels]
         return np.array(rows, dtype=int)
 
     def in_session(self, session: str | None) -> NDArray:
-        """Return the (R,) bool of a session's rows; all for None."""
+        """Return (R,) bool, True for rows of the session; all True for None."""
         every = np.ones(len(self), dtype=bool)
         return every if session is None else np.asarray(self.session == session)
 
@@ -173,7 +180,7 @@ class Campaign:
         """Return selected rows; ``configuration`` and ``repeat`` keep their numbers.
 
         Args:
-            rows: their numbers, a mask (R,), or a slice.
+            rows: numbers of rows, a mask (R,), or a slice.
 
         Returns:
             A campaign of those rows, in the order given.
@@ -196,10 +203,10 @@ class Campaign:
 
 
 def number_rows(*columns: ArrayLike, step: float = 1e-9) -> NDArray:
-    """Number rows so that equal ones share a number, from 0 by first use.
+    """Return a number for each row; equal rows have the same number, counted from 0.
 
     Args:
-        columns: (R,) or (R, k) each; NaN equals NaN.
+        columns: (R,) or (R, k) arrays; NaN equals NaN.
         step: smaller differences count as zero.
 
     Returns:
@@ -216,7 +223,7 @@ def number_rows(*columns: ArrayLike, step: float = 1e-9) -> NDArray:
 
 
 def _index(rows: ArrayLike) -> NDArray:
-    """Return the numbers of rows, or a mask, as an index; an empty list is no rows."""
+    """Return numbers or a mask of rows as an index; an empty list selects no row."""
     index = np.asarray(rows)
     return index.astype(int) if index.size == 0 else index
 

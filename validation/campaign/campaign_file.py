@@ -1,6 +1,6 @@
-"""Reader of campaign folders: ``campaign.toml`` and its table, completely checked.
+"""Reader of campaign folders: ``campaign.toml`` and its table, with all checks.
 
-The format is that of ``docs/campaigns.md``.
+The format is described in ``docs/campaigns.md``.
 """
 
 import os.path
@@ -40,12 +40,13 @@ from validation.campaign.measurement_table import (
     read_table,
 )
 
-_CLOSED = 1e-6  # [rad, m] accepted mismatch of rounded robot files
+# [rad, m] largest accepted closure error, which rounding of robot files causes
+_CLOSED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class _Declared:
-    """The content of ``campaign.toml``, or its defaults for a table alone."""
+    """The content of ``campaign.toml``, or the defaults for a table alone."""
 
     root: Table
     name: str
@@ -58,40 +59,41 @@ class _Declared:
     per_session: tuple[str, ...]
 
 
-def read_campaign(folder: Path | str) -> Campaign:
+def read_campaign(folder: Path | str, *, links: bool = True) -> Campaign:
     """Return the campaign of a folder.
 
     Args:
-        folder: folder with ``campaign.toml`` in it, or that file.
+        folder: folder with a file ``campaign.toml``, or that file.
+        links: whether links given by meshes are solved, which diagnoses need.
 
     Returns:
-        The campaign, every configuration placed.
+        The campaign, with joint coordinates of every configuration.
 
     Raises:
-        BadInput: part of it breaks a rule of the format, is not plausible, or a
-            configuration is unreachable; the message has file, place, found and
-            expected.
+        BadInput: the folder violates a rule of the format, a value is not plausible, or
+            a configuration is unreachable; the message names file, place, found and
+            expected value.
     """
     root = read_toml(_declaration(folder))
     robot_name = root.text("robot", expected="a built-in robot or a robot file")
     declared = _declared(root)
-    return _campaign(declared, _read_robot(root, robot_name))
+    return _campaign(declared, _read_robot(root, robot_name, links))
 
 
 def read_commands(source: Path | str, robot: Robot) -> Campaign:
-    """Return the commands of a machine as a campaign; readings may be missing.
+    """Return the commands of a machine as a campaign; measurements may be missing.
 
     Args:
-        source: a campaign, or a table of the same columns alone, in SI.  Its readings
-            are those of the point of the robot's identification, or of the platform's
-            origin.
+        source: a campaign, or a table with the same columns alone, in SI units.  The
+            readings of a table are those of the measured point of the robot's
+            identification, or of the platform's origin.
         robot: the robot that replaces the campaign's.
 
     Returns:
-        A campaign with a row for each point of each row, NaN where not measured.
+        A campaign with one row for each point of each row, NaN where not measured.
 
     Raises:
-        BadInput: as :func:`read_campaign`.
+        BadInput: for the same reasons as in :func:`read_campaign`.
     """
     if Path(source).suffix.lower() == ".csv":
         content: dict[str, Any] = {"measurements": Path(source).name}
@@ -143,7 +145,7 @@ def _per_session(root: Table) -> tuple[str, ...]:
 
 
 def _table_names(root: Table) -> list[str]:
-    """Return the name of one table, or names by session."""
+    """Return the name of one table, or a name for each session."""
     given = root.get("measurements")
     if not isinstance(given, list):
         return [root.text("measurements", expected="a CSV file")]
@@ -155,15 +157,15 @@ def _table_names(root: Table) -> list[str]:
 
 
 def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Campaign:
-    """Return the campaign of a declaration, with a robot.
+    """Return the campaign that a declaration describes.
 
     Args:
-        declared: value in the file.
-        robot: the robot for the commands.
+        declared: content of the file.
+        robot: robot that executes the commands.
         measured: whether every row must have a measurement.
 
     Returns:
-        The campaign, a row for each point read.
+        The campaign, with one row for each measured point.
     """
     point, points = declared.point, declared.points
     table = join_tables([
@@ -185,7 +187,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
     _check_points(declared, extent)
     if measured:
         check_measured(table, points)
-    # readings and their sigma by point, first those of the reference point
+    # readings and their sigma by point; the reference point is first
     every: dict[str, tuple[NDArray, NDArray]] = {}
     for name, at in {"": point, **points}.items():
         every[name] = _readings(table, name, declared.noise)
@@ -193,7 +195,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
         check_readings(table, name, every[name][1], declared.registration, reach)
     row, which = _rows_of_points(every, measured)
     configuration = configuration[row]
-    loads = (table.stack("load", LOAD, 0.0) + 0.0)[row]  # no negative zero
+    loads = (table.stack("load", LOAD, 0.0) + 0.0)[row]  # replaces -0.0 by 0.0
     session = np.array(table.sessions)[row] if table.sessions else None
     kinds = [which]
     if session is not None:
@@ -229,7 +231,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
 
 
 def _check_points(declared: _Declared, extent: float) -> None:
-    """Reject measured points that are far from a robot of an extent [m]."""
+    """Reject measured points that are far from a robot of a given extent [m]."""
     points = {f"points.{name}": at for name, at in declared.points.items()}
     for place, at in ({"reference_point": declared.point} | points).items():
         if np.linalg.norm(at) > 10 * extent:
@@ -244,7 +246,7 @@ def _check_points(declared: _Declared, extent: float) -> None:
 def _labels(
     ids: Sequence[str], points: Sequence[str], row: NDArray, which: NDArray
 ) -> tuple[str, ...]:
-    """Return labels of rows of points: the row's, and the point's if it has a name."""
+    """Return a label for each row: the file's label, and the point's name if any."""
     return tuple(
         f"{ids[i]}:{points[k]}" if points[k] else ids[i]
         for i, k in zip(row, which, strict=True)
@@ -254,21 +256,22 @@ def _labels(
 def _rows_of_points(
     every: dict[str, tuple[NDArray, NDArray]], measured: bool
 ) -> tuple[NDArray, NDArray]:
-    """Return the rows of the file, each once for every point that it reads.
+    """Return the numbers of the file's rows, repeated for every measured point.
 
     Args:
         every: readings (R, 6) and their sigma, by point.
         measured: whether only measurements are kept; otherwise a row without a reading
-            stays, for all declared points.
+            stays, once for each declared point.
 
     Returns:
-        (C,) rows of the file, ascending, and (C,) number of the point.
+        (C,) row of the file, ascending, and (C,) number of the point.
     """
     taken = np.column_stack([
         np.isfinite(readings).any(axis=1) for readings, _ in every.values()
     ])
     if not measured:
-        alone = not taken.any() and len(every) > 1  # points, none of them measured yet
+        # rows with several points, none of which has been measured yet
+        alone = not taken.any() and len(every) > 1
         taken[~taken.any(axis=1)] = taken.any(axis=0) if taken.any() else True
         taken[:, 0] &= not alone
     rows, which = np.nonzero(taken)
@@ -282,7 +285,7 @@ def _read_points(root: Table) -> dict[str, NDArray]:
     table = root.table("points")
     for name in table.content:
         if not name or "." in name or ":" in name or name in READING:
-            message = "expected a name without . and :, other than those of readings"
+            message = "expected a name without . and : that is no component"
             raise table.bad("", f"found {quoted(name)}, {message}")
     return {name: table.array(name, (3,), "m", largest=1e4) for name in table.content}
 
@@ -290,7 +293,7 @@ def _read_points(root: Table) -> dict[str, NDArray]:
 def _readings(
     table: MeasurementTable, point: str, noise: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return (R, 6) readings of a point, and sigma [rad, m], stated or the device's."""
+    """Return (R, 6) readings of a point, and sigma [rad, m] of table or device."""
     at = f".{point}" if point else ""
     stated = table.stack(f"sigma{at}", READING, np.nan)
     sigma = np.where(np.isnan(stated), noise, stated)
@@ -298,7 +301,7 @@ def _readings(
 
 
 def _read_noise(root: Table) -> NDArray:
-    """Return (6,) [rad, m] standard deviations of the device, NaN if not stated."""
+    """Return (6,) [rad, m] standard deviations of the device; NaN if not stated."""
     noise = np.full(6, np.nan)
     if root.has("noise"):
         table = root.table("noise")
@@ -310,21 +313,21 @@ def _read_noise(root: Table) -> NDArray:
     return noise
 
 
-def _read_robot(root: Table, name: str) -> Robot:
-    """Return the robot: built in, or a file next to the campaign's."""
+def _read_robot(root: Table, name: str, links: bool) -> Robot:
+    """Return robot: a built-in one, or one of a file next to the campaign's file."""
     if name in BUILT_IN:
         return BUILT_IN[name]()
     path = Path(root.file).parent / name
     if not os.path.isfile(path):
         message = (
-            f"found {quoted(name)}, neither a built-in robot nor a file beside this"
+            f"found {quoted(name)}, neither a built-in robot nor a file in this folder"
         )
         raise root.bad("robot", f"{message}{nearest(name, BUILT_IN)}")
-    return load_robot(path)
+    return load_robot(path, links=links)
 
 
 def _commanded(table: MeasurementTable, robot: Robot) -> str:
-    """Return names of the table's commands: all joints, or components of the pose."""
+    """Return the names of the table's commands: joints, or components of the pose."""
     actuated = [f"q.{f.name}" for f in robot.frames if f.actuated]
     given = [name for name in table.columns if name.startswith("q.")]
     pose = [name for name in table.columns if name.startswith("pose.")]
@@ -358,7 +361,7 @@ def _command(table: MeasurementTable, robot: Robot, commanded: str) -> NDArray:
 
 def _place(table: MeasurementTable, robot: Robot, commanded: str,
            rows: NDArray) -> list[Posture]:  # fmt: skip
-    """Return posture of each row, or raise an error on the first unreachable one."""
+    """Return the posture of each row; reject the first unreachable row."""
     place = place_many if commanded == "pose" else place_many_joints
     postures, reasons = place(robot, _command(table, robot, commanded)[rows])
     placed = []

@@ -1,4 +1,4 @@
-"""What ``campaign.toml`` holds, for editors: the keys that its reader knows."""
+"""Schema of ``campaign.toml`` for editors: the keys that the reader accepts."""
 
 from assembly.effects import LIBRARY
 from forcefit.results.quantities import number, text

@@ -1,7 +1,7 @@
-"""Plausibility checks of a campaign: a deviation of 153 m is a mistake of the unit.
+"""Plausibility checks of a campaign: a deviation of 153 m is a wrong unit.
 
-All values checked here are well-formed numbers.  Refused are values that are impossible
-for a machine, with the likely mistake in the message.
+The values checked here are well-formed numbers.  A value that is impossible for a
+machine is refused, and the message names the likely mistake.
 """
 
 from collections.abc import Iterable
@@ -14,13 +14,14 @@ from assembly.model.robot import Robot
 from validation.campaign.campaign import LOAD, READING
 from validation.campaign.measurement_table import MeasurementTable
 
-_TURNS = 8 * np.pi  # [rad] largest command of a joint; 25 or more is in degrees
-_FORCE = 1e7  # [N], [N m] larger than any platform's load
-# [K] largest difference from calibration; 293 is an absolute temperature
+# [rad] largest accepted command of a joint; a larger one is probably in degrees
+_TURNS = 8 * np.pi
+_FORCE = 1e7  # [N], [N m] largest accepted load; it exceeds the load of any platform
+# [K] largest accepted difference from calibration; 293 would be an absolute temperature
 _WARMEST = 250.0
-_LATEST = 3e8  # [s] ten years; larger is a date
-_ROOM = 1000.0  # [m] largest distance of a measuring device
-_FINEST = 1e-15  # [rad, m] finer than any device
+_LATEST = 3e8  # [s] largest accepted time, ten years; a larger number is a date
+_ROOM = 1000.0  # [m] largest accepted distance of a measuring device
+_FINEST = 1e-15  # [rad, m] smallest accepted standard deviation of a device
 _UNITS = "; declare other units in [units] of campaign.toml"
 
 
@@ -28,11 +29,11 @@ def check_commands(table: MeasurementTable, robot: Robot) -> None:
     """Reject impossible commands, loads and covariates.
 
     Args:
-        table: the table as read.
+        table: the table in SI units.
         robot: robot of the campaign.
 
     Raises:
-        BadInput: the first such cell, with its likely meaning.
+        BadInput: the first impossible cell, with the likely mistake.
     """
     reach = _body_length(robot)
     for name, values in table.columns.items():
@@ -76,11 +77,11 @@ def check_measured(table: MeasurementTable, points: Iterable[str]) -> None:
     """Reject a row without any measurement.
 
     Args:
-        table: the table as read.
+        table: the table in SI units.
         points: names of further points measured.
 
     Raises:
-        BadInput: the first such row.
+        BadInput: the first row without a measurement.
     """
     groups = ["meas", *(f"meas.{point}" for point in points)]
     measured = np.hstack([table.stack(group, READING, np.nan) for group in groups])
@@ -96,14 +97,15 @@ def check_readings(table: MeasurementTable, point: str, sigma: NDArray,
     """Reject deviations larger than the robot, and invalid sigma.
 
     Args:
-        table: the table as read.
-        point: name of the point read, ``""`` for the reference point.
-        sigma: (R, 6) [rad, m] of each reading, NaN where none is stated.
+        table: the table in SI units.
+        point: name of the measured point, ``""`` for the reference point.
+        sigma: (R, 6) [rad, m] standard deviation of each reading, NaN where none is
+            stated.
         registration: for ``"unknown"`` the device may be anywhere in a room.
-        extent: [m] of the robot over all configurations.
+        extent: [m] size of the robot over all configurations.
 
     Raises:
-        BadInput: the first such reading, with its likely meaning.
+        BadInput: the first invalid reading, with the likely mistake.
     """
     at = f".{point}" if point else ""
     measured = table.stack(f"meas{at}", READING, np.nan)
@@ -134,11 +136,11 @@ def check_readings(table: MeasurementTable, point: str, sigma: NDArray,
 
 
 def extent_of(transforms: NDArray, reference_points: NDArray) -> float:
-    """Return the diagonal [m] of the box around all origins, base and measured points.
+    """Return diagonal [m] of the box around the base, all origins and measured points.
 
     Args:
         transforms: (k, n, 4, 4) frames of the configurations.
-        reference_points: (k, 3) [m] base axes.
+        reference_points: (k, 3) [m] measured points, base axes.
 
     Returns:
         The diagonal; 1 if all of these coincide.
@@ -149,7 +151,7 @@ def extent_of(transforms: NDArray, reference_points: NDArray) -> float:
 
 
 def _body_length(robot: Robot) -> float:
-    """Return length [m] of all bodies together, at least the largest travel at home."""
+    """Return [m] total length of all bodies, at least the largest travel at home."""
     lengths = np.linalg.norm(robot.fixed_transforms[:, :3, 3], axis=1).sum()
     slides = [abs(f.position) for f in robot.frames if f.joint == "prismatic"]
     return float(lengths + sum(slides)) or 1.0
@@ -157,7 +159,7 @@ def _body_length(robot: Robot) -> float:
 
 def _within(table: MeasurementTable, name: str, values: NDArray, largest: float,
             expected: str) -> None:  # fmt: skip
-    """Reject the first value whose size exceeds the largest valid one."""
+    """Reject the first value that exceeds the largest accepted size."""
     for i in np.flatnonzero(np.abs(values) > largest * (1 + 1e-9))[:1]:
         message = f"found {values[i]:g}, expected {expected}"
         raise table.bad(int(i), name, message)

@@ -1,6 +1,6 @@
 """Format of a campaign's table: delimiter, decimal mark and units.
 
-It is declared in ``campaign.toml``; the defaults are comma, point, SI.
+``campaign.toml`` declares the format; the defaults are comma, point and SI units.
 """
 
 import math
@@ -16,7 +16,8 @@ _ANGLES = {
     "rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180,
     "arcsec": math.pi / 648000,
 }  # fmt: skip
-UNITS = {  # key of [units]: factor to SI of each unit it may name, SI first
+# factors to SI of the units that each key of [units] accepts; the SI unit is first
+UNITS = {
     "position": _LENGTHS,
     "rotation": _ANGLES,
     "command_position": _LENGTHS,
@@ -34,9 +35,9 @@ class Dialect:
     """Format of a table.
 
     Attributes:
-        delimiter: between cells.
+        delimiter: character between cells.
         decimal: the decimal mark.
-        units: unit by key; SI for others.
+        units: unit by key; keys that are not declared are in SI units.
         motions: unit of each covariate that is a measured motion, by name.
     """
 
@@ -96,7 +97,7 @@ def read_dialect(root: Table) -> Dialect:
 
 
 def parse_number(cell: str, decimal: str) -> float:
-    """Return the number in a cell; NaN if it is none ("nan" and "1_000" are none)."""
+    """Return the number in a cell; NaN for other text, such as "nan" or "1_000"."""
     if decimal != ".":
         cell = cell.replace(".", "?").replace(decimal, ".")
     return float(cell) if _NUMBER.fullmatch(cell) else math.nan

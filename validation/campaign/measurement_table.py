@@ -1,8 +1,8 @@
-"""The table of a campaign: text to numbers, with every cell checked.
+"""The table of a campaign: conversion of text to numbers, with checks of every cell.
 
-The reader accepts only the declared format: delimiter, decimal mark and units come from
-``campaign.toml``.  A table in another format is refused, with the key that would
-declare it.
+The reader accepts only the declared format: ``campaign.toml`` declares delimiter,
+decimal mark and units.  A table in another format is refused, and the message names the
+key that would declare it.
 """
 
 import csv
@@ -34,17 +34,17 @@ _TEXTS = ("id", "session")  # columns that are not numbers
 
 @dataclass(frozen=True, eq=False)
 class MeasurementTable:
-    """A table as numbers in SI.
+    """A table of numbers in SI units.
 
     Attributes:
-        file: its name, for messages.
-        ids: label of each row, unique.
+        file: name of the file, for messages.
+        ids: unique label of each row.
         lines: line of the file on which each row ends, for messages.
-        columns: (R,) by name, in the order of the file, without ``id``; NaN where a
-            cell is empty.
+        columns: (R,) values by name of the column, in the order of the file, without
+            ``id``; NaN for an empty cell.
         dialect: format of the table.
         sessions: name of the session of each row; empty if the file has none.
-        files: file of each row, if there are several.
+        files: name of each row's file, if there are several files.
     """
 
     file: str
@@ -66,7 +66,7 @@ class MeasurementTable:
         return BadInput(f"{file}: {where}: {message}")
 
     def stack(self, prefix: str, names: tuple[str, ...], absent: float) -> NDArray:
-        """Return the (R, k) columns of a group; ``absent`` for a missing column."""
+        """Return (R, k) columns of a group, with ``absent`` for a missing column."""
         empty = np.full(len(self), absent)
         return np.column_stack([
             self.columns.get(f"{prefix}.{n}", empty) for n in names
@@ -82,13 +82,13 @@ def read_table(
         path: a CSV file with a header.
         robot: robot with actuated joints that may be columns.
         dialect: format of the table.
-        points: names of further points measured.
+        points: names of further measured points.
 
     Returns:
-        The table in SI.
+        The table in SI units.
 
     Raises:
-        BadInput: no such table; the message has line and column.
+        BadInput: the file is not a valid table; the message names line and column.
     """
     path = Path(path)
     lines, rows = _cells(path, dialect)
@@ -117,21 +117,21 @@ def read_table(
     for k, name in enumerate(header):
         if name not in _TEXTS:
             table.columns[name] = _numbers(table, robot, name, [row[k] for row in rows])
-    _check_labels(table)  # after the numbers, which show a wrong format first
+    _check_labels(table)  # after the conversion, whose messages name a wrong format
     return table
 
 
 def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
-    """Join tables of rows, each a session unless it says otherwise.
+    """Join tables; the rows of a table without sessions are one session.
 
     Args:
         tables: tables of one campaign, at least one.
 
     Returns:
-        A single table unchanged; for several, labels begin with the file's name.
+        The joined table; labels begin with the file's name if there are several tables.
 
     Raises:
-        BadInput: a table lacks a column of the others.  Only covariates may be absent
+        BadInput: a table lacks a column of another one.  Only covariates may be absent
             from a whole table; they are NaN there.
     """
     if len(tables) == 1:
@@ -142,7 +142,9 @@ def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
         may_lack = name.startswith(("meas.", "sigma.", "load.", "cov."))
         for table in tables:
             if name not in table.columns and not may_lack:
-                message = f"line 1: missing column {quoted(name)}, which others have"
+                message = (
+                    f"line 1: missing column {quoted(name)}, which other tables have"
+                )
                 raise BadInput(f"{table.file}: {message}")
         absent = 0.0 if name.startswith("load.") else math.nan
         columns[name] = np.concatenate([
@@ -164,7 +166,7 @@ def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
 
 
 def _cells(path: Path, dialect: Dialect) -> tuple[list[int], list[list[str]]]:
-    """Return cells without blanks around them, and the line at each row's end."""
+    """Return stripped cells, and the line number at the end of each row."""
     lines, rows = [], []
     text = io.StringIO(read_text(path), newline="")
     reader = csv.reader(text, delimiter=dialect.delimiter, strict=True)
@@ -195,7 +197,7 @@ def _check_printable(path: Path, line: int, rows: list[list[str]]) -> None:
 def _header(
     path: Path, names: list[str], robot: Robot, points: tuple[str, ...]
 ) -> list[str]:
-    """Return the first line, if every name in it is that of a column."""
+    """Return the header, after a check that every name is the name of a column."""
     q = [f"q.{f.name}" for f in robot.frames if f.actuated]
     groups: dict[str, tuple[str, ...]] = {
         "pose": POSE, "load": LOAD, "meas": READING, "sigma": READING,
@@ -205,7 +207,7 @@ def _header(
     known = [*_TEXTS, *q, *(f"{g}.{c}" for g, cs in groups.items() for c in cs)]
     known += ["cov.temperature", "cov.time", "cov.approach"]
     if not any(name in known or name.startswith("cov.") for name in names):
-        # not printed: the file may be no table at all
+        # the names are not printed, because the file may not be a table
         raise BadInput(
             f"{path}: line 1: found no column of a table of "
             f"measurements{_other(names)}; expected id, q.<frame> or pose.tx "
@@ -230,7 +232,7 @@ def _header(
 
 
 def _passive(name: str, robot: Robot) -> str:
-    """Return why a joint of the robot cannot be commanded, if that is the error."""
+    """Return reason why a joint of the robot cannot be commanded, if it is passive."""
     frames = {f"q.{f.name}": f for f in robot.frames}
     if name not in frames:
         return ""
@@ -239,7 +241,7 @@ def _passive(name: str, robot: Robot) -> str:
 
 
 def _other(names: list[str]) -> str:
-    """Return the key that would make a header of one cell readable."""
+    """Return the remedy for a header that was read as one cell."""
     for word, mark in DELIMITERS.items():
         if len(names) == 1 and mark in names[0]:
             return (f"; it contains {word}: if this separates the cells, set "
@@ -258,7 +260,7 @@ def _dialect_hint(row: list[str], expected: int, dialect: Dialect) -> str:
 
 
 def _check_labels(table: MeasurementTable) -> None:
-    """Reject a missing id, or one that another row has."""
+    """Reject a missing id, or an id that another row has."""
     seen: dict[str, int] = {}
     for label, line in zip(table.ids, table.lines, strict=True):
         where = f"{table.file}: line {line}, id"
@@ -267,7 +269,7 @@ def _check_labels(table: MeasurementTable) -> None:
         if label in seen:
             raise BadInput(
                 f"{where}: found {quoted(label)}, already the label of "
-                f"line {seen[label]}; expected another"
+                f"line {seen[label]}; expected a different label"
             )
         seen[label] = line
 
@@ -275,7 +277,7 @@ def _check_labels(table: MeasurementTable) -> None:
 def _numbers(
     table: MeasurementTable, robot: Robot, name: str, cells: list[str]
 ) -> NDArray:
-    """Return a column in SI; a reading not taken is NaN."""
+    """Return a column in SI units; a missing reading is NaN."""
     key = _unit_key(name, robot)
     unit = table.dialect.unit(key) if key else ""
     factor = table.dialect.factor(key) if key else 1.0
@@ -303,12 +305,13 @@ def _numbers(
 
 
 def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
-    """Return the likely meaning of a cell that is no number."""
+    """Return the likely meaning of a cell that is not a number."""
     other = "," if dialect.decimal == "." else "."
     if math.isfinite(parse_number(cell, other)):
         written = quoted(cell.replace(other, dialect.decimal))
         setting = f'decimal = "{other}" in campaign.toml'
-        if other == dialect.delimiter:  # in quotes: the comma would also separate cells
+        # quoted, because the comma would also separate cells
+        if other == dialect.delimiter:
             setting = f'delimiter = ";", {setting} and separate cells by ";"'
         return (
             f'; the decimal mark here is not "{other}": write {written}, or set '
@@ -321,7 +324,7 @@ def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
 
 
 def _unit_key(name: str, robot: Robot) -> str:
-    """Return the key of ``[units]`` for a column, empty for none."""
+    """Return the key of ``[units]`` for a column, empty if it has no unit."""
     group, _, rest = name.partition(".")
     if group in {"meas", "sigma"}:
         turns = rest.rpartition(".")[2][0] == "r"

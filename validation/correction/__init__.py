@@ -1,4 +1,4 @@
 """Use of a corrected robot: predicted readings, corrected commands, new sessions.
 
-Begin at ``prediction.py``; the docs are ``docs/correction.md``.
+Begin at ``prediction.py``; see ``docs/correction.md``.
 """

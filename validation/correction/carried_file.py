@@ -1,4 +1,4 @@
-"""A robot fitted to new sessions as a file, with its covariance in another file."""
+"""Robot file of a robot fitted to new sessions, and the file of its covariance."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +21,7 @@ from validation.diagnosis.saved_covariance import (
 
 
 def save(carried: CarriedRobot, path: Path | str) -> None:
-    """Write the robot in its new sessions, and its covariance to another file.
+    """Write the robot in its new sessions, and its covariance in another file.
 
     Args:
         carried: the robot in these sessions.
@@ -41,14 +41,14 @@ def save(carried: CarriedRobot, path: Path | str) -> None:
 
 
 def covariance_of(carried: CarriedRobot, robot: Robot) -> SavedCovariance:
-    """Return the covariance of the numbers that were fitted to the set-up rows.
+    """Return the covariance of the parameters that were fitted to the set-up rows.
 
     Args:
         carried: the robot in these sessions.
-        robot: the robot as written.
+        robot: the robot as written to its file.
 
     Returns:
-        The covariance of the numbers in its file.
+        The covariance of the parameters in the robot's file.
     """
     fit, rows = carried.fit, dict[Number, NDArray]()
     count, machine = len(fit.x), fit.machine
@@ -70,7 +70,7 @@ def covariance_of(carried: CarriedRobot, robot: Robot) -> SavedCovariance:
 
 
 def _with_std(robot: Robot, known: SavedCovariance) -> Robot:
-    """Return the robot with the present uncertainty of its functions' numbers."""
+    """Return the robot with the present standard deviations of its functions."""
     functions = list(robot.functions)
     for number, sigma in zip(known.numbers, known.std.tolist(), strict=True):
         if number.kind == FUNCTION:

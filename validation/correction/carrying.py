@@ -1,13 +1,13 @@
-r"""A saved robot in a new session, fitted to set-up rows and judged on the others.
+r"""A saved robot in a new session: fit to set-up rows, test on the other rows.
 
-A session's own values are the pose of the measuring device, the changes with time and,
-if requested, the measured point and the zeros of the joints (:mod:`.session_unknowns`).
-The robot's own numbers have their saved values within their covariance
-(:mod:`.machine_numbers`).  Both are fitted to the set-up rows of all sessions
-(:mod:`.session_fit`), and judged on all other rows.
+The parameters of a session are the pose of the measuring device, the changes with time
+and, if requested, the measured point and the zeros of the joints
+(:mod:`.session_unknowns`).  The robot's parameters have their saved values and
+covariance as prior (:mod:`.machine_numbers`).  Both are fitted to the set-up rows of
+all sessions (:mod:`.session_fit`), and tested on all other rows.
 
-The set-up rows do not suffice if the covariance allows the other rows to change by more
-than the residual of the set-up rows with the saved robot.
+The set-up rows are insufficient if the covariance of the fit allows larger changes of
+the other rows than the residual of the set-up rows with the saved robot.
 """
 
 import math
@@ -39,23 +39,23 @@ _MACHINE = "the robot's own numbers"
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """One session: fitted values and errors.
+    """Fitted values and errors of one session.
 
     Attributes:
         session: name of the session; None if the campaign has no sessions.
-        unknowns: the k values that were fitted.
-        values: (k,) [rad, m].
+        unknowns: the k fitted parameters.
+        values: (k,) [rad, m] fitted values.
         std: (k,) standard deviations of the values.
-        rows: numbers of set-up rows and of others.
+        rows: number of set-up rows and number of other rows.
         error: error on the other rows.
-        declared: error of the campaign's own robot, fitted in the same way.
-        uncertainty: [m] rms of the uncertainty of the other rows' points after the
-            set-up rows.
+        declared: error of the campaign's declared robot, fitted in the same way.
+        uncertainty: [m] rms uncertainty of the predicted points of the other rows.
         left: [m] rms residual of the set-up rows.
-        held: [m] rms residual with the robot's own numbers as saved.
-        open_: names of the most uncertain values, if the set-up rows do not suffice.
+        held: [m] rms residual of the set-up rows with the saved robot's parameters.
+        open_: names of the most uncertain parameters, if the set-up rows are
+            insufficient.
         left_behind: changes with time in the original session that are not fitted here,
-            because their course is unknown without a clock.
+            because they need a clock.
     """
 
     session: str | None
@@ -75,7 +75,7 @@ class Carried:
 
     @property
     def suffices(self) -> bool:
-        """Whether the set-up rows suffice."""
+        """Whether the set-up rows are sufficient."""
         return not self.open_
 
     @property
@@ -91,7 +91,7 @@ class CarriedRobot:
 
     Attributes:
         fit: fit of the sessions' values and of the robot's own numbers.
-        sessions: the sessions, judged on their other rows.
+        sessions: the sessions, tested on their other rows.
     """
 
     fit: SessionsFit
@@ -99,7 +99,7 @@ class CarriedRobot:
 
     @property
     def good(self) -> bool:
-        """Whether set-up rows suffice and the robot is better than the declared one."""
+        """Whether set-up rows are sufficient and the robot beats the declared one."""
         return all(one.suffices and one.better for one in self.sessions)
 
 
@@ -109,19 +109,19 @@ def carry(
     setup: NDArray,
     fitted: Sequence[str] = ("registration",),
 ) -> CarriedRobot:
-    """Fit a saved robot to the set-up rows of sessions, and judge it on the others.
+    """Fit a saved robot to the set-up rows of sessions, and test it on the others.
 
     Args:
-        campaign: campaign of the saved robot.
-        declared: the same rows with the campaign's own robot.
-        setup: (R,) bool, the set-up rows.
-        fitted: names in :data:`OF_A_SESSION`.
+        campaign: campaign with the saved robot.
+        declared: the same rows with the campaign's declared robot.
+        setup: (R,) bool, True for set-up rows.
+        fitted: names of parameters in :data:`OF_A_SESSION`.
 
     Returns:
-        The robot in these sessions, and every session.
+        The robot in these sessions, and the result of every session.
 
     Raises:
-        BadInput: a session has no set-up rows, or no others.
+        BadInput: a session has no set-up rows, or no other rows.
     """
     clock = "time" in campaign.covariates
     unknowns = session_unknowns(campaign.robot, fitted, clock=clock)
@@ -142,12 +142,12 @@ def carry(
 
 
 def _sessions(campaign: Campaign) -> tuple[str | None, ...]:
-    """Return the names of sessions; for a campaign without any, None alone."""
+    """Return the names of the sessions; (None,) for a campaign without sessions."""
     return campaign.sessions or (None,)
 
 
 def _of(campaign: Campaign, session: str | None, setup: NDArray) -> NDArray:
-    """Return (R,) bool of a session's rows, some but not all of them set-up rows."""
+    """Return (R,) bool of a session's rows; some but not all must be set-up rows."""
     own = campaign.in_session(session)
     if setup[own].any() and not setup[own].all():
         return own
@@ -159,14 +159,14 @@ def _of(campaign: Campaign, session: str | None, setup: NDArray) -> NDArray:
 
 
 def _left_behind(robot: Robot, unknowns: SessionUnknowns) -> tuple[str, ...]:
-    """Return titles of changes with time that are not among a session's unknowns."""
+    """Return the titles of changes with time that a session does not fit."""
     drift, functions = of_one_session(robot)
     whole = [DRIFT] if drift and unknowns.constant is None else []
     return (*whole, *(f.title for f in functions if f not in unknowns.functions))
 
 
 def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
-    """Return one session, judged on the rows that were not fitted."""
+    """Return one session, tested on the rows that were not fitted."""
     one, alike = fit.sessions[number], other.sessions[number]
     campaign, setup, values = one.campaign, one.rows, fit.values(number)
     read = one.read(fit.robot, values)
@@ -180,7 +180,7 @@ def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
     ]
     level = max(*off, float(np.median(campaign.sigma[own])))
     cells = campaign.cells & ~setup[:, None]
-    cells[:, :3] &= not cells[:, 3:].any()  # positions decide, if there are any
+    cells[:, :3] &= not cells[:, 3:].any()  # rotations only without positions
     variance, blame = fit.spread(number, cells)
     names = [*(name for _, name in one.unknowns.names), _MACHINE]
     worst = np.flatnonzero(blame > 0.1 * blame.max()).tolist()
@@ -202,7 +202,7 @@ def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
 
 
 def carried_robot(carried: CarriedRobot) -> Robot:
-    """Return the robot in its new sessions, without the values of its old session.
+    """Return the robot in its new sessions, without the values of its original session.
 
     Args:
         carried: the robot in these sessions.
@@ -222,7 +222,7 @@ def carried_robot(carried: CarriedRobot) -> Robot:
 
 
 def _added(before: Any, more: dict[str, dict[str, float]]) -> dict[str, Any]:
-    """Return effects with values added to their parameters; a drift's is replaced."""
+    """Return effects with values added to their parameters; a drift is replaced."""
     merged = {name: dict(values) for name, values in before.items()}
     for effect, values in more.items():
         own = merged.setdefault(effect, {})

@@ -8,7 +8,7 @@ from validation.correction.carrying import CarriedRobot
 
 
 def table(carried: CarriedRobot) -> dict[str, Any]:
-    """Return plain values: every session, its values and its errors on other rows."""
+    """Return plain values: sessions, their fitted values and errors on other rows."""
     return {
         "machine": {
             "numbers": len(carried.fit.machine.numbers),
@@ -53,9 +53,13 @@ def text(carried: CarriedRobot) -> str:
         )
     for one in carried.sessions:
         name = one.session or "campaign"
-        lines.append(f"{name}: {one.rows[0]} set-up rows, {one.rows[1]} others")
-        lines.append(f"  others, as carried over: {readings_text(vars(one.error))}")
-        lines.append(f"  others, declared robot: {readings_text(vars(one.declared))}")
+        lines.append(f"{name}: {one.rows[0]} set-up rows, {one.rows[1]} other rows")
+        lines.append(
+            f"  other rows, identified robot: {readings_text(vars(one.error))}"
+        )
+        lines.append(
+            f"  other rows, declared robot: {readings_text(vars(one.declared))}"
+        )
         lines.append(
             "  uncertainty after the set-up rows: "
             f"{in_unit(one.uncertainty, 'um')}; residual of the set-up rows: "
@@ -63,18 +67,18 @@ def text(carried: CarriedRobot) -> str:
             f"{in_unit(one.held, 'um')}"
         )
         lines += [
-            f"  not carried over, an effect of an earlier session: {title}"
+            f"  not used here, an effect of an earlier session: {title}"
             for title in one.left_behind
         ]
         if not one.suffices:
             lines.append(
-                "  the set-up rows do not suffice to determine "
+                "  the set-up rows are not sufficient to determine "
                 f"{', '.join(one.open_)}; measure set-up rows at other places and in "
                 "other orientations"
             )
         elif not one.better:
             lines.append(
                 "  the error is larger than that of the declared robot: the "
-                "identified robot does not carry over to this session"
+                "identified robot is not valid in this session"
             )
     return "\n".join(lines)

@@ -1,8 +1,9 @@
-r"""Commands that bring a corrected robot to the pose of the declared one.
+r"""Commands with which a corrected robot reaches the pose of the declared one.
 
 For a command q a controller moves the drives so that the nominal robot would have the
-wanted pose; the machine deviates from it by d(q) of the corrected model.
-Gauss-Newton's method solves for commands at which both cancel, for all rows together:
+wanted pose.  The machine deviates from this pose by d(q), which the corrected model
+predicts.  Gauss-Newton's method solves for commands that cancel this deviation, for all
+rows together:
 
     nominal pose(q) with deviation d(q)  =  pose wanted
 
@@ -41,29 +42,30 @@ from validation.diagnosis.prediction import finite_conditions
 
 _STEPS = 25
 _HALVINGS = 8
-_STILL = 1e-10  # [rad or m] smaller steps count as zero
-_TURN = np.pi  # [rad] largest valid correction of a revolute drive
-_LOW = 1e-4  # of a rotation's weight, if not all six components can be met
+_STILL = 1e-10  # [rad or m] smaller changes of a command count as zero
+_TURN = np.pi  # [rad] largest accepted correction of a revolute drive
+# factor on the weight of rotations, if the drives cannot correct all six components
+_LOW = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class Compensation:
-    """Corrected commands, R rows.
+    """Corrected commands for R rows.
 
     Attributes:
         targets: the commands at which the nominal robot would have the wanted poses.
         drives: names of the d driven joints.
-        commands: (R, d) [rad or m] for the machine; as given in rows without a
-            solution.
+        commands: (R, d) [rad or m] corrected commands; rows without a solution are
+            unchanged.
         transforms: (R, n, 4, 4) nominal frames at the commands.
-        coordinates: (R, n) [rad or m] of every joint there.
-        before: (R, 6) [rad, m] distance of the machine from the wanted pose, at the
-            reference point, base axes, for the given commands.
-        after: (R, 6) the same for the corrected commands.
-        spread: (R, 6) [rad, m] standard deviation of it, by the uncertainty in the
-            robot's file.
-        limited: (R,) bool, whether a joint's limit prevents the correction.
-        reason: (R,) reason without a solution, else empty.
+        coordinates: (R, n) [rad or m] coordinate of every joint at the commands.
+        before: (R, 6) [rad, m] distance of the machine from the wanted pose for the
+            given commands, at the reference point, base axes.
+        after: (R, 6) [rad, m] the same distance for the corrected commands.
+        spread: (R, 6) [rad, m] standard deviation of ``after`` due to the uncertainty
+            in the robot's file.
+        limited: (R,) bool, True where a joint's limit prevents the correction.
+        reason: (R,) reason why there is no solution, else empty.
     """
 
     targets: Campaign
@@ -81,7 +83,7 @@ class Compensation:
 
     @property
     def offsets(self) -> NDArray:
-        """(R, d) [rad or m] to be added to the commands of the drives."""
+        """(R, d) [rad or m] corrections to add to the commands of the drives."""
         return self.commands - self.targets.coordinates[:, _driven(self.targets.robot)]
 
 
@@ -91,10 +93,10 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
     Args:
         targets: commands for the corrected robot.
         as_read: whether the device's reading becomes zero.  Otherwise effects of the
-            device alone are not corrected.
+            device itself are not corrected.
 
     Returns:
-        The commands; those of rows without a solution are unchanged.
+        The commands; a row without a solution keeps its command.
 
     Raises:
         BadInput: an effect of the robot depends on a covariate that the targets lack.
@@ -123,7 +125,7 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
             if not worse.any():
                 break
             share = np.where(worse, share / 2, share)
-        # the residual is rounding, or as small as limits allow
+        # the residual is due to rounding or to joint limits
         going &= moving & ~worse
         q = np.where(going[:, None], tried, q)
         standing = next_ if going[moving].all() else machine.at(q, targets)[0]
@@ -152,7 +154,7 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
 
 
 def _each_once(targets: Campaign) -> Campaign:
-    """Return the commands without a row for each point read."""
+    """Return the commands once each, instead of once for each measured point."""
     if targets.point is None:
         return targets
     labels = tuple(dict.fromkeys(targets.labels))
@@ -161,12 +163,12 @@ def _each_once(targets: Campaign) -> Campaign:
 
 
 def _driven(robot: Robot) -> NDArray:
-    """Return the (d,) rows of the frames with a drive."""
+    """Return the (d,) indices of the driven frames."""
     return np.flatnonzero([frame.actuated for frame in robot.frames])
 
 
 def _limits(robot: Robot, driven: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the (d,) least and (d,) largest commands."""
+    """Return the (d,) smallest and (d,) largest commands."""
     given = [robot.frames[i].limits or (-np.inf, np.inf) for i in driven]
     least, most = np.array(given).reshape(-1, 2).T
     return least, most
@@ -175,7 +177,7 @@ def _limits(robot: Robot, driven: NDArray) -> tuple[NDArray, NDArray]:
 def _too_far(
     robot: Robot, driven: NDArray, change: NDArray, reason: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return rows with corrections (R, d) larger than the robot, and all reasons.
+    """Return the rows with corrections (R, d) larger than the robot, and the reasons.
 
     Returns:
         (R,) bool, and (R,) texts.
@@ -196,7 +198,7 @@ def _too_far(
 
 
 def _astray(robot: Robot, error: NDArray, reason: NDArray) -> NDArray:
-    """Return (R,) texts, one for each row whose error (R, 6) exceeds the robot."""
+    """Return (R,) texts, one for each row with an error (R, 6) beyond the robot."""
     size, reason = size_of(robot), reason.copy()
     off = np.linalg.norm(error[:, 3:], axis=1)
     for row in np.flatnonzero((off > size) & (reason == "")):
@@ -208,20 +210,20 @@ def _astray(robot: Robot, error: NDArray, reason: NDArray) -> NDArray:
 
 
 def _weights(robot: Robot, drives: int) -> NDArray:
-    """Return the (6,) [m/rad and 1] weights of an error's components."""
+    """Return the (6,) [m/rad and 1] weights of the components of an error."""
     turn = size_of(robot) * (1.0 if drives >= 6 else _LOW)
     return np.repeat([turn, 1.0], 3)
 
 
 @dataclass(frozen=True, eq=False)
 class _Standing:
-    """State of the machine at commands.
+    """State of the machine at its commands.
 
     Attributes:
         campaign: the commands.
-        conditions: their conditions.
-        error: (R, 6) [rad, m] to the wanted pose; NaN without a solution.
-        jacobian: (R, 6, d) at the reference point.
+        conditions: conditions of the measurement at the commands.
+        error: (R, 6) [rad, m] motion to the wanted pose; NaN without a solution.
+        jacobian: (R, 6, d) derivative of the reference point's pose by the drives.
     """
 
     campaign: Campaign
@@ -236,12 +238,12 @@ class _Standing:
 
 @dataclass(frozen=True, eq=False)
 class _Machine:
-    """The corrected robot, for which commands are computed.
+    """The corrected robot for which commands are computed.
 
     Attributes:
-        targets: the commands as given.
+        targets: the given commands.
         goal: (R, 4, 4) wanted platform poses.
-        as_read: whether the device's own effects are corrected.
+        as_read: whether effects of the device are corrected too.
     """
 
     targets: Campaign
@@ -257,14 +259,14 @@ class _Machine:
         return replace(conditions, base=still, tool=still[:3], reading=0.0)
 
     def at(self, q: NDArray, last: Campaign) -> tuple[_Standing, NDArray]:
-        """Return the machine's state at commands, and (R,) reasons of failure.
+        """Return the machine's state at commands, and (R,) reasons for failure.
 
         Args:
             q: (R, d) commands.
-            last: reachable commands, for rows that cannot be reached.
+            last: last reachable commands, used for rows that cannot be reached.
 
         Returns:
-            State and reasons.
+            The state and the reasons.
         """
         campaign, reason = _commanded(last, q)
         conditions = self.conditions(campaign)
@@ -299,7 +301,7 @@ def _commanded(last: Campaign, q: NDArray) -> tuple[Campaign, NDArray]:
 
 
 def _between(conditions: Conditions, deviation: NDArray, goal: NDArray) -> NDArray:
-    """Return (R, 6) from the reference point's pose to the wanted one, base axes."""
+    """Return the (R, 6) motion from the present to the wanted pose, base axes."""
     nominal = conditions.postures.platform
     arm = nominal[:, :3, :3] @ conditions.point
     R = rotation_matrix(deviation[:, :3]) @ nominal[:, :3, :3]
@@ -325,7 +327,7 @@ def _jacobian(conditions: Conditions, drives: int) -> NDArray:
 def _step(
     standing: _Standing, weights: NDArray, q: NDArray, limits: tuple[NDArray, NDArray]
 ) -> NDArray:
-    """Return the (R, d) least-squares step; drives at their limits stay there."""
+    """Return the (R, d) least-squares step, zero for drives at their limits."""
     A = standing.jacobian * weights[:, None]
     b = np.nan_to_num(standing.error) * weights
     held = np.zeros(q.shape, dtype=bool)

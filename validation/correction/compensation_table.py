@@ -17,11 +17,11 @@ def command_table(compensation: Compensation) -> str:
     """Return the corrected commands as a table with the columns of the targets.
 
     Args:
-        compensation: compensation of any targets.
+        compensation: result of :func:`.compensation.compensate`.
 
     Returns:
-        CSV: ``id``, ``q.*`` or ``pose.*``, loads and covariates as given; it can be
-            commanded, measured and compensated again.
+        CSV with ``id``, ``q.*`` or ``pose.*``, and the given loads and covariates; the
+        file can be commanded, measured and compensated again.
     """
     targets = compensation.targets
     platform = compensation.transforms[:, targets.robot.index(targets.robot.platform)]
@@ -45,12 +45,13 @@ def command_table(compensation: Compensation) -> str:
 def offset_table(compensation: Compensation) -> str:
     """Return the controller's offsets, and the error before and after, as a table.
 
-    Args:
+    compensation: result of :func:`.compensation.compensate`.
         compensation: compensation of any targets.
 
     Returns:
-        CSV: ``id``, ``offset.<drive>`` [rad or m], ``before`` and ``after`` in position
-        [m] and rotation [rad], ``spread`` [m] of the position after.
+        CSV with ``id``, ``offset.<drive>`` [rad or m], ``before`` and ``after`` in
+        position [m] and rotation [rad], and the standard deviation ``spread`` [m] of
+        the position after.
     """
     columns: dict[str, Any] = {
         f"offset.{n}": x
@@ -64,7 +65,7 @@ def offset_table(compensation: Compensation) -> str:
 
 
 def _text(compensation: Compensation, columns: dict[str, Any]) -> str:
-    """Return the columns under their names."""
+    """Return the columns as CSV with their names."""
     rows = {
         label: {
             name: values[i] if name == "session" else float(values[i])
@@ -81,14 +82,14 @@ def summary(
     """Return plain values: expected errors, and rows without a solution.
 
     Args:
-        compensation: compensation of any targets.
-        diagnosed: ``position`` [m] and ``rotation`` [rad] rms of a reading on held-out
-            rows, if not those of the robot's file.
+        compensation: result of :func:`.compensation.compensate`.
+        diagnosed: ``position`` [m] and ``rotation`` [rad] rms error on held-out rows;
+            None for the values of the robot's file.
 
     Returns:
-        Plain values.  ``expected`` adds the error after correction, the spread stated
-        in the file and the unexplained error of the diagnosis; None if neither the file
-        nor ``diagnosed`` has data.
+        Plain values.  ``expected`` combines the error after correction, the standard
+        deviation by the file and the unexplained error of the diagnosis; it is None if
+        neither the file nor ``diagnosed`` has data.
     """
     ids = compensation.targets.ids
     record = compensation.targets.robot.diagnosis
@@ -125,7 +126,7 @@ def summary(
 def _unexplained(
     record: Mapping[str, Any], diagnosed: Mapping[str, float] | None
 ) -> dict[str, float] | None:
-    """Return the [m, rad] unexplained error of a diagnosis, None if unknown."""
+    """Return the [m, rad] unexplained error of a diagnosis; None if unknown."""
     sizes = {}
     for key in ("position", "rotation"):
         after = record.get(key, 0.0) if diagnosed is None else diagnosed[key]
@@ -135,7 +136,7 @@ def _unexplained(
 
 
 def _sizes(error: NDArray) -> dict[str, float | None]:
-    """Return the rms length of positions and rotations; None without any."""
+    """Return the rms of positions and of rotations; None without values."""
 
     def rms(part: NDArray) -> float | None:
         known = part[np.isfinite(part).all(axis=1)]

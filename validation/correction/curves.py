@@ -1,4 +1,4 @@
-"""Functions of a robot's file as curves, with bands of their uncertainty.
+"""Functions of a robot's file as curves, with bands of uncertainty.
 
 A function with memory is plotted as its response to a unit step over time.  A function
 of the direction of motion is plotted for motion from below.
@@ -26,26 +26,29 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _POINTS = 181
-_SHOWN = 13  # number of points in a text
-_LATE = 4.0  # number of time constants or periods that are plotted
-_RANGES = {"temperature": 10.0, "approach": 1.0}  # plotted to either side
-_LOAD = 100.0  # [N, N m] plotted to either side
-_TRAVEL = 0.5  # [m] plotted to either side
+_SHOWN = 13  # number of points of a curve in a text
+_LATE = 4.0  # plotted duration, in time constants or periods
+# half of the plotted range of each variable, in its unit
+_RANGES = {"temperature": 10.0, "approach": 1.0}
+_LOAD = 100.0  # [N, N m] half of the plotted range of a load
+_TRAVEL = 0.5  # [m] half of the plotted range of a position
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One component of a function.
+    """Curve of one component of a function.
 
     Attributes:
         function: the function.
-        component: its component.
+        component: component of the screw or compliance.
         variable: variable along which it is plotted.
-        beside: (name, value) of a second variable, None if there is none.
-        x: (k,) in the variable's unit.
-        values: (k,) [rad, m, N m, N], or per wrench for a compliance.
-        std: (k,) standard deviation, zero if the file gives none.
-        units: units of x and of the values.
+        beside: (name, value) of a second variable, which is fixed; None if there is
+            none.
+        x: (k,) values of the variable, in its unit.
+        values: (k,) values of the component [rad, m, N m, N], or per wrench for a
+            compliance.
+        std: (k,) standard deviations; zero if the file states none.
+        units: unit of x and unit of the values.
     """
 
     function: Function
@@ -67,12 +70,12 @@ def curves_of(
 
     Args:
         robot: robot with its functions.
-        over: least and largest value by variable; by default a full turn, the knots of
-            a spline, or a typical range.
+        over: smallest and largest value by variable; the default is a full turn, the
+            knots of a spline, or a typical range.
 
     Returns:
-        A curve for each component; for two variables one for each of three values of
-        the second.
+        One curve for each component; with two variables, one for each of three values
+        of the second variable.
     """
     curves = []
     for function in robot.functions:
@@ -90,7 +93,7 @@ def curves_of(
 
 
 def _variables(function: Function) -> tuple[str, str]:
-    """Return the variable along which a function is plotted, and the other if any."""
+    """Return the plotted variable, and the second variable if there is one."""
     first, *rest = function.variables
     if function.form in {"lag", "creep"}:
         return "time", ""
@@ -103,7 +106,7 @@ def _curve(
     robot: Robot, function: Function, component: str, along: str,
     fixed: tuple[str, float] | None, x: NDArray,
 ) -> Curve:  # fmt: skip
-    """Return one curve, with its standard deviation by its numbers' covariance."""
+    """Return one curve, with standard deviations by its parameters' covariance."""
     values = _values(function, component, x, fixed)
     numbers, C = _covariance_of(robot, function)
     slopes = np.zeros((len(numbers), len(values)))
@@ -130,7 +133,7 @@ def _curve(
 
 
 def _covariance_of(robot: Robot, function: Function) -> tuple[list[str], NDArray]:
-    """Return names of a function's uncertain numbers, and their covariance (k, k)."""
+    """Return the uncertain parameters of a function, and their (k, k) covariance."""
     known = known_covariance(robot)
     place = str(next(k for k, f in enumerate(robot.functions) if f is function))
     own = [
@@ -213,7 +216,7 @@ def table(robot: Robot, curves: list[Curve]) -> list[dict[str, Any]]:
 
 
 def text(curves: list[Curve]) -> str:
-    """Return the curves as text: a dozen points of each."""
+    """Return the curves as text, with :data:`_SHOWN` points of each."""
     lines: list[str] = []
     for c in curves:
         beside = f", {c.beside[0]} = {c.beside[1]:.4g}" if c.beside else ""
@@ -231,7 +234,7 @@ def text(curves: list[Curve]) -> str:
 
 
 def figure_of(curves: list[Curve]) -> "Figure":
-    """Return a figure with each curve in a panel, with twice its standard deviation.
+    """Return a figure: a panel for each curve, with a band of two standard deviations.
 
     Args:
         curves: result of :func:`curves_of`, at least one curve.

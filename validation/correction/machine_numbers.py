@@ -1,15 +1,15 @@
-r"""The machine's own numbers in a new session: saved values with their covariance.
+r"""Prior of the machine's parameters in a new session: saved values and covariance.
 
-A saved robot's geometric errors, compliances, effects and functions are known with the
-covariance C of the fit, which is their prior in another session.  The machine may have
-changed by more than this uncertainty: the prior is k C, with k of the largest evidence
-in the set-up rows (:mod:`.session_fit`).
+The geometric errors, compliances, effects and functions of a saved robot are known with
+the covariance C of the fit.  This is their prior in another session.  The machine may
+have changed by more than this uncertainty, so the prior covariance is k C; k is chosen
+by cross-validation on the set-up rows (:mod:`.session_fit`).
 
 ======  =============  =========  ====================================================
 symbol  code           shape      meaning
 ======  =============  =========  ====================================================
-u       ``u``          (r,)       independent numbers of variance k
-L       ``root``       (m, r)     C = L L'; the m numbers are the saved ones plus L u
+u       ``u``          (r,)       independent variables of variance k
+L       ``root``       (m, r)     C = L L'; the m parameters are saved + L u
 ======  =============  =========  ====================================================
 """
 
@@ -28,17 +28,17 @@ from validation.diagnosis.saved_covariance import (
     known_covariance,
 )
 
-# of the largest eigenvalue of the correlations: smaller ones are rounding
+# relative to the largest eigenvalue of the correlations; smaller ones are rounding
 _RANK = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class MachineNumbers:
-    """Numbers of a saved robot that do not belong to a session.
+    """Parameters of a saved robot that do not belong to one session.
 
     Attributes:
-        robot: robot as saved.
-        numbers: m of them.
+        robot: the saved robot.
+        numbers: the m parameters.
         root: (m, r) factor of their covariance.
     """
 
@@ -51,17 +51,17 @@ class MachineNumbers:
 
     @property
     def std(self) -> NDArray:
-        """(m,) standard deviations of the numbers."""
+        """(m,) standard deviations of the parameters."""
         return np.sqrt(np.einsum("mr,mr->m", self.root, self.root))
 
     def robot_at(self, u: NDArray) -> Robot:
-        """Return the robot with numbers changed by L u, within their possible range.
+        """Return the robot with its parameters changed by L u, within their range.
 
         Args:
             u: (r,).
 
         Returns:
-            The robot; numbers that cannot be negative change by a factor.
+            The robot; a parameter that cannot be negative is multiplied by a factor.
         """
         robot = self.robot
         if not np.any(u):
@@ -73,14 +73,14 @@ class MachineNumbers:
 
 
 def machine_numbers(robot: Robot) -> MachineNumbers:
-    """Return the numbers of a saved robot that every session shares.
+    """Return the parameters of a saved robot that all sessions share.
 
     Args:
-        robot: robot with its covariance, or ``tolerance`` and ``std``, in its file.
+        robot: robot with a covariance, or with ``tolerance`` and ``std``, in its file.
 
     Returns:
-        Those with a stated uncertainty, except numbers of one session and of a
-        measuring device's pose.
+        Parameters with a stated uncertainty, except those of one session and of the
+        pose of a measuring device.
 
     Raises:
         BadInput: the covariance that the file names cannot be read.
@@ -97,7 +97,7 @@ def machine_numbers(robot: Robot) -> MachineNumbers:
 
 
 def _is_shared(number: Number, robot: Robot) -> bool:
-    """Return whether a number belongs to the machine in all sessions."""
+    """Return whether a parameter is the same in all sessions."""
     if number.kind == EFFECT:
         return not number.session and number.owner not in {"registration", DRIFT}
     if number.kind == FUNCTION:
@@ -107,7 +107,7 @@ def _is_shared(number: Number, robot: Robot) -> bool:
 
 
 def _possible(number: Number, robot: Robot, by: float) -> float:
-    """Return a change that keeps a number in its possible range."""
+    """Return a change that keeps a parameter in its possible range."""
     value = number.of(robot)
     if number.kind == EFFECT and value > 0.0:
         unknowns = LIBRARY[number.owner].unknowns(robot)
@@ -117,18 +117,18 @@ def _possible(number: Number, robot: Robot, by: float) -> float:
 
 
 def unchanging(robot: Robot) -> MachineNumbers:
-    """Return a robot whose numbers are taken as exact."""
+    """Return a robot whose parameters are taken as exact."""
     return MachineNumbers(robot, (), np.zeros((0, 0)))
 
 
 def renumbered(machine: MachineNumbers) -> list[Number]:
-    """Return the numbers of a robot with new indices, without changes in time.
+    """Return the parameters with new indices, without those of changes in time.
 
     Args:
-        machine: numbers of a saved robot.
+        machine: parameters of a saved robot.
 
     Returns:
-        The same numbers, with functions counted without those of time.
+        The same parameters; functions are numbered without the functions of time.
     """
     own, places = of_one_session(machine.robot)[1], dict[str, str]()
     for place, function in enumerate(machine.robot.functions):

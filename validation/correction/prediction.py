@@ -1,4 +1,4 @@
-"""Readings that a robot predicts for commands, measured or not."""
+"""Readings that a robot predicts for commands, with or without measurements."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -22,7 +22,7 @@ from validation.diagnosis.registration import register
 from validation.diagnosis.sequence import Errors, errors_of, rms
 from validation.diagnosis.unknowns import effects_in, with_effects_in
 
-_MOVED = 3.0  # factor of the residual above which the measuring device has been moved
+_MOVED = 3.0  # factor on the residual above which the measuring device has been moved
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,16 +32,17 @@ class PredictedReadings:
     Attributes:
         commands: the commands, R rows.
         prediction: the robot's readings.
-        error: error of measured minus predicted; NaN where not measured.
-        spread: (R, 6) [rad, m] standard deviation of the prediction, by the uncertainty
-            in the robot's file.
-        noise: (R, 6) [rad, m] standard deviation of a reading about the machine's own
-            deviation; NaN if neither the table nor the robot's file has it.
+        error: error of the readings minus the predicted ones; NaN where not measured.
+        spread: (R, 6) [rad, m] standard deviation of the prediction due to the
+            uncertainty in the robot's file.
+        noise: (R, 6) [rad, m] standard deviation of a reading about the machine's true
+            deviation; NaN if neither the table nor the robot's file states it.
         extrapolated: (R,) names of variables outside the range in which the robot was
-            identified, else empty.
+            identified, or empty.
         registration: ``"known"``, ``"of the robot file"``, ``"fitted to these rows"``
             or ``"none"``.
-        point: the point of the identification, if readings are of another point.
+        point: measured point of the identification, if the readings are of another
+            point.
     """
 
     commands: Campaign
@@ -88,14 +89,14 @@ def predict(commands: Campaign) -> PredictedReadings:
     """Return the readings of a campaign's robot for its commands.
 
     An unknown registration is taken from the robot's file.  It is fitted to the
-    measured rows if the file has none, or if rows are measured and it does not fit them
-    any more (the device was moved).
+    measured rows if the file has none, or if the residual of these rows shows that the
+    device was moved.
 
     Args:
-        commands: the robot, with its effects, and rows.
+        commands: campaign with the robot, its effects and its rows.
 
     Returns:
-        The readings with their uncertainty.
+        The predicted readings with their uncertainty.
 
     Raises:
         BadInput: the registration is unknown, and the rows do not determine it.
@@ -128,7 +129,7 @@ _FITTED = "fitted to these rows"
 
 
 def _registered(commands: Campaign, conditions: Conditions) -> tuple[Conditions, str]:
-    """Return the conditions with the measuring frame, and its origin."""
+    """Return the conditions with the measuring frame, and the source of its pose."""
     if commands.registration == "known":
         return conditions, "known"
     carried = np.broadcast_to(conditions.base, (len(commands), 6)).any(axis=1).all()
@@ -173,14 +174,14 @@ def _noise(commands: Campaign) -> NDArray:
 
 
 def reading_names(commands: Campaign) -> list[tuple[str, str, int]]:
-    """Return the columns of a table of readings: column, point, component.
+    """Return the columns of a table of readings as triples: column, point, component.
 
     Args:
-        commands: the rows of the table; components measured nowhere are left out,
-            unless all are.
+        commands: the rows of the table; components that no row measured are left out,
+            unless no component was measured.
 
     Returns:
-        A triple for each.
+        A triple for each column.
     """
     points = [""]
     if commands.point is not None:
@@ -201,15 +202,16 @@ def reading_names(commands: Campaign) -> list[tuple[str, str, int]]:
 
 
 def reading_table(predicted: PredictedReadings) -> str:
-    """Return predicted readings as a table: ``id`` and a campaign's reading columns.
+    """Return predicted readings as a table with ``id`` and a campaign's columns.
 
     Args:
-        predicted: predicted readings of any commands.
+        predicted: result of :func:`predict`.
 
     Returns:
         CSV; a cell is empty without a solution.  If the robot's file has uncertainties,
-        ``std.`` and ``noise.`` of every reading follow, and ``extrapolated``: variables
-        outside the range in which the robot was identified.
+        the columns ``std.`` and ``noise.`` of every reading follow, and
+        ``extrapolated`` with the names of variables outside the range in which the
+        robot was identified.
     """
     commands, deviations = predicted.commands, predicted.prediction.deviation
     columns = reading_names(commands)
@@ -234,11 +236,11 @@ def reading_table(predicted: PredictedReadings) -> str:
 
 
 def csv_text(rows: Mapping[str, Mapping[str, object]], columns: Sequence[str]) -> str:
-    """Return a table with labels.
+    """Return a table with labelled rows as CSV.
 
     Args:
-        rows: cells by column, by label.
-        columns: names in addition to ``id``, in order.
+        rows: for each label, the cells by name of the column.
+        columns: names of the columns after ``id``, in order.
 
     Returns:
         CSV with a header; missing values and NaN are empty cells.
@@ -250,7 +252,7 @@ def csv_text(rows: Mapping[str, Mapping[str, object]], columns: Sequence[str]) -
 
 
 def _cell(value: object) -> str:
-    """Return a number with ten digits, a text unchanged."""
+    """Return a number with ten digits, or a text unchanged."""
     if not isinstance(value, float):
         return str(value)
     return "" if np.isnan(value) else f"{value:.10g}"

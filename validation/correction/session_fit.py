@@ -1,24 +1,24 @@
-r"""Fit of sessions to their set-up rows: their values, and the machine's numbers.
+r"""Fit of sessions to their set-up rows: parameters of sessions and of the machine.
 
 ======  =============  =========  ====================================================
 symbol  code           shape      meaning
 ======  =============  =========  ====================================================
-x       ``x``          (k,)       values of every session, then u of the machine
+x       ``x``          (k,)       parameters of every session, then u of the machine
 J       ``slopes``     (R,6,p+r)  derivative of the readings by a session's p
                                   values and of u
 C       ``covariance`` (k, k)     of x
 ======  =============  =========  ====================================================
 
-A session has its own values (:mod:`.session_unknowns`), flat or with a prior; u
-(:mod:`.machine_numbers`) is common to all, N(0, k).  The ratio tau of the readings'
-scatter about the saved robot to sigma is known from its diagnosis with 20 degrees of
-freedom.  Rows of one configuration carry the same information: readings are weighted as
-if there were one row of each.
+A session has parameters of its own (:mod:`.session_unknowns`), with a flat prior or a
+Gaussian one; u (:mod:`.machine_numbers`) is common to all sessions, with prior N(0, k).
+The diagnosis of the robot gives the ratio tau between the scatter of the readings about
+the saved robot and sigma, with 20 degrees of freedom.  Rows of one configuration carry
+the same information, so they are weighted as one row.
 
 k is chosen by cross-validation: each configuration of the set-up rows is predicted by a
-fit to the others.  The chosen k is the least one that no other beats by a standard
-error and by a relevant part of the noise.  The evidence of k is not used, because it
-assumes that the machine changed in the directions of the covariance.
+fit to the others.  The smallest k is chosen from which no other k differs by more than
+a standard error and a relevant part of the noise.  The evidence of k is not used,
+because it assumes that the machine changed in the directions of the covariance.
 """
 
 from collections.abc import Sequence
@@ -42,21 +42,21 @@ from validation.diagnosis.registration import coarse_frame
 from validation.diagnosis.separability import orthonormal_basis
 
 _STEPS = 8
-_SETTLED = 1e-3  # [sigma of the value] step at convergence
-_WIDENED = 4.0 ** np.arange(8)  # values of k that are tried
-_SURE = 1.0  # standard errors by which a larger k must predict better
-_MATTERS = 0.03  # relative to the noise's variance: relevant part
-_AT_ONCE = 1000  # number of rows in a batch, to limit memory
+_SETTLED = 1e-3  # [standard deviations] change of every parameter at convergence
+_WIDENED = 4.0 ** np.arange(8)  # values of k to choose from
+_SURE = 1.0  # number of standard errors by which a larger k must predict better
+_MATTERS = 0.03  # relative to the noise's variance: smallest relevant improvement
+_AT_ONCE = 1000  # number of rows in a batch, which limits memory
 
 
 @dataclass(frozen=True, eq=False)
 class SetUp:
-    """A session of R rows, with its set-up rows.
+    """A session of R rows, some of which are set-up rows.
 
     Attributes:
         campaign: the rows, with the saved robot.
-        rows: (R,) bool, the set-up rows.
-        unknowns: the session's values.
+        rows: (R,) bool, True for set-up rows.
+        unknowns: parameters of the session.
     """
 
     campaign: Campaign
@@ -75,7 +75,7 @@ class SetUp:
 
     @property
     def told(self) -> float:
-        """Prior variance of a reading over sigma^2; larger where rows repeat."""
+        """Prior variance of a reading over sigma^2; larger if rows are repeated."""
         left = self.campaign.robot.diagnosis.get("normalised")
         level = max(1.0, left) if isinstance(left, float) else 1.0
         return level**2 * self.repeated
@@ -90,7 +90,7 @@ class SetUp:
         return x
 
     def _still(self, robot: Robot, rows: NDArray) -> Conditions:
-        """Return the conditions of some rows without the session's effects."""
+        """Return the conditions of selected rows without the session's effects."""
         bare = replace(self.campaign, robot=without_session(robot))
         return finite_conditions(bare, rows)
 
@@ -102,16 +102,16 @@ class SetUp:
     def tangent(
         self, machine: MachineNumbers, values: NDArray, u: NDArray, rows: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Return the readings of some rows, and their derivatives.
+        """Return the readings of selected rows, and their derivatives.
 
         Args:
-            machine: the robot's own numbers.
-            values: (p,) values of the session.
-            u: (r,) numbers of the machine.
+            machine: parameters of the robot.
+            values: (p,) values of the session's parameters.
+            u: (r,) changes of the machine.
             rows: mask (R,) or numbers of N rows.
 
         Returns:
-            (N, 6) and (N, 6, p + r).
+            (N, 6) readings and (N, 6, p + r) derivatives.
         """
         robot, unknowns = machine.robot_at(u), self.unknowns
         still = self._still(robot, rows)
@@ -143,15 +143,15 @@ class SetUp:
 
 @dataclass(frozen=True, eq=False)
 class SessionsFit:
-    """Sessions and machine as fitted.
+    """Fitted sessions and machine.
 
     Attributes:
         sessions: m of them.
-        machine: the robot's own numbers.
-        x: (k,) values of every session, then u.
-        covariance: (k, k) of them.
-        widened: factor on the covariance of the machine's numbers.
-        held: values of every session for the machine's saved numbers.
+        machine: parameters of the robot.
+        x: (k,) parameters of every session, then u.
+        covariance: (k, k) covariance of x.
+        widened: factor on the covariance of the machine's parameters.
+        held: parameters of every session, fitted with the machine's saved parameters.
     """
 
     sessions: tuple[SetUp, ...]
@@ -168,27 +168,27 @@ class SessionsFit:
 
     @property
     def robot(self) -> Robot:
-        """The saved robot with its numbers in these sessions."""
+        """The saved robot with its parameters in these sessions."""
         return self.machine.robot_at(self.u)
 
     def own(self, number: int) -> slice:
-        """Return the slice of a session's values in x."""
+        """Return the slice of a session's parameters in x."""
         return _own(self.sessions, number)
 
     def values(self, number: int) -> NDArray:
-        """Return the (p,) values of a session."""
+        """Return the (p,) parameters of a session."""
         return self.x[self.own(number)]
 
     def spread(self, number: int, cells: NDArray) -> tuple[float, NDArray]:
-        """Return the uncertainty of a session's readings due to that of x.
+        """Return the uncertainty of a session's readings due to the uncertainty of x.
 
         Args:
             number: number of the session.
-            cells: (R, 6) bool, which readings.
+            cells: (R, 6) bool, the readings considered.
 
         Returns:
-            Mean variance, and (p + 1,) the contribution of each single value, and of
-            all of u together.
+            Mean variance, and (p + 1,) the contributions of each parameter, and of all
+            of u together.
         """
         one, own = self.sessions[number], self.own(number)
         p, u = own.stop - own.start, slice(len(self.x) - len(self.machine), len(self.x))
@@ -206,20 +206,20 @@ class SessionsFit:
 
 
 def _own(sessions: Sequence[SetUp], number: int) -> slice:
-    """Return the slice of a session's values in x."""
+    """Return the slice of a session's parameters in x."""
     begin = sum(len(one.unknowns) for one in sessions[:number])
     return slice(begin, begin + len(sessions[number].unknowns))
 
 
 def fit_sessions(sessions: Sequence[SetUp], machine: MachineNumbers) -> SessionsFit:
-    """Fit the sessions' values and the machine's numbers to the set-up rows.
+    """Fit the parameters of sessions and machine to the set-up rows.
 
     Args:
         sessions: sessions of one robot.
-        machine: its own numbers.
+        machine: parameters of the robot.
 
     Returns:
-        The most probable values, by Gauss-Newton's method.
+        The most probable values, found by Gauss-Newton's method.
     """
     told = [one.told for one in sessions]
     x = np.concatenate([np.zeros(0), *(one.start() for one in sessions)])
@@ -236,7 +236,7 @@ def _settled(
     sessions: Sequence[SetUp], machine: MachineNumbers, x: NDArray,
     told: Sequence[float], widened: float,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the (k,) most probable x, and its covariance (k, k)."""
+    """Return the most probable x (k,), and its covariance (k, k)."""
     begin = len(x) - len(machine)
     mean = np.concatenate([
         *(s.unknowns.mean for s in sessions),
@@ -272,7 +272,7 @@ def _widened(
     sessions: Sequence[SetUp], machine: MachineNumbers, x: NDArray,
     told: Sequence[float],
 ) -> tuple[float, float]:  # fmt: skip
-    """Return the factor on the covariance, and tau, by cross-validation."""
+    """Return the factor k on the covariance, and tau, by cross-validation."""
     values = sum(len(one.unknowns) for one in sessions)
     zs, rows = [], []
     for k, one in enumerate(sessions):
@@ -308,7 +308,7 @@ def _widened(
 
 
 def _matters(more: NDArray, count: int) -> bool:
-    """Return whether blocks are predicted worse, beyond chance and some noise."""
+    """Return whether blocks are predicted clearly worse than by chance."""
     error = float(more.std(ddof=1)) * np.sqrt(len(more)) if len(more) > 1 else 0.0
     return bool(more.sum() > max(_SURE * error, _MATTERS * count))
 

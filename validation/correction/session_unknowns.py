@@ -1,12 +1,12 @@
-"""Numbers of a robot that belong to one session and are fitted again in the next.
+"""Parameters of a robot that belong to one session and are fitted again in the next.
 
 They are the pose of the device; if requested, the measured point and the zeros of the
-joints; and all changes with time: the effect ``drift`` and functions of time.  A slow
-wave or a step of one day does not belong to the machine: in a new session its numbers
-have mean zero, with their old size as standard deviation.  A change that settled from a
-session's beginning may do so again: its numbers have their old values as mean.  Early
-readings determine a later drift poorly, which is then part of the uncertainty after
-set-up rows.  A session without a clock has no drift.
+joints; and all changes with time, that is the effect ``drift`` and functions of time.
+A slow wave or a step of one day does not belong to the machine: in a new session its
+coefficients have mean zero, and their previous size as standard deviation.  A change
+that settled from a session's beginning may repeat: its coefficients have their previous
+values as mean.  Early readings determine a later drift poorly; the drift is then part
+of the uncertainty after the set-up rows.  A session without a clock has no drift.
 """
 
 from collections.abc import Sequence
@@ -31,14 +31,14 @@ from assembly.model.robot import Robot
 
 OF_A_SESSION = ("registration", "tool", "zeros")
 DRIFT = "drift"
-_ZERO = 1e-3  # [rad, m] standard deviation of a zero that was set again
+_ZERO = 1e-3  # [rad, m] standard deviation of a joint's zero that was set again
 _SETTLING = ("lag", "creep")  # functions of time that begin with the session
-_STEP = 1e-6  # [rad, m] step of parameters other than a drift
+_STEP = 1e-6  # [rad, m] step of the derivative by a parameter other than a drift
 _CONSTANT = "time_constant"
 
 
 def of_one_session(robot: Robot) -> tuple[dict[str, float], tuple[Function, ...]]:
-    """Return the drift's parameters and functions of time without a named session."""
+    """Return the parameters of the drift, and the functions of time of all sessions."""
     functions = tuple(
         f for f in robot.functions
         if f.session is None and any(name in CLOCKS for name in f.variables)
@@ -47,7 +47,7 @@ def of_one_session(robot: Robot) -> tuple[dict[str, float], tuple[Function, ...]
 
 
 def without_session(robot: Robot) -> Robot:
-    """Return the robot alone: without the device's pose and changes with time."""
+    """Return the robot without the device's pose and without changes with time."""
     effects = {name: dict(values) for name, values in robot.effects.items()}
     effects.pop(DRIFT, None)
     tool = {k: v for k, v in effects.pop("registration", {}).items() if k in TOOL}
@@ -60,15 +60,15 @@ def without_session(robot: Robot) -> Robot:
 
 @dataclass(frozen=True, eq=False)
 class SessionUnknowns:
-    """The k numbers that are fitted in a session.
+    """The k parameters that are fitted in a session.
 
     Attributes:
-        names: owner of each (an effect, or a function's title) and its own name.
+        names: pairs of the owner (an effect, or a function's title) and the parameter.
         mean: (k,) prior means.
-        prior: (k,) prior precisions, 1 / variance; zero without information.
-        step: (k,) change that moves the readings by micrometres, for slopes.
-        constant: [s] the drift's time constant, absent if no drift is fitted.
-        functions: functions of time, whose numbers are fitted.
+        prior: (k,) prior precisions, 1 / variance; zero for a flat prior.
+        step: (k,) step of the derivative, which moves the readings by micrometres.
+        constant: [s] time constant of the drift; None if no drift is fitted.
+        functions: functions of time whose coefficients are fitted.
     """
 
     names: tuple[tuple[str, str], ...]
@@ -83,11 +83,11 @@ class SessionUnknowns:
 
     @property
     def owners(self) -> list[str]:
-        """Names of the owners of each function's numbers."""
+        """Owner of each function's coefficients, by title."""
         return [_owner(i, function) for i, function in enumerate(self.functions)]
 
     def effects(self, x: NDArray) -> dict[str, dict[str, float]]:
-        """Return the effects of the library with values (k,)."""
+        """Return the library's effects with values (k,) of the parameters."""
         values: dict[str, dict[str, float]] = {}
         for (effect, name), value in zip(self.names, x.tolist(), strict=True):
             if effect in LIBRARY:
@@ -97,7 +97,7 @@ class SessionUnknowns:
         return values
 
     def functions_with(self, x: NDArray, session: str | None) -> tuple[Function, ...]:
-        """Return the functions of time with values (k,), in a session alone."""
+        """Return the functions of time with values (k,), active in one session."""
         known = dict(zip(self.names, x.tolist(), strict=True))
         return tuple(
             replace(
@@ -121,15 +121,15 @@ class SessionUnknowns:
 def session_unknowns(
     robot: Robot, fitted: Sequence[str], *, clock: bool
 ) -> SessionUnknowns:
-    """Return the numbers to be fitted in a session.
+    """Return the parameters that are fitted in a session.
 
     Args:
-        robot: robot as saved, with the values of its original session.
-        fitted: names in :data:`OF_A_SESSION`.
+        robot: saved robot, with the values of its original session.
+        fitted: names of parameters in :data:`OF_A_SESSION`.
         clock: whether the session's rows have a time.
 
     Returns:
-        The unknowns; changes with time are included if there is a clock.
+        The parameters; changes with time are included if there is a clock.
     """
     names: list[tuple[str, str]] = []
     if "registration" in fitted:
@@ -172,12 +172,12 @@ def session_unknowns(
 
 
 def _owner(number: int, function: Function) -> str:
-    """Return the owner's name of the numbers of a function of time."""
+    """Return the name of the owner of a function's coefficients."""
     return f"function of time {number + 1}: {function.title}"
 
 
 def _numbers(robot: Robot, function: Function) -> dict[str, tuple[str, float]]:
-    """Return the numbers in which a function is linear: unit, and value."""
+    """Return the coefficients in which a function is linear: unit and value."""
     numbers, units = {}, units_of(robot, function)
     for component in function.components:
         own = parameters_of(function, component)

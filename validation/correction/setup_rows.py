@@ -1,4 +1,4 @@
-"""The rows of a campaign selected by ``--setup``."""
+"""Selection of the rows of a campaign by ``--setup``."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,15 +11,15 @@ def setup_rows(campaign: Campaign, text: str) -> NDArray:
     """Return the rows selected by ``--setup``.
 
     Args:
-        campaign: campaign with rows in the order of the file.
-        text: ``20`` for the first 20 of each session, numbers and ranges of rows such
-            as ``1-20,31``, or labels.
+        campaign: campaign with rows in the order of its file.
+        text: ``20`` for the first 20 rows of each session, numbers and ranges of rows
+            such as ``1-20,31``, or labels.
 
     Returns:
-        (R,) bool; all points of a row of the file together.
+        (R,) bool; all points of one row of the file are selected together.
 
     Raises:
-        BadInput: neither a number of rows nor existing rows.
+        BadInput: the text is neither a number of rows nor a list of existing rows.
     """
     labels = list(campaign.labels)
     order = list(dict.fromkeys(labels))
@@ -42,7 +42,7 @@ def _first(campaign: Campaign, labels: list[str], count: int) -> set[str]:
 
 
 def _range(part: str, order: list[str]) -> list[str]:
-    """Return the labels for a row's number, a range of numbers, or a label."""
+    """Return the labels selected by a number, a range of numbers, or a label."""
     if part in order:
         return [part]
     begin, dash, end = part.partition("-")
@@ -55,4 +55,4 @@ def _range(part: str, order: list[str]) -> list[str]:
             f"--setup: found {quoted(part)}, expected rows 1 to {len(order)}"
         )
     hint = nearest(part, order)
-    raise BadInput(f"--setup: found {quoted(part)}, which is no row's label{hint}")
+    raise BadInput(f"--setup: found {quoted(part)}, expected a row's label{hint}")

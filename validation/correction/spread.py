@@ -1,7 +1,7 @@
-"""Standard deviation of a robot's deviation by the uncertainty in its file.
+"""Standard deviation of a robot's deviation due to the uncertainty in its file.
 
-The covariance of readings is J C J', with C that of the numbers in the file
-(:mod:`validation.diagnosis.saved_covariance`) and J their derivatives.
+The covariance of the readings is J C J', where C is the covariance of the parameters in
+the file (:mod:`validation.diagnosis.saved_covariance`) and J their derivatives.
 """
 
 from collections.abc import Callable
@@ -25,20 +25,20 @@ from validation.diagnosis.saved_covariance import (
     known_covariance,
 )
 
-_STEP = 0.1  # standard deviations of a number: step for its derivative
+_STEP = 0.1  # [standard deviations of a parameter] step of the derivative
 
 
 def deviation_spread(
     robot: Robot, conditions_for: Callable[[Robot], Conditions]
 ) -> NDArray:
-    """Return the standard deviation of the platform's deviation at the points measured.
+    """Return the standard deviation of the deviation at the measured points.
 
     Args:
         robot: robot with its effects.
-        conditions_for: function of a robot that returns R rows of conditions.
+        conditions_for: function that returns R rows of conditions for a robot.
 
     Returns:
-        (R, 6) [rad, m]; zero if the file has no uncertainty.
+        (R, 6) [rad, m]; zero if the file states no uncertainty.
     """
     known = known_covariance(robot)
     conditions = conditions_for(robot)
@@ -53,17 +53,17 @@ def number_slopes(
     robot: Robot, conditions: Conditions, numbers: tuple[Number, ...], std: NDArray,
     conditions_for: Callable[[Robot], Conditions],
 ) -> NDArray:  # fmt: skip
-    """Return derivatives of the deviation by numbers of a robot's file.
+    """Return derivatives of the deviation by parameters of a robot's file.
 
     Args:
         robot: robot with its effects.
-        conditions: R rows of it.
-        numbers: k of its file.
-        std: (k,) their standard deviations, which determine the steps.
-        conditions_for: function of a robot that returns the same rows for it.
+        conditions: R rows of conditions of the robot.
+        numbers: k parameters of its file.
+        std: (k,) standard deviations of the parameters, which determine the steps.
+        conditions_for: function that returns the same rows for another robot.
 
     Returns:
-        (R, 6, k) [rad, m] per unit of a number; zero without a solution.
+        (R, 6, k) [rad, m] per unit of a parameter; zero without a solution.
     """
     J = np.zeros((len(conditions), 6, len(numbers)))
     response = responses(conditions)
@@ -84,7 +84,7 @@ def number_slopes(
 
 
 def _is_direct(robot: Robot, number: Number) -> bool:
-    """Return whether a function does not depend on its own effect."""
+    """Return whether a function does not depend on the motion that it causes."""
     function = robot.functions[int(number.owner)]
     wrench = any(name.startswith("wrench.") for name in function.variables)
     alone = function.where not in PLACES and function.kind == "compliance"
@@ -97,7 +97,7 @@ def _of_function(
     robot: Robot, conditions: Conditions, response: Responses, number: Number,
     sigma: float,
 ) -> NDArray:  # fmt: skip
-    """Return the (R, 6) derivatives of the deviation by a function's numbers."""
+    """Return the (R, 6) derivatives of the deviation by a function's parameters."""
     one = robot.functions[int(number.owner)]
     step = _STEP * sigma if sigma > 0.0 else 1.0
     more = one.parameters[number.name] + step
@@ -115,7 +115,7 @@ def _of_function(
 def _answer(
     conditions: Conditions, response: Responses, function: Function, component: str
 ) -> NDArray:
-    """Return the (R, 6) derivative of the deviation by a function's component."""
+    """Return the (R, 6) derivatives of the deviation by a component of a function."""
     axis = READING.index(component)
     if function.where == "reading":
         return np.broadcast_to(np.eye(6)[axis], (len(conditions), 6))

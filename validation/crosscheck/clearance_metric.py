@@ -1,12 +1,13 @@
-"""Energies and springs of two models with clearances.
+"""Comparison of two models with clearances, by energies and springs.
 
-If no load acts on a clearance the minimum is not unique in the pose, so poses are not
-compared.  The least energy and the springs' deformations and wrenches are unique. The
-simulated clearance screws are also inserted into the linear model: their energy there,
-beyond the least, is the optimality gap.  With springs as links the energy must also be
-that of the exact virtual-joint model, at full size.  Errors, clearances and load are
-scaled together by s; the linear energy is proportional to s^2.  The relative gap falls
-as s^2 too, down to the compliance of the contacts.
+If no load acts on a clearance, the pose of least energy is not unique, so poses are not
+compared.  The least energy and the deformations and wrenches of the springs are unique.
+The simulated clearance screws are also inserted into the linear model: the difference
+between their energy there and the least energy is the optimality gap.  With springs as
+links, the energy must also equal the energy of the exact virtual-joint model at full
+size.  Errors, clearances and load are scaled together by s; the linear energy is
+proportional to s^2.  The relative gap decreases as s^2 too, until the compliance of the
+contacts dominates.
 """
 
 import math
@@ -26,18 +27,18 @@ from validation.crosscheck.limits import extrapolate, limit_difference, limit_of
 from validation.crosscheck.pair import Pair
 from validation.crosscheck.verdict import Check
 
-TOLERANCE = 0.02  # relative, of limits: contacts are compliant and smoothed
+TOLERANCE = 0.02  # relative tolerance of limits: contacts are compliant and smoothed
 FLOOR_ENERGY = 1e-4  # [J] energy of the springs that centre clearances, at scale 1
 
 
 @dataclass(frozen=True, eq=False)
 class ClearanceMetric:
-    """Differences of the energy and of springs, and the optimality gap.
+    """Differences of energies and springs, and the optimality gap.
 
     Attributes:
         robot: robot with its clearances.
         pairs: both solutions at each scale, largest first.
-        springs: whether all links are springs in the simulation too.
+        springs: whether the simulation models all links as springs too.
     """
 
     robot: Robot
@@ -51,15 +52,15 @@ class ClearanceMetric:
 
     @property
     def scales(self) -> NDArray:
-        """(k,) factors, largest first."""
+        """(k,) scales of the imperfections, largest first."""
         return np.array([pair.scale for pair in self.pairs])
 
     @cached_property
     def gaps(self) -> NDArray:
-        """(k,) optimality gap of the simulated clearance screws, relative.
+        """(k,) relative optimality gaps of the simulated clearance screws.
 
-        The reference is the energy of closing without clearances, or the energy stored
-        under the load if that is more.
+        The reference is the energy of closing without clearances or, if larger, the
+        energy stored under the load.
         """
         return np.array([optimality_gap(pair) for pair in self.pairs])
 
@@ -77,7 +78,7 @@ class ClearanceMetric:
 
     @cached_property
     def limits(self) -> dict[str, Check]:
-        """Relative differences extrapolated to zero imperfections."""
+        """Relative difference of each quantity, extrapolated to zero imperfections."""
         ours = np.array([pair.linear_energy for pair in self.pairs])
         theirs = np.array([pair.simulated.rigid_energy for pair in self.pairs])
         gap = limit_of(self.scales**2, self.gaps)
@@ -92,7 +93,7 @@ class ClearanceMetric:
         return {k: replace(check, signal=self.signal) for k, check in limits.items()}
 
     def _strain_limit(self) -> Check:
-        """Return the difference of all springs' deformations in the energy norm."""
+        """Return difference of the deformations of all springs in the energy norm."""
         frames = self.robot.frames
         K = {"link_screws": np.zeros((len(frames), 6, 6))}
         K["joint_screws"] = np.zeros((len(frames), 6, 6))
@@ -127,7 +128,7 @@ class ClearanceMetric:
 
     @cached_property
     def energies(self) -> dict[str, NDArray]:
-        """(k,) energy, simulated minus linear or exact, relative to the latter.
+        """(k,) relative difference of the energy from the linear or exact one.
 
         NaN where the exact model has no solution.
         """
@@ -142,7 +143,7 @@ class ClearanceMetric:
 
     @cached_property
     def checks(self) -> dict[str, Check]:
-        """The checks, by name."""
+        """Checks of the comparison, by name."""
         checks = {f"limit of {name}": check for name, check in self.limits.items()}
         exact = abs(float(self.energies["exact"][0]))
         if self.springs:
@@ -153,7 +154,7 @@ class ClearanceMetric:
         return checks
 
     def table(self) -> dict[str, Any]:
-        """Return the metric's own keys of the public format."""
+        """Return the entries of the public format that only this metric has."""
         return {
             "clearances": "on both sides; poses are not unique and not judged",
             "slope": None,
@@ -163,7 +164,7 @@ class ClearanceMetric:
         }
 
     def header(self) -> list[str]:
-        """Return the names of the columns of :meth:`rows`."""
+        """Return the column headings of :meth:`rows`."""
         return [
             "scale of imperfections",
             "energy, simulated [J]",
@@ -173,7 +174,7 @@ class ClearanceMetric:
         ]
 
     def rows(self) -> list[list[str]]:
-        """Return one row for each scale, as text."""
+        """Return one row of text for each scale."""
         return [
             [
                 f"{pair.scale:.4g}",
@@ -196,18 +197,18 @@ def optimality_gap(pair: Pair) -> float:
     """Return energy of simulated clearance screws in the linear model, less the least.
 
     Args:
-        pair: both solutions, of a robot with clearances.
+        pair: both solutions of a robot with clearances.
 
     Returns:
         [-] energy minus the load's work at the simulated clearance screws, projected
-        onto their cones, minus the least one.  It is relative to the largest of the
-        energy stored without clearances, that with them under the load, and
-        :data:`FLOOR_ENERGY`.
+        onto their cones, minus the least value.  The reference is the largest of the
+        energy stored without clearances, the energy stored with them under the load,
+        and :data:`FLOOR_ENERGY`.
     """
     best = pair.linear
     small = reduce_problem(linearise(best.posture), best.joints, best.frame_loads)
     cones = best.joints.cones
-    # a column of cones has one entry, its bound
+    # a column of cones has one entry: the inverse of its bound
     u = cones.T @ pair.simulated.clearance_screws.ravel() / (cones**2).sum(axis=0)
     u = into_cones(u, best.joints.group)
     strain, least = small.G @ u + small.h, small.G @ best.clearances + small.h

@@ -1,9 +1,9 @@
 """Comparison of the virtual-joint model with the multibody simulation of a robot.
 
-Both models are solved at several scales s of all imperfections (geometric errors,
-clearances) and loads.  Without clearances the platform's poses are compared
-(:mod:`validation.crosscheck.pose_metric`).  With clearances the pose of least energy is
-not unique, and energies and springs are compared
+Both models are solved at several scales s of the load and all imperfections (geometric
+errors, clearances).  Without clearances, the platform's poses are compared
+(:mod:`validation.crosscheck.pose_metric`).  With clearances, the pose of least energy
+is not unique, so energies and springs are compared
 (:mod:`validation.crosscheck.clearance_metric`).
 """
 
@@ -61,37 +61,37 @@ class Metric(Protocol):
 
     @property
     def slope(self) -> float:
-        """Slope of the pose difference over the scale; NaN without poses."""
+        """Slope of the pose difference against the scale; NaN without poses."""
 
     @property
     def checks(self) -> dict[str, Check]:
-        """The checks, by name."""
+        """Checks of the comparison, by name."""
 
     def notes(self) -> list[str]:
         """Return lines of text before the table of scales."""
 
     def header(self) -> list[str]:
-        """Return the names of the columns of :meth:`rows`."""
+        """Return the column headings of :meth:`rows`."""
 
     def rows(self) -> list[list[str]]:
-        """Return cells, one row for each scale."""
+        """Return one row of text for each scale."""
 
     def table(self) -> dict[str, Any]:
-        """Return the metric's own keys of the public format."""
+        """Return the entries of the public format that only this metric has."""
 
 
 @dataclass(frozen=True, eq=False)
 class Crosscheck:
-    """A robot at one posture, solved by two models at several scales.
+    """Solutions of a robot at one posture by two models at several scales.
 
     Attributes:
-        posture: nominal.
+        posture: the nominal posture.
         load: (6,) [N m, N] on the platform at scale 1, base axes.
         links: model of links in the simulation: ``"beam"``, ``"spring"``, ``"fem"``.
         gravity: (3,) [m/s^2] at scale 1, base axes.
-        pairs: one for each scale, largest first.
-        asked: number of requested scales; smaller ones were added for a decision.
-        metric: the comparison.
+        pairs: solutions at each scale, largest first.
+        asked: number of requested scales; smaller ones were added to reach a decision.
+        metric: comparison of the solutions.
     """
 
     posture: Posture
@@ -106,22 +106,22 @@ class Crosscheck:
 
     @property
     def scales(self) -> NDArray:
-        """(k,) factors, largest first."""
+        """(k,) scales of the imperfections, largest first."""
         return np.array([pair.scale for pair in self.pairs])
 
     @property
     def slope(self) -> float:
-        """Slope of the pose difference over the scale; NaN without poses."""
+        """Slope of the pose difference against the scale; NaN without poses."""
         return self.metric.slope
 
     @property
     def checks(self) -> dict[str, Check]:
-        """The checks, by name."""
+        """Checks of the comparison, by name."""
         return self.metric.checks
 
     @cached_property
     def resolutions(self) -> list[Resolution]:
-        """The smallest change of each number of the robot that the check detects."""
+        """The smallest change of each parameter of the robot that the checks detect."""
         assert isinstance(self.metric, PoseMetric | ClearanceMetric)
         return resolutions(
             self.posture, self.pairs, self.metric, self.load, self.gravity
@@ -133,10 +133,10 @@ class Crosscheck:
         return verdict(self) == PASSED
 
     def table(self) -> dict[str, Any]:
-        """Return all results of ``validation crosscheck``, keys of the public format.
+        """Return all results of ``validation crosscheck`` by keys of the public format.
 
         Returns:
-            ``scales`` holds the requested ones, ``added_scales`` the others.
+            ``scales`` has the requested scales, ``added_scales`` the others.
         """
         robot = self.posture.robot
         tables = [pair.table(robot) for pair in self.pairs]
@@ -177,7 +177,7 @@ class Crosscheck:
         }
 
     def text(self) -> str:
-        """Return a table and the verdict as text, without colours."""
+        """Return a table and the verdict as text without colours."""
         cells = [self.metric.header(), *self.metric.rows()]
         lines = [f"{self.posture.robot.name}, {self.metric.notes()[0]}"]
         lines += self.metric.notes()[1:]
@@ -209,38 +209,37 @@ def crosscheck(
 
     Args:
         posture: the robot's configuration.
-        scales: at least two different factors on errors, clearances and load, > 0;
-            smaller ones are added if a check is undecided.
+        scales: factors on errors, clearances and load, > 0, at least two different
+            ones; smaller ones are added if a check is undecided.
         load: (6,) [N m, N] on the platform at its origin, base axes, or by component,
             ``{"fz": -50}``.
-        links: ``"beam"``: beams bend geometrically exactly; ``"spring"``: every link
-            is its K_E in the simulation too, which checks everything but the beams;
+        links: ``"beam"``: beams are geometrically exact; ``"spring"``: every link is
+            its K_E in the simulation too, which checks everything but the beams;
             ``"fem"``: meshed links are solids in floating frames.
         gravity: (3,) [m/s^2] base axes; beams with a density and bodies with a mass
-            then have weight in all three models.
+            then have weight in all models.
         time_limit: [s] for each simulation.
-        clearances: whether clearances are kept, in both models; poses are then not
-            compared.
+        clearances: whether both models have clearances; poses are then not compared.
 
     Returns:
         Both solutions at every scale, and the verdict.
 
     Raises:
-        BadInput: too few scales, or one that is not positive.
+        BadInput: fewer than two scales, or a scale that is not positive.
         SimulationFailed: the simulation found no equilibrium.
         CannotAssemble: the virtual-joint model has no solution.
-        FreeMotion: the load drives a motion that nothing resists.
+        FreeMotion: the load acts along a motion without stiffness.
     """
     robot = posture.robot if clearances else without_clearance(posture.robot)
     compared = replace(posture, robot=robot)
     wrench = np.zeros(6) if load is None else given_load(load)
-    force = wrench * [0, 0, 0, 1, 1, 1]  # its moment acts as a couple of dead forces
+    force = wrench * [0, 0, 0, 1, 1, 1]  # the moment acts as a couple of dead forces
     model = replace(link_models(robot, links), elements=ELEMENTS, clearances=clearances)
     g = np.zeros(3) if gravity is None else np.array(gravity, dtype=float)
     springs = links == "spring"
     between = 0.0 if springs else energy_between_ends(compared, g, ELEMENTS)
 
-    held: list[float] = []  # motions held at one scale are held at all smaller ones
+    held: list[float] = []  # motions held at one scale are held at all smaller scales
 
     def solve(s: float) -> Pair:
         models = [compared] if clearances else [compared, hold_free_motions(compared)]
@@ -254,7 +253,7 @@ def crosscheck(
         )  # fmt: skip
         if simulated.held:
             held.append(s)
-        # springs that hold free motions in the simulation are in the other models too
+        # the other models too have the springs that hold free motions in the simulation
         if simulated.held and holding is not None:
             linear = holding
         exact = exact_solution(linear, s * g)
@@ -285,12 +284,12 @@ def attempt(
     """Return a check's result or the reason of its failure.
 
     Args:
-        robot: its name.
-        check: function that runs the check, without arguments.
+        robot: name of the robot.
+        check: function without arguments that runs the check.
 
     Returns:
-        The result and nothing, or None and ``status``, ``reason``, ``passed`` and a
-        null ``slope``.
+        The result and None; or None and a table with ``status``, ``reason``, ``passed``
+        and a null ``slope``.
     """
     try:
         return check(), {}

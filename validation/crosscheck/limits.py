@@ -1,15 +1,15 @@
-"""Limits and slopes of two models as imperfections vanish, with uncertainties.
+"""Limits and slopes of differences between two models, with uncertainties.
 
 ======  ===================  ==========================================================
 symbol  code                 meaning
 ======  ===================  ==========================================================
 s       ``scale``            factor on geometric errors, clearances and load
-slope   ``difference_slope`` of log difference over log scale, as s goes to 0
+slope   ``difference_slope`` slope of log difference over log scale, as s goes to 0
 limit   ``limit_difference`` difference / s^p extrapolated to s = 0, relative
 ======  ===================  ==========================================================
 
 The uncertainty of a limit is twice its change when the largest scale is left out.
-Differences below :data:`FLOOR`, the resolution of simulations, are noise.
+Differences below :data:`FLOOR`, the resolution of simulations, count as noise.
 """
 
 import math
@@ -23,12 +23,13 @@ from validation.crosscheck.link_models import link_stiffness
 from validation.crosscheck.pair import Pair, sprung
 from validation.crosscheck.verdict import Check
 
-LIMIT_TOLERANCE = 1e-3  # relative, of every quantity extrapolated to zero error
+# relative tolerance of every quantity extrapolated to zero imperfections
+LIMIT_TOLERANCE = 1e-3
 FLOOR = {
     "rotation": 1e-10,
     "translation": 1e-11,
-}  # [rad], [m] resolution of simulations
-# factor on the effect of free motions' weak springs, below which changes are noise
+}  # [rad], [m] resolution of a simulation
+# multiple of the effect of weak springs on free motions; smaller changes are noise
 _NOISE = 3.0
 HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 
@@ -36,17 +37,17 @@ HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 def spring_limits(
     robot: Robot, pairs: Sequence[Pair], spread: bool = False
 ) -> dict[str, Check]:
-    """Return the differences of springs and energy, extrapolated to zero error.
+    """Return the differences of springs and energy, extrapolated to zero imperfections.
 
     Args:
-        robot: the robot with the links and joint springs compared.
+        robot: robot with the compared links and joint springs.
         pairs: both solutions at several scales.
-        spread: whether loads act between the links' ends.  The linear model lacks
-            these, so links' wrenches are left out.
+        spread: whether loads act between the ends of links.  The linear model does not
+            contain them, so links' wrenches are not compared.
 
     Returns:
-        By name, relative to the largest among all links or all joints; see
-        :func:`limit_difference`.
+        Differences by name, relative to the largest value among all links or all
+        joints; see :func:`limit_difference`.
     """
     scales = np.array([pair.scale for pair in pairs])
     stiff = _stiffest(robot)
@@ -79,7 +80,7 @@ def spring_limits(
 
 
 def energy_floor(robot: Robot) -> float:
-    """Return the energy [J] of noise: :data:`FLOOR` in the stiffest spring."""
+    """Return the energy [J] of the noise: :data:`FLOOR` in the stiffest spring."""
     return float((_stiffest(robot) * np.array(list(FLOOR.values())) ** 2).max())
 
 
@@ -87,21 +88,21 @@ def limit_difference(
     scales: NDArray, ours: NDArray, theirs: NDArray, power: int, floor: float,
     bound: float = LIMIT_TOLERANCE, least_size: float = 0.0,
 ) -> Check:  # fmt: skip
-    """Return the largest difference as the scale goes to 0, relative to the values.
+    """Return the largest relative difference of two models as the scale goes to 0.
 
     Args:
-        scales: (k,) all different, largest first.
-        ours: (k, ...) values that decrease as a power of the scale.
-        theirs: (k, ...) values to compare.
+        scales: (k,) different scales, largest first.
+        ours: (k, ...) values of our model, which decrease as a power of the scale.
+        theirs: (k, ...) values of the other model.
         power: power of the scale.
-        floor: differences below it, in the values' unit, are noise.
-        bound: on the relative difference.
-        least_size: least reference of the difference, in the unit of the values at
+        floor: differences below it, in the unit of the values, are noise.
+        bound: largest accepted relative difference.
+        least_size: smallest reference of the difference, in the unit of the values at
             scale 1.
 
     Returns:
-        [-] the difference; at most the bound if only noise remains.  There is a signal
-        if the bound on our largest value is above the noise.
+        [-] the difference, at most the bound if only noise remains.  There is a signal
+        if the bound, times our largest value, is above the noise.
     """
     weight = scales.reshape(-1, *[1] * (ours.ndim - 1)) ** -float(power)
     limit, change = limit_of(scales, (theirs - ours) * weight)
@@ -115,11 +116,12 @@ def limit_of(scales: NDArray, values: NDArray) -> tuple[float, float]:
     """Return the largest component at scale 0, and its uncertainty.
 
     Args:
-        scales: (k,) all different, largest first.
-        values: (k, ...) at these scales.
+        scales: (k,) different scales, largest first.
+        values: (k, ...) values at these scales.
 
     Returns:
-        Its size, and twice its largest change when the largest scale is left out.
+        The size of the component, and twice its largest change when the largest scale
+        is left out.
     """
     limit = extrapolate(scales, values)
     change = limit - extrapolate(scales[1:], values[1:])
@@ -137,22 +139,22 @@ def _stiffest(robot: Robot) -> NDArray:
 
 
 def difference_slope(scales: ArrayLike, differences: ArrayLike, floor: float) -> float:
-    """Return the slope of log difference over log scale, by its first two orders.
+    """Return the slope of log difference over log scale, from its first two orders.
 
     A difference of second order is ``c2 s^2 + c3 s^3 + ..``, with vectors that may
-    partly cancel.  A line through the logarithms of its size then has any slope, down
-    to 1.3 at scales from 1 to 1/8.  So the first-order term ``c1 s`` is extrapolated
-    separately, from ``difference / s``, and compared with all others at the smallest
-    scale.
+    partly cancel.  A line through the logarithms of its size may then have any slope,
+    down to 1.3 at scales from 1 to 1/8.  So the first-order term ``c1 s`` is
+    extrapolated separately, from ``difference / s``, and compared with the terms of
+    higher order at the smallest scale.
 
     Args:
         scales: (k,) > 0, largest first.
-        differences: (k, ...) components at these scales.
-        floor: differences of a size below it are noise and are left out.
+        differences: (k, ...) components of the difference at these scales.
+        floor: differences of a smaller size are noise and are left out.
 
     Returns:
         2 without a first-order term, 1 with this term alone; NaN with fewer than two
-        differences.
+        differences above the floor.
     """
     scales, parts = _clear(scales, differences, floor)
     if len(scales) < 2:
@@ -165,17 +167,17 @@ def difference_slope(scales: ArrayLike, differences: ArrayLike, floor: float) ->
 def slope_check(
     scales: ArrayLike, differences: ArrayLike, floor: float, bound: float
 ) -> Check:
-    """Return the difference of a slope from 2.
+    """Return the check of a slope: its difference from 2.
 
     Args:
-        scales: (k,) largest first.
-        differences: (k, ...) components at these scales.
-        floor: differences of a size below it are noise and are left out.
-        bound: on the difference of the slope.
+        scales: (k,) scales, largest first.
+        differences: (k, ...) components of the difference at these scales.
+        floor: differences of a smaller size are noise and are left out.
+        bound: largest accepted difference of the slope from 2.
 
     Returns:
-        The difference; its uncertainty is the change when the largest scale is left
-        out, infinite for two scales.  There is no slope, and no signal, without two
+        The check.  Its uncertainty is the change when the largest scale is left out,
+        infinite for two scales.  The check has no signal with fewer than two
         differences above the floor, or if noise alone can change the slope by more than
         the bound.
     """
@@ -214,11 +216,11 @@ def extrapolate(scales: NDArray, values: NDArray) -> NDArray:
     """Return the value at scale 0 of the polynomial through all points (Neville).
 
     Args:
-        scales: (k,) all different.
-        values: (k, ...) at these scales.
+        scales: (k,) different scales.
+        values: (k, ...) values at these scales.
 
     Returns:
-        (...) the limit; its error is of the order of the product of the scales.
+        (...) value at scale 0; its error is of the order of the product of the scales.
     """
     table = [np.asarray(v, dtype=float) for v in values]
     for step in range(1, len(table)):

@@ -15,18 +15,19 @@ KINDS = ("beam", "spring", "fem")
 
 
 def link_models(robot: Robot, kind: str) -> SimulationModel:
-    """Return the model of a robot's links: stiffnesses of springs, and solids.
+    """Return the model of a robot's links: spring stiffnesses, and solids.
 
     Args:
-        robot: any robot.
-        kind: ``"beam"``: beams as beams, all others as springs; ``"spring"``: all as
-            springs; ``"fem"``: meshed links as solids, others as for ``"beam"``.
+        robot: robot of the virtual-joint model.
+        kind: ``"beam"``: beams as beams, other links as springs; ``"spring"``: all
+            links as springs; ``"fem"``: meshed links as solids, others as for
+            ``"beam"``.
 
     Returns:
         The model; its joints have no clearance.
 
     Raises:
-        BadInput: an unknown kind, or a mesh is not usable.
+        BadInput: the kind is unknown, or a mesh is not usable.
     """
     if kind not in KINDS:
         raise BadInput(f"links: found {kind!r}, expected one of {', '.join(KINDS)}")
@@ -43,11 +44,11 @@ def link_stiffnesses(robot: Robot, links: str) -> Mapping[str, NDArray]:
     """Return K_E of the links that a simulation models as springs.
 
     Args:
-        robot: any robot.
-        links: ``"spring"``, or another kind, in which beams are left out.
+        robot: robot of the virtual-joint model.
+        links: ``"spring"`` for all links; for another kind, beams are left out.
 
     Returns:
-        By frame, (6, 6) [N m/rad .. N/m] in its axes.
+        Mapping from the frame's name to K_E, (6, 6) [N m/rad .. N/m] in its axes.
     """
     return {
         frame.name: link_stiffness(frame)

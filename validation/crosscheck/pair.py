@@ -1,4 +1,4 @@
-"""Both models' solutions at one scale of a robot's imperfections."""
+"""Solutions of two models at one scale of a robot's imperfections."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -18,18 +18,19 @@ from validation.multibody.simulation import MultibodyAssembly
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Both solutions at one scale.
+    """Solutions of two models at one scale.
 
     Attributes:
         scale: factor on errors and load.
         linear: result of the virtual-joint model.
         simulated: result of the simulation.
-        exact: result of the virtual-joint model with finite rotations, or None.
-        between: [J] energy of distributed weights in the simulation's beams, which the
-            linear model does not contain.
-        holding: the linear model with the springs of :func:`hold_free_motions`, to
-            estimate the effect of weaker ones in the simulation; None if there are
+        exact: result of the virtual-joint model with finite rotations; None if it has
             none.
+        between: [J] energy of distributed weights in the simulation's beams; the linear
+            model does not contain it.
+        holding: solution of the linear model with the springs of
+            :func:`hold_free_motions`, which estimates the effect of the simulation's
+            weaker springs; None if there are none.
     """
 
     scale: float
@@ -40,12 +41,13 @@ class Pair:
     holding: Assembly | None = None
 
     def noise_of(self, quantity: str) -> NDArray:
-        """Return the effect of the simulation's springs of free motions, at scale 1.
+        """Return the effect of the simulation's springs on free motions, at scale 1.
 
         They are so weak that their effect is proportional to their stiffness.
 
         Args:
-            quantity: a screw or wrenches of an ``Assembly``, proportional to the scale.
+            quantity: name of a screw or of wrenches of an ``Assembly``, proportional to
+                the scale.
 
         Returns:
             Sizes of the changes, shaped as the quantity; zero if both models have the
@@ -60,7 +62,7 @@ class Pair:
 
     @property
     def linear_energy(self) -> float:
-        """[J] of the linear model, and of distributed weights.
+        """[J] energy of the linear model, with the energy of distributed weights.
 
         It excludes the springs that hold free motions, as in the simulation.
         """
@@ -117,13 +119,13 @@ class Pair:
 
 
 def sprung(robot: Robot) -> NDArray:
-    """Return the components with joint springs; rigid ones have no simulated wrench.
+    """Return the components with joint springs; a rigid one has no simulated wrench.
 
     Args:
         robot: robot of n frames.
 
     Returns:
-        (n, 6) 1 where K_B is finite, else 0.
+        (n, 6) 1 where K_B is finite, 0 elsewhere.
     """
     rows = np.zeros((len(robot.frames), 6))
     for row, frame in zip(rows, robot.frames, strict=True):
@@ -133,7 +135,7 @@ def sprung(robot: Robot) -> NDArray:
 
 
 def _named(robot: Robot, part: str, rows: NDArray) -> dict[str, NDArray]:
-    """Return the rows of the frames that have a part, by name."""
+    """Return the rows of the frames that have a part, by name of the frame."""
     return {
         frame.name: row
         for frame, row in zip(robot.frames, rows, strict=True)
@@ -142,14 +144,15 @@ def _named(robot: Robot, part: str, rows: NDArray) -> dict[str, NDArray]:
 
 
 def hold_free_motions(posture: Posture) -> Posture:
-    """Return the posture with the simulation's springs on free motions.
+    """Return the posture with the simulation's springs on its free motions.
 
     Args:
         posture: posture of a robot without clearances.
 
     Returns:
-        A posture of a robot whose passive joints without a spring of their own have one
-        of :data:`~validation.multibody.exudyn_model.HOLDING_STIFFNESS`.
+        The posture of a robot whose passive joints have a spring of
+        :data:`~validation.multibody.exudyn_model.HOLDING_STIFFNESS`, unless they have a
+        spring already.
     """
 
     def hold(frame: Frame) -> Frame:
@@ -165,10 +168,10 @@ def hold_free_motions(posture: Posture) -> Posture:
 
 
 def holding_energy(robot: Robot, joint_screws: NDArray) -> float:
-    """Return the energy in the springs that hold free motions, if there are any.
+    """Return the energy of the springs that hold free motions; zero without them.
 
     Args:
-        robot: robot of the virtual-joint model, perhaps with such springs.
+        robot: robot of the virtual-joint model, with or without such springs.
         joint_screws: (n, 6) [rad, m] deformations of its joints.
 
     Returns:
@@ -184,11 +187,11 @@ def holding_energy(robot: Robot, joint_screws: NDArray) -> float:
 def exact_solution(
     linear: Assembly, gravity: ArrayLike | None = None
 ) -> ExactAssembly | None:
-    """Return a solution with finite rotations near a linear one, or None.
+    """Return the solution with finite rotations near a linear one, or None.
 
     Args:
-        linear: the start.
-        gravity: (3,) [m/s^2] base axes, the one of the linear solution.
+        linear: linear solution from which the iteration starts.
+        gravity: (3,) [m/s^2] base axes, as in the linear solution.
 
     Returns:
         The exact solution or None.  The load's moment is a couple of dead forces on the
@@ -196,7 +199,7 @@ def exact_solution(
     """
     joints, robot = linear.joints, linear.posture.robot
     if not any(A.shape[1] for A in (joints.elastic, joints.cones, joints.free)):
-        return None  # nothing can move
+        return None  # no joint or link can deform
     couple = np.zeros((len(robot.frames), 6))
     couple[robot.index(robot.platform), :3] = linear.load[:3]
     force = np.concatenate([np.zeros(3), linear.load[3:]])
@@ -207,7 +210,7 @@ def exact_solution(
 
 
 def scaled(posture: Posture, scale: float) -> Posture:
-    """Return the same posture with all imperfections times a factor.
+    """Return a posture with all imperfections multiplied by a factor.
 
     Args:
         posture: nominal.

@@ -1,4 +1,4 @@
-"""Plots of cross-checks.  Functions take a result and return a figure."""
+"""Figures of cross-checks."""
 
 import math
 from typing import TYPE_CHECKING
@@ -13,15 +13,15 @@ if TYPE_CHECKING:
 
 
 def slope_figure(check: Crosscheck) -> "Figure":
-    """Return the difference of simulation and linear model against the errors' scale.
+    """Return a figure of the difference between both models over the scale.
 
     Args:
         check: result of :func:`validation.crosscheck.crosscheck.crosscheck`, without
             clearances.
 
     Returns:
-        A log-log figure with rotation [mrad] and translation [mm], each with a line of
-        slope 2 through the value of the smallest scale.
+        A log-log figure with panels for rotation [mrad] and translation [mm], each with
+        a line of slope 2 through the value at the smallest scale.
     """
     from matplotlib.figure import Figure
 

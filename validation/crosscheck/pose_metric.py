@@ -1,17 +1,18 @@
-"""Poses of two models without clearances: slopes, limits, explained differences.
+"""Comparison of the poses of two models without clearances: slopes and limits.
 
 The virtual-joint model is linear in the errors, the simulation is not.  If the linear
 model is right, their difference is of second order.  If errors and load are scaled by
-s, the pose difference falls as s^2, with a slope of 2 in a log-log plot.  Every
-quantity of the simulation, divided by its power of s and extrapolated to s = 0, is then
-that of the linear model.  A wrong term of first order, even of a thousandth, changes
-the slope and the limit.  Passive joints move freely along their z on both sides.
+s, the pose difference decreases as s^2, with a slope of 2 in a log-log plot.  Every
+quantity of the simulation, divided by its power of s and extrapolated to s = 0, then
+equals the quantity of the linear model.  A wrong term of first order, even of a
+thousandth, changes the slope and the limit.  Passive joints move freely about or along
+their z axis in both models.
 
 ======  ===============  =============================================================
 symbol  code             meaning
 ======  ===============  =============================================================
 s       ``scale``        factor on geometric errors and load
-slope   ``slopes``       of log difference over log scale, first two orders
+slope   ``slopes``       slope of log difference over log scale, first two orders
 limit   ``limits``       quantity / s^p extrapolated to s = 0, relative difference
 ======  ===============  =============================================================
 """
@@ -36,22 +37,24 @@ from validation.crosscheck.limits import (
 from validation.crosscheck.pair import Pair
 from validation.crosscheck.verdict import Check
 
-SLOPE_TOLERANCE = 0.1  # accepted difference of the pose difference's slope from 2
-# accepted share of the pose difference that the exact model with springs leaves
+# largest accepted difference between 2 and the slope of the pose difference
+SLOPE_TOLERANCE = 0.1
+# largest accepted share of the pose difference that remains with the exact model, if
+# links are springs
 EXPLAINED_TOLERANCE = 0.02
-# relative, of the pose: a first-order difference between a mesh's K_E and its solid due
-# to rounding, significant only where second orders are as small
+# relative to the pose: first-order difference between a mesh's K_E and its solid due to
+# rounding, significant only where second-order terms are as small
 _ROUNDING = 2e-5
 
 
 @dataclass(frozen=True, eq=False)
 class PoseMetric:
-    """Differences of the platform's pose, of springs and energy.
+    """Differences of the platform's pose, of springs and of energy.
 
     Attributes:
         robot: robot without clearances.
         pairs: both solutions at each scale, largest first.
-        springs: whether all links are springs in the simulation too.
+        springs: whether the simulation models all links as springs too.
         gravity: whether there is gravity.
     """
 
@@ -62,23 +65,23 @@ class PoseMetric:
 
     @property
     def scales(self) -> NDArray:
-        """(k,) factors, largest first."""
+        """(k,) scales of the imperfections, largest first."""
         return np.array([pair.scale for pair in self.pairs])
 
     @cached_property
     def components(self) -> dict[str, NDArray]:
-        """(k, 3) pose difference, ``rotation`` [rad], ``translation`` [m]."""
+        """(k, 3) pose differences ``rotation`` [rad] and ``translation`` [m]."""
         screws = np.array([pair.screw_difference for pair in self.pairs])
         return {name: screws[:, half] for name, half in HALVES.items()}
 
     @cached_property
     def differences(self) -> dict[str, NDArray]:
-        """(k,) norm of the pose difference, ``rotation`` [rad], ``translation`` [m]."""
+        """(k,) norm of the pose difference: ``rotation`` [rad], ``translation`` [m]."""
         return {k: np.linalg.norm(v, axis=1) for k, v in self.components.items()}
 
     @cached_property
     def slopes(self) -> dict[str, float]:
-        """Slope of each difference; NaN if it is only the solver's noise."""
+        """Slope of each difference; NaN if it is below the solver's noise."""
         return {
             name: difference_slope(self.scales, values, FLOOR[name])
             for name, values in self.components.items()
@@ -86,7 +89,7 @@ class PoseMetric:
 
     @property
     def slope(self) -> float:
-        """The slope farther from 2; NaN if there is no difference."""
+        """Slope that differs most from 2; NaN without a significant difference."""
         known = [s for s in self.slopes.values() if not math.isnan(s)]
         return max(known, key=lambda s: abs(s - 2.0)) if known else math.nan
 
@@ -94,9 +97,9 @@ class PoseMetric:
     def unexplained(self) -> dict[str, float]:
         """Share of the pose difference that remains with the exact virtual-joint model.
 
-        It is taken at the largest scale.  With springs as links only rounding remains;
-        with beams, the error of an end-point spring for a beam's own finite bending.
-        NaN without a difference.
+        It is taken at the largest scale.  With springs as links, only rounding remains;
+        with beams, the error of modelling a beam's finite bending by one spring.  NaN
+        without a difference.
         """
         first = self.pairs[0]
         if first.exact is None:
@@ -111,11 +114,12 @@ class PoseMetric:
 
     @cached_property
     def limits(self) -> dict[str, Check]:
-        """Relative difference of each quantity, extrapolated to zero error.
+        """Relative difference of each quantity, extrapolated to zero imperfections.
 
-        Screws and wrenches are compared by halves, each relative to the largest among
-        all frames that have such a spring; differences below :data:`FLOOR`, and the
-        wrench they cause in the stiffest spring, are noise.
+        Screws and wrenches are compared by rotations and translations, each relative to
+        the largest value among all frames with such a spring.  Differences below
+        :data:`FLOOR`, and wrenches that such differences cause in the stiffest spring,
+        are noise.
         """
         ours = np.array([p.linear.platform_screw for p in self.pairs])
         theirs = np.array([p.simulated.platform_screw for p in self.pairs])
@@ -130,7 +134,7 @@ class PoseMetric:
 
     @cached_property
     def checks(self) -> dict[str, Check]:
-        """The checks, by name."""
+        """Checks of the comparison, by name."""
         slopes = {}
         for name, values in self.components.items():
             slope = slope_check(self.scales, values, FLOOR[name], SLOPE_TOLERANCE)
@@ -149,7 +153,7 @@ class PoseMetric:
         return slopes | limits | shares
 
     def table(self) -> dict[str, Any]:
-        """Return the metric's own keys of the public format."""
+        """Return the entries of the public format that only this metric has."""
         return {
             "clearances": "left out on both sides",
             "slope": self.slope,
@@ -159,7 +163,7 @@ class PoseMetric:
         }
 
     def header(self) -> list[str]:
-        """Return the names of the columns of :meth:`rows`."""
+        """Return the column headings of :meth:`rows`."""
         return [
             "scale of the errors",
             "rotation difference [rad]",
@@ -169,7 +173,7 @@ class PoseMetric:
         ]
 
     def rows(self) -> list[list[str]]:
-        """Return one row for each scale, as text."""
+        """Return one row of text for each scale."""
         differences = zip(*self.differences.values(), strict=True)
         return [
             [

@@ -1,4 +1,4 @@
-"""A cross-check at every pose of a grid; a failure is recorded and stops no other."""
+"""A cross-check at every pose of a grid; a failure at one pose is recorded."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -37,13 +37,14 @@ def check_poses(
     Args:
         robot: robot with its errors.
         axes: values [m or rad] by pose component; components not named are free.
-        check: function that runs at a posture.
+        check: function that runs a check at a posture.
         progress: function called after each pose with the number done and the total.
 
     Returns:
-        For each pose the requested pose as ``asked``, ``passed``, ``status`` and the
-        check's table; unreachable poses have the status ``"out of reach"``, those
-        beyond the joints' limits ``"beyond_limits"``, and ``passed`` None.
+        For each pose a table with the requested pose as ``asked``, ``passed``,
+        ``status`` and the results of the check.  ``passed`` is None for unreachable
+        poses, with status ``"out of reach"``, and for poses beyond the joints' limits,
+        with status ``"beyond_limits"``.
 
     Raises:
         BadInput: the robot's closures do not hold in its home pose.
@@ -77,7 +78,7 @@ def _row(
 
 
 def poses_table(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return plain values; ``passed`` is true if all of the reached poses passed."""
+    """Return plain values; ``passed`` is true if all reached poses passed."""
     reached = [row for row in rows if row["passed"] is not None]
     passed = bool(reached) and all(row["passed"] for row in reached)
     return {"poses": rows, "passed": passed, "reached": len(reached)}

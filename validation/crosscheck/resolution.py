@@ -1,10 +1,10 @@
-"""The smallest change of each number of a robot that a cross-check detects.
+"""The smallest change of each parameter of a robot that a cross-check detects.
 
-A check detects a wrong number by its effect in the linear model.  Each number is
-changed by a hundredth and the model is solved again.  The result is compared with the
-unchanged one by the same metric, floors and bounds as the simulation's.  The relative
-change at which the first check reaches its bound follows in proportion.  A number is
-unproved if a change by its own size is not detected.
+A check detects a wrong parameter by its effect in the linear model.  Each parameter is
+changed by one hundredth and the model is solved again.  The result is compared with the
+unchanged one by the same metric, noise floors and bounds as the simulation's.  The
+relative change at which the first check reaches its bound follows in proportion.  A
+parameter is unproved if a change by its full value is not detected.
 """
 
 from collections.abc import Iterator, Sequence
@@ -33,23 +33,27 @@ from validation.crosscheck.pair import (
 )
 from validation.crosscheck.pose_metric import PoseMetric
 
-_CHANGE = 1e-2  # relative change of a number, to compute its effect
-_QUADRATIC = "optimality gap"  # grows with the square of a change
-UNPROVED = 1.0  # relative change that is not detected
-_NAMED = 4  # largest number of numbers in a line of text
+_CHANGE = 1e-2  # relative change of a parameter for the computation of its effect
+# name of the check that grows with the square of a change
+_QUADRATIC = "optimality gap"
+# relative change; a parameter is unproved if a change of this size is not detected
+UNPROVED = 1.0
+_NAMED = 4  # largest number of parameters named in a line of text
 _KINDS = ("link", "joint stiffness", "clearance", "error")
 
 
 @dataclass(frozen=True)
 class Resolution:
-    """Detection of changes of one number by a cross-check.
+    """Smallest detected change of one parameter of the robot.
 
     Attributes:
         name: frame and quantity, such as ``leg1.elbow.radial``.
-        kind: link, joint stiffness, clearance or error.
-        value: value of the number; 1 for a link, whose stiffness is scaled.
-        smallest: relative change that is detected; inf if none is.
-        by: the check that detects it first.
+        kind: kind of the parameter: link, joint stiffness, clearance or error.
+        value: value of the parameter; 1 for a link, whose stiffness is multiplied by
+            it.
+        smallest: smallest relative change that a check detects; inf if none is
+            detected.
+        by: name of the check that detects it first.
     """
 
     name: str
@@ -60,7 +64,7 @@ class Resolution:
 
     @property
     def unproved(self) -> bool:
-        """Whether even a change by its own size is not detected."""
+        """Whether even a change by the full value is not detected."""
         return not self.smallest < UNPROVED
 
 
@@ -71,15 +75,15 @@ def resolutions(
     """Return the smallest changes that the limits of a cross-check detect.
 
     Args:
-        posture: posture of the robot compared.
+        posture: posture at which the models are compared.
         pairs: solutions at several scales, largest first.
-        metric: the comparison.
+        metric: comparison of the solutions.
         load: (6,) [N m, N] at scale 1.
         gravity: (3,) [m/s^2] at scale 1.
 
     Returns:
-        One for each link, finite entry of a joint's stiffness, clearance and component
-        of a geometric error that is not zero, in the robot's order.
+        One result for each link, finite entry of a joint's stiffness, clearance and
+        component of a geometric error that is not zero, in the robot's order.
     """
     found = []
     for name, kind, value, frame in _changes(posture, bool(gravity.any())):
@@ -93,7 +97,7 @@ def resolutions(
 
 
 def _changes(posture: Posture, weight: bool) -> Iterator[tuple[str, str, float, Frame]]:
-    """Yield name, kind and value of each number, and its changed frame."""
+    """Yield name, kind and value of each parameter, and its changed frame."""
     more = 1.0 + _CHANGE
     for frame in posture.robot.frames:
         link = frame.link
@@ -121,7 +125,7 @@ def _changes(posture: Posture, weight: bool) -> Iterator[tuple[str, str, float, 
 def _joint_changes(
     frame: Frame, more: float
 ) -> Iterator[tuple[str, str, float, Frame]]:
-    """Yield the finite entries of a joint's stiffness; a full matrix as a whole."""
+    """Yield the finite entries of a joint's stiffness; a full matrix is one entry."""
     K = frame.joint_stiffness
     if K is None:
         return
@@ -147,13 +151,13 @@ def _noticed(
     changed: Posture, pairs: Sequence[Pair], metric: PoseMetric | ClearanceMetric,
     load: NDArray, gravity: NDArray,
 ) -> tuple[float, str]:  # fmt: skip
-    """Return the smallest relative change that a limit detects, and which limit."""
+    """Return smallest relative change that a limit detects, and the limit's name."""
     first = pairs[0]
     if first.simulated.held:
         changed = hold_free_motions(changed)
     s = first.scale
     other = solve_assembly(scaled(changed, s), s * load, gravity=s * gravity)
-    # the linear model is homogeneous, so any second scale is valid
+    # the linear model is homogeneous, so any second scale can be used
     compared = tuple(
         replace(pair, simulated=_as_simulated(other, first, pair)) for pair in pairs[:2]
     )
@@ -170,7 +174,7 @@ def _noticed(
 
 
 def _as_simulated(other: Assembly, first: Pair, pair: Pair) -> Any:
-    """Return a solution at the first scale as a simulation's at another."""
+    """Return a linear solution as if it were the simulation's at another scale."""
     ratio = pair.scale / first.scale
     held = holding_energy(other.posture.robot, other.joint_screws)
     energy = (other.energy - held) * ratio**2 + pair.between
@@ -188,26 +192,26 @@ def _as_simulated(other: Assembly, first: Pair, pair: Pair) -> Any:
 
 
 def resolution_text(found: Sequence[Resolution]) -> list[str]:
-    """Return text lines: detected changes of each kind of number, unproved numbers."""
+    """Return lines of text: detected changes of each kind, and unproved parameters."""
     lines = []
     for kind in _KINDS:
         proved = [r for r in found if r.kind == kind and not r.unproved]
         if proved:
             low, high = (f(proved, key=lambda r: r.smallest) for f in (min, max))
             lines.append(
-                f"smallest change noticed, {kind}: {_percent(low.smallest)} "
+                f"smallest change detected, {kind}: {_percent(low.smallest)} "
                 f"({low.name}) to {_percent(high.smallest)} ({high.name})"
             )
     unproved = [r.name for r in found if r.unproved]
     if unproved:
         more = f" and {len(unproved) - _NAMED} more" if len(unproved) > _NAMED else ""
         lines.append(
-            f"unproved, a change by its own size would not be noticed: {len(unproved)} "
-            f"of {len(found)} numbers: {', '.join(unproved[:_NAMED])}{more}"
+            f"unproved, a change by the full value is not detected: {len(unproved)} "
+            f"of {len(found)} parameters: {', '.join(unproved[:_NAMED])}{more}"
         )
     return lines
 
 
 def _percent(share: float) -> str:
-    """Return a share with two digits."""
+    """Return a fraction in per cent, with two digits."""
     return f"{100 * share:.2g} %"

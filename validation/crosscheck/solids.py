@@ -1,4 +1,4 @@
-"""Meshed links as solids for a simulation: the mesh behind K_E, and its matrix."""
+"""Meshed links as solids for a simulation: the mesh of K_E and its matrix."""
 
 import numpy as np
 from scipy.sparse import csr_matrix, diags
@@ -14,15 +14,15 @@ def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
     """Return the solids of a robot's mesh links, for a simulation.
 
     Args:
-        robot: any robot.
+        robot: robot of the virtual-joint model.
 
     Returns:
-        By frame, the finest mesh, from which the linear model's K_E comes too; links of
-        one shape and material share one solid.
+        Mapping from the frame's name to the finest mesh, from which the linear model's
+        K_E comes too; links of one shape and material share one solid.
 
     Raises:
         BadInput: a mesh was not solved when the robot was loaded, or an interface is
-            not rigid, the only kind supported here.
+            not rigid; only rigid interfaces are supported here.
     """
     known: dict[tuple[MeshedLink, float], MeshedSolid] = {}
     bodies = {}

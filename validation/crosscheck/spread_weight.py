@@ -1,10 +1,10 @@
-"""Distributed weight of a beam, and the energy lost by weights at its ends.
+"""Distributed weight of a beam, and the energy that weights at its ends neglect.
 
-The virtual-joint model describes a link by its two ends.  Half of the weight at each
-end, with the moments of a beam clamped at both (:func:`assembly.linear.load.weights`),
-causes the exact displacements of the ends; the energy between them is missing.  Half of
-the weight alone, without the moments, also moves the ends: that of a cantilever by a
-third too far.
+The virtual-joint model describes a link by its two ends.  If half of the weight acts at
+each end, with the moments of a beam clamped at both ends
+(:func:`assembly.linear.load.weights`), the displacements of the ends are exact, but the
+energy between them is missing.  Without the moments, the displacements of the ends are
+wrong too: the tip of a cantilever moves by a third too far.
 """
 
 from collections.abc import Iterator
@@ -21,16 +21,16 @@ from stiffness.beam.sections import Section, declared_section
 
 @dataclass(frozen=True, eq=False)
 class HeavyBeam:
-    """A beam under its weight.
+    """A beam under its own weight.
 
     Attributes:
         index: index of its frame.
-        link: its material.
-        section: its section constants.
-        length: [m].
-        line: (3,) [m] from its base to its tip, base axes.
-        weight: (3,) [N/m] across its section's x, y, z.
-        total: (3,) [N] base axes.
+        link: the beam, with its material.
+        section: constants of its cross-section.
+        length: [m] length of the beam.
+        line: (3,) [m] vector from base to tip, base axes.
+        weight: (3,) [N/m] weight per length along the section's x, y, z.
+        total: (3,) [N] weight of the beam, base axes.
     """
 
     index: int
@@ -78,18 +78,20 @@ def energy_between_ends(
 ) -> float:
     """Return the energy of beams clamped at both ends under their own weight.
 
-    For the weight across, q^2 L^5 / 1440 EI in bending and q^2 L^3 / 24 GA in shear;
-    q^2 L^3 / 24 EA for that along the beam.  The ends' motion does no work on it.
+    The energy of the weight across the beam is q^2 L^5 / 1440 EI in bending and q^2 L^3
+    / 24 GA in shear; the energy of the weight along the beam is q^2 L^3 / 24 EA.  The
+    weight does no work on the motion of the ends.
 
     Args:
         posture: the robot's configuration.
         gravity: (3,) [m/s^2] base axes.
         pieces: number of equal pieces with weights at their ends, and the moments of a
-            clamped piece.  Their own energy is left out, the share 1 / pieces^4 of
-            bending and 1 / pieces^2 of shear and stretching.
+            clamped piece.  The energy inside the pieces is left out; it is the share 1
+            / pieces^4 of the bending energy and 1 / pieces^2 of the energy of shear and
+            stretching.
 
     Returns:
-        [J] the sum over all beams with a density.
+        [J] sum over all beams with a density.
 
     Sources:
         Timoshenko & Gere, Mechanics of Materials: beam with built-in ends under a

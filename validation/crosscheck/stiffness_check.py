@@ -1,14 +1,15 @@
 """The platform's stiffness by two methods of the multibody simulation.
 
-At the equilibrium with the robot's errors, its load and its weight the simulation's own
-residual is differentiated.  It is also loaded slightly along each axis, in both
-directions.  Each method has its own uncertainty (:mod:`validation.multibody.tangent`).
-A method whose uncertainty exceeds the tolerance decides nothing.
+At the equilibrium with the robot's errors, its load and its weight, the residual of the
+simulation is differentiated.  In addition, the platform is loaded slightly along each
+axis, in both directions.  Each method has an estimated uncertainty
+(:mod:`validation.multibody.tangent`).  A method whose uncertainty exceeds the tolerance
+is not used for the verdict.
 
-Clearances are left out on both sides unless requested.  With pressed clearances only
-the linearised method is used, through smoothed contacts.  A load's force is dead, its
-moment a couple of dead forces: a moment of fixed axes has no potential
-(``docs/exact.md``).
+Clearances are zero in both models unless requested.  If clearances are in contact, only
+the linearised method is used, with smoothed contacts.  The force of a load is dead, and
+its moment is a couple of dead forces, because a moment about fixed axes has no
+potential (``docs/exact.md``).
 """
 
 from dataclasses import dataclass, replace
@@ -30,26 +31,28 @@ from validation.crosscheck.link_models import link_models
 from validation.multibody.simulation import TIME_LIMIT, without_clearance
 from validation.multibody.tangent import SimulatedTangent, is_bent, simulated_tangent
 
-# of entries over sqrt(C_ii C_jj); contacts of the simulation are compliant themselves
+# tolerances of entries over sqrt(C_ii C_jj), by model of the links
 TOLERANCE = {"spring": 1e-6, "beam": 1e-3, "fem": 2e-2}
 CONTACT_TOLERANCE = 2e-2
-_ELSEWHERE = 0.1  # of the platforms' motion; with beams as links they differ by 1e-3
+# [-] relative difference of the platforms' displacements from which the equilibria are
+# different; with beams as links the difference is 1e-3
+_ELSEWHERE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class StiffnessCheck:
-    """A compliance computed by three methods.
+    """Compliance of the platform computed by three methods.
 
     Attributes:
-        exact: the tangent of the exact equilibrium, without clearances.
-        linear: the classical one, of the nominal robot.
+        exact: tangent of the exact equilibrium, without clearances.
+        linear: classical stiffness of the nominal robot.
         simulated: stiffness in the simulation, for small motions at the platform's
             origin.
-        load: (6,) [N m, N] existing load.
-        links: the simulation's model of the links.
-        bent: whether springs are bent: by errors, a load or weight.
-        clearances: whether they are included.
-        moved: (6,) [rad, m] displacement of the platform from its nominal pose, by the
+        load: (6,) [N m, N] load at the equilibrium.
+        links: model of the links in the simulation.
+        bent: whether springs are deformed, by errors, a load or weight.
+        clearances: whether clearances are included.
+        moved: (6,) [rad, m] displacement of the platform from its nominal pose at the
             exact equilibrium.
     """
 
@@ -66,10 +69,11 @@ class StiffnessCheck:
 
     @cached_property
     def differences(self) -> dict[str, float]:
-        """Largest difference of entries over sqrt(C_ii C_jj).
+        """Largest differences of entries over sqrt(C_ii C_jj), by name.
 
-        They are differences of the exact compliance from load steps and from the
-        linearised system, and of the classical one from load steps.
+        The exact compliance is compared with load steps (``exact``) and with the
+        linearised simulation (``linearised``); the classical compliance is compared
+        with the linearised simulation (``linear``).
         """
         exact, linear = self.exact.compliance, self.linear.compliance
         stepped, linearised = self.simulated.stepped, self.simulated.linearised
@@ -93,17 +97,17 @@ class StiffnessCheck:
 
     @property
     def tolerance(self) -> float:
-        """[-] accepted difference of the exact tangent."""
+        """[-] largest accepted difference of the exact tangent."""
         own = TOLERANCE[self.links]
         return max(own, CONTACT_TOLERANCE) if self.clearances else own
 
     @cached_property
     def mixed(self) -> tuple[str, ...]:
-        """Joints that are bent and have no unique finite law.
+        """Names of deformed joints for which finite motions have no unique law.
 
-        They rotate or slide elastically, are locked otherwise, and are elastic in more
-        than one direction.  A locked component is one of the logarithm here, and an
-        angle between axes in the simulation: equal only to first order.
+        They are locked in some components and elastic in several others, at least one
+        of them a rotation.  A locked component is a component of the logarithm here,
+        but an angle between axes in the simulation; both are equal only to first order.
         """
         names = []
         for frame in self.exact.posture.robot.frames:
@@ -115,7 +119,7 @@ class StiffnessCheck:
 
     @cached_property
     def simulated_moved(self) -> NDArray:
-        """(6,) [rad, m] the same displacement in the simulation."""
+        """(6,) [rad, m] displacement of the platform in the simulation."""
         nominal, there = self.exact.posture.platform, self.simulated.platform
         turn = rotation_vector(there[:3, :3] @ nominal[:3, :3].T)
         return np.concatenate([turn, there[:3, 3] - nominal[:3, 3]])
@@ -134,12 +138,12 @@ class StiffnessCheck:
 
     @property
     def passed(self) -> bool:
-        """Whether every method that decides agrees, and at least one decides."""
+        """Whether there are sufficiently accurate methods, and all agree."""
         return not self.mixed and bool(self._decided) and all(self._decided)
 
     @property
     def _decided(self) -> list[bool]:
-        """Whether the methods with sufficient accuracy agree."""
+        """Whether the exact tangent agrees with each sufficiently accurate method."""
         return [
             self.differences[name] <= self.tolerance
             for name, own in self.uncertainties.items() if own <= self.tolerance
@@ -243,14 +247,14 @@ def check_stiffness(
         links: ``"spring"``, ``"beam"`` or ``"fem"``.
         gravity: (3,) [m/s^2] base axes.
         time_limit: [s] of the simulation.
-        clearances: whether they are included.
+        clearances: whether clearances are included.
 
     Returns:
-        All compliances.
+        The compliances by all methods.
 
     Raises:
-        CannotAssemble: the errors cannot be closed.
-        FreeMotion: a motion of the platform has no resistance.
+        CannotAssemble: the closures cannot be closed with these errors.
+        FreeMotion: a motion of the platform has no stiffness.
         SolverFailed: no equilibrium was found.
         SimulationFailed: the simulation found no equilibrium either.
     """

@@ -1,12 +1,12 @@
 """Verdicts of comparisons, at as many scales as a decision needs.
 
-At large errors and few scales the uncertainty of a limit exceeds its bound: terms of
+At large errors and few scales, the uncertainty of a limit exceeds its bound: terms of
 higher order look like errors of first order, or cancel them.  Then smaller scales are
 added, each half of the last, until every check is decided: a wrong term of first order
-remains, all others vanish.  No check fails on fewer than four scales.
+remains, all others vanish.  A check can fail only on four scales or more.
 
-If a quantity is below the noise of either model (a robot without errors and load)
-nothing is compared: such a check has no signal, and does not count as passed.
+If a quantity is below the noise of either model (a robot without errors and load),
+nothing is compared.  Such a check has no signal and does not count as passed.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -29,7 +29,7 @@ from validation.crosscheck.pair import Pair
 
 SCALES = (1.0, 0.5, 0.25, 0.125)
 NOT_CHECKED = "not checked, nothing to compare"
-# least number of scales on which a check may fail; largest number of scales
+# smallest number of scales with which a check can fail, and largest number of scales
 _FEWEST, _MOST = 4, 6
 
 
@@ -38,10 +38,10 @@ class Check:
     """A value that must not exceed a bound.
 
     Attributes:
-        value: best estimate, >= 0.
-        bound: on it.
+        value: best estimate of the value, >= 0.
+        bound: bound on the value.
         uncertainty: uncertainty of the value.
-        signal: whether the compared quantities are above the noise.
+        signal: whether the compared quantities exceed the noise.
     """
 
     value: float
@@ -60,28 +60,28 @@ class Check:
             return FAILS
         if not self.signal and not max(self.value, self.uncertainty) > self.bound:
             return NO_SIGNAL
-        # a value that is not a number is unknown
+        # a value that is not a number counts as unknown
         known = self.value <= self.bound and self.uncertainty <= self.bound
         return OK if known else UNDECIDED
 
 
 class Judged(Protocol):
-    """Checks on both solutions at several scales."""
+    """Checks on the solutions of two models at several scales."""
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
-        """One for each scale, largest first."""
+        """One pair of solutions for each scale, largest first."""
 
     @property
     def checks(self) -> Mapping[str, Check]:
-        """The checks, by name."""
+        """Checks of the comparison, by name."""
 
 
 Comparison = TypeVar("Comparison", bound=Judged)
 
 
 def verdict(comparison: Judged) -> str:
-    """Return the outcome of all checks on the scales solved.
+    """Return the outcome of all checks at the solved scales.
 
     Args:
         comparison: comparison with its checks.
@@ -108,14 +108,14 @@ def compare_scales(
     Args:
         scales: factors on all imperfections, at least two different ones.
         solve: function that solves both models at a scale.
-        judge: function that makes a comparison of pairs, largest scale first, and the
-            number of requested ones.
+        judge: function that makes a comparison from pairs, largest scale first, and the
+            number of requested scales.
 
     Returns:
-        The comparison, decided or on six scales at least.
+        The comparison: decided, or on six scales at least.
 
     Raises:
-        BadInput: fewer than two scales, or one that is not finite and > 0.
+        BadInput: fewer than two scales, or a scale that is not finite and > 0.
     """
     factors = check_scales(scales)
     pairs = [solve(scale) for scale in factors]
@@ -136,7 +136,7 @@ def check_scales(scales: Sequence[float]) -> list[float]:
         The distinct scales, sorted.
 
     Raises:
-        BadInput: fewer than two, or one that is not finite and > 0.
+        BadInput: fewer than two scales, or a scale that is not finite and > 0.
     """
     factors = sorted({float(s) for s in scales}, reverse=True)
     if len(factors) < 2 or not all(0 < s < np.inf for s in factors):
@@ -160,5 +160,5 @@ def verdict_text(comparison: Judged) -> str:
     silent = sum(check.verdict == NO_SIGNAL for check in comparison.checks.values())
     if outcome == PASSED and silent:
         count = len(comparison.checks)
-        return f"passed; {silent} of {count} checks had nothing to compare"
+        return f"passed; {silent} of {count} checks had no signal above the noise"
     return texts[outcome]

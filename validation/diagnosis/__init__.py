@@ -1,5 +1,5 @@
 """From measured deviations to the effect that a declared model lacks.
 
-Begin at ``diagnose.py``: selection of effects, learning of functions, and the verdict
-of ``judge.py``; ``diagnosis.py`` holds the result.
+Begin at ``diagnose.py``, which selects effects and learns functions.  ``judge.py``
+finds the verdict; ``diagnosis.py`` holds the result.
 """

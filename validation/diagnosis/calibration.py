@@ -1,4 +1,4 @@
-"""Error rates of a diagnosis on a campaign's own design, by simulation."""
+"""Error rates of a diagnosis on the design of a campaign, by simulation."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -17,13 +17,15 @@ from validation.diagnosis.verdict import verdict
 
 @dataclass(frozen=True)
 class Calibration:
-    """Success and error rates of the method on a campaign's own design.
+    """Success and error rates of a diagnosis on the design of a campaign.
 
     Attributes:
-        campaigns: number simulated, of each kind.
-        without: verdicts on campaigns of noise alone.
-        with_found: verdicts on campaigns with the effects found, at their fitted sizes.
-        right: share of the latter with exactly the effects found.
+        campaigns: number of simulated campaigns of each kind.
+        without: number of each verdict on campaigns with noise alone.
+        with_found: number of each verdict on campaigns with the effects found, at their
+            fitted sizes.
+        right: share of the campaigns with effects in which exactly these effects were
+            found.
         false_claims: share of all verdicts that named absent effects.
     """
 
@@ -37,18 +39,18 @@ class Calibration:
 def calibrate(
     diagnosis: Diagnosis, count: int, update: Callable[[int, int], None]
 ) -> Calibration:
-    """Simulate campaigns on a design and search them.
+    """Simulate campaigns on a design and diagnose them.
 
-    The simulation is of first order about the machine found.  Search and verdict are
-    those of the diagnosis; the final fit is left out.
+    Simulated readings are linear in the effects of the machine found.  Search and
+    verdict are those of the diagnosis; the final fit is left out.
 
     Args:
-        diagnosis: with the design and the machine.
+        diagnosis: diagnosis that gives the design and the machine.
         count: number of campaigns of each kind.
-        update: function called with the number done.
+        update: function called with the number of finished campaigns.
 
     Returns:
-        The tally.
+        The error rates.
     """
     traced = diagnosis.traced
     cells = traced.used[traced.columns.row]

@@ -1,6 +1,7 @@
 """Functions that a machine may have in addition to the library's effects.
 
-A function is a small screw, or a compliance, at a place, that depends on a variable.
+A candidate function is a small screw, or a compliance, at a place of the robot, and
+depends on a variable.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,19 +19,19 @@ from assembly.model.robot import Robot
 from validation.diagnosis.function_forms import CandidateShape
 
 TURN, SHIFT = AXES[:3], AXES[3:]
-# relative to the largest component of a vector: smaller changes are rounding
+# relative to the largest component of a vector; smaller changes are rounding
 _ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
 class CandidatePart:
-    """Place of a candidate, and its variables there.
+    """Place at which a candidate function acts, and its variables there.
 
     Attributes:
         where: a frame, ``"base"`` or ``"reading"``.
-        components: components of the screw there.
-        variable: its public name.
-        beside: public name of a second variable, if there are two.
+        components: components of the screw at the place.
+        variable: public name of the variable.
+        beside: public name of a second variable; None if there is none.
     """
 
     where: str
@@ -46,12 +47,12 @@ class CandidatePart:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A function that may act, at one place or at several of one kind.
+    """A function that may act at one place, or at several places of one kind.
 
     Attributes:
         parts: places and variables.
         kind: ``"screw"`` or ``"compliance"``.
-        shape: the form, the same for all parts.
+        shape: form of the function, the same for all parts.
     """
 
     parts: tuple[CandidatePart, ...]
@@ -59,7 +60,7 @@ class Candidate:
     shape: CandidateShape
 
     def functions(self) -> list[Function]:
-        """Return the functions of a robot file, with numbers still unknown."""
+        """Return the functions of a robot file, with unknown coefficients."""
         numbers = dict.fromkeys(self.shape.names, 0.0) | dict(self.shape.given)
         return [
             Function(
@@ -80,9 +81,10 @@ def is_turn(component: str) -> bool:
 
 
 def variables_of(conditions: Conditions) -> list[str]:
-    """Return the names of variables that vary and are known throughout a session.
+    """Return the names of variables that vary and are known in a whole session.
 
-    They are coordinates of drives, loads and their sizes, positions, covariates.
+    They are coordinates of drives, loads and their magnitudes, positions and
+    covariates.
     """
     names = [f"q.{name}" for name in drives(conditions.robot)]
     names += [f"load.{axis}" for axis in ("mx", "my", "mz", "fx", "fy", "fz")]
@@ -102,15 +104,15 @@ def variables_of(conditions: Conditions) -> list[str]:
 
 
 def _kind(name: str) -> str:
-    """Return the vector of a component, whose others may vary by rounding alone."""
+    """Return the name of a component's vector, or the name itself without a vector."""
     vectors = "position.", "load.m", "load.f"
     return next((v for v in vectors if name.startswith(v)), name)
 
 
 def is_known(conditions: Conditions, *names: str) -> NDArray:
-    """Return the (R,) bool of rows of sessions in which variables are always known.
+    """Return (R,) bool: rows of sessions in which the variables are always known.
 
-    Without sessions all rows are one; wrenches are not checked.
+    Without sessions all rows count as one session; wrenches are not checked.
     """
     known = np.ones(len(conditions), dtype=bool)
     for name in names:
@@ -124,11 +126,12 @@ def is_known(conditions: Conditions, *names: str) -> NDArray:
 def places_of(
     robot: Robot, variables: Sequence[str]
 ) -> Iterator[tuple[str, tuple[CandidatePart, ...]]]:
-    """Yield kinds and parts of all candidates, variable by variable.
+    """Yield kinds and parts of all candidates, for one variable after another.
 
     Yields:
-        Kind, and place with variable: components one by one and by three, all drives
-        together with their own coordinates, all bodies together along their axes.
+        The kind, and the places with the variable: single components, groups of three
+        components, all drives together with their own coordinates, and all bodies
+        together along their axes.
     """
     single: list[tuple[str, tuple[str, ...]]]
     single = [(f.name, (axis,)) for f in robot.frames for axis in AXES]
@@ -152,6 +155,6 @@ def places_of(
 
 
 def _along(robot: Robot, name: str) -> tuple[str, ...]:
-    """Return the components of a body's lengthening."""
+    """Return the components in which a body becomes longer."""
     axis = np.abs(body_axis(robot.frame(name))[1])
     return tuple(a for a, part in zip(SHIFT, axis, strict=True) if part > 1e-9)

@@ -1,8 +1,8 @@
 """Effects of a fitted machine that the readings support.
 
 An effect is claimed on three conditions: its change of the readings exceeds the
-uncertainty of that change; the chance of as large a change without it is small; and no
-unknown that defines it is at a bound.
+uncertainty of that change; a change of this size is improbable without the effect; and
+no unknown that defines the effect is at a bound.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from validation.diagnosis.lack_of_fit import UNLIKELY
 from validation.diagnosis.separability import orthonormal_basis
 from validation.diagnosis.unknowns import STEP, Acting, effects_in
 
-# relative to a bound: distance within which an unknown is at the bound
+# relative to a bound: distance from which an unknown counts as at the bound
 _AT_BOUND = 1e-3
 
 
@@ -51,7 +51,7 @@ def supported(fit: MachineFit, one: Acting) -> bool:
 
 
 def _without_devices(fit: MachineFit, slopes: NDArray) -> NDArray:
-    """Return (n, k) slopes without the part that a measuring frame imitates."""
+    """Return (n, k) slopes without the part that a measuring frame can imitate."""
     own = [fit.own(one)[2] for one in fit.unknowns.effects if one.device]
     if not own:
         return slopes
@@ -66,14 +66,14 @@ def _at_bound(bound: float, value: float) -> bool:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of an effect of a machine, in the unit of the public format.
+    """Parameter of an effect of a machine, in the unit of the public format.
 
     Attributes:
         name: public name.
-        value: value of the machine, with the declared value.
+        value: value in the machine found, with the declared value included.
         std: its standard deviation.
-        declared: value in the robot's file; None if it has none.
-        difference: the difference found.
+        declared: value in the robot's file; None if the file has none.
+        difference: difference between value and declared value.
     """
 
     name: str
@@ -84,7 +84,7 @@ class Parameter:
 
 
 def parameters_of(fit: MachineFit, one: Acting) -> list[Parameter]:
-    """Return the parameters of an effect found, on which some reading depends."""
+    """Return the parameters of an effect found, if any reading depends on them."""
     h, robot = one.hypothesis, fit.unknowns.robot.without_effects()
     declared = effects_in(fit.unknowns.robot, one.session).get(h.effect, {})
     x, C, _ = fit.own(one)

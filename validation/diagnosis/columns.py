@@ -1,4 +1,4 @@
-"""Columns of all candidates, from the design of a campaign without its readings."""
+"""Columns of all candidates, computed from a campaign's design without its readings."""
 
 import math
 from collections import Counter
@@ -38,31 +38,35 @@ from validation.diagnosis.signatures import (
 from validation.diagnosis.whitening import Whitening, platform_motions, whitening
 
 FUNCTION = "function"
-_CLOCK = 0.999  # correlation with time above which a variable counts as the time
-# number of rows, drawn once: functions by the thousand are scored in a second
+_CLOCK = 0.999  # correlation with time above which a variable is taken as the time
+# number of randomly drawn rows by which thousands of functions are scored
 _SAMPLE = 500
-# share of a column that a device's frame does not imitate, below which none is left
+# share of a column that no motion of the measuring frame imitates, below which the
+# column counts as imitated
 _ALIKE = 1e-3
-_VISIBLE = 4.0  # squared whitened change of all readings: two standard deviations
+# least visible squared whitened change of all readings: two standard deviations
+_VISIBLE = 4.0
 
 
 class Columns:
     """Columns of the N measured cells of a campaign.
 
     Attributes:
-        campaign, conditions: of R rows.
+        campaign, conditions: campaign of R rows and its conditions.
         row: (N,) row of every cell.
-        block: (N,) configuration or span of time of every cell.
-        visit: (N,) measurement of every cell: a row of the file, of several points.
+        block: (N,) configuration or time span of every cell.
+        visit: (N,) measurement of every cell: the row of the file, which may have
+            several points.
         motions: (R, 6, 6) change of the readings by motions of the platform, see
-            :func:`.platform_motions`; None if every row is a measurement.
-        device: hypothesis of an unknown measuring frame; None if it is known.
-        flat: (N, f) its columns, by session.
+            :func:`.platform_motions`; None if no row reads several points.
+        device: hypothesis of an unknown measuring frame; None if its pose is known.
+        flat: (N, f) columns of the measuring frame, separate for each session.
         library: elements of the library's effects.
         nuisance: geometric errors and springs.
         functions: candidate functions at single places.
         sampled: (N,) cells of the rows by which functions are scored first.
-        explicit: elements of functions at several places, with columns of these cells.
+        explicit: elements of functions at several places, with columns of the sampled
+            cells.
     """
 
     def __init__(
@@ -70,11 +74,11 @@ class Columns:
         update: Callable[[str, int, int], None] = lambda what, done, total: None,
         odds: Mapping[str, float] = MappingProxyType({}),
     ) -> None:  # fmt: skip
-        """Compute all derivatives; of the readings only the pattern of NaN is used.
+        """Compute all derivatives; of the readings only their presence is used.
 
-        Conditions are registered and have the second-order part.  ``odds`` are factors
+        Conditions are registered and include second-order terms.  ``odds`` are factors
         on the prior odds of effects by name, of ``"function"``, ``"geometry"`` and
-        ``"springs"``; 0 excludes one.
+        ``"springs"``; 0 excludes one of them.
         """
         self.odds = odds
         self.campaign, self.conditions = campaign, derivatives.conditions
@@ -103,7 +107,7 @@ class Columns:
         self.explicit = joint_functions(self.functions, rows) if any_function else []
 
     def _library(self, update: Callable[[str, int, int], None]) -> list[Element]:
-        """Return visible hypotheses with distinct columns."""
+        """Return the visible hypotheses with distinct columns."""
         campaign = self.campaign
         shown: dict[object, Signature] = {}
         listed = hypotheses(self.conditions, loaded_components(campaign))
@@ -140,11 +144,11 @@ class Columns:
 
     @property
     def candidates(self) -> bool:
-        """Whether any effect or function may act."""
+        """Whether there is any candidate effect or function."""
         return bool(self.library or self.explicit or self.functions.variables)
 
     def loadings(self, cells: NDArray) -> NDArray | None:
-        """Return the (n, 6) change of cells over sigma per rotation and shift."""
+        """Return (n, 6) changes of cells over sigma per rotation and shift."""
         if self.motions is None:
             return None
         measured = self.campaign.cells
@@ -154,10 +158,11 @@ class Columns:
     def whitening(
         self, cells: NDArray, root: NDArray, common: tuple[float, float]
     ) -> Whitening:
-        """Return the map of cells (N,) bool to cells of independent noise.
+        """Return the map from cells (N,) bool to cells with independent noise.
 
-        ``root`` (n,) are square roots of their relative precisions, ``common`` [rad, m]
-        standard deviations of the platform's common motion, over tau.
+        ``root`` (n,) are the square roots of the relative precisions of the cells,
+        ``common`` [rad, m] the standard deviations of the platform's common motion,
+        over tau.
         """
         loadings = self.loadings(cells) if any(common) else None
         if loadings is not None:
@@ -193,7 +198,7 @@ class Columns:
         return np.hstack([columns * self.tangents.rows_of(s) for s in sessions])
 
     def _told(self, signature: Signature) -> Signature:
-        """Return a hypothesis of sessions without the part that devices imitate."""
+        """Return a hypothesis by sessions without the part that devices can imitate."""
         h = signature.hypothesis
         if not self.flat.shape[1] or sessions_of(h) == (None,):
             return signature
@@ -208,13 +213,13 @@ class Columns:
 
 
 def _shows(signature: Signature) -> bool:
-    """Return whether a hypothesis visibly changes the readings."""
+    """Return whether a hypothesis changes the readings visibly."""
     squares = float(signature.offset @ signature.offset)
     return signature.finite and bool(signature.columns.any() or squares > _VISIBLE)
 
 
 def _print(signature: Signature) -> object:
-    """Return a key that hypotheses of one effect with equal columns share."""
+    """Return a key that is equal for hypotheses of one effect with equal columns."""
     shown = signature.columns[:, signature.columns.any(axis=0)]
     starts = tuple(s.start for s in signature.hypothesis.slots if s.shape)
     return signature.hypothesis.effect, tuple(sorted(fingerprints(shown))), starts

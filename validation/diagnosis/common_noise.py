@@ -1,10 +1,10 @@
-"""Size of the noise that the points of one measurement have in common.
+"""Size of the noise that the points of one measurement share.
 
-A device that reads several points of the platform together sees in all of them the
-machine's repeatability and the motion of its frame.  This is a small motion of the
-platform, drawn once for a measurement.  It has one standard deviation of rotations and
-one of translations of the points' centre.  Both maximise the evidence of a model of the
-readings, with all other unknowns marginalised.
+If a device reads several points of the platform together, all of them include the
+machine's repeatability and the motion of the device's frame.  This noise is modelled as
+a small motion of the platform, drawn once for each measurement.  It has one standard
+deviation of rotations, and one of translations of the points' centre.  Both maximise
+the evidence of a model of the readings, in which all other unknowns are marginalised.
 """
 
 import math
@@ -17,20 +17,23 @@ from validation.diagnosis.gaussian import size_penalty
 from validation.diagnosis.states import IN_USE, Models, State
 from validation.diagnosis.weighted_readings import NONE
 
-_STEP = 1.0  # first step of the logarithms of both sizes, which start at one sigma
-_CLOSE = 0.05  # relative to a logarithm: step that ends the search
-_LEAST = 0.02  # [sigma] contribution to the readings below which a size is 0
-_CLEAR = 1.0  # [sigma] contribution to the readings above which a size is needed
+# first step of the logarithms of both standard deviations, which start at one sigma
+_STEP = 1.0
+_CLOSE = 0.05  # relative change of a logarithm that ends the search
+# [sigma] contribution to the readings below which a standard deviation is set to 0
+_LEAST = 0.02
+# [sigma] contribution to the readings above which a standard deviation is needed
+_CLEAR = 1.0
 _EVALUATIONS = 40  # largest number of evaluations; each fits a model
-_STABLE = 0.1  # change of a logarithm that changes no decision
+_STABLE = 0.1  # change of a logarithm that does not change any decision
 
 
 def common_sizes(state: State) -> tuple[float, float]:
-    """Estimate the noise in common, for the elements of a model.
+    """Estimate the noise that points share, for the elements of a model.
 
     Returns:
         [rad, m] standard deviations of rotation and translation over the noise's scale;
-        zero if the gain is not above the cost of the size.
+        zero if the gain in evidence is not above the cost of the parameter.
     """
     some = state.readings.sample(NONE)
     loadings = some.columns.loadings(some.cells)
@@ -57,7 +60,7 @@ def common_sizes(state: State) -> tuple[float, float]:
 def _largest(
     state: State, kinds: tuple[int, ...], units: list[float]
 ) -> tuple[tuple[float, float], float]:
-    """Return the sizes of largest evidence, and the evidence."""
+    """Return the standard deviations of largest evidence, and the evidence."""
 
     def sizes(logs: NDArray) -> tuple[float, float]:
         own = dict(zip(kinds, np.exp(logs).tolist(), strict=True))
@@ -77,7 +80,7 @@ def _largest(
 
 
 def _evidence(state: State, sizes: tuple[float, float]) -> float:
-    """Return the log posterior of a model's elements with noise in common."""
+    """Return the log posterior of a model's elements with shared noise."""
     some = state.readings.sample(sizes)
     return (
         Models(some).state(state.elements, state.mode, state).score - some.log_det / 2
@@ -85,7 +88,7 @@ def _evidence(state: State, sizes: tuple[float, float]) -> float:
 
 
 def stable(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    """Return whether two estimates of the sizes lead to the same decisions."""
+    """Return whether two estimates of the standard deviations are equivalent."""
     pairs = list(zip(one, other, strict=True))
     if any((a > 0) != (b > 0) for a, b in pairs):
         return False

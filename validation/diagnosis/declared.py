@@ -1,4 +1,4 @@
-"""Readings of a machine as its file declares it, common to all folds."""
+"""Readings of a machine as declared in its file, common to all folds."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -21,7 +21,7 @@ from validation.diagnosis.signatures import conditions_of, whiten
 
 @dataclass(frozen=True, eq=False)
 class Declared:
-    """Predicted readings of a machine as declared; no measured reading is used.
+    """Predicted readings of the declared machine; measured readings are not used.
 
     Attributes:
         conditions: conditions of all rows, before any registration.
@@ -33,7 +33,7 @@ class Declared:
 
     @cached_property
     def derivatives(self) -> Derivatives:
-        """Derivatives of the readings there, with closed chains' clearances at rest."""
+        """Derivatives of the declared readings, with clearances at rest."""
         return Derivatives(at_rest(self.conditions))
 
     def bent(
@@ -41,7 +41,7 @@ class Declared:
     ) -> Conditions | None:
         """Return conditions with finite motions' effect on geometric errors (n, 6).
 
-        None if this changes no reading of the campaign by ``least`` [sigma].
+        None if this effect changes no reading of the campaign by ``least`` [sigma].
         """
         if not errors.any():
             return None
@@ -61,11 +61,11 @@ def declared(campaign: Campaign, *, finite: bool = False) -> Declared:
 
     Args:
         campaign: campaign of R rows.
-        finite: whether motions of the declared model are finite; they also are if the
-            file says so.
+        finite: whether motions of the declared model are finite; they are too if the
+            robot's file says so.
 
     Returns:
-        The same result whichever readings of the campaign are hidden.
+        The declared model; it does not depend on the campaign's readings.
     """
     conditions = conditions_of(campaign)
     finite = finite or conditions.exact
@@ -74,7 +74,7 @@ def declared(campaign: Campaign, *, finite: bool = False) -> Declared:
 
 
 def at_rest(conditions: Conditions) -> Conditions:
-    """Return conditions with clearances of closed chains at rest, computed once."""
+    """Return conditions with clearances of closed chains at rest; cached."""
     if conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]:
         return with_rest_positions(conditions)
     return conditions

@@ -1,7 +1,7 @@
-"""Readings of a machine under declared conditions, and their derivatives by effects.
+"""Readings of a machine under declared conditions, and derivatives by effects.
 
-They depend on the design of a campaign and on none of its readings.  So searches with
-the same conditions share them, above all the folds of a diagnosis.
+They depend on the design of a campaign and not on its readings.  Searches with equal
+conditions therefore share them, for example the folds of a diagnosis.
 """
 
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ from validation.diagnosis.hypotheses import Slot
 from validation.diagnosis.responses import Responses, responses
 from validation.diagnosis.sensitivities import Sensitivities
 
-# relative to an unknown's plausible size: a step between rounding and curvature
+# relative to an unknown's plausible size: step that limits both rounding and curvature
 STEP = 1e-3
 
 
@@ -27,7 +27,7 @@ class Derivatives:
     """Readings of R rows near the declared model; each is computed once.
 
     Attributes:
-        conditions: declared conditions, with the registration if it was fitted.
+        conditions: declared conditions; they include the registration if it was fitted.
     """
 
     def __init__(self, conditions: Conditions) -> None:
@@ -51,11 +51,11 @@ class Derivatives:
         return Sensitivities(self.conditions, self.response)
 
     def model(self, effects: Mapping[str, Values], *, finite: bool = False) -> NDArray:
-        """Return the (R, 6) [rad, m] readings with effects, clearances to first order.
+        """Return the (R, 6) [rad, m] readings with effects, linear in clearances.
 
-        Effects are parameters by their public names; NaN without a solution.  Finite
-        motions are those of the declared machine or, if requested, of the changed
-        machine.
+        ``effects`` has parameters by public name; readings are NaN without a solution.
+        Finite motions are computed for the declared machine or, if ``finite``, for the
+        changed machine.
         """
         changed = apply_effects(self.conditions, effects)
         if any(LIBRARY[name].clearance for name in effects):
@@ -66,9 +66,10 @@ class Derivatives:
         return predict(changed).deviation
 
     def begun(self, effect: str, slot: Slot, shapes: Mapping[str, float]) -> NDArray:
-        """Return the (R, 6) [rad, m] readings with one number of an effect a step off.
+        """Return the (R, 6) [rad, m] readings with one unknown of an effect changed.
 
-        ``shapes`` are values of the unknowns that shape the effect.
+        The unknown is changed by one step.  ``shapes`` are values of the effect's shape
+        parameters.
         """
         key = (effect, slot.names, tuple(sorted(set(shapes.values()))))
         if key not in self._begun:

@@ -2,13 +2,13 @@
 
 Steps:
 
-1. choose the rows that judge (:mod:`.holdout`); step 5 is the first to read them;
-2. search for set-up blunders (:mod:`.setup_blunders`), then for effects and functions
-(:mod:`.trace`), in the other rows;
-3. fit all unknown numbers of the machine together, through the function that
-      predicts with the saved file (:mod:`.fit`); drop effects that the readings do not
-      support (:mod:`.claims`);
-4. if there are folds, repeat 2 and 3 for each fold and for all rows;
+1. choose the held-out rows (:mod:`.holdout`); their readings are first used in step 5;
+2. search the other rows for set-up blunders (:mod:`.setup_blunders`), then for effects
+and functions (:mod:`.trace`);
+3. fit all unknown parameters of the machine together, by the function that predicts
+with the saved file (:mod:`.fit`); drop effects that the readings do not support
+(:mod:`.claims`);
+4. with folds, repeat steps 2 and 3 for each fold and for all rows;
 5. compute the errors of the fitted robots on the held-out rows, and the verdict.
 """
 
@@ -37,12 +37,12 @@ Update = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """Result of search and fit without some rows.
+    """Result of search and fit without the held-out rows.
 
     Attributes:
         traced: result of the search.
         fit: the fitted machine.
-        setup: blunders of the set-up.
+        setup: set-up blunders.
     """
 
     traced: Traced
@@ -57,12 +57,12 @@ def diagnose(
     odds: Mapping[str, float] = MappingProxyType({}),
     update: Update = lambda what, done, total: None,
 ) -> Diagnosis:
-    """Trace a campaign's residual to the effect that the declared model lacks.
+    """Find the effects that cause a campaign's residual from the declared model.
 
     Args:
         campaign: measured deviations.
-        finite: whether motions of the declared model are finite in the search; they
-            also are if the robot's file has the effect ``geometric_stiffening``.
+        finite: whether motions of the declared model are finite in the search; they are
+            too if the robot's file has the effect ``geometric_stiffening``.
         odds: factors on the prior odds of effects by name, of ``"function"`` (any
             function), ``"geometry"`` and ``"springs"``; 0 excludes one.
         update: function called with the step, its progress and its total.
@@ -74,13 +74,14 @@ def diagnose(
         BadInput: the measuring frame is unknown and cannot be estimated.
     """
     held = hold_out(campaign)
-    design = declared(campaign, finite=finite)  # the same in all folds
+    design = declared(campaign, finite=finite)  # common to all folds
 
     def found(rows: NDArray) -> _Found:
         part = hidden(campaign, ~rows)
         seen = part.cells.any(axis=1)
         setup = setup_blunders(part.take(seen), conditions_of(part).take(seen))
-        # with blunders any other effect found would imitate them
+        # if there are blunders, no effect is searched, because effects would imitate
+        # the blunders
         nothing = dict.fromkeys((*LIBRARY, FUNCTION, GEOMETRY, SPRINGS), 0.0)
         own = nothing if setup else odds
         return _Found(*trace(part, rows, design, update, odds=own), setup)
@@ -103,5 +104,5 @@ def diagnose(
 
 
 def _fitted_rows(held: HeldOut, rows: NDArray) -> NDArray:
-    """Return (R,) bool of rows to fit while others judge; all if none are spared."""
+    """Return (R,) bool: rows to fit, which are not held out; all if none can be."""
     return np.ones(len(rows), dtype=bool) if held.how == "none" else ~rows

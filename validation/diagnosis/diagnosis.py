@@ -1,7 +1,7 @@
-"""Result of a diagnosis: the verdict and its grounds.
+"""Result of a diagnosis: the verdict and the evidence for it.
 
-The modules above format it as text, figures and files.  ``wording`` is the function
-that makes the text, so that this module imports none of them.
+Other modules format the result as text, figures and files.  ``wording`` is the function
+that makes the text, so that this module does not import them.
 """
 
 from collections.abc import Callable
@@ -32,41 +32,46 @@ class Diagnosis:
         campaign: the measurements, with the stated sigma.
         verdict: ``"explained"``, ``"learned"``, ``"none_needed"``, ``"ambiguous"``,
             ``"outside_library"`` or ``"not_enough_rows"``.
-        fit: the machine found, with all numbers fitted together; its robot is saved.
+        fit: the machine found, with all parameters fitted together; its robot is saved.
         traced: result of the search.
         claimed: names of the claimed effects.
-        effects: names of the effects of the machine found, claimed or not.
+        effects: names of all effects of the machine found, claimed or not.
         probability: probability of every effect of the library that the design can
-            show.
-        alternatives: sets of effects by name, with their probabilities, best first.
-        lack: test whether the residual of the fitted rows is noise.
-        before: errors of the declared model on the held-out rows without outliers.
-        after: errors there of machines fitted without these rows, for any verdict.
-        saved: errors of the saved robot on all rows without outliers, to which it was
-            fitted.
-        noise: errors due to sigma, and to the noise that points of a measurement share.
-        with_outliers: before and after, with the held-out outliers included.
-        uncertainty: [-] standard error of ``after.normalised``, by scatter of blocks.
-        noise_scale: true over stated sigma, and its standard deviation.
-        noise_scale: true over stated sigma, and the standard deviation of that.
-        noise_in_time: correlation of the noise in time, None if there is none; it makes
-            intervals of the effects wider.
-        sequence: models up to the machine found, with errors on the held-out rows.
-        held: the rows that judge, and the method.
-        outliers: (R,) bool, rows left out of all computations.
-        conditions: conditions of the campaign, as declared and registered.
+            detect.
+        alternatives: sets of effects by name, with their probabilities, most probable
+            first.
+        lack: result of the test whether the residual of the fitted rows is noise.
+        before: errors of the declared model on the held-out rows, without outliers.
+        after: errors on the same rows of machines fitted without these rows.
+        saved: errors of the saved robot on all rows without outliers; it was fitted to
+            these rows.
+        noise: errors due to sigma, and due to the noise that points of a measurement
+            share.
+        with_outliers: errors before and after with the held-out outliers included.
+        uncertainty: [-] standard error of ``after.normalised``, from the scatter of
+            blocks.
+        noise_scale: ratio of true to stated sigma, and its standard deviation.
+        noise_scale: ratio of true to stated sigma, and the standard deviation of the
+            ratio.
+        noise_in_time: correlation of the noise in time, which widens the intervals of
+            the effects; None if there is none.
+        sequence: models from the declared one to the machine found, with their errors.
+        held: the held-out rows, and the method of holding out.
+        outliers: (R,) bool, rows that no computation uses.
+        conditions: declared conditions of the campaign, registered.
         open: (R,) bool, rows in which clearances leave the pose undetermined, in the
             declared model or with the effects found; see
             :class:`assembly.measurement.predict.Prediction`.
-        residual_before: (R, 6) [rad, m] reading minus declared model; NaN not measured.
-        residual_after: (R, 6) [rad, m] reading minus that of the saved robot.
+        residual_before: (R, 6) [rad, m] reading minus declared model; NaN if not
+            measured.
+        residual_after: (R, 6) [rad, m] reading minus reading of the saved robot.
         trends: variables with which the residual varies, if it is more than noise.
-        next: the measurement that would decide, if the verdict is ambiguous.
-        needed: rows that would decide, if there are too few.
-        remarks: implausible numbers of the machine, and impossible readings.
-        setup: errors of the campaign's set-up; if there are any, nothing else was
+        next: the measurement that would decide an ambiguous verdict.
+        needed: description of the rows that would decide, if there are too few.
+        remarks: implausible parameters of the machine, and impossible readings.
+        setup: errors of the campaign's set-up; if there are any, no effects were
             searched.
-        wording: function that puts a diagnosis into words.
+        wording: function that returns a diagnosis as text.
     """
 
     campaign: Campaign
@@ -109,18 +114,18 @@ class Diagnosis:
 
     @property
     def fitted(self) -> NDArray:
-        """(R,) bool, rows to which the saved machine was fitted."""
+        """(R,) bool, True for rows to which the saved machine was fitted."""
         return np.asarray(self.traced.used | (self.held.rows & ~self.outliers))
 
     @property
     def better(self) -> bool:
-        """Whether the machine found predicts the held-out rows better than declared."""
+        """Whether the machine found has smaller held-out errors than the declared."""
         found = bool(len(self.fit.unknowns)) or bool(self.effects)
         return found and self.after.normalised < self.before.normalised
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """Findings on the noise: its scale, repeatability, memory."""
+        """Sentences on the noise: its scale, its repeatability, its memory."""
         return self.traced.selected.noise.findings
 
     def summary(self) -> str:
@@ -128,7 +133,7 @@ class Diagnosis:
         return self.wording(self)
 
     def _figures(self) -> Figures:
-        """Return the verdict, and the numbers behind it."""
+        """Return lines with the verdict and its main numbers."""
         likely = sorted(self.probability.items(), key=lambda one: -one[1])[:3]
         return {
             "campaign": f"{self.campaign.name}, {len(self.campaign)} rows",

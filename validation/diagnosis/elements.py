@@ -1,7 +1,8 @@
-"""Elements of a model: effects of the library and functions.
+"""Elements of a model: effects of the library, and functions.
 
 An element adds ``offset + columns d`` to the whitened readings.  Its unknowns d are
-scaled so that columns of one unit have norm one; they share a prior standard deviation.
+scaled so that the columns of unknowns of one unit have norm one; they share a prior
+standard deviation.
 """
 
 from collections.abc import Iterable
@@ -29,16 +30,16 @@ class Element:
     Attributes:
         name: name of the effect; ``""`` for a function.
         columns: (N, m) whitened change of the readings per scaled unknown.
-        scale: (m,) unknown per scaled unknown.
-        offset: (N,) contribution at d = 0; None if zero.
+        scale: (m,) value of an unknown per scaled unknown.
+        offset: (N,) whitened contribution at d = 0; None if it is zero.
         lower, upper: (m,) bounds of the scaled unknowns.
-        given: (m,) fixed prior standard deviation, or NaN.
+        given: (m,) fixed prior standard deviation; NaN where it is optimised.
         most: largest plausible prior standard deviation.
-        log_prior: ln of the prior probability.
-        what: the hypothesis or candidate.
-        slots: (m,) slots of the hypothesis, or unknowns of the candidate.
+        log_prior: logarithm of the prior probability.
+        what: the hypothesis or the candidate.
+        slots: (m,) indices of the hypothesis' slots, or of the candidate's unknowns.
         begin: values of all slots at d = 0.
-        first: the element as linearised at its start values, if this one is not.
+        first: the element linearised at its start values; None if this element is.
     """
 
     name: str
@@ -57,7 +58,7 @@ class Element:
 
     @property
     def origin(self) -> "Element":
-        """The element as linearised at its start values."""
+        """The element linearised at its start values."""
         return self.first or self
 
     @property
@@ -68,17 +69,17 @@ class Element:
 
     @property
     def candidate(self) -> Candidate:
-        """Candidate of a function."""
+        """The candidate, if the element is a function."""
         assert isinstance(self.what, Candidate)
         return self.what
 
     @property
     def bounded(self) -> NDArray:
-        """(m,) whether an unknown starts at its lower bound."""
+        """(m,) bool, True for an unknown that starts at its lower bound."""
         return np.abs(self.lower) < 1e-12
 
     def values(self, d: NDArray) -> NDArray:
-        """Return values of all slots or of a function's unknowns, within bounds."""
+        """Return values of all slots, or of a function's unknowns, within bounds."""
         x = self.begin.copy()
         x[self.slots] += np.clip(d, self.lower, self.upper) * self.scale
         return x
@@ -89,8 +90,8 @@ def effect_element(
 ) -> Element:
     """Return the element of a library effect.
 
-    ``shapes`` (k,) are the values at which it is linearised; absent for the start
-    values.  Unknowns without influence keep their start values.
+    ``shapes`` (k,) are the shape parameters at which it is linearised; None for the
+    start values.  Unknowns without influence keep their start values.
     """
     h = signature.hypothesis
     shape = np.array([slot.shape for slot in h.slots], dtype=bool)
@@ -99,7 +100,7 @@ def effect_element(
     used = shown if shapes is not None else shown & ~shape
     slots = np.flatnonzero(used)
     plausible = np.array([h.slots[k].unknown.scale for k in slots])
-    # prior of a nonlinear parameter: half its value
+    # the prior standard deviation of a nonlinear parameter is half its value
     plausible = np.where(shape[slots], 0.5 * np.abs(begin[slots]), plausible)
     columns = signature.columns[:, slots] * plausible
     kinds = [_kind(robot, h, k) for k in slots.tolist()]
@@ -128,7 +129,7 @@ def effect_element(
 
 
 def _kind(robot: Robot, h: Hypothesis, slot: int) -> tuple[object, ...]:
-    """Return a key that unknowns of the same unit share."""
+    """Return a key that is equal for unknowns of the same unit."""
     name, unknown = h.slots[slot].names[0], h.slots[slot].unknown
     last = name.rpartition(".")[2]
     joints = [f.joint for f in robot.frames if name.startswith(f"{f.name}.")]
@@ -136,7 +137,7 @@ def _kind(robot: Robot, h: Hypothesis, slot: int) -> tuple[object, ...]:
 
 
 def _norms(columns: NDArray, kinds: Iterable[object]) -> NDArray:
-    """Return the (m,) rms norm of the columns of each column's kind."""
+    """Return, for each of m columns, the rms norm of all columns of its kind."""
     names = list(kinds)
     squares = (columns**2).sum(axis=0)
     own = [[k for k, other in enumerate(names) if other == kind] for kind in names]
@@ -149,9 +150,9 @@ def function_element(
 ) -> Element | None:  # fmt: skip
     """Return the element of a function of m unknowns; None if it is not visible.
 
-    ``columns`` (N, m) are the whitened change of the readings per unknown, ``axes``
-    (m,) the component of each, ``falling`` (m,) relative prior standard deviations, and
-    ``most`` is the largest plausible value.
+    ``columns`` (N, m) are the whitened changes of the readings per unknown, ``axes``
+    (m,) the component of each unknown, ``falling`` (m,) the relative prior standard
+    deviations, and ``most`` is the largest plausible value.
     """
     scaled = columns * falling
     norm = _norms(scaled, axes // 3)
@@ -166,12 +167,12 @@ def function_element(
 
 
 class Dense:
-    """Elements with stored columns, scored in batches."""
+    """Elements with stored columns, which are scored in batches."""
 
     def __init__(
         self, elements: list[Element], cells: NDArray, whiten: Whitening
     ) -> None:
-        """Group candidates by their number of columns in cells (N,) bool."""
+        """Group elements by their number of columns in cells (N,) bool."""
         self.elements = elements
         self._offsets: list[tuple[int, NDArray]] = []
         self._groups: list[tuple[NDArray, NDArray, NDArray, NDArray, NDArray]] = []

@@ -1,6 +1,6 @@
 """Charts of a diagnosis, and a three-dimensional view of the robot.
 
-Functions take a diagnosis and return HTML of a page.
+The functions take a diagnosis and return HTML for a page.
 """
 
 from dataclasses import replace
@@ -25,7 +25,7 @@ _COLOURS = {"before": RED, "after": BLUE}
 
 
 def error_chart(diagnosis: Diagnosis) -> str:
-    """Return the bars of the errors before, after and of noise on the held-out rows."""
+    """Return bars of the errors before and after and of the noise, on held-out rows."""
     charts = []
     for kind, unit in (("position", "m"), ("rotation", "rad")):
         names = ("before", "after", "noise")
@@ -33,24 +33,24 @@ def error_chart(diagnosis: Diagnosis) -> str:
         known = {name: v for name, v in values.items() if np.isfinite(v)}
         if known:
             axis = Axis(f"{kind}: rms on held-out rows", unit)
-            caption = "Rows that chose and fitted nothing."
+            caption = "Rows used neither to choose nor to fit the model."
             charts.append(bars(known, axis, caption, float("nan")))
     return grid(*charts)
 
 
 def sequence_chart(diagnosis: Diagnosis) -> str:
-    """Return bars of the error of every model of the sequence, in sigma, in order."""
+    """Return bars of the error of each model of the sequence, in sigma."""
     values: dict[str, float] = {}
     for step in diagnosis.sequence:
         again = step.term in values  # several functions may be learned
         name = f"{step.term} ({len(values) + 1})" if again else step.term
         values[name] = step.error.normalised
     axis = Axis("rms on held-out rows [sigma]")
-    return bars(values, axis, "Line at 1: noise as stated.")
+    return bars(values, axis, "A value of 1 (line) is the stated noise.")
 
 
 def vector_charts(diagnosis: Diagnosis) -> str:
-    """Return residual displacements at the measured points, from top and side."""
+    """Return residual displacements of the measured points, from top and side."""
     platform = diagnosis.conditions.postures.platform
     where = platform[:, :3, 3] + platform[:, :3, :3] @ diagnosis.conditions.point
     known = ~diagnosis.outliers
@@ -81,7 +81,7 @@ def vector_charts(diagnosis: Diagnosis) -> str:
 
 
 def covariate_charts(diagnosis: Diagnosis) -> str:
-    """Return charts of the residual, before and after, against load and variables."""
+    """Return charts of the residual before and after, against load and variables."""
     kept, rows = ~diagnosis.outliers, _labels(diagnosis)
     sizes = {
         name: np.sqrt(np.nanmean((left / diagnosis.campaign.sigma) ** 2, axis=1))[kept]
@@ -105,24 +105,24 @@ def covariate_charts(diagnosis: Diagnosis) -> str:
             "line": {"color": GREY}, "hoverinfo": "skip", "showlegend": False,
         })  # fmt: skip
         log = Axis("residual / sigma", options={"type": "log"})
-        caption = "Line at 1: noise as stated."
+        caption = "A value of 1 (line) is the stated noise."
         charts.append(chart(traces, Axis(name, unit), log, caption))
     return grid(*charts)
 
 
 def _residuals(diagnosis: Diagnosis) -> dict[str, NDArray]:
-    """Return the (R, 6) [rad, m] before and after."""
+    """Return the (R, 6) [rad, m] residuals before and after."""
     return {"before": diagnosis.residual_before, "after": diagnosis.residual_after}
 
 
 def _labels(diagnosis: Diagnosis) -> list[str]:
-    """Return labels of all rows except outliers."""
+    """Return the labels of all rows except outliers."""
     ids = zip(diagnosis.campaign.ids, diagnosis.outliers, strict=True)
     return [label(name) for name, outlier in ids if not outlier]
 
 
 def _varied(diagnosis: Diagnosis) -> dict[tuple[str, str], NDArray]:
-    """Return the variables of the residual, with name and unit."""
+    """Return the variables of the charts, with name and unit."""
     campaign = diagnosis.campaign
     varied = {("load size", "N"): np.linalg.norm(campaign.loads[:, 3:], axis=1)}
     for i, frame in enumerate(campaign.robot.frames):
@@ -136,17 +136,19 @@ def _varied(diagnosis: Diagnosis) -> dict[tuple[str, str], NDArray]:
 
 
 def probability_chart(diagnosis: Diagnosis) -> str:
-    """Return the bars of the probability of every effect, the likeliest on top."""
+    """Return bars of the probability of every effect, the most probable on top."""
     ranked = sorted(diagnosis.probability.items(), key=lambda item: -item[1])
     axis = Axis(f"probability (claimed from {CLAIM}, a rival from {RIVAL})",
                 options={"range": [0, 1]})  # fmt: skip
-    return bars(dict(ranked), axis, "Posterior weight of all sets with it.", CLAIM)
+    return bars(
+        dict(ranked), axis, "Posterior weight of all sets containing it.", CLAIM
+    )
 
 
 def confounding_chart(diagnosis: Diagnosis) -> str:
-    """Return a matrix: share of the row's effect that the column's can imitate."""
+    """Return the matrix of the share of a row's effect that a column's can imitate."""
     columns: dict[str, NDArray] = {}
-    for element in diagnosis.traced.columns.library:  # the most general form first
+    for element in diagnosis.traced.columns.library:  # the most general form is first
         if np.any(element.columns):
             columns.setdefault(element.name, element.columns)
     angles = compare_signatures(columns)
@@ -157,11 +159,11 @@ def confounding_chart(diagnosis: Diagnosis) -> str:
 
 
 def worst_row(diagnosis: Diagnosis) -> tuple[int, str]:
-    """Return the held-out row at which the declared model errs most.
+    """Return the held-out row with the largest error of the declared model.
 
     Returns:
         The row, and the larger part of its error: ``"position"``, or ``"rotation"`` if
-        no position was measured; -1 and an empty text without such a row.
+        no position was measured; -1 and an empty text if there is no such row.
     """
     aside = diagnosis.held.rows & ~diagnosis.outliers
     for name, part in (("position", slice(3, 6)), ("rotation", slice(0, 3))):
@@ -184,7 +186,7 @@ def assembled(diagnosis: Diagnosis, row: int) -> Assembly | None:
 
 
 def worst_robot(diagnosis: Diagnosis) -> str:
-    """Return the scene of the robot at the worst row; empty without such a row."""
+    """Return the scene of the robot at the row of largest error; empty without one."""
     row, name = worst_row(diagnosis)
     forced = assembled(diagnosis, row) if row >= 0 else None
     if forced is None:

@@ -1,13 +1,13 @@
-r"""Fit of all unknown numbers of a robot together, the last step of a diagnosis.
+r"""Fit of all unknown parameters of a robot together, the last step of a diagnosis.
 
 The most probable x minimises
 
     F(x) = |W (y - f(x)) / sigma|^2 + |(x - m) / s|^2    within the bounds of x,
 
-with f the readings of the robot that would be saved, computed by the function that
-predicts with the saved file (:mod:`validation.diagnosis.prediction`).  Steps are
-Gauss-Newton steps, with the slopes of the linear model at the present robot; a step
-that increases F is halved.
+Here f are the readings of the robot to be saved, computed by the function that predicts
+with the saved file (:mod:`validation.diagnosis.prediction`).  Steps are Gauss-Newton
+steps, with the slopes of the linear model at the present robot; a step that increases F
+is halved.
 
 ======  ==============  =========  ===================================================
 symbol  code            shape      meaning
@@ -39,23 +39,26 @@ from validation.diagnosis.separability import ROUNDING
 from validation.diagnosis.unknowns import Acting, Unknowns
 from validation.diagnosis.whitening import whitening_of
 
-_STEPS = 20  # largest number of Gauss-Newton steps: most fits converge within ten
-_SLOPES = 6  # number of steps with recomputed slopes
-_SHORTEST = 1 / 64  # shortest part of a step
-_SETTLED = 1e-3  # decrease of F at convergence; F counts squared standard deviations
-_NO_ANSWER = 1e3  # [sigma] residual of a reading for which the robot has no solution
+_STEPS = 20  # largest number of Gauss-Newton steps; most fits converge within ten
+_SLOPES = 6  # number of steps in which the slopes are recomputed
+_SHORTEST = 1 / 64  # smallest fraction of a step that is tried
+# decrease of F at convergence; F is a sum of squared standard deviations
+_SETTLED = 1e-3
+# [sigma] residual assigned to a reading for which the robot has no solution
+_NO_ANSWER = 1e3
 
 
 @dataclass(frozen=True, eq=False)
 class MachineFit:
-    """A robot fitted to some rows of a campaign.
+    """A robot fitted to selected rows of a campaign.
 
     Attributes:
-        unknowns: the numbers fitted.
-        x: (k,) their most probable values.
-        covariance: (k, k) of their posterior, at fixed prior sizes and sigma.
+        unknowns: the fitted parameters.
+        x: (k,) most probable values of the parameters.
+        covariance: (k, k) posterior covariance of x, at fixed prior standard deviations
+            and sigma.
         slopes: (n, k) change of the fitted cells per unknown, over sigma, whitened.
-        residual: (n,) of the fitted cells, over sigma, whitened.
+        residual: (n,) residual of the fitted cells, over sigma, whitened.
     """
 
     unknowns: Unknowns
@@ -66,23 +69,23 @@ class MachineFit:
 
     @cached_property
     def robot(self) -> Robot:
-        """The fitted robot, as it is saved."""
+        """The fitted robot, which is saved."""
         return self.unknowns.robot_at(self.x)
 
     @property
     def std(self) -> NDArray:
-        """(k,) standard deviations of the numbers."""
+        """(k,) standard deviations of the parameters."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     @property
     def determined(self) -> NDArray:
-        """(k,) share of each unknown that the readings determine, not its prior."""
+        """(k,) share of each unknown that the readings determine, not the prior."""
         prior = self.unknowns.std**2
         return 1.0 - np.clip(np.diag(self.covariance) / prior, 0.0, 1.0)
 
     @property
     def effects(self) -> tuple[Acting, ...]:
-        """Effects of the library that it has, without the measuring frame's pose."""
+        """Effects of the library in the robot, except the measuring frame's pose."""
         return tuple(one for one in self.unknowns.effects if not one.device)
 
     def own(self, part: Acting) -> tuple[NDArray, NDArray, NDArray]:
@@ -91,25 +94,25 @@ class MachineFit:
         return self.x[own], self.covariance[own, own], self.slopes[:, own]
 
     def seen(self, part: Acting) -> NDArray:
-        """Return the (k,) bool of an effect's unknowns on which a reading depends."""
+        """Return (k,) bool: unknowns of an effect on which a reading depends."""
         return self.determined[self.unknowns.place(part)] > ROUNDING
 
 
 def fit_machine(
     campaign: Campaign, unknowns: Unknowns, rows: NDArray, start: NDArray | None = None
 ) -> MachineFit:
-    """Fit the unknown numbers of a robot to some rows of a campaign.
+    """Fit the unknown parameters of a robot to selected rows of a campaign.
 
     Args:
-        campaign: campaign of R rows, whose sigma and noise in common are used.
-        unknowns: unknowns of its robot.
-        rows: (R,) bool, rows to be fitted; readings of others are not used.
-        start: (k,) start values; the prior's mean if absent.
+        campaign: campaign of R rows; its sigma and shared noise are used.
+        unknowns: unknown parameters of its robot.
+        rows: (R,) bool, rows to be fitted; readings of other rows are not used.
+        start: (k,) start values; the mean of the prior if absent.
 
     Returns:
         The fit.
     """
-    # all rows are predicted, because a row may depend on commands before it
+    # all rows are predicted, because a row may depend on earlier commands
     cells = campaign.cells & rows[:, None]
     sigma, whiten = campaign.sigma[cells], whitening_of(campaign, cells)
 
@@ -130,7 +133,7 @@ def _minimum(
     unknowns: Unknowns, residual: Callable[[NDArray], NDArray],
     slopes: Callable[[NDArray], NDArray], start: NDArray | None,
 ) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
-    """Return the (k,) most probable x, (n, k) slopes and (n,) residual there."""
+    """Return the (k,) most probable x, and (n, k) slopes and (n,) residual at it."""
     mean, std = unknowns.mean, unknowns.std
     lower, upper = unknowns.bounds
     x = np.clip(mean if start is None else start, lower, upper)
@@ -170,7 +173,7 @@ def _step(unknowns: Unknowns, A: NDArray, left: NDArray, x: NDArray) -> NDArray:
     step = solve_triangular(L, y, lower=True, trans=1, check_finite=False)
     low, high = ((bound - x) / std for bound in unknowns.bounds)
     if np.any(step < low) or np.any(step > high):
-        # |L' step - y| has the same minimum, now with bounds
+        # |L' step - y| has the same minimum, and allows bounds
         wide = high - low > 0.0
         step = np.zeros(len(x))
         free = lsq_linear(L.T[:, wide], y, (low[wide], high[wide]), method="bvls")

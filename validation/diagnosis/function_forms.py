@@ -1,7 +1,7 @@
 """Forms of functions of one or two variables, and their prior probabilities.
 
 All families of forms of a variable have the same prior probability.  The forms of a
-family share it; the share of waves falls with their order.
+family share it; the share of a wave decreases with its order.
 """
 
 import math
@@ -15,33 +15,37 @@ from assembly.measurement.conditions import Conditions
 from assembly.measurement.variables import variable
 from assembly.model.robot import Robot
 
-KNOTS = 7  # knots of a spline, which fits shapes that powers up to three do not
+KNOTS = 7  # number of knots of a spline; powers up to three fit simpler shapes
 MANY = 150  # number of rows above which waves of high order are searched
-# time constants relative to the span of time
+# time constants relative to the campaign's duration
 LAGS = 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.3, 0.5
-_CYCLES = 0.5, 1, 1.5, 2, 3, 4, 6  # cycles of a slow wave in the span of time
+_CYCLES = 0.5, 1, 1.5, 2, 3, 4, 6  # cycles of a slow wave in the campaign's duration
 _DEPTHS = 0.03, 0.1, 0.3, 1.0  # depths of slip, relative to the variable's range
-# of the best depth, in a refined search
+# depths of slip near the best one, in a refined search
 _ALL_DEPTHS = tuple(0.01 * 1.4**k for k in range(15))
-# turns of a screw over its slide's range: step of the search; larger ones miss waves
+# step of the search for the number of turns of a screw over its slide's range; larger
+# steps miss waves
 _TURNS = 0.5
-_MOST_TURNS = 200.0  # most turns of a screw over that range, and two for each position
+# largest number of turns over that range; also at most two turns for each position
+_MOST_TURNS = 200.0
 _FINER = 1.2  # first factor in the refinement of a shape parameter
-_NO_LOAD = 1e-3  # relative to the largest load: a smaller one does not take up backlash
+# relative to the largest load: a smaller load does not take up backlash
+_NO_LOAD = 1e-3
 _HIGH = 12  # highest order of waves that is tried alone
 _CLOCKS = "time", "cov.time"
-_JUMPS, _MANY_JUMPS = 10, 91  # numbers of times at which a step is tried
+# number of instants at which a step is tried, in short and long campaigns
+_JUMPS, _MANY_JUMPS = 10, 91
 _INNER = np.linspace(0.1, 0.9, 9)  # quantiles at which other shape parameters are tried
 
 
 @dataclass(frozen=True)
 class CandidateShape:
-    """A form with the names of its columns.
+    """A form of a function, with the names of its columns.
 
     Attributes:
         form: a name of :data:`assembly.effects.forms.FORMS`.
-        names: names of the columns.
-        given: shape parameters, in which it is not linear.
+        names: names of the columns, which are linear in the coefficients.
+        given: names and values of the shape parameters, in which the form is nonlinear.
     """
 
     form: str
@@ -50,12 +54,12 @@ class CandidateShape:
 
     @property
     def bends(self) -> NDArray:
-        """(0,) or (1,) the shape parameter, if it is fitted."""
+        """(0,) or (1,) value of the shape parameter, if it is fitted."""
         one = len(self.given) == 1 and self.form != "step"
         return np.array([value for _, value in self.given] if one else [])
 
     def bent(self, by: float) -> "CandidateShape":
-        """Return the form with its shape parameter increased."""
+        """Return the form with a larger shape parameter."""
         ((key, value),) = self.given
         return replace(self, given=((key, value + by),))
 
@@ -65,7 +69,7 @@ def _powers(*powers: int) -> CandidateShape:
 
 
 def _waves(*orders: int, form: str = "waves") -> CandidateShape:
-    """Return the sines and cosines of these orders of an angle."""
+    """Return the sines and cosines of an angle, of the given orders."""
     names = tuple(f"{k}.{w}" for k in orders for w in ("sine", "cosine"))
     return CandidateShape(form, names)
 
@@ -73,7 +77,7 @@ def _waves(*orders: int, form: str = "waves") -> CandidateShape:
 def _at_each(
     form: str, names: tuple[str, ...], key: str, values: Iterable[float]
 ) -> list[CandidateShape]:
-    """Return a form with each of several values of its shape parameter."""
+    """Return the form once for each value of its shape parameter."""
     return [CandidateShape(form, names, ((key, float(v)),)) for v in values]
 
 
@@ -83,13 +87,13 @@ _ANGLE = ("0.cosine", *_WAVE)
 
 
 def is_angle(robot: Robot, name: str) -> bool:
-    """Return whether a variable is the coordinate of a joint that turns."""
+    """Return whether a variable is the coordinate of a revolute joint."""
     kind, _, rest = name.partition(".")
     return kind == "q" and robot.frame(rest).turns
 
 
 def first(conditions: Conditions, name: str) -> list[CandidateShape]:
-    """Return general forms that test whether a variable matters."""
+    """Return general forms by which to test whether a variable has an influence."""
     if name == "approach":
         return [STRAIGHT]
     cubic, memory = _powers(0, 1, 2, 3), _reversals(conditions, name, _DEPTHS)
@@ -156,7 +160,7 @@ def is_screw(shape: CandidateShape) -> bool:
 
 
 def of_direction(conditions: Conditions, name: str) -> list[CandidateShape]:
-    """Return forms of backlash that varies over a turn, of a drive or of its screw."""
+    """Return forms of backlash that varies over a turn of a drive or of its screw."""
     if is_angle(conditions.robot, name):
         return [CandidateShape("reversal_waves", _ANGLE)]
     return screw(conditions, name, "reversal_waves", _ANGLE)
@@ -165,9 +169,9 @@ def of_direction(conditions: Conditions, name: str) -> list[CandidateShape]:
 def of_two(
     conditions: Conditions, first: str, second: str
 ) -> tuple[tuple[str, str], list[CandidateShape]] | None:
-    """Return the forms of a product of two variables, and the variables in their order.
+    """Return forms of a product of two variables, and the variables in their order.
 
-    None if the product is not useful.
+    None if the product is not considered.
     """
     angles = [is_angle(conditions.robot, name) for name in (first, second)]
     if {first, second} == set(_CLOCKS):
@@ -190,7 +194,7 @@ def of_two(
 
 
 def knees(load: NDArray, *, jump: bool) -> list[CandidateShape]:
-    """Return laws with a knee at some of the loads; also a jump at load zero."""
+    """Return laws with a knee at some of the loads; also with a jump at load zero."""
     least = _NO_LOAD * float(load.max(initial=0.0))
     levels = np.unique(np.quantile(load, _INNER))
     levels = levels[levels > least]
@@ -203,10 +207,10 @@ def knees(load: NDArray, *, jump: bool) -> list[CandidateShape]:
 def near(
     conditions: Conditions, variables: Sequence[str], shape: CandidateShape, part: float
 ) -> list[CandidateShape]:
-    """Return a form with its shape parameter slightly smaller, and larger.
+    """Return a form with its shape parameter slightly smaller and slightly larger.
 
-    ``part`` is relative to half the step of the first search.  Empty for a form without
-    shape parameter, or a step.
+    ``part`` is relative to half the step of the first search.  The result is empty for
+    a step and for a form without shape parameter.
     """
     if not len(shape.bends):
         return []
@@ -262,6 +266,6 @@ def falling(shape: CandidateShape, count: int) -> NDArray:
 
 
 def _orders(shape: CandidateShape) -> list[int]:
-    """Return the order of each column of waves, of two variables the larger one."""
+    """Return the order of each column of waves; of two orders the larger one."""
     parts = [name.split(".")[:-1] for name in shape.names]
     return [max(abs(int(part)) for part in orders) for orders in parts]

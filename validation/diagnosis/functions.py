@@ -1,7 +1,7 @@
 """Candidate functions, scored in batches: places times forms of variables.
 
-A column of a function is the response of a row's readings to a component, times a
-number of that row: B_(rc)q = a_rc P_rq.  Inner products therefore factor:
+A column of a function is the response of a row's readings to a component, times a value
+for that row: B_(rc)q = a_rc P_rq.  Inner products therefore factor:
 
 ======  ===============  ===========  ================================================
 symbol  code             shape        meaning
@@ -9,7 +9,7 @@ symbol  code             shape        meaning
 a       ``answers``      (S, R, 6)    whitened change per unit of a component at a place
 W       ``squares``      (S, R)       sum of a^2 over the cells of a row
 P       ``numbers``      (R, q)       columns of all forms of a variable
-T       ``through``      (R, S, p)    sum over the cells of a row of a U
+T       ``through``      (R, S, p)    sum over the cells of a row of a times U
 ======  ===============  ===========  ================================================
 
     B'B = P' W P,    U'B = T' P,    B'C^-1 z = P' (sum of a C^-1 z).
@@ -40,11 +40,13 @@ from validation.diagnosis.places import Places, Weighted, Where
 from validation.diagnosis.sensitivities import Sensitivities, in_cells
 
 Variables = tuple[str, ...]
-Request = tuple[Variables, tuple[CandidateShape, ...]]  # variables, and their forms
-_WIDEST = 36  # largest number of columns of several components: six of six
-# number of best functions among which those of each request are selected
+# the variables of a function, and the forms to be scored
+Request = tuple[Variables, tuple[CandidateShape, ...]]
+# largest number of columns of several components: six columns each of six components
+_WIDEST = 36
+# number of best functions among which the best of each request are selected
 _LISTED = 2000
-_BATCH = 2_000_000  # numbers in a batch: 16 MB
+_BATCH = 2_000_000  # number of values in a batch: 16 MB
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ class ScoredFunction:
 
 
 def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
-    """Return (f, c, m) rms norms of columns, of rotations and of translations."""
+    """Return (f, c, m) rms norms of columns, for rotations and translations."""
     diagonal = np.einsum("...kk->...k", gram)
     squares = np.zeros_like(diagonal)
     for kind in (turns, ~turns):
@@ -92,20 +94,20 @@ class Functions:
         self._numbers = cache(self._columns)
 
     def of(self, variables: list[str]) -> "Functions":
-        """Return the functions of some of the variables."""
+        """Return the functions that depend on given variables."""
         other = copy(self)
         other._depend_on(variables)
         return other
 
     def at_rows(self, rows: NDArray) -> "Functions":
-        """Return the functions with elements that have columns only in some rows."""
+        """Return the functions with columns of selected rows only."""
         other = copy(self)
         other.campaign = self.campaign.take(rows)
         other.sensitivities = self.sensitivities.take(rows)
         return other
 
     def known(self, *names: str) -> Conditions:
-        """Return the rows in which variables are known."""
+        """Return the conditions of the rows in which variables are known."""
         rows = is_known(self.conditions, *names)
         return self.conditions if rows.all() else self.conditions.take(rows)
 
@@ -123,7 +125,7 @@ class Functions:
             prior -= math.log(2.0 * max(count - 1, 1))
         logs = forms.log_priors(shapes)
         if variables[0].removeprefix("cov.") in self.campaign.motion_units:
-            # a measured motion most likely moves something in proportion
+            # a measured motion probably causes a proportional motion
             straight = np.array([shape == forms.STRAIGHT for shape in shapes])
             logs = np.log((np.exp(logs) + straight) / 2)
         return {s: prior + float(p) for s, p in zip(shapes, logs, strict=True)}
@@ -134,7 +136,7 @@ class Functions:
         return known.get(shape, min(known.values(), default=-math.inf))
 
     def first_look(self) -> list[Request]:
-        """Return requests for general forms of every variable."""
+        """Return the requests scored first: general forms of every variable."""
         requests: list[Request] = []
         for name in self.variables:
             shapes = forms.first(self.known(name), name)
@@ -143,7 +145,7 @@ class Functions:
         return requests
 
     def products(self, names: Iterable[str]) -> list[Request]:
-        """Return requests for products of given variables with all others."""
+        """Return the requests for products of given variables with all others."""
         requests: dict[Variables, tuple[CandidateShape, ...]] = {}
         for name in names:
             for other in self.variables:
@@ -163,7 +165,7 @@ class Functions:
     ) -> list[ScoredFunction]:  # fmt: skip
         """Return the functions that improve a model most, best first.
 
-        The model is that of the cells of ``weighted``; ``most`` functions of each
+        The model is fitted to the cells of ``weighted``; ``most`` functions of each
         request are returned.
         """
         if not len(self.places):
@@ -198,9 +200,9 @@ class Functions:
     def _by_width(
         self, requests: Sequence[Request], size: int
     ) -> Iterator[list[tuple[int, int]]]:
-        """Yield request and form of functions with equally many columns, in batches.
+        """Yield requests and forms of functions with equally many columns, in batches.
 
-        One column of one function occupies ``size`` numbers.
+        One column of one function occupies ``size`` values in memory.
         """
         by_width: dict[int, list[tuple[int, int]]] = {}
         for number, (variables, shapes) in enumerate(requests):
@@ -219,8 +221,8 @@ class Functions:
 
         Yields:
             For c functions with equally many columns: (c, 3) indices of the request,
-            its form and the place; (c, m, m) B'C^-1 B, columns scaled to norm about 1;
-            (c, m) B'C^-1 z; (c,) largest plausible size; (c,) log prior.
+            the form and the place; (c, m, m) B'C^-1 B, with columns scaled to norm
+            about 1; (c, m) B'C^-1 z; (c,) largest plausible size; (c,) log prior.
         """
         named = [(requests[number][0], requests[number][1][k]) for number, k in own]
         each = [self._numbers(*name)[weighted.rows] for name in named]
@@ -261,7 +263,7 @@ class Functions:
         return columns * forms.falling(shape, columns.shape[1])
 
     def equivalents(self, one: Candidate) -> list[tuple[CandidatePart, ...]]:
-        """Return the parts of candidates at other places with equal columns."""
+        """Return the parts of candidates at other places that have equal columns."""
         if len(one.parts) > 1:
             return []
         part = one.parts[0]
@@ -284,6 +286,6 @@ class Functions:
 def _at(
     place: tuple[Where, ...], variables: Variables, shape: CandidateShape
 ) -> Candidate:
-    """Return the function of variables at a place."""
+    """Return the candidate with given variables at a place."""
     part = CandidatePart(place[0][0], tuple(w[1] for w in place), *variables)
     return Candidate((part,), place[0][2], shape)

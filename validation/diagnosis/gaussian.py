@@ -1,7 +1,7 @@
 r"""Gaussian linear models with their unknowns marginalised.
 
-Readings are z = X u + noise with u ~ N(0, s^2) and noise ~ N(0, 1), both in units of a
-scale tau.  With S = diag(s) and C = 1 + X S^2 X':
+Readings are z = X u + noise with u ~ N(0, s^2) and noise ~ N(0, 1), both in units of
+the noise's scale tau.  With S = diag(s) and C = 1 + X S^2 X':
 
 ======  ==================  =======  =================================================
 symbol  code                shape    meaning
@@ -11,7 +11,7 @@ U       ``factor_columns``  (n, p)   X S L^-T with L L' = M, so that C^-1 = 1 - 
 Q       ``squares``                  z' C^-1 z
 ======  ==================  =======  =================================================
 
-tau^2 follows a scaled inverse chi-square about 1, which makes z multivariate t.
+tau^2 has a scaled inverse chi-square prior about 1, which makes z multivariate t.
 
 Sources:
     Gelman et al., Bayesian Data Analysis, sections 3.3, 14.8 (scale, prior as rows).
@@ -26,11 +26,13 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr
 
-# degrees of freedom of tau^2's prior: true sigma is 1/2 to 3 times the stated one
+# degrees of freedom of the prior of tau^2, which allows a true sigma of 1/2 to 3 times
+# the stated sigma
 FREEDOM = 20.0
-SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)  # [sigma] prior contributions to readings
+# [sigma] prior contributions to the readings over which the evidence is averaged
+SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)
 SPAN = math.log(SIZES[-1] / SIZES[0])
-_SEEN = 1e-8  # least eigenvalue of a scaled candidate above rounding
+_SEEN = 1e-8  # smallest eigenvalue of a scaled candidate that is above rounding
 
 
 def deviance(squares: NDArray | float, count: int) -> NDArray | float:
@@ -47,12 +49,12 @@ def scale(squares: float, count: int) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class Marginal:
-    """A model with its unknowns marginalised, for scoring many candidates.
+    """A model with its unknowns marginalised, for scoring of many candidates.
 
     Attributes:
         factor_columns: (n, p) U, so that B'C^-1 B = B'B - (U'B)'(U'B).
-        held: (n,) C^-1 z.
-        squares: z' C^-1 z.
+        held: (n,) value of C^-1 z.
+        squares: value of z' C^-1 z.
     """
 
     factor_columns: NDArray
@@ -74,10 +76,10 @@ def marginalise(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Ma
 def leave_block_out(
     marginal: Marginal, blocks: NDArray, tau: float = 1.0
 ) -> tuple[NDArray, NDArray]:
-    """Predict each block of readings (n,) by a fit to all others, exactly.
+    """Predict each block of readings (n,) exactly by a fit to all others.
 
     Returns:
-        (n,) prediction errors and (blocks,) ln predictive densities.
+        (n,) prediction errors, and (blocks,) logarithms of the predictive densities.
     """
     errors, densities = np.empty_like(marginal.held), []
     for name in np.unique(blocks):
@@ -86,7 +88,7 @@ def leave_block_out(
         if len(U) <= U.shape[1]:
             left = np.eye(len(U)) - U @ U.T
             errors[own] = np.linalg.lstsq(left, held, rcond=None)[0]
-        else:  # Woodbury's identity: as many equations as columns
+        else:  # Woodbury's identity has as many equations as there are columns
             left = np.eye(U.shape[1]) - U.T @ U
             errors[own] = held + U @ np.linalg.lstsq(left, U.T @ held, rcond=None)[0]
         size = np.linalg.slogdet(left)[1] - len(U) * math.log(2 * math.pi * tau**2)
@@ -101,14 +103,14 @@ def evidence_gains(
     """Return log evidence ratios of candidates, averaged over prior sizes.
 
     Args:
-        gram: (c, m, m) B'C^-1 B of c candidates, columns scaled to norm about 1.
+        gram: (c, m, m) B'C^-1 B of c candidates, with columns scaled to norm about 1.
         along: (c, m) B'C^-1 z.
         most: (c,) largest plausible prior standard deviation, in that scale.
-        bounded: (c,) whether the single unknown cannot be negative.
-        marginal: the model to which they are added.
+        bounded: (c,) bool, True if the single unknown cannot be negative.
+        marginal: model to which the candidates are added.
 
     Returns:
-        (c,) logarithms; -inf where no plausible size is visible.
+        (c,) log evidence ratios; -inf where no plausible size is visible.
     """
     count = len(marginal.held)
     if gram.shape[1] == 1:
@@ -139,9 +141,10 @@ def evidence_gains(
 
 
 def size_penalty(determined: float) -> float:
-    """Return the penalty of an optimised prior size (Laplace approximation).
+    """Return the penalty of an optimised prior standard deviation (Laplace).
 
-    It is the logarithm of the ratio of maximum and average over the range of sizes,
-    which ``determined`` well-determined unknowns share.
+    It is the logarithm of the ratio of the maximum to the average over the range of
+    standard deviations; ``determined`` is the number of well-determined unknowns that
+    share it.
     """
     return math.log(SPAN) + 0.5 * math.log(max(determined, 1.0) / math.pi)

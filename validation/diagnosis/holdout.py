@@ -1,9 +1,9 @@
-"""Held-out rows: whole configurations or spans of time, never split between sets.
+"""Held-out rows: whole configurations or time spans, which are never split.
 
-A campaign of 60 configurations or more is split once.  A smaller one is judged by
-cross-validation, because a quarter of few configurations is too small a sample: in each
-fold the whole diagnosis is repeated without its rows (nested).  No readings of a
-held-out row are used before the verdict.
+A campaign of 60 configurations or more is split once.  A smaller one is tested by
+nested cross-validation, because a quarter of few configurations is too small a sample:
+in each fold the whole diagnosis is repeated without the fold's rows.  No reading of a
+held-out row is used before the verdict.
 """
 
 from dataclasses import dataclass, replace
@@ -13,22 +13,26 @@ from numpy.typing import NDArray
 
 from validation.campaign.campaign import Campaign
 
-FEWEST = 8  # least number of blocks of rows that can judge
-_SPLIT = 60  # number of configurations above which one split judges
-_SHARES = (1 / 4, 1 / 10)  # of the blocks held out: of 60, and of many
-_ENOUGH = 60  # number of held-out blocks that suffices for any campaign
-_FOLDS = 5  # Hastie, Tibshirani, Friedman, Elements of Statistical Learning, 7.10
+FEWEST = 8  # smallest number of blocks of rows for a test on held-out rows
+# number of configurations from which on a single part of the rows is held out
+_SPLIT = 60
+# share of held-out blocks if there are 60 blocks, and if there are many blocks
+_SHARES = (1 / 4, 1 / 10)
+_ENOUGH = 60  # number of held-out blocks that is sufficient for any campaign
+# number of folds (Hastie, Tibshirani, Friedman, Elements of Statistical Learning, 7.10)
+_FOLDS = 5
 SPANS = "spans of time"
 
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """The rows that judge, and the method.
+    """The held-out rows, and the method of holding out.
 
     Attributes:
         how: ``"split"``, ``"folds"`` or ``"none"``.
-        folds: (R,) bool each, rows held out together; one for a split.
-        words: the method in words.
+        folds: (R,) bool for each fold, True for its held-out rows; a split has one
+            fold.
+        words: description of the method.
     """
 
     how: str
@@ -37,16 +41,16 @@ class HeldOut:
 
     @property
     def rows(self) -> NDArray:
-        """(R,) bool, rows that judge."""
+        """(R,) bool, True for rows that are held out in any fold."""
         return np.any(self.folds, axis=0)
 
 
 def hold_out(campaign: Campaign) -> HeldOut:
-    """Choose the rows that judge a diagnosis.
+    """Choose the held-out rows of a diagnosis.
 
     Returns:
-        The same for the same campaign; ``"none"`` for fewer than two blocks, where all
-        rows are judged by their own fit.
+        The held-out rows, always the same for the same campaign.  The method is
+        ``"none"`` for fewer than two blocks; all rows are then tested by their own fit.
     """
     blocks, kind = blocks_of(campaign)
     names = np.random.default_rng(0).permutation(np.unique(blocks))
@@ -72,30 +76,30 @@ def hold_out(campaign: Campaign) -> HeldOut:
 
 
 def hidden(campaign: Campaign, rows: NDArray) -> Campaign:
-    """Return the campaign with readings of rows (R,) bool set to NaN; commands stay."""
+    """Return campaign with readings of rows (R,) bool set to NaN; commands remain."""
     readings = np.where(rows[:, None], np.nan, campaign.measured)
     return replace(campaign, measured=readings)
 
 
 def drawn(visit: NDArray, most: int) -> NDArray:
-    """Return (R,) bool: about ``most`` rows drawn once, rows of one visit together."""
+    """Return (R,) bool: about ``most`` random rows, rows of a visit together."""
     listed = np.unique(visit)
     count = most * len(listed) // max(len(visit), 1)
     return np.isin(visit, np.random.default_rng(0).permutation(listed)[:count])
 
 
 def blocks_of(campaign: Campaign) -> tuple[NDArray, str]:
-    """Return the blocks that must not be shared by predicted and fitted rows.
+    """Return the blocks that are either fitted or predicted as a whole.
 
     Returns:
-        (R,) number of the configuration, or of a span of time if configurations are too
-        few; and which of the two, in words.
+        (R,) number of the configuration, or of a time span if there are too few
+        configurations; and which of the two, as text.
     """
     blocks = campaign.configuration
     if len(np.unique(blocks)) >= FEWEST:
         return blocks, "configurations"
     time = campaign.covariates.get("time", np.arange(len(campaign)))
-    # points that are measured together are in one span
+    # points that are measured together are in one time span
     _, first, visit = np.unique(
         campaign.measured_at_once, return_index=True, return_inverse=True
     )

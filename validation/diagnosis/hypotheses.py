@@ -1,12 +1,13 @@
 """Hypotheses: an effect of the library, at certain frames, with certain unknowns.
 
-An effect may act at one frame, at each frame with its own number, or at several frames
-that share one number (all, or those of one kind: ``leg1.rod``, ``leg2.rod``).  Each of
-these is a separate hypothesis, with as many unknowns as it has slots.
+An effect may act at one frame, at each frame with a separate parameter, or at several
+frames that share one parameter (all frames, or those of one kind: ``leg1.rod``,
+``leg2.rod``).  Each of these is a separate hypothesis, with as many unknowns as it has
+slots.
 
-Between sessions a machine is homed again, its tool is changed and its device is moved,
-so an effect may have different numbers in each.  Such a hypothesis has every slot once
-for each session; a session's slots act in its rows alone.
+Between sessions a machine may be homed again, its tool changed or its device moved, so
+an effect may have different parameters in each session.  Such a hypothesis has every
+slot once for each session; the slots of a session act in its rows only.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,20 +22,21 @@ from assembly.measurement.conditions import Conditions
 from assembly.model.robot import Robot
 
 PER_SESSION = ("registration", "encoder_offset", "drift")
-# of one effect; with more frames these share unknowns, kind by kind
+# largest number of unknowns of one effect; if more are needed, frames of the same kind
+# have one unknown in common
 _MOST_UNKNOWNS = 24
 
 
 @dataclass(frozen=True)
 class Slot:
-    """One number to be fitted, which several unknowns of an effect may share.
+    """A parameter to be fitted, which several unknowns of an effect may share.
 
     Attributes:
-        names: names of the unknowns that it sets.
-        unknown: their scale and bounds.
+        names: names of the unknowns that have this value.
+        unknown: scale and bounds of the unknowns.
         start: start value of a fit.
-        shape: whether the model is strongly nonlinear in it; screening then holds it.
-        session: the only session in which it acts; None for all.
+        shape: whether the model is strongly nonlinear in it; screening then fixes it.
+        session: name of the only session in which it acts; None for all sessions.
     """
 
     names: tuple[str, ...]
@@ -46,12 +48,12 @@ class Slot:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """An effect, the frames at which it acts, and the numbers that describe it.
+    """An effect, the frames at which it acts, and its parameters.
 
     Attributes:
-        effect: its name.
-        where: frames at which it acts, none for effects of the whole.
-        slots: the numbers to be fitted.
+        effect: name of the effect.
+        where: frames at which it acts; empty for effects of the whole machine.
+        slots: the parameters to be fitted.
     """
 
     effect: str
@@ -59,7 +61,7 @@ class Hypothesis:
     slots: tuple[Slot, ...]
 
     def public(self, robot: Robot, x: Sequence[float] | NDArray) -> dict[str, float]:
-        """Return parameters by their public names [SI], for values x of the slots."""
+        """Return parameters by public name, in SI units, for values x of the slots."""
         values = {
             name: float(value)
             for slot, value in zip(self.slots, x, strict=True)
@@ -84,8 +86,8 @@ class Hypothesis:
 def hypotheses(conditions: Conditions, loads: Sequence[str]) -> list[Hypothesis]:
     """Return all hypotheses that declared conditions can test.
 
-    They are listed effect by effect.  ``loads`` are the components of the load that the
-    campaign records, such as ``["fx"]``.
+    They are ordered by effect.  ``loads`` are the load components that the campaign
+    records, such as ``["fx"]``.
     """
     return [h for effect in LIBRARY.values() for h in _of(effect, conditions, loads)]
 
@@ -93,7 +95,7 @@ def hypotheses(conditions: Conditions, loads: Sequence[str]) -> list[Hypothesis]
 def _of(
     effect: Effect, conditions: Conditions, loads: Sequence[str]
 ) -> Iterator[Hypothesis]:
-    """Yield hypotheses of one effect."""
+    """Yield the hypotheses of one effect."""
     for covariate in effect.needs:
         values = getattr(conditions, covariate)
         if not np.isfinite(values).all() or not np.any(values):
@@ -123,9 +125,10 @@ def _of(
 def _choices(
     effect: Effect, unknowns: tuple[Unknown, ...], loads: Sequence[str]
 ) -> Iterator[list[Unknown]]:
-    """Yield subsets of an effect's unknowns if it has no frames, first all."""
+    """Yield subsets of an effect's unknowns if it has no frames; all of them first."""
     if effect.follows_load:
-        # an offset in a direction never loaded belongs to another candidate model
+        # an offset in a direction without recorded load belongs to another candidate
+        # model
         kept = {f"offset.{name}" for name in loads}
         unknowns = tuple(
             u for u in unknowns if u.name in kept or "offset." not in u.name
@@ -143,7 +146,7 @@ def _choices(
 def _groupings(
     places: tuple[str, ...], each: int
 ) -> Iterator[tuple[tuple[str, ...], ...]]:
-    """Yield groupings of frames: own numbers, one for all, by kind, single frames."""
+    """Yield ways to divide frames into groups that have their unknowns in common."""
     if not places:
         return
     kinds: dict[str, list[str]] = {}
@@ -182,7 +185,7 @@ def _scanned(
 
 
 def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis]:
-    """Return the hypotheses that combine with a declared effect to a single one.
+    """Return the hypotheses that combine with a declared effect to a single effect.
 
     Contact laws and delays are left out if one is declared.  A drift has the declared
     time constant, and springs may be stiffer than declared.
@@ -206,12 +209,13 @@ def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis
     return list(kept)
 
 
-_CURVED = ("contact_stiffening", "delayed_expansion")  # two of them are not one
+# effects of which two do not combine to one
+_CURVED = ("contact_stiffening", "delayed_expansion")
 _SPRINGS = ("drive_compliance", "base_compliance")
 
 
 def _stiffer(slot: Slot, soft: Mapping[str, float]) -> Slot:
-    """Return a slot of compliances, which may be negative down to the declared ones."""
+    """Return a slot of compliances, which may cancel the declared ones."""
     names = [
         n.removesuffix(".compliance").replace("compliance.", "stiffness.")
         for n in slot.names
@@ -221,7 +225,7 @@ def _stiffer(slot: Slot, soft: Mapping[str, float]) -> Slot:
 
 
 def _held(slot: Slot, constant: float) -> Slot:
-    """Return a slot of a drift, its time constant held."""
+    """Return a slot of a drift with its time constant fixed."""
     if slot.names != ("time_constant",):
         return slot
     unknown = replace(slot.unknown, lower=constant, upper=constant, scan=())
@@ -231,11 +235,11 @@ def _held(slot: Slot, constant: float) -> Slot:
 def with_sessions(
     listed: Sequence[Hypothesis], sessions: Sequence[str], further: Sequence[str] = ()
 ) -> list[Hypothesis]:
-    """Return hypotheses, and those that may differ from session to session.
+    """Return the hypotheses, and additional ones with parameters for each session.
 
     If there are several sessions, each effect of :data:`PER_SESSION` and ``further``
-    that shares no number among frames is listed a second time, with numbers for every
-    session.
+    that shares no parameter among frames is listed a second time, with parameters for
+    every session.
     """
     if len(sessions) < 2:
         return list(listed)
@@ -249,18 +253,18 @@ def with_sessions(
 
 
 def _each(h: Hypothesis, sessions: Sequence[str]) -> Hypothesis:
-    """Return a hypothesis with numbers for every session."""
+    """Return a hypothesis with separate parameters for every session."""
     slots = (replace(slot, session=name) for name in sessions for slot in h.slots)
     return replace(h, slots=tuple(slots))
 
 
 def sessions_of(h: Hypothesis) -> tuple[str | None, ...]:
-    """Return the sessions for which a hypothesis has own numbers, else None alone."""
+    """Return sessions for which a hypothesis has separate parameters, or (None,)."""
     return tuple(dict.fromkeys(slot.session for slot in h.slots)) or (None,)
 
 
 def in_one_session(h: Hypothesis, session: str | None) -> tuple[Hypothesis, NDArray]:
-    """Return a hypothesis of one session, as if of all, and its slots."""
+    """Return a hypothesis of one session as if it were of all, and its slots."""
     own = [k for k, s in enumerate(h.slots) if s.session in (None, session)]
     slots = tuple(replace(h.slots[k], session=None) for k in own)
     return replace(h, slots=slots), np.array(own, dtype=int)

@@ -1,7 +1,7 @@
 """Functions that act at several places, and cubic springs.
 
 Examples: all bodies swell with humidity; all drives have backlash.  The form is the
-same at all places; each place has its own coefficients.
+same at all places; each place has separate coefficients.
 """
 
 import math
@@ -21,14 +21,15 @@ from validation.diagnosis.function_forms import CandidateShape, is_angle
 from validation.diagnosis.functions import Functions
 from validation.diagnosis.gaussian import SIZES
 
-_CUBIC = CandidateShape("powers", ("2",))  # compliance proportional to wrench^2
+# compliance proportional to the squared wrench
+_CUBIC = CandidateShape("powers", ("2",))
 Parts = tuple[CandidatePart, ...]
 
 
 def joint_functions(functions: Functions, rows: NDArray) -> list[Element]:
-    """Return functions at several places and cubic springs that affect the readings.
+    """Return functions at several places, and cubic springs, that affect the readings.
 
-    Their columns are those of the cells of the given rows.
+    Their columns are computed for the cells of the given rows.
     """
     some = functions.at_rows(rows)
     listed: list[tuple[Candidate, float]] = []
@@ -41,7 +42,7 @@ def joint_functions(functions: Functions, rows: NDArray) -> list[Element]:
 
 
 def _of_wrench(functions: Functions) -> list[tuple[Candidate, float]]:
-    """Return springs at all joints that are cubic or have a knee, and backlash."""
+    """Return backlash, and springs at all joints that are cubic or have a knee."""
     names = functions.places.names
     joints = [p[0] for p in names if len(p) == 1 and p[0][2] == "compliance"]
     prior = -math.log(4.0 * max(len(functions.variables), 1) * max(len(joints), 1))
@@ -58,7 +59,7 @@ def _of_wrench(functions: Functions) -> list[tuple[Candidate, float]]:
 
 
 def _knees(functions: Functions, name: str, component: str) -> list[CandidateShape]:
-    """Return laws with a knee for the load of a drive or a spring along its motion."""
+    """Return laws with a knee for the load of a drive or spring along its motion."""
     robot = functions.conditions.robot
     frame, axis = robot.frame(name), AXES.index(component)
     if axis != frame.own_axis or name not in (*drives(robot), *elastic_joints(robot)):
@@ -69,7 +70,7 @@ def _knees(functions: Functions, name: str, component: str) -> list[CandidateSha
 
 
 def _by_kind(functions: Functions) -> Iterator[tuple[str, Parts, list[CandidateShape]]]:
-    """Return functions of all bodies, and of all drives' own coordinates."""
+    """Return functions of all bodies, and of the coordinates of all drives."""
     for kind, parts in places_of(functions.campaign.robot, functions.variables):
         if len(parts) > 1:
             known = functions.known(parts[0].variable)
@@ -82,7 +83,7 @@ def _by_kind(functions: Functions) -> Iterator[tuple[str, Parts, list[CandidateS
 def _at_drives(
     functions: Functions,
 ) -> Iterator[tuple[str, Parts, list[CandidateShape]]]:
-    """Return functions of all drives: shared variables, and backlash over a turn."""
+    """Return functions of all drives: common variables, and backlash over a turn."""
     conditions, robot = functions.conditions, functions.campaign.robot
     own = [(f.name, (AXES[f.own_axis],)) for f in robot.frames if f.actuated]
     if len(own) < 2:

@@ -39,19 +39,21 @@ from validation.diagnosis.trace import FINITE, Traced
 from validation.diagnosis.verdict import by_names, verdict
 from validation.diagnosis.whitening import independent, size_of_noise, whitening_of
 
-# rms of held-out rows, in sigma, that counts as noise for any probability
+# [sigma] rms of held-out rows below which a residual counts as noise, for any
+# probability
 _LOOSE = 1.25
-_SHARE = 0.5  # relative to the readings: largest share of determined unknowns
+# largest number of determined unknowns, relative to the number of readings
+_SHARE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A machine fitted without the rows that judge it.
+    """A machine fitted without the rows on which it is tested.
 
     Attributes:
         fit: the machine.
-        used: (R,) bool, rows that were fitted.
-        held: (R,) bool, rows that judge it.
+        used: (R,) bool, True for fitted rows.
+        held: (R,) bool, True for held-out rows.
     """
 
     fit: MachineFit
@@ -69,8 +71,8 @@ def judge(
         campaign: campaign of R rows, as measured.
         traced: result of the search.
         fit: the machine that is saved.
-        held: the rows that judge.
-        folds: machines fitted without them.
+        held: the held-out rows.
+        folds: machines fitted without the held-out rows.
 
     Returns:
         The diagnosis.
@@ -109,7 +111,7 @@ def judge(
     if FINITE in names:
         conditions = replace(conditions, second_order=0.0)
     declared = np.asarray(campaign.measured - predict(conditions).deviation)
-    if held.how == "split":  # after judging, the saved machine is fitted to all rows
+    if held.how == "split":  # after the test, the saved machine is fitted to all rows
         fit, correlated = _of_all_rows(believed, traced, fit, used | rows)
         left = residual_of(campaign, fit.robot)
     varies, following = [], None
@@ -156,8 +158,8 @@ def judge(
 
 
 def _noisy(campaign: Campaign, traced: Traced) -> Campaign:
-    """Return the campaign with the noise that is used to judge residuals."""
-    # sigma as stated, unless it is part of the noise in common
+    """Return the campaign with the noise by which residuals are judged."""
+    # the stated sigma, unless a part of it is the shared noise
     common = traced.campaign.common
     if common is None:
         return campaign
@@ -168,7 +170,7 @@ def _noisy(campaign: Campaign, traced: Traced) -> Campaign:
 def _outlying_held(
     campaign: Campaign, traced: Traced, held: HeldOut, residual: NDArray
 ) -> NDArray:
-    """Return the (R,) bool, outliers among the rows that judge."""
+    """Return (R,) bool: outliers among the held-out rows."""
     outliers = np.zeros(len(campaign), dtype=bool)
     judged = campaign.take(held.rows)
     whitened = np.nan_to_num(whiten(judged, residual[held.rows]))
@@ -180,7 +182,7 @@ def _outlying_held(
 def _of_all_rows(
     believed: Campaign, traced: Traced, fit: MachineFit, rows: NDArray
 ) -> tuple[MachineFit, NoiseInTime | None]:
-    """Return the fit of the same unknowns to more rows, with the noise found."""
+    """Return the fit of the same unknowns to more rows, with the estimated noise."""
     more = believed.cells & ~traced.campaign.cells
     sigma = np.where(more, traced.selected.noise.tau, 1.0) * believed.sigma
     believed = replace(believed, sigma=sigma)
@@ -191,7 +193,7 @@ def _of_all_rows(
 def _with_noise_in_time(
     fitting: Campaign, fit: MachineFit
 ) -> tuple[MachineFit, NoiseInTime | None]:
-    """Return the fit with the covariance due to noise correlated in time, if any."""
+    """Return the fit with the larger covariance if noise is correlated in time."""
     noise = noise_in_time(fitting, fit.residual)
     if noise is None or not len(fit.x):
         return fit, noise
@@ -203,7 +205,7 @@ def _fails(
     campaign: Campaign, folds: Sequence[Judged], residual: NDArray, rows: NDArray,
     lack: LackOfFit,
 ) -> bool:  # fmt: skip
-    """Return whether held-out rows show more than noise and the fit's uncertainty."""
+    """Return whether held-out residuals exceed noise and the fit's uncertainty."""
     squares, count = 0.0, 0
     for one in folds:
         own = campaign.cells & (one.held & rows)[:, None] & np.isfinite(residual)
@@ -224,14 +226,14 @@ def _fails(
 
 
 def _too_few(campaign: Campaign, used: NDArray, determined: float, fails: bool) -> bool:
-    """Return whether too few rows leave the verdict undecided."""
+    """Return whether the verdict is undecided because there are too few rows."""
     blocks = len(np.unique(blocks_of(campaign)[0][used]))
     many = determined > _SHARE * int(campaign.cells[used].sum())
     return many or (fails and blocks <= FEWEST)
 
 
 def _needed(campaign: Campaign, fit: MachineFit) -> str:
-    """Return the rows that would decide, in words."""
+    """Return a description of the rows that would decide."""
     components = max(1, int(campaign.cells.any(axis=0).sum()))
     wanted = float(fit.determined.sum()) / _SHARE / components
     blocks = len(np.unique(campaign.configuration))
@@ -244,7 +246,7 @@ def _needed(campaign: Campaign, fit: MachineFit) -> str:
 
 
 def _uncertainty(campaign: Campaign, residual: NDArray, rows: NDArray) -> float:
-    """Return the standard error of the held-out rms in sigma, by scatter of blocks."""
+    """Return the standard error of the held-out rms in sigma, from block scatter."""
     z = np.where(campaign.cells, residual / campaign.sigma, np.nan)[rows]
     _, block = np.unique(blocks_of(campaign)[0][rows], return_inverse=True)
     sums = np.bincount(block, np.nansum(z**2, axis=1))
@@ -256,7 +258,7 @@ def _uncertainty(campaign: Campaign, residual: NDArray, rows: NDArray) -> float:
 
 
 def _impossible(campaign: Campaign) -> tuple[str, ...]:
-    """Return a remark on rows with impossible readings, or none."""
+    """Return a remark on rows with impossible readings; empty if there are none."""
     ids = [campaign.ids[i] for i in np.flatnonzero(impossible_rows(campaign))]
     if not ids:
         return ()

@@ -1,8 +1,8 @@
-"""Tests whether a residual is noise; its outliers and trends if it is not.
+"""Tests whether a residual is noise, and its outliers and trends.
 
 The residual is compared with the stated sigma and with repeats.  A trend is a group of
-functions of one variable (a component of the pose, the load, a covariate) which all six
-components of the reading follow, each with its own coefficients.
+functions of one variable (a component of the pose, the load, a covariate).  All six
+components of the reading follow it, each with separate coefficients.
 
 Sources:
     Draper, Smith, Applied Regression Analysis, 3rd ed., section 2.1 (lack of fit and
@@ -24,9 +24,10 @@ from validation.diagnosis.separability import orthonormal_basis
 
 SIGNIFICANT = 1e-4  # probability below which a residual is not noise
 UNLIKELY = 1e-3  # probability below which one of many tested residuals is unlikely
-OUTLIERS = 20  # at most one row in 20 may be an outlier
-_LEVELS = 30  # bins over a covariate's range; rows of a bin count as replicates
-_OUTLYING = 5.5  # rms of an outlying row, in medians of all rows
+OUTLIERS = 20  # number of rows for each accepted outlier
+# number of bins over a covariate's range; rows of one bin count as replicates
+_LEVELS = 30
+_OUTLYING = 5.5  # rms of an outlying row, relative to the median of all rows
 _MOST = 6  # largest number of trends that are reported
 
 
@@ -35,14 +36,16 @@ class LackOfFit:
     """Result of the test of a residual.
 
     Attributes:
-        rms: [-] of the whitened residual, with degrees of freedom.
-        probability: probability of a residual as large by noise of the stated sigma.
+        rms: [-] rms of the whitened residual, with degrees of freedom.
+        probability: probability that noise of the stated sigma causes a residual as
+            large.
         repeats: [-] rms scatter between repeats, whitened; NaN without repeats.
-        repeats_freedom: [-] its degrees of freedom.
-        against_repeats: probability of a residual as large by noise of the repeats'
-            scatter.
-        common: whether the noise common to points of one measurement was estimated from
-            the residual itself; repeats must then show it too.
+        repeats_freedom: [-] degrees of freedom of this scatter.
+        against_repeats: probability that noise with the scatter of the repeats causes a
+            residual as large.
+        common: whether the noise that points of one measurement share was estimated
+            from the residual itself; the residual is then significant only if repeats
+            show it too.
     """
 
     rms: float
@@ -54,7 +57,7 @@ class LackOfFit:
 
     @property
     def significant(self) -> bool:
-        """Whether the residual is more than noise, by sigma and by repeats."""
+        """Whether the residual exceeds the noise, by sigma and by repeats."""
         by_repeats = self.against_repeats < SIGNIFICANT
         if self.sigma_too_small:
             return by_repeats
@@ -62,7 +65,7 @@ class LackOfFit:
 
     @property
     def sigma_too_small(self) -> bool:
-        """Whether repeats scatter more than sigma."""
+        """Whether repeats scatter more than sigma states."""
         if not self.repeats_freedom:
             return False
         squares = self.repeats**2 * self.repeats_freedom
@@ -73,12 +76,12 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
     """Test a residual.
 
     Args:
-        campaign: campaign of R rows, N measured cells.
-        residual: (N,) whitened, independent in every cell if it is noise.
-        unknowns: number of unknowns fitted.
+        campaign: campaign of R rows with N measured cells.
+        residual: (N,) whitened residual; if it is noise, its cells are independent.
+        unknowns: number of fitted unknowns.
 
     Returns:
-        The judgement.
+        The result of the test.
     """
     rss = float(residual @ residual)
     freedom = max(1, len(residual) - unknowns)
@@ -89,8 +92,8 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
     repeats, between = repeat_scatter(residual, group)
     against = 1.0
     if between and freedom > between:
-        # scatter beyond repeats: lack of fit over pure error, which is zero where a
-        # device rounds and repeats are equal
+        # scatter beyond repeats, that is lack of fit over pure error; repeats scatter
+        # by zero where a device rounds to equal readings
         excess = (rss - between * repeats**2) / (freedom - between)
         ratio = excess / repeats**2 if repeats else (np.inf if excess > 0 else 0.0)
         against = float(f.sf(ratio, freedom - between, between))
@@ -102,9 +105,9 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
 
 
 def _alike(campaign: Campaign) -> NDArray:
-    """Return the (R,) number of the conditions: command, load, covariates but time."""
-    # alike: no covariate differs by more than a thirtieth of its range, so that an
-    # effect that is not modelled does not count as noise
+    """Return (R,) numbers of conditions: command, load, covariates except time."""
+    # conditions are alike if no covariate differs by more than a thirtieth of its
+    # range, so that an effect that is not modelled does not count as noise
     parts = [campaign.repeat]
     for name, values in campaign.covariates.items():
         span = float(np.ptp(values))
@@ -117,22 +120,23 @@ def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> 
     """Return the rows whose residuals are outliers.
 
     Args:
-        campaign: campaign of R rows, N measured cells.
-        residual: (N,) whitened.
-        most: largest number of outliers; one row in twenty if absent.
+        campaign: campaign of R rows with N measured cells.
+        residual: (N,) whitened residual.
+        most: largest number of outliers; by default one row in twenty.
 
     Returns:
-        (R,) bool.
+        (R,) bool, True for an outlier.
 
     Sources:
-        Baarda (1968), A testing procedure for use in geodetic networks: the largest
-        first.
+    Baarda (1968), A testing procedure for use in geodetic networks: the largest
+    residual is tested first.
     """
     rows = np.nonzero(campaign.cells)[0]
     squares = np.bincount(rows, residual**2, minlength=len(campaign))
     cells = np.bincount(rows, minlength=len(campaign))
     rms = np.sqrt(squares / np.maximum(cells, 1))
-    # a row of few cells is noisier: compared with the largest noise of its size
+    # a row with few cells scatters more, so it is compared with the largest noise of
+    # its size
     far = rms > _OUTLYING * max(float(np.median(rms)), 1.0)
     most = len(campaign) // OUTLIERS if most is None else most
     if far.sum() > most:
@@ -145,9 +149,9 @@ class Trend:
     """A variable with which a residual varies.
 
     Attributes:
-        against: the variable in words.
-        share: [-] of the squared whitened residual that it explains.
-        probability: probability of so large a share by noise, over all trends tried.
+        against: description of the variable.
+        share: [-] share of the squared whitened residual that the variable explains.
+        probability: probability that noise causes a share as large in any tested trend.
     """
 
     against: str
@@ -158,15 +162,15 @@ class Trend:
 def trends(
     campaign: Campaign, conditions: Conditions, residual: NDArray
 ) -> list[Trend]:
-    """Return variables with which a residual varies, the strongest first.
+    """Return the variables with which a residual varies, the strongest first.
 
     Args:
         campaign: campaign of R rows.
-        conditions: its conditions.
-        residual: (R, 6) [rad, m]; NaN where not measured.
+        conditions: conditions of the campaign.
+        residual: (R, 6) [rad, m] residual; NaN where not measured.
 
     Returns:
-        At most six trends that are unlikely for noise.
+        At most six trends that noise is unlikely to cause.
     """
     z = residual / campaign.sigma
     tried = list(_candidates(campaign, conditions))
@@ -178,7 +182,7 @@ def trends(
 def _candidates(
     campaign: Campaign, conditions: Conditions
 ) -> Iterator[tuple[str, NDArray]]:
-    """Yield names, and functions (R, p) without the constant."""
+    """Yield names of variables, and functions (R, p) without the constant."""
     loads = campaign.loads
     force = loads[:, 3:]
     size = np.linalg.norm(force, axis=1)
@@ -210,13 +214,13 @@ def _candidates(
 
 
 def _powers(x: NDArray) -> NDArray:
-    """Return (R, 2): a quantity about its mean, and its square."""
+    """Return (R, 2): a quantity minus its mean, and the square of this."""
     centred = x - x.mean()
     return np.column_stack([centred, centred**2])
 
 
 def _test(name: str, X: NDArray, z: NDArray, tried: int) -> Trend | None:
-    """Return the F test of functions with a constant, in all components."""
+    """Return the F test of functions, with a constant, in all components."""
     before = after = 0.0
     extra = freedom = 0
     for column in z.T:

@@ -1,8 +1,8 @@
 """Range of the data a model was identified on, and rows that extrapolate beyond it.
 
 A function of a covariate, and any other effect, is known only in the covariate's range.
-The angle of a joint that has made a full turn is compared modulo a turn, unless the
-file has a function of it that does not repeat after a turn.
+If a joint has made a full turn, its angle is compared modulo a turn, unless the file
+has a function of the angle that does not repeat after a turn.
 """
 
 from collections.abc import Iterator
@@ -17,9 +17,10 @@ from assembly.model.function import Function
 from assembly.model.robot import Robot
 from validation.campaign.campaign import LOAD, Campaign
 
-_MARGIN = 0.05  # relative to a range: accepted extrapolation
-_SAME = 1e-3  # relative to a value: accepted difference if a variable never varied
-# forms that repeat after a turn of any variable; then those of the first alone
+_MARGIN = 0.05  # relative to the width of a range: accepted extrapolation
+_SAME = 1e-3  # relative to a value: accepted difference if the variable never varied
+# forms that repeat after a turn of any variable, then forms that repeat only after a
+# turn of the first variable
 _PERIODIC = ("waves", "reversal_waves", "scaled_waves", "reversal", "slip")
 
 
@@ -28,10 +29,10 @@ class Beyond:
     """A variable outside the range in which a robot was identified.
 
     Attributes:
-        variable: its public name.
-        learned: least and largest value of the range.
-        now: least and largest value in the rows.
-        rows: number of rows outside.
+        variable: public name of the variable.
+        learned: smallest and largest value of the range.
+        now: smallest and largest value in the rows.
+        rows: number of rows outside the range.
         count: number of all rows.
     """
 
@@ -57,9 +58,10 @@ class Beyond:
 
 
 def learned_range(campaign: Campaign, rows: NDArray) -> dict[str, tuple[float, float]]:
-    """Return least and largest value of all variables in some rows, except time.
+    """Return the smallest and largest value of every variable in some rows.
 
-    They are drives, components of the load and covariates, by public name.
+    The variables are drives, components of the load and covariates except time, by
+    public name.
     """
     ranges = {}
     for name, values in _variables(campaign).items():
@@ -70,10 +72,10 @@ def learned_range(campaign: Campaign, rows: NDArray) -> dict[str, tuple[float, f
 
 
 def beyond(robot: Robot, campaign: Campaign) -> tuple[Beyond, ...]:
-    """Return variables outside the range in which a robot was identified.
+    """Return the variables outside the range in which a robot was identified.
 
-    A variable is listed if it is outside by more than a twentieth of its range; none if
-    the robot's file has no range.
+    A variable is listed if it exceeds its range by more than a twentieth of the width.
+    The list is empty if the robot's file states no range.
     """
     left = []
     for name, values, outside in _outside(robot, campaign):
@@ -84,7 +86,7 @@ def beyond(robot: Robot, campaign: Campaign) -> tuple[Beyond, ...]:
 
 
 def beyond_by_row(robot: Robot, campaign: Campaign) -> NDArray:
-    """Return the (R,) names of variables outside the range in each row, or empty."""
+    """Return (R,) texts: the variables outside the range in each row, or empty."""
     names = np.full(len(campaign), "", dtype=object)
     for name, _, outside in _outside(robot, campaign):
         names[outside] = [f"{before} {name}".strip() for before in names[outside]]
@@ -94,7 +96,7 @@ def beyond_by_row(robot: Robot, campaign: Campaign) -> NDArray:
 def _outside(
     robot: Robot, campaign: Campaign
 ) -> Iterator[tuple[str, NDArray, NDArray]]:
-    """Yield name, (R,) values and (R,) bool of every variable outside its range."""
+    """Yield name, (R,) values and (R,) bool of each variable outside its range."""
     variables = _variables(campaign)
     for name, (low, high) in robot.learned_range.items():
         values = variables.get(name, np.zeros(0))
@@ -108,7 +110,7 @@ def _outside(
 
 
 def _repeats(robot: Robot, name: str) -> bool:
-    """Return whether the robot is unchanged after a turn of a variable."""
+    """Return whether the robot is unchanged after a full turn of a variable."""
     turning = [f"q.{f.name}" for f in robot.frames if f.joint == "revolute"]
     return name in turning and all(
         _turns_over(function, name)
@@ -118,13 +120,13 @@ def _repeats(robot: Robot, name: str) -> bool:
 
 
 def _turns_over(function: Function, name: str) -> bool:
-    """Return whether a function repeats after a turn of one of its variables."""
+    """Return whether a function repeats after a full turn of one variable."""
     forms = _PERIODIC if name == function.variables[0] else _PERIODIC[:2]
     return function.form in forms and "period" not in function.parameters
 
 
 def _variables(campaign: Campaign) -> dict[str, NDArray]:
-    """Return the (R,) values of all variables, by public name."""
+    """Return the (R,) values of all variables by public name."""
     robot = campaign.robot
     variables = {
         f"q.{name}": campaign.coordinates[:, robot.index(name)]
@@ -132,6 +134,6 @@ def _variables(campaign: Campaign) -> dict[str, NDArray]:
     }
     variables |= {f"load.{a}": w for a, w in zip(LOAD, campaign.loads.T, strict=True)}
     for name, values in campaign.covariates.items():
-        if name != "time":  # every session has its own time
+        if name != "time":  # time is counted separately in each session
             variables["approach" if name == "approach" else f"cov.{name}"] = values
     return variables

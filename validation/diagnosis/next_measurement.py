@@ -1,13 +1,14 @@
 """The measurement that would decide between two candidate models.
 
-If model A is true, model B fitted to the same readings errs in a further measurement by
-d.  The covariance J C J' is the part that B could still adapt.  The measurement with
+If model A is true, a further measurement differs by d from the prediction of model B,
+fitted to the same readings.  J C J' is the covariance by which B could still adapt.
+The measurement with the largest non-centrality
 the greatest non-centrality
 
     d' (I + J C J')^-1 d     (whitened)
 
-distinguishes them best.  The smaller of the values for A against B and B against A is
-used.
+distinguishes the models best.  The smaller one of the values for A against B and for B
+against A is used.
 
 Sources:
     Atkinson, Fedorov (1975), The design of experiments for discriminating between two
@@ -27,12 +28,14 @@ from assembly.measurement.predict import predict
 from validation.campaign.campaign import LOAD, Campaign
 from validation.diagnosis.fit import MachineFit
 
-_TRIED = 240  # number of conditions tried
-_FURTHER = 1.5  # factor on the range of loads and covariates used so far
-_STEP = 1e-3  # relative to a standard deviation: step for derivatives
-# relative to the largest non-centrality: conditions above it are equally good
+_TRIED = 240  # number of conditions that are tried
+# factor by which the tried range of loads and covariates exceeds the measured range
+_FURTHER = 1.5
+_STEP = 1e-3  # relative to a standard deviation: step of the derivatives
+# relative to the largest non-centrality; conditions above it are considered equally
+# good
 _AS_GOOD = 0.97
-_DECIDES = 1.0  # [-] least non-centrality worth a measurement
+_DECIDES = 1.0  # [-] smallest non-centrality that justifies a measurement
 
 
 @dataclass(frozen=True)
@@ -40,11 +43,12 @@ class NextMeasurement:
     """A measurement that would decide between models.
 
     Attributes:
-        why: reason in words.
+        why: the reason as text.
         configuration: commanded coordinates or pose by column name.
         load: (6,) [N m, N] at the reference point, base axes.
-        covariates: covariates, such as a temperature to be set.
-        power: [-] non-centrality of one such reading; 10 decides nearly always.
+        covariates: values of covariates to be set, such as a temperature.
+        power: [-] non-centrality of one reading under these conditions; 10 decides
+            nearly always.
     """
 
     why: str
@@ -60,22 +64,22 @@ def next_measurement(
     fit: MachineFit,
     rivals: Sequence[MachineFit],
 ) -> NextMeasurement | None:
-    """Return the measurement that would decide between a fit and its likeliest rival.
+    """Return the measurement that decides between a fit and its most probable rival.
 
-    The search covers the configurations measured so far and others between any two of
-    them that the robot can reach.  Loads and covariates may exceed their ranges by
-    half. If a rival is indistinguishable from the fit (a longer bar and a turned
-    encoder may be equivalent) the next rival is used.
+    The search covers the measured configurations, and reachable configurations between
+    any two of them.  Loads and covariates may exceed their measured ranges by half.  If
+    a rival is indistinguishable from the fit (for example a longer bar and a rotated
+    encoder), the next rival is used.
 
     Args:
         campaign: the measurements.
-        conditions: its conditions, as declared and registered.
+        conditions: declared conditions of the campaign, registered.
         fit: the best model.
-        rivals: other models, likeliest first.
+        rivals: other models, most probable first.
 
     Returns:
-        The measurement, None if none of those tried distinguishes any rival from the
-        fit.
+        The measurement; None if none of the tried measurements distinguishes any rival
+        from the fit.
     """
     tried = _conditions_tried(conditions)
     sigma = np.nanmedian(campaign.sigma, axis=0)
@@ -84,7 +88,8 @@ def next_measurement(
     for rival in rivals:
         b, Jb, Cb = _model(tried, rival, sigma)
         powers = np.minimum(_power(a - b, Jb, Cb), _power(b - a, Ja, Ca))
-        # among conditions as good as the best, the one with the least load
+        # among conditions nearly as good as the best one, the one with the smallest
+        # load
         good = powers >= _AS_GOOD * powers.max()
         best = int(np.argmin(np.where(good, size, np.inf)))
         if powers[best] >= _DECIDES:
@@ -97,7 +102,7 @@ def _measurement(
     campaign: Campaign, tried: Conditions, best: int, power: float,
     fits: Sequence[MachineFit],
 ) -> NextMeasurement:  # fmt: skip
-    """Return one of the conditions tried, in words and numbers."""
+    """Return one of the tried conditions as text and numbers."""
     sets = [sorted({e.hypothesis.effect for e in one.effects}) for one in fits]
     names = [" + ".join(effects) or "nothing" for effects in sets]
     why = (
@@ -112,7 +117,7 @@ def _measurement(
 
 
 def _conditions_tried(conditions: Conditions) -> Conditions:
-    """Return conditions to choose from: reachable, with wider loads and covariates."""
+    """Return reachable conditions to try, with wider ranges of loads and covariates."""
     rng = np.random.default_rng(0)
     tried = _between(conditions.take(rng.integers(0, len(conditions), _TRIED)), rng)
     largest = np.abs(conditions.load).max(axis=0)
@@ -120,7 +125,8 @@ def _conditions_tried(conditions: Conditions) -> Conditions:
     temperature = tried.temperature
     if np.isfinite(temperature).all():
         low, high = conditions.temperature.min(), conditions.temperature.max()
-        # a campaign at one temperature: ten kelvin are possible in a workshop
+        # if a campaign has one temperature, a change by ten kelvin is assumed to be
+        # possible
         span = max(_FURTHER * (high - low), 10.0)
         temperature = rng.choice([low, (low + high) / 2, low + span], _TRIED)
     approach = tried.approach
@@ -135,8 +141,9 @@ def _conditions_tried(conditions: Conditions) -> Conditions:
 
 
 def _between(measured: Conditions, rng: np.random.Generator) -> Conditions:
-    """Return the conditions with half of the configurations moved towards others."""
-    if measured.rest is not None:  # known only for measured configurations
+    """Return conditions with half of the configurations moved towards other ones."""
+    # rest positions are known only for measured configurations
+    if measured.rest is not None:
         return measured
     actuated = np.array([frame.actuated for frame in measured.robot.frames])
     q = np.where(actuated, measured.coordinates, np.nan)
@@ -148,7 +155,8 @@ def _between(measured: Conditions, rng: np.random.Generator) -> Conditions:
     for i, posture in enumerate(postures):
         if posture is not None:
             coordinates[i], transforms[i] = posture.coordinates, posture.transforms
-    # second orders of the declared errors are in both models, and unknown elsewhere
+    # second-order terms of the declared errors are equal in both models; unknown
+    # elsewhere
     return replace(
         measured, coordinates=coordinates, transforms=transforms, second_order=0.0
     )
@@ -158,7 +166,7 @@ def _model(
     tried: Conditions, fit: MachineFit, sigma: NDArray
 ) -> tuple[NDArray, NDArray, NDArray]:
     """Return (S, 6) whitened predictions with a machine's effects, and derivatives."""
-    # a session's own numbers do not apply to another measurement
+    # parameters of one session do not apply to another measurement
     parts = [one for one in fit.effects if one.session is None]
     places = [fit.unknowns.place(one) for one in parts]
     chosen = np.concatenate([np.arange(len(fit.x))[own] for own in [slice(0), *places]])
@@ -174,7 +182,7 @@ def _model(
         return predict(conditions).deviation / sigma
 
     model = read(fit.x, finite)
-    # finite motions hardly change the slopes, and take a hundred times longer
+    # finite motions hardly change the slopes, but take a hundred times longer
     middle = read(fit.x, False) if finite else model
     J = np.zeros((*middle.shape, len(chosen)))
     for k, place in enumerate(chosen):
@@ -188,11 +196,11 @@ def _model(
 
 
 def _power(d: NDArray, J: NDArray, C: NDArray) -> NDArray:
-    """Return the (S,) non-centrality of errors d with J C J' open; 0 if not finite."""
+    """Return (S,) non-centrality of d if J C J' is not determined; 0 if not finite."""
     S = np.eye(d.shape[1]) + np.einsum("sik,kl,sjl->sij", J, C, J)
     good = np.isfinite(d).all(axis=1) & np.isfinite(S).all(axis=(1, 2))
     powers = np.zeros(len(d))
-    # S is 1 plus a matrix that is semidefinite up to rounding, which may be large
+    # S is 1 plus a matrix that is semidefinite except for rounding, which may be large
     values, vectors = np.linalg.eigh(S[good])
     along = np.einsum("sij,si->sj", vectors, d[good])
     powers[good] = np.sum(along**2 / np.maximum(values, 1.0), axis=1)
@@ -200,7 +208,7 @@ def _power(d: NDArray, J: NDArray, C: NDArray) -> NDArray:
 
 
 def _configuration(campaign: Campaign, tried: Conditions, row: int) -> dict[str, float]:
-    """Return the command of some conditions, by the columns of the campaign."""
+    """Return the command of a tried condition, by the columns of the campaign."""
     if campaign.commanded == "joints":
         return {
             f"q.{frame.name}": float(tried.coordinates[row, i])
@@ -215,6 +223,6 @@ def _configuration(campaign: Campaign, tried: Conditions, row: int) -> dict[str,
 
 
 def load_text(load: Sequence[float]) -> str:
-    """Return a load as on the command line."""
+    """Return a load in the format of the command line."""
     parts = [f"{name}={w:g}" for name, w in zip(LOAD, load, strict=True) if w]
     return ",".join(parts) or "none"

@@ -1,7 +1,7 @@
 """Noise: its scale relative to the stated sigma, and blunders.
 
-A reading is good, with distribution N(0, tau^2), or with a probability of one in five
-thousand a blunder, thirty times as wide.
+A reading is good, with distribution N(0, tau^2).  With a probability of one in five
+thousand it is a blunder, with a standard deviation thirty times as large.
 
 Sources:
     Box, Tiao (1968), A Bayesian approach to some outlier problems, Biometrika 55, 119.
@@ -16,24 +16,25 @@ from scipy.stats import chi2
 from forcefit.results.text import readings_text
 
 _BLUNDERS = 2e-4  # prior probability of a blunder
-_WIDTH = 30.0  # standard deviation of blunders over tau
-_LEFT_OUT = 1e-12  # relative precision of a blunder
-_CLEAR = 10.0  # residual over tau: least size of a blunder before a model is fitted
-_MANY = 0.05  # largest share of blunders, as in the judgement; more indicate an effect
-_UNLIKE = 4.0  # standard deviations of tau from 1 above which it is reported
-_CLOSE = 0.2  # least ln tau that is reported: accuracy of a stated sigma
-_CHANCE = 1e-4  # p-value below which repeats are not repeatable
+_WIDTH = 30.0  # standard deviation of a blunder, relative to tau
+_LEFT_OUT = 1e-12  # relative precision assigned to a blunder
+_CLEAR = 10.0  # smallest residual over tau of a blunder, before a model is fitted
+# largest share of blunders, as in the final test; a larger share indicates an effect
+_MANY = 0.05
+_UNLIKE = 4.0  # standard deviations by which tau must differ from 1 to be reported
+_CLOSE = 0.2  # smallest reported abs(ln tau): accuracy of a stated sigma
+_CHANCE = 1e-4  # p-value below which repeats are called not repeatable
 _MEDIAN = 0.4549  # median of chi-square with one degree of freedom
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Estimated noise.
+    """Estimated noise of a campaign.
 
     Attributes:
-        tau: true over stated sigma.
-        tau_std: its standard deviation.
-        findings: sentences for the user.
+        tau: ratio of true to stated sigma.
+        tau_std: standard deviation of tau.
+        findings: sentences on the noise for the user.
         common: [rad, m] standard deviations of rotation and translation of the motion
             that the points of one measurement share.
     """
@@ -45,11 +46,11 @@ class Noise:
 
 
 def probability_good(squares: NDArray, *, clearly: bool = False) -> NDArray:
-    """Return the (n,) probability that each reading is good, from expected squares.
+    """Return (n,) probabilities that readings are good, from expected squares.
 
-    It is 1 if the reading is more likely good, and for all readings if there are too
-    many outliers.  ``clearly`` requires large residuals, because effects are not fitted
-    yet.
+    The result is 1 for a reading that is more probably good than not, and for all
+    readings if there are too many outliers.  With ``clearly``, only large residuals
+    count as outliers, because effects are not fitted yet.
     """
     v = max(float(np.median(squares)) / _MEDIAN, 1e-12)
     with np.errstate(over="ignore", under="ignore"):
@@ -63,7 +64,7 @@ def probability_good(squares: NDArray, *, clearly: bool = False) -> NDArray:
 
 
 def cell_weights(good: NDArray) -> NDArray:
-    """Return (n,) relative precisions: 1 for a good reading, nearly 0 for a blunder."""
+    """Return (n,) relative precisions: 1 for good readings, nearly 0 for blunders."""
     return np.maximum(good, _LEFT_OUT)
 
 
@@ -80,12 +81,12 @@ def findings(
     tau: float, tau_std: float, repeats: tuple[float, int], *, memory: bool,
     common: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[str, ...]:  # fmt: skip
-    """Return sentences about the noise; none if it is as stated.
+    """Return sentences on the noise; none if the noise is as stated.
 
     Args:
-        tau: true over stated sigma.
-        tau_std: its standard deviation.
-        repeats: result of :func:`repeat_scatter`, from the residual.
+        tau: ratio of true to stated sigma.
+        tau_std: standard deviation of tau.
+        repeats: result of :func:`repeat_scatter` for the residual.
         memory: whether the model depends on earlier rows.
         common: [rad, m] noise that the points of a measurement share.
 
@@ -98,7 +99,7 @@ def findings(
         sizes = readings_text(named, digits=3)
         told.append(f"noise common to the points of a row: {sizes}")
         if not repeats[1]:
-            unsure = "a cause that was not recorded would look the same"
+            unsure = "an unrecorded cause has the same effect"
             told[0] += f"; without repeats {unsure}"
     if abs(np.log(tau)) > max(_UNLIKE * tau_std / tau, _CLOSE):
         told.append(f"the residual is {tau:.2g} times the stated sigma")

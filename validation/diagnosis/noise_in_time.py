@@ -1,21 +1,21 @@
-r"""Noise correlated in time: its size, and the wider intervals due to it.
+r"""Noise correlated in time: its size, and the wider intervals that it causes.
 
-Within a session each component of a reading has noise that is partly white and partly
-an Ornstein-Uhlenbeck process.  Over sigma, between times t_i and t_j,
+Within a session, the noise of each component of a reading is partly white and partly an
+Ornstein-Uhlenbeck process.  Its correlation between times t_i and t_j is
 
     R_ij = (1 - a) delta_ij + a exp(-|t_i - t_j| / tau).
 
 ======  =============  =========  ====================================================
 symbol  code           shape      meaning
 ======  =============  =========  ====================================================
-a       ``share``                 of the variance that is correlated
+a       ``share``                 share of the variance that is correlated
 tau     ``constant``              [s] correlation time
 G       ``slopes``     (N, k)     change of the whitened readings per unknown
-H       ``covariance`` (k, k)     (G'G)^-1, of the unknowns by white noise
+H       ``covariance`` (k, k)     (G'G)^-1, covariance of the unknowns for white noise
 ======  =============  =========  ====================================================
 
-Fits remain those for white noise; with R instead of 1 their covariance is H G'R G H.
-The likelihood of a and tau is computed by a Kalman filter on a grid of both.
+Fits assume white noise.  If the correlation is R instead of 1, their covariance is H
+G'R G H. The likelihood of a and tau is computed by a Kalman filter on a grid of both.
 
 Sources:
     Uhlenbeck, Ornstein (1930), On the theory of the Brownian motion, Phys. Rev. 36.
@@ -33,9 +33,9 @@ from validation.campaign.campaign import Campaign
 from validation.diagnosis.lack_of_fit import SIGNIFICANT
 
 _SHARES = np.array([0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95])
-# number of time constants from the usual step of time to the longest session
+# number of time constants between the usual time step and the longest session
 _CONSTANTS = 12
-_FEWEST = 30  # least number of rows with a time
+_FEWEST = 30  # smallest number of rows with a time
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,9 @@ class NoiseInTime:
     """Noise that is partly an Ornstein-Uhlenbeck process.
 
     Attributes:
-        share: [-] of the variance that is correlated.
+        share: [-] share of the variance that is correlated.
         constant: [s] correlation time.
-        probability: probability of as much correlation by white noise.
+        probability: probability that white noise shows a correlation as large.
     """
 
     share: float
@@ -57,12 +57,13 @@ def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
     """Estimate the correlation of a residual in time.
 
     Args:
-        campaign: campaign of R rows, N measured cells.
-        residual: (N,) whitened.
+        campaign: campaign of R rows with N measured cells.
+        residual: (N,) whitened residual.
 
     Returns:
         Share and time constant of the largest likelihood.  None if the rows have no
-        time or are few, or if white noise looks as correlated in one case in 10^4.
+        time or are few, or if white noise shows this correlation more often than once
+        in 10^4 cases.
     """
     if "time" not in campaign.covariates or len(campaign) < _FEWEST:
         return None
@@ -76,7 +77,8 @@ def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
     for times, z in series:
         more = _innovations(times, z, constants)
         squares, logs = squares + more[0], logs + more[1]
-    # the size of the noise is free: a sigma that is too large does not look white
+    # the variance of the noise is estimated too, because with a too large sigma the
+    # residual does not look white
     count = len(residual)
     gain = count * np.log(residual @ residual / squares) - logs
     best = np.unravel_index(np.argmax(gain), gain.shape)
@@ -89,19 +91,19 @@ def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
 def widened(
     covariance: NDArray, slopes: NDArray, campaign: Campaign, noise: NoiseInTime
 ) -> NDArray:
-    """Return the covariance of unknowns that were fitted as if noise were white.
+    """Return the covariance of unknowns that were fitted for white noise.
 
     Args:
-        covariance: (k, k) by white noise.
-        slopes: (N, k) of the estimates' weights: the estimates are the covariance times
-            their products with the whitened readings.
-        campaign: campaign of R rows, N measured cells.
+        covariance: (k, k) covariance for white noise.
+        slopes: (N, k) weights: the estimates are the covariance times the products of
+            the weights with the whitened readings.
+        campaign: campaign of R rows with N measured cells.
         noise: the correlated noise.
 
     Returns:
-        (k, k).
+        (k, k) covariance for the correlated noise.
     """
-    along = np.zeros_like(slopes)  # (R - 1) G
+    along = np.zeros_like(slopes)  # product (R - 1) G
     for times, cells in _series(campaign):
         fading = np.exp(-np.diff(times) / noise.constant)
         for own, fades in ((cells, fading), (cells[::-1], fading[::-1])):
@@ -113,7 +115,7 @@ def widened(
 
 
 def _series(campaign: Campaign) -> Iterator[tuple[NDArray, NDArray]]:
-    """Yield the series of each component, point and session: times and cells."""
+    """Yield the times and cells of each component, point and session."""
     rows, columns = np.nonzero(campaign.cells)
     time = campaign.covariates["time"][rows]
     own = [
@@ -130,7 +132,7 @@ def _series(campaign: Campaign) -> Iterator[tuple[NDArray, NDArray]]:
 def _innovations(
     times: NDArray, z: NDArray, constants: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the sums over a series of v^2/S and ln S, (shares, constants)."""
+    """Return the sums over a series of v^2/S and of ln S, (shares, constants)."""
     share = _SHARES[:, None]
     fading = np.exp(-np.diff(times)[:, None] / constants)
     mean = np.zeros((len(_SHARES), len(constants)))

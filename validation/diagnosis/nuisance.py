@@ -1,8 +1,8 @@
 """Nuisance parameters: geometric errors and compliances that every machine has.
 
-No frame is made exactly as drawn, and no part is rigid.  Each of these unknowns has a
-Gaussian prior about its declared value: from the frame's ``tolerance``, or with a
-standard deviation common to a group, which the readings determine.
+No frame is manufactured exactly as drawn, and no part is rigid.  Each of these unknowns
+has a Gaussian prior about its declared value.  Its standard deviation is the frame's
+``tolerance``, or is common to a group and determined by the readings.
 """
 
 from collections.abc import Container
@@ -22,22 +22,23 @@ from validation.diagnosis.signatures import UNSEEN, whiten
 GEOMETRY, SPRINGS = "geometry", "springs"
 KINDS = ("rotation", "translation")
 LARGEST_TURN = 0.2  # [rad] largest error of a drive, a frame or a device
-LARGEST_SHIFT = 0.1  # relative to the robot's size: largest plausible translation
-# relative to the largest column of a group: smaller ones move no reading
+# relative to the robot's size: largest plausible translation of a frame
+LARGEST_SHIFT = 0.1
+# relative to the largest column of a group; smaller columns change no reading
 _ROUNDING = 1e-9
 _SAME = 1 - 1e-6  # cosine above which two columns are equal
 
 
 @dataclass(frozen=True, eq=False)
 class Nuisance:
-    """k unknowns of geometric errors and springs.
+    """k unknown geometric errors and spring compliances.
 
     Attributes:
         columns: (N, k) change of the whitened readings per unknown.
-        spring: (k,) whether it is a spring; its compliance cannot be negative.
+        spring: (k,) bool, True for a spring, whose compliance cannot be negative.
         frame, axis: (k,) row of the frame in the campaign's robot, and component of the
-            screw there, 0 to 5.
-        given: (k,) declared standard deviation, or NaN.
+            screw at the frame, 0 to 5.
+        given: (k,) declared standard deviation; NaN where none is declared.
         most: (k,) largest plausible standard deviation.
     """
 
@@ -50,7 +51,7 @@ class Nuisance:
 
     @property
     def group(self) -> NDArray:
-        """(k,) 0 and 1 rotations and translations of frames, 2 and 3 of springs."""
+        """(k,) 0 and 1 for rotations and translations of frames, 2 and 3 of springs."""
         return 2 * self.spring + self.axis // 3
 
     @property
@@ -59,7 +60,7 @@ class Nuisance:
         return bool(np.isfinite(self.given).any())
 
     def take(self, unknowns: NDArray) -> "Nuisance":
-        """Return a selection of the unknowns, by a mask (k,) or numbers."""
+        """Return selected unknowns, by a mask (k,) or by indices."""
         return Nuisance(
             self.columns[:, unknowns], self.spring[unknowns], self.frame[unknowns],
             self.axis[unknowns], self.given[unknowns], self.most[unknowns],
@@ -70,16 +71,16 @@ def nuisance(
     campaign: Campaign, conditions: Conditions, response: Responses, named: NDArray,
     kinds: Container[str] = (GEOMETRY, SPRINGS),
 ) -> Nuisance:  # fmt: skip
-    """Return geometric errors and springs that affect a campaign's readings.
+    """Return the geometric errors and springs that affect a campaign's readings.
 
-    Random springs describe compliance distributed over many joints.  A spring with the
-    same column as a single unknown of a library effect (N, c) ``named`` is that effect,
-    and left out.  ``response`` is of the conditions as declared.
+    The springs describe compliance distributed over many joints.  A spring is left out
+    if its column equals the column of a single unknown of a library effect (N, c)
+    ``named``. ``response`` is the response under declared conditions.
     """
     robot, n = campaign.robot, len(campaign.robot.frames)
     own = [conditions.robot.index(frame.name) for frame in robot.frames]
     screws, carried = response.screws[:, :, own], response.wrenches[:, own]
-    # frames of closures and of the platform have no spring of their own
+    # frames of closures and of the platform cannot have a joint spring
     carried[:, [not _may_give(robot, f.name) for f in robot.frames]] = 0.0
     changes = np.concatenate([screws, screws * carried[:, None]], axis=2)
     given = np.full((2 * n, 6), np.nan)
@@ -108,25 +109,25 @@ def _may_give(robot: Robot, name: str) -> bool:
 
 
 def visible(small: Nuisance) -> NDArray:
-    """Return the (k,) bool of unknowns visible within their group, and at all."""
+    """Return (k,) bool: unknowns that are visible within their group, and at all."""
     size = np.linalg.norm(small.columns, axis=0)
     largest = np.zeros(4)
     np.maximum.at(largest, small.group, size)
-    # a tolerance of zero declares a direction exact
+    # a tolerance of zero declares a direction as exact
     shown = (size > _ROUNDING * largest[small.group]) & ~(small.given == 0.0)
     return np.asarray(shown & (size > UNSEEN / small.most))
 
 
 def _is_among(columns: NDArray, named: NDArray) -> NDArray:
-    """Return (k,) bool: columns (N, k) equal to others except for their size."""
+    """Return (k,) bool: columns (N, k) that equal named ones except for their size."""
     unit = [c / np.maximum(np.linalg.norm(c, axis=0), 1e-300) for c in (named, columns)]
     return np.asarray((np.abs(unit[0].T @ unit[1]) > _SAME).any(axis=0))
 
 
 def with_error(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot:
-    """Return a robot whose geometric errors are larger by x (k,) [rad, m].
+    """Return a robot with geometric errors increased by x (k,) [rad, m].
 
-    At frames (k,), rows of the robot's, in components (k,) of the screw there, 0 to 5.
+    x acts at frames (k,), given as rows, in components (k,) of the screw, 0 to 5.
     """
     errors = robot.errors.copy()
     np.add.at(errors, (frame, axis), x)
@@ -136,8 +137,8 @@ def with_error(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot
 def with_compliance(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot:
     """Return a robot with x (k,) [rad/(N m), m/N] in series with its joints.
 
-    At frames (k,), rows of the robot's, in components (k,) of the screw there, 0 to 5;
-    0 changes nothing.
+    x acts at frames (k,), given as rows, in components (k,) of the screw, 0 to 5; a
+    value of 0 changes nothing.
     """
     frames = list(robot.frames)
     for i, a, c in zip(frame.tolist(), axis.tolist(), x.tolist(), strict=True):

@@ -1,7 +1,7 @@
 """Places at which a function can act, with the responses of the readings.
 
-A place is a component of a screw at a frame, at the base or in the reading, a component
-of the load, or several components at the same frame.  Places with equal responses are
+A place is a component of a screw at a frame, at the base or in the reading; a component
+of the load; or several components at the same frame.  Places with equal responses are
 listed once.
 """
 
@@ -22,11 +22,12 @@ from validation.diagnosis.sensitivities import Sensitivities
 from validation.diagnosis.signatures import fingerprints
 from validation.diagnosis.whitening import Whitening
 
-Where = tuple[str, str, str]  # place, component, kind
-# largest unrecorded force over the largest recorded one, such as a cable's
+Where = tuple[str, str, str]  # place, component, kind of candidate
+# ratio of the largest unrecorded force, such as a cable's, to the largest recorded
+# force
 _HEAVY = 10.0
 _FORCE = 1000.0  # [N] largest unrecorded force where no load is recorded
-# largest number of columns of a form whose products are cached, to limit memory
+# largest number of columns of a form whose products are cached, which limits memory
 _REMEMBERED = 8
 
 
@@ -35,10 +36,10 @@ class Weighted:
     """Weighted responses at all places, in selected cells.
 
     Attributes:
-        rows: (R,) rows with a selected cell.
-        answers: (S, R, 6) responses, zero in other cells.
+        rows: (R,) rows that have a selected cell.
+        answers: (S, R, 6) responses, zero in cells that are not selected.
         squares: (S, R) sums of squares over the cells of a row.
-        beside: (pairs, R) the same of two components of a combination.
+        beside: (pairs, R) sums of products of two components of a combination.
         cells: row and component of the selected cells.
         known: cache of inner products by form.
     """
@@ -68,10 +69,10 @@ class Places:
 
     Attributes:
         names: components of each place.
-        members: indices of the S single components of each place.
-        equal: other components with the same response.
+        members: indices of the S single components that form each place.
+        equal: other components with the same response as a place.
         most: largest plausible unknown of each place.
-        sizes: for each number of components: places, members and rotations among them.
+        sizes: for each number of components: places, members and number of rotations.
     """
 
     def __init__(self, campaign: Campaign, sensitivities: Sensitivities) -> None:
@@ -97,7 +98,7 @@ class Places:
         return len(self.names)
 
     def _listed(self) -> tuple[list[Where], list[tuple[Where, ...]]]:
-        """Return single components and combinations."""
+        """Return all single components and combinations."""
         singles: list[Where] = [("load", force, "screw") for force in LOADS[3:]]
         combined = [tuple(singles)]
         for kind, (part, *others) in places_of(self._campaign.robot, [""]):
@@ -109,7 +110,7 @@ class Places:
         return sorted(singles, key=self._preference), combined
 
     def _list_singles(self, singles: list[Where]) -> None:
-        """List single components with distinct responses."""
+        """List the single components with distinct responses."""
         over_sigma = np.where(self._campaign.cells, 1 / self._campaign.sigma, 0.0)
         shown, answers = [], []
         for where in singles:
@@ -133,7 +134,7 @@ class Places:
         self.number = {own[0]: k for k, each in enumerate(same) for own in each}
 
     def _list_combinations(self, combined: list[tuple[Where, ...]]) -> None:
-        """List combinations of components of one frame."""
+        """List the combinations of components of one frame."""
         known = {frozenset(members) for members in self.members}
         for own in combined:
             shown = [w for w in own if w in self.number]
@@ -145,7 +146,7 @@ class Places:
                 self.equal.append([])
 
     def _preference(self, where: Where) -> tuple[bool, bool, bool]:
-        """Return the sort key: drives' own motions, other frames, other places."""
+        """Return sort key: motions of drives, then other frames, then other places."""
         name, component, kind = where
         frames = {f.name: f for f in self._campaign.robot.frames}
         frame = frames.get(name)
@@ -153,7 +154,7 @@ class Places:
         return kind != "screw", not own, frame is None
 
     def plausible(self, where: Where) -> float:
-        """Return the largest plausible unknown: displacement, compliance or force."""
+        """Return the largest plausible unknown: a displacement, compliance or force."""
         name, component, kind = where
         conditions = self._sensitivities.conditions
         if name == "load":
@@ -169,10 +170,10 @@ class Places:
         return most / size if size > 0 else 0.0
 
     def weighted(self, cells: NDArray, whiten: Whitening) -> Weighted:
-        """Return weighted responses at all places in cells (N,) bool.
+        """Return the weighted responses at all places in cells (N,) bool.
 
-        Rows of one measurement have equal variables, so that a response times a
-        function is whitened like the response.
+        Rows of one measurement have equal variables, so a response times a function is
+        whitened like the response alone.
         """
         row, component = (axis[cells] for axis in np.nonzero(self._campaign.cells))
         rows, row = np.unique(row, return_inverse=True)

@@ -1,8 +1,9 @@
-"""Implausible numbers of a machine, and impossible readings of a sensor.
+"""Implausible parameters of a machine, and impossible readings of a sensor.
 
-A fit may explain readings by a base that is 29 m away on a foundation as soft as
+A fit may explain readings by a base that is 29 m away, on a foundation as soft as
 rubber. The plausible ranges are wide, relative to the robot's size and the largest
-load.  Beyond them another cause is likely, and no effect is claimed.
+load.  A parameter beyond its range probably has another cause, and no effect is
+claimed.
 
 Sources:
     Ashby, Materials Selection in Mechanical Design, 4th ed., figure 4.11 (expansion of
@@ -25,16 +26,17 @@ from validation.diagnosis.nuisance import (
     LARGEST_TURN,
 )
 
-_GIVES = 0.2  # [rad, sizes] largest deformation under the largest load
-_MADE = (0.1, 0.02)  # [rad, sizes] largest geometric errors of a manufactured frame
-_HOT = 150.0  # [K] largest distance from the calibration temperature
-_G = 9.81  # [m/s^2]
+_GIVES = 0.2  # [rad, robot sizes] largest plausible deformation under the largest load
+# [rad, robot sizes] largest plausible geometric error of a manufactured frame
+_MADE = (0.1, 0.02)
+_HOT = 150.0  # [K] largest plausible distance from the calibration temperature
+_G = 9.81  # [m/s^2] acceleration of gravity
 _FACTORS = {"load_gain": (0.3, 3.0), "modulus_scale": (0.2, 5.0)}
 _LIKELY = "check the declared stiffness, the units and the registration"
 
 
 def impossible_rows(campaign: Campaign) -> NDArray:
-    """Return (R,) bool: rows with a temperature that is impossible at a machine."""
+    """Return (R,) bool: rows with a temperature that no machine can have."""
     wrong = np.zeros(len(campaign), dtype=bool)
     for name, values in campaign.covariates.items():
         if "temperature" in name:
@@ -43,19 +45,20 @@ def impossible_rows(campaign: Campaign) -> NDArray:
 
 
 def implausible(campaign: Campaign, fit: MachineFit) -> tuple[str, ...]:
-    """Return implausible numbers of a fitted machine, one sentence each."""
+    """Return one sentence for each implausible parameter of a fitted machine."""
     return tuple(f"{one}: {_LIKELY}" for one in _implausible(campaign, fit))
 
 
 def _implausible(campaign: Campaign, fit: MachineFit) -> Iterator[str]:
-    """Yield statements on implausible numbers."""
+    """Yield a statement for each implausible parameter."""
     robot, size = campaign.robot, size_of(campaign.robot)
     force = float(np.abs(campaign.loads[:, 3:]).max())
     force += _G * sum(frame.mass for frame in robot.frames)
     moment = float(np.abs(campaign.loads[:, :3]).max()) + force * size
-    reach = ", so compliant that the loads would move the platform out of reach"
+    reach = ", so compliant that the loads move the platform out of its workspace"
     shift = LARGEST_SHIFT * size
-    ranges = {  # by unit: least, largest, and the statement beyond them
+    # by unit: smallest and largest plausible value, and the statement beyond them
+    ranges = {
         "rad": (-LARGEST_TURN, LARGEST_TURN, f", larger than {LARGEST_TURN:.2g}"),
         "m": (-shift, shift, f", larger than {shift:.2g}"),
         "N/m": (force / (_GIVES * size), np.inf, reach),
@@ -83,11 +86,11 @@ def _implausible(campaign: Campaign, fit: MachineFit) -> Iterator[str]:
 def _parameters(
     campaign: Campaign, fit: MachineFit
 ) -> Iterator[tuple[str, str, float]]:
-    """Yield effect, name and value of the parameters found; a drift at its end."""
+    """Yield effect, parameter and value; for a drift its value at the end."""
     bare = campaign.robot.without_effects()
     for one in fit.effects:
         values = one.hypothesis.public(bare, fit.own(one)[0])
-        if one.session is None:  # the values of the robot's file are added
+        if one.session is None:  # in one session, values are added to those of the file
             machine = fit.robot.effects.get(one.hypothesis.effect, {})
             values = {k: machine.get(k, v) for k, v in values.items()}
         went = 1.0

@@ -1,7 +1,7 @@
-"""Readings of a saved robot: the one function for fitting and judging robots.
+"""Readings of a saved robot, by the one function that fits and tests use.
 
-A diagnosis fits a robot through it and prints the robot's errors through it, and
-``forcefit validation predict`` prints readings of the saved file through it.
+A diagnosis fits a robot and computes the robot's errors with this function, and
+``forcefit validation predict`` computes the readings of the saved file with it.
 """
 
 from dataclasses import replace
@@ -18,15 +18,16 @@ from validation.diagnosis.signatures import conditions_of
 
 
 def finite_conditions(campaign: Campaign, rows: NDArray | None = None) -> Conditions:
-    """Return the conditions of a campaign with finite motions, as of a real machine.
+    """Return the conditions of a campaign with finite motions, as in a real machine.
 
     Args:
         campaign: campaign of R rows.
-        rows: selection by numbers or a mask; their readings may depend on earlier rows.
+        rows: numbers or mask of the rows to return; their readings may depend on
+            earlier rows.
 
     Returns:
-        Their conditions; for a robot with clearance those of the linear model, since
-        its rest position without a load is undetermined.
+        The conditions of these rows.  For a robot with clearance they are those of the
+        linear model, because its rest position without a load is undetermined.
     """
     conditions = conditions_of(campaign)
     if rows is not None:
@@ -43,17 +44,17 @@ def predicted(
 
     Args:
         campaign: campaign of R rows; its readings are not used.
-        robot: other than the campaign's, of the same frames and closures.
-        linear: whether motions are small, for a model without finite motions.
+        robot: robot with the same frames and closures as the campaign's.
+        linear: whether motions are small, as in a model without finite motions.
 
     Returns:
-        The readings, with the robot's registration.
+        The predicted readings, with the robot's registration.
     """
     campaign = replace(campaign, robot=campaign.robot if robot is None else robot)
     return predict((conditions_of if linear else finite_conditions)(campaign))
 
 
 def residual_of(campaign: Campaign, robot: Robot, *, linear: bool = False) -> NDArray:
-    """Return (R, 6) [rad, m] readings minus predicted ones; NaN if not measured."""
+    """Return (R, 6) [rad, m] readings minus predicted readings; NaN if not measured."""
     deviation = predicted(campaign, robot, linear=linear).deviation
     return np.asarray(campaign.measured - deviation)

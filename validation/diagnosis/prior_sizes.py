@@ -1,10 +1,12 @@
 """Prior standard deviations of groups of unknowns by maximum evidence.
 
-With posterior mean mu and covariance V of the unknowns of a group and s their size,
+With posterior mean mu and covariance V of the unknowns of a group, and their prior
+standard deviation s,
 
     d ln p(z) / d ln s = sum of [(mu^2 + V)/s^2 - 1],
 
-which is zero for s^2 = sum mu^2 / sum (1 - V/s^2): MacKay's step, with a limit.
+which is zero for s^2 = sum mu^2 / sum (1 - V/s^2).  This is MacKay's step, with a
+limit.
 
 Sources:
     MacKay (1992), Bayesian interpolation, Neural Computation 4, 415.
@@ -22,23 +24,25 @@ from validation.diagnosis.gaussian import FREEDOM, deviance, size_penalty
 
 Eigen = tuple[NDArray, NDArray]
 _STEPS = 25  # largest number of steps; about ten are needed
-_SETTLED = 0.03  # change of ln s that ends the iteration: the evidence is flat there
-_LEAP = 4.0  # largest factor of change in a step
-_BEGIN = 4.0  # [sigma] start value of a group's contribution to the readings
-_LEAST = 1e-2  # [sigma] contribution below which a size is 0
+# change of ln s that ends the iteration, because the evidence is flat there
+_SETTLED = 0.03
+_LEAP = 4.0  # largest factor by which s changes in a step
+_BEGIN = 4.0  # [sigma] contribution of a group to the readings at the start values
+# [sigma] contribution to the readings below which a standard deviation is set to 0
+_LEAST = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
 class Sizes:
-    """Optimised prior standard deviations and the posterior.
+    """Optimised prior standard deviations, and the posterior.
 
     Attributes:
         std: (k,) prior standard deviation of every unknown, over the noise's scale tau.
-        of_group: standard deviations by group.
+        of_group: prior standard deviation of each group.
         mean: (k,) posterior mean.
         covariance: (k, k) posterior covariance, over tau^2.
-        squares: z' C^-1 z.
-        log_det: ln det C.
+        squares: value of z' C^-1 z.
+        log_det: value of ln det C.
         cost: penalty of the optimisation, see :func:`.gaussian.size_penalty`.
     """
 
@@ -52,7 +56,7 @@ class Sizes:
 
     @property
     def determined(self) -> NDArray:
-        """(k,) 1 for an unknown that the readings determine, 0 for the prior."""
+        """(k,) 1 for an unknown determined by the readings, 0 by the prior only."""
         with np.errstate(divide="ignore", invalid="ignore"):
             share = 1 - np.diag(self.covariance) / self.std**2
         return np.where(self.std > 0, share, 0.0)
@@ -68,7 +72,7 @@ class Grouped:
         squares: sum of squares of the readings.
         count: n, number of readings.
         group: (k,) group of each unknown.
-        given: (k,) fixed standard deviation, or NaN.
+        given: (k,) fixed standard deviation; NaN where it is optimised.
         most: (k,) largest plausible standard deviation.
     """
 
@@ -81,7 +85,7 @@ class Grouped:
     most: NDArray
 
     def without(self, unknowns: NDArray) -> "Grouped":
-        """Return the unknowns without some of them, by number."""
+        """Return the unknowns without those of the given indices."""
         kept = np.delete(np.arange(len(self.along)), unknowns)
         return replace(
             self, gram=self.gram[np.ix_(kept, kept)], along=self.along[kept],
@@ -93,10 +97,10 @@ def best_sizes(
     model: Grouped, start: Mapping[int, float] = MappingProxyType({}),
     eigen: Mapping[int, Eigen] = MappingProxyType({}),
 ) -> Sizes:  # fmt: skip
-    """Return the likeliest prior standard deviations of all groups.
+    """Return the prior standard deviations of all groups with the largest evidence.
 
-    The iteration starts at ``start``; ``eigen`` are eigenvalues and eigenvectors of
-    some groups' blocks of the inner products.
+    The iteration starts at ``start``; ``eigen`` has the eigenvalues and eigenvectors of
+    the blocks of some groups in the inner products.
     """
     given, group, count = model.given, model.group, model.count
     free = np.isnan(given)
@@ -147,15 +151,16 @@ def best_sizes(
 
 @dataclass(frozen=True, eq=False)
 class _Posterior:
-    """Posterior at given standard deviations, in the rotated unknowns over them.
+    """Posterior at given prior standard deviations, in the rotated unknowns.
 
     Attributes:
-        std: (k,) standard deviations.
-        x: (k,) means.
-        determined: (k,) 1 minus the variances; those of the largest group by their sum.
-        left: z' C^-1 z.
-        log_det: ln det C.
-        D, E, L: 1 + s^2 values, C D^-1, and L L' = A - C D^-1 C'.
+        std: (k,) prior standard deviations.
+        x: (k,) posterior means over the standard deviations.
+        determined: (k,) 1 minus relative variances; for the largest group only their
+            sum.
+        left: value of z' C^-1 z.
+        log_det: value of ln det C.
+        D, E, L: 1 + s^2 times eigenvalues, C D^-1, and L L' = A - C D^-1 C'.
     """
 
     std: NDArray
@@ -176,13 +181,13 @@ class _Turned:
 
         M = 1 + S G S = [A  C; C' D],
 
-    because they share one standard deviation, for any value of it.  M is factored by A
-    - C D^-1 C', which is small, while a group may have hundreds of unknowns.
+    because these unknowns share one standard deviation.  M is factored by A - C D^-1
+    C', which is small although a group may have hundreds of unknowns.
 
     Attributes:
         values, V: eigenvalues and eigenvectors of the group's block.
-        group, rest: indices of its unknowns and of all others.
-        inner, across: inner products of the others, and of them with the group.
+        group, rest: indices of the unknowns in this group and of all others.
+        inner, across: inner products among the others, and between them and the group.
         along: (k,) inner products with the readings.
     """
 
@@ -195,7 +200,7 @@ class _Turned:
     along: NDArray
 
     def posterior(self, std: NDArray, squares: float) -> _Posterior:
-        """Return the posterior at standard deviations (k,)."""
+        """Return the posterior at prior standard deviations (k,)."""
         o, g = self.rest, self.group
         s, S = (float(std[g[0]]) if len(g) else 0.0), std[o]
         D = 1.0 + s**2 * self.values
@@ -219,7 +224,7 @@ class _Turned:
         )  # fmt: skip
 
     def back(self, x: NDArray) -> NDArray:
-        """Return unknowns along the last axis, rotated back."""
+        """Return unknowns, along the last axis, in their original axes."""
         turned = x.copy()
         turned[..., self.group] = x[..., self.group] @ self.V.T
         return turned

@@ -1,9 +1,9 @@
 """Errors of functions outside the range of their variable.
 
 Each fifth of the range of a function's variable is predicted by a fit to the other
-fifths, at the model's prior sizes, without refits, by the leave-block-out identity
-(:mod:`.gaussian`).  Random rows lie between others, so they do not test a function,
-such as a wave, outside the range.
+fifths.  The fit uses the prior standard deviations of the model and the leave-block-out
+identity (:mod:`.gaussian`), without iteration.  Random held-out rows are surrounded by
+fitted rows, so they do not test a function, such as a wave, outside its range.
 """
 
 from dataclasses import dataclass
@@ -16,19 +16,19 @@ from validation.diagnosis.candidates import Candidate
 from validation.diagnosis.gaussian import leave_block_out
 from validation.diagnosis.states import State
 
-PARTS = 5  # number of parts of a range, as of folds
-_DISTINCT = 4  # least number of values of a variable in each part
+PARTS = 5  # number of parts of a range, equal to the number of folds
+_DISTINCT = 4  # smallest number of different values of a variable in each part
 
 
 @dataclass(frozen=True)
 class RangeError:
-    """Errors on parts of a variable's range, each left out in turn.
+    """Errors of a function on parts of its variable's range, each left out in turn.
 
     Attributes:
-        variable: its public name.
+        variable: public name of the variable.
         without: [sigma] rms of all readings, predicted by the model without the
             function.
-        after: [sigma] the same with the function.
+        after: [sigma] the same rms with the function.
     """
 
     variable: str
@@ -39,11 +39,11 @@ class RangeError:
 def range_error(
     candidate: Candidate, best: State, without: State, rows: NDArray
 ) -> RangeError | None:
-    """Return the error of a function of a model where it must extrapolate.
+    """Return the error of a function of a model in extrapolation.
 
-    For several variables the largest error is returned, None if none has enough values.
-    ``without`` is the model without the function, ``rows`` (n,) are the rows of the
-    fitted cells.
+    For several variables the largest error is returned; None if no variable has enough
+    values.  ``without`` is the model without the function, ``rows`` (n,) are the rows
+    of the fitted cells.
     """
     conditions = best.readings.columns.conditions
     names = dict.fromkeys(v for part in candidate.parts for v in part.variables)

@@ -17,11 +17,11 @@ from validation.diagnosis.hypotheses import Hypothesis, Slot
 from validation.diagnosis.signatures import conditions_of
 from validation.diagnosis.unknowns import Acting, Unknowns
 
-_FEWEST_POINTS = 3  # least number of points that determine a frame
+_FEWEST_POINTS = 3  # smallest number of points that determine a frame
 
 
 def device_frame(declared: Conditions) -> Hypothesis:
-    """Return the hypothesis of a rotated and shifted measuring frame, six unknowns."""
+    """Return hypothesis of a measuring frame with unknown rotation and translation."""
     unknowns = LIBRARY["registration"].unknowns(declared.robot)
     slots = (Slot((u.name,), u, u.start) for u in unknowns if u.name in BASE)
     return Hypothesis("registration", (), tuple(slots))
@@ -32,10 +32,10 @@ def register(campaign: Campaign, conditions: Conditions) -> Conditions:
 
     Args:
         campaign: rows for the estimate.
-        conditions: all conditions to be registered, of these rows or of more.
+        conditions: conditions to be registered, of these rows or of more rows.
 
     Returns:
-        The same conditions, registered, each session separately.
+        The same conditions, with a registration for each session.
 
     Raises:
         BadInput: too few complete positions and rotations for the estimate, or a
@@ -67,7 +67,7 @@ def _device(campaign: Campaign, own: Conditions) -> dict[str, dict[str, float]]:
 
 
 def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]:
-    """Return a first guess: Kabsch's rotation of points, or the mean of rotations."""
+    """Return start values: Kabsch's rotation of points, or the mean of rotations."""
     model = predict(conditions).deviation
     nominal = conditions.measured_points
     answered = np.isfinite(model).all(axis=1)
@@ -92,27 +92,28 @@ def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]
 def device_rotation(
     points: NDArray, seen: NDArray, turns: NDArray, seen_turns: NDArray
 ) -> NDArray:
-    """Return a device's rotation: the mean of rotations, else Kabsch's.
+    """Return device's rotation: the mean of rotations, or Kabsch's rotation of points.
 
     Args:
-        points: (P, 3) [m] in the base's axes, off one line if there are no rotations.
+        points: (P, 3) [m] in the base's axes; not on one line if there are no
+            rotations.
         seen: (P, 3) [m] the same points in the device's axes.
         turns: (T, 3, 3) orientations in the base's axes.
         seen_turns: (T, 3, 3) the same orientations in the device's axes.
 
     Returns:
-        (3, 3) from the base's axes to the device's.
+        (3, 3) rotation from the base's axes to the device's axes.
     """
     if len(turns):
         gap = seen_turns @ np.swapaxes(turns, 1, 2)
         return Rotation.from_matrix(gap).mean().as_matrix()
-    # it suffices to centre one of two sets of points
+    # it is sufficient to centre one of the two sets of points
     centred = points - points.mean(axis=0)
     return Rotation.align_vectors(seen, centred)[0].as_matrix()
 
 
 def off_one_line(points: NDArray) -> bool:
-    """Return whether (P, 3) points determine a frame."""
+    """Return whether (P, 3) points are not all on one line."""
     if len(points) < _FEWEST_POINTS:
         return False
     size = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)

@@ -1,4 +1,4 @@
-"""Linearise the effects of a model again at their estimates, all together.
+"""Repeated linearisation of the effects of a model at their estimates.
 
 Derivatives at the start values lack three things: products of two effects, nonlinear
 parameters (a time constant, an exponent), and finite motions.  So the prediction with
@@ -17,22 +17,23 @@ from validation.diagnosis.hypotheses import in_one_session, sessions_of
 from validation.diagnosis.signatures import Signature, Tangents
 from validation.diagnosis.states import Models, State
 
-_ROUNDS = 3  # largest number of linearisations, which may oscillate
-MOVED = 0.3  # change of the log posterior that alters no decision
+_ROUNDS = 3  # largest number of linearisations, because they may oscillate
+MOVED = 0.3  # change of the log posterior that does not alter any decision
 _LINEAR = 0.5  # largest accepted squared whitened error of a linearisation
-_SHIFT = 3.0  # largest factor by which a nonlinear parameter changes in a round
+# largest factor by which a nonlinear parameter changes in one linearisation
+_SHIFT = 3.0
 
 
 class Relinearisation:
     """Linearisations of models at their estimates, with a cache."""
 
     def __init__(self, tangents: Tangents, models: Models) -> None:
-        """Start with an empty cache; tangents are of all cells."""
+        """Start with an empty cache; ``tangents`` are those of all cells."""
         self.tangents, self.models = tangents, models
         self._about: dict[object, list[Element] | None] = {}
 
     def relinearised(self, state: State) -> State:
-        """Return a model whose linearisation holds at its estimates."""
+        """Return model linearised until its linearisation is valid at its estimates."""
         for _ in range(_ROUNDS):
             elements = self._again(state)
             if elements is None:
@@ -43,7 +44,7 @@ class Relinearisation:
         return state
 
     def _again(self, state: State) -> tuple[Element, ...] | None:
-        """Return elements linearised at the estimates; None if there is no change."""
+        """Return elements linearised at the estimates; None if nothing changes."""
         own = [
             (k, e)
             for k, e in enumerate(state.elements)
@@ -84,10 +85,10 @@ class Relinearisation:
     def again(
         self, elements: Sequence[Element], xs: Sequence[NDArray]
     ) -> list[Element]:
-        """Return effects linearised at given values of their slots, acting together.
+        """Return effects that act together, linearised at given values of their slots.
 
-        The sum of the returned elements is exact there.  The given ones are returned if
-        the model has no solution there.
+        The sum of the returned elements is exact at these values.  The given elements
+        are returned if the model has no solution there.
         """
         robot = self.tangents.campaign.robot
         middle = self.combined(elements, xs)
@@ -98,7 +99,7 @@ class Relinearisation:
                 return list(elements)
             middle = middle - signature.columns @ x
             made.append(replace(signature, offset=np.zeros_like(middle)))
-        # the joint offset is stored with the first element
+        # the joint offset of all elements is stored with the first one
         made[0] = replace(made[0], offset=middle)
         return [
             replace(effect_element(s, robot, e.log_prior, x), first=e.origin)
@@ -108,7 +109,7 @@ class Relinearisation:
     def _one(
         self, elements: Sequence[Element], xs: Sequence[NDArray], k: int
     ) -> Signature:
-        """Return k-th effect to first order about values, with the others acting."""
+        """Return the k-th effect linearised about values, while the others act."""
         h, offset = elements[k].hypothesis, np.zeros_like(self.tangents.declared)
         columns = np.zeros((len(offset), len(h.slots)))
         for session in _sessions(elements):
@@ -133,7 +134,7 @@ class Relinearisation:
     def _public(
         self, elements: Sequence[Element], xs: Sequence[NDArray], session: str | None
     ) -> dict[str, dict[str, float]]:
-        """Return parameters by their public names, as they act in a session."""
+        """Return parameters by public name, as they act in a session."""
         robot, values = self.tangents.derivatives.conditions.robot, {}
         for e, x in zip(elements, xs, strict=True):
             there, own = in_one_session(e.hypothesis, session)
@@ -142,18 +143,18 @@ class Relinearisation:
 
 
 def _sessions(elements: Sequence[Element]) -> tuple[str | None, ...]:
-    """Return the sessions that effects distinguish, else None alone."""
+    """Return the sessions that the effects distinguish, or (None,)."""
     every = [name for e in elements for name in sessions_of(e.hypothesis)]
     return tuple(dict.fromkeys(name for name in every if name is not None)) or (None,)
 
 
 def _has_shapes(e: Element) -> bool:
-    """Return whether the nonlinear parameters are among the unknowns."""
+    """Return whether the nonlinear parameters are among an element's unknowns."""
     return all(j in e.slots for j, slot in enumerate(e.hypothesis.slots) if slot.shape)
 
 
 def _within(e: Element, x: NDArray) -> NDArray:
-    """Return values with nonlinear parameters limited to one round's change."""
+    """Return values, with nonlinear parameters limited to the change of one round."""
     for j, slot in enumerate(e.hypothesis.slots):
         if slot.shape:
             x[j] = np.clip(x[j], e.begin[j] / _SHIFT, e.begin[j] * _SHIFT)

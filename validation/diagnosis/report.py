@@ -23,7 +23,7 @@ from validation.diagnosis.next_measurement import load_text
 from validation.diagnosis.sentence import calibration_text, open_text
 
 _ASSUMED = (
-    "Errors before and after are of held-out rows, which chose and fitted nothing.",
+    "Errors are computed on held-out rows, used neither to choose nor to fit models.",
     "The noise of the readings is their stated sigma, unless stated otherwise below.",
     "An effect that the library lacks is found as a learned function, or as outside "
     "the library; effects that the design cannot distinguish are named together.",
@@ -38,16 +38,16 @@ def write_report(
     tally: Calibration | None = None,
     provenance: Provenance = NOWHERE,
 ) -> None:
-    """Write the page, whole or not at all.
+    """Write the page of a diagnosis; an incomplete page is never left behind.
 
     Args:
         diagnosis: the diagnosis.
-        path: of the page.
-        tally: simulated success rate on this design, if it was computed.
-        provenance: command and files.
+        path: path of the page.
+        tally: simulated error rates on this design, if they were computed.
+        provenance: the command and the files.
 
     Raises:
-        BadInput: it cannot be written.
+        BadInput: the page cannot be written.
     """
     write_text(report_page(diagnosis, tally, provenance), path)
 
@@ -107,24 +107,24 @@ def report_page(
 
 
 def _section(title: str, content: str) -> list[str]:
-    """Return a section, unless it is empty."""
+    """Return a section, or nothing if its content is empty."""
     return [section(title, content)] if content else []
 
 
 def _tiles(diagnosis: Diagnosis) -> list[Tile]:
-    """Return verdict, error before and after, likeliest effect, next measurement."""
+    """Return tiles: verdict, errors, most probable effect, next measurement."""
     before, after = diagnosis.before, diagnosis.after
     tiles = [Tile("Verdict", [diagnosis.verdict.replace("_", " ")])]
     for kind, unit in (("position", "m"), ("rotation", "rad")):
         values = [getattr(errors, kind) for errors in (before, after)]
-        if all(v == v for v in values):  # NaN: not measured
+        if all(v == v for v in values):  # NaN if not measured
             tiles.append(Tile(f"Error of {kind}, rms", [
                 Value(values[0], unit, 3), " to ", Value(values[1], unit, 3),
-            ], ["before and after, on held-out rows."]))  # fmt: skip
+            ], ["Errors before and after, on held-out rows."]))  # fmt: skip
     names = " + ".join(diagnosis.effects) or "nothing"
     likely = max(diagnosis.probability.values(), default=0.0)
     tiles.append(Tile("Most probable cause", [names.replace("_", " ")],
-                      [f"largest probability of an effect {likely:.3f}."]))  # fmt: skip
+                      [f"Largest probability of an effect {likely:.3f}."]))  # fmt: skip
     if diagnosis.next is not None:
         tiles.append(Tile("Next measurement", [diagnosis.next.why]))
     return tiles
@@ -151,7 +151,7 @@ def _sets(answer: Table) -> str:
 
 
 def _learned(answer: Table) -> str:
-    """Return the table of the functions learned."""
+    """Return the table of the learned functions."""
     rows = [
         [f"{one['where']} {', '.join(one['components'])}", ", ".join(one["variables"]),
          one["form"], one["formula"]]
@@ -162,7 +162,7 @@ def _learned(answer: Table) -> str:
 
 
 def _parameters(answer: Table) -> tuple[str, str]:
-    """Return the title and table of the best set's parameters."""
+    """Return the title and table of the parameters of the most probable set."""
     rows: list[list[Cell]] = [
         [f"{effect['name']}: {p['name']}", Value(p["value"], p["unit"], 6),
          Value(p["std"], p["unit"], 2),
@@ -178,7 +178,7 @@ def _parameters(answer: Table) -> tuple[str, str]:
 
 
 def _structure(answer: Table) -> list[str]:
-    """Return the table of variables with which the residual varies."""
+    """Return the table of the variables with which the residual varies."""
     rows: list[list[Cell]] = [
         [t["against"], f"{100 * t['share']:.0f} %", f"{t['probability']:.1g}"]
         for t in answer["structure"]

@@ -1,8 +1,8 @@
 """Response of the readings to small screws at any frame, and joint wrenches.
 
-Both come from the linear model at the declared state, for all rows together.  A small
-geometric error adds its screw times the response; a spring adds its compliance times
-its wrench times the response.
+Both are computed with the linear model at the declared state, for all rows together. A
+small geometric error changes the readings by its screw times the response; a spring
+changes them by its compliance times its wrench times the response.
 
 ======  =============  ============  =================================================
 symbol  code           shape         meaning
@@ -30,20 +30,20 @@ from assembly.measurement.settled_clearance import (
 )
 from assembly.measurement.without_clearance import flexibility
 
-_STEP = 1e-5  # [rad, m] step of a derivative: central, exact to 1e-10
-# of the largest moment or force: rounding, as in struts between ball joints
+_STEP = 1e-5  # [rad, m] step of a central difference, exact to 1e-10
+# relative to the largest moment or force: smaller ones are rounding
 _ROUNDING = 1e-9
-_AT_ONCE = 50  # number of postures in a batch, to limit memory
+_AT_ONCE = 50  # number of postures in a batch, which limits memory
 
 
 @dataclass(frozen=True, eq=False)
 class Responses:
-    """Responses of R readings of a robot with n frames; see the module's docstring.
+    """Responses of R readings of a robot with n frames; symbols as in the module.
 
     Attributes:
-        reading: (R, 6, 6) per unit platform screw [rad, m].
-        screws: (R, 6, n, 6) per unit screw at a frame, in its axes.
-        wrenches: (R, n, 6) [N m, N] through every joint as declared, in its axes.
+        reading: (R, 6, 6) change per unit platform screw [rad, m].
+        screws: (R, 6, n, 6) change per unit screw at a frame, in its axes.
+        wrenches: (R, n, 6) [N m, N] declared wrench through every joint, in its axes.
     """
 
     reading: NDArray
@@ -52,9 +52,9 @@ class Responses:
 
 
 def responses(conditions: Conditions) -> Responses:
-    """Return the response of R rows to small screws, with clearances at rest.
+    """Return the responses of R rows to small screws, with clearances at rest.
 
-    Rows without a solution have zeros.
+    Rows without a solution are zero.
     """
     tight = _without_clearance(conditions)
     distinct, which = tight.postures.distinct
@@ -75,7 +75,7 @@ def responses(conditions: Conditions) -> Responses:
     screws = np.einsum("rij,rjk->rik", D, platform[which])
     good = np.isfinite(screws).all(axis=(1, 2)) & np.isfinite(wrenches).all(axis=1)
     screws[~good], wrenches[~good] = 0.0, 0.0
-    # moments in struts between ball joints are rounding
+    # struts between ball joints transmit no moment: smaller values are rounding
     wrenches[np.abs(wrenches) < _ROUNDING * np.abs(wrenches).max(initial=0.0)] = 0.0
     return Responses(D, screws.reshape(R, 6, n, 6), wrenches.reshape(R, n, 6))
 
@@ -92,7 +92,7 @@ def _without_clearance(conditions: Conditions) -> Conditions:
 
 
 def _some(postures: Posture, rows: slice) -> Posture:
-    """Return a selection of many postures."""
+    """Return selected postures."""
     return replace(
         postures,
         coordinates=postures.coordinates[rows],

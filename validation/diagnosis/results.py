@@ -19,13 +19,14 @@ from validation.diagnosis.sequence import LEARNED
 
 # verdicts that list effects
 LISTED = {statuses.EXPLAINED, statuses.AMBIGUOUS, statuses.LEARNED}
-_HARDLY = 0.05  # combinations determined; frames with fewer are not listed
-_INTERVAL = 1.645  # standard deviations of a normal distribution: 90 % lie within
+_HARDLY = 0.05  # number of determined combinations below which a frame is not listed
+# number of standard deviations of a normal distribution between which 90 % lie
+_INTERVAL = 1.645
 _UNITS = {GEOMETRY: ("rad", "m"), SPRINGS: ("rad/(N m)", "m/N")}
 
 
 def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
-    """Return the diagnosis in the public format, with a tally if one was simulated."""
+    """Return the diagnosis in the public format, with error rates if simulated."""
     listed = diagnosis.verdict in LISTED
     ids = np.array(diagnosis.campaign.ids)
     noise, held = diagnosis.traced.selected.noise, diagnosis.held
@@ -90,12 +91,12 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
 
 
 def _plain(one: Any) -> dict[str, Any] | None:
-    """Return a dataclass as plain values, if there is one."""
+    """Return a dataclass as plain values; None stays None."""
     return None if one is None else asdict(one)
 
 
 def steps(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return the model sequence; rms in m or, without positions, in rad."""
+    """Return the model sequence, with rms in m or, without positions, in rad."""
     rows = []
     for step in diagnosis.sequence:
         error = step.error
@@ -112,7 +113,7 @@ def steps(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
-    """Return the geometric errors, or springs, of all frames in the public format.
+    """Return the geometric errors, or the springs, of all frames in the public format.
 
     Args:
         diagnosis: a diagnosis.
@@ -160,8 +161,8 @@ def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Return the effects found with their parameters, in the public format.
 
     Returns:
-        The effects; of one that the robot's file declares, the value of the saved
-        robot, the declared value and the difference.
+        The effects; for an effect that the robot's file declares, the saved value, the
+        declared value and the difference.
     """
     bare, shown = diagnosis.campaign.robot.without_effects(), []
     for one in diagnosis.fit.effects:
@@ -171,7 +172,7 @@ def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         shown.append({
             "name": name,
             **({} if one.session is None else {"session": one.session}),
-            # frames found rigid or tight have no parameter
+            # frames found to be rigid or without clearance have no parameter
             "where": [frame for frame in one.hypothesis.where if frame in acting],
             "probability": diagnosis.probability.get(name, 0.0),
             "parameters": [
@@ -193,7 +194,7 @@ def _parameter(p: Parameter, unit: str) -> dict[str, Any]:
 
 
 def _unnamed(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return geometric errors and springs, where no effect of the library is named."""
+    """Return geometric errors and springs, if no effect of the library is named."""
     if diagnosis.effects or diagnosis.fit.unknowns.functions:
         return []
     found = [(words, small(diagnosis, name)) for name, words in WORDS.items()]
@@ -213,7 +214,7 @@ def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     places = places or [len(sequence) - 1]
     shown = []
     for k, functions in enumerate(functions_of(diagnosis)):
-        # in folds fewer functions may have been found
+        # with folds, some fits may have found fewer functions
         at = places[min(k, len(places) - 1)]
         found = diagnosis.traced.selected.functions[k]
         same = [

@@ -1,10 +1,12 @@
-"""Covariance of the numbers in a saved robot file, stored in a separate file.
+"""Covariance of the parameters in a saved robot file, stored in a separate file.
 
-A number of the file is a geometric error, a compliance in series with a joint, a
-parameter of an effect or a parameter of a function.  The file holds their joint
-posterior covariance, so that readings can be predicted with an interval:
+A parameter of the file is a geometric error, a compliance in series with a joint, a
+parameter of an effect or a coefficient of a function.  The covariance file holds the
+joint posterior covariance of all of them, so that readings can be predicted with an
+interval:
 
-    covariance of readings = J C J',  J their derivatives in the numbers.
+    covariance of the readings = J C J',  where J are their derivatives by the
+    parameters.
 """
 
 import io
@@ -29,18 +31,19 @@ from validation.diagnosis.unknowns import STEP, Small, effects_in, with_effects_
 ERROR, COMPLIANCE, EFFECT, FUNCTION = (
     "geometric_error", "joint_compliance", "effect", "function",
 )  # fmt: skip
-_STAYS = 1e-3  # smallest compliance after a correction, over the declared one
+# relative to the declared compliance: smallest compliance after a correction
+_STAYS = 1e-3
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number of a robot file.
+    """A parameter of a robot file.
 
     Attributes:
         kind: one of the four kinds in the module's docstring.
         owner: the frame, the effect, or the index of the function in the file.
         name: the component, or the parameter.
-        session: session of an effect that acts in only one session.
+        session: name of the session of an effect that acts in one session only.
     """
 
     kind: str
@@ -49,7 +52,7 @@ class Number:
     session: str = ""
 
     def of(self, robot: Robot) -> float:
-        """Return the number's value; 0 for a change of a compliance in the file."""
+        """Return the parameter's value; 0 for a change of a compliance in the file."""
         if self.kind == ERROR:
             return float(
                 robot.errors[robot.index(self.owner), READING.index(self.name)]
@@ -62,7 +65,7 @@ class Number:
         return 0.0
 
     def moved(self, robot: Robot, by: float) -> Robot:
-        """Return the robot with the number increased; compliances stay positive."""
+        """Return the robot with the parameter increased; compliances stay positive."""
         if self.kind == ERROR:
             row, axis = robot.index(self.owner), READING.index(self.name)
             return with_error(robot, *map(np.atleast_1d, (row, axis, by)))
@@ -81,7 +84,7 @@ class Number:
         )
 
     def _softened(self, robot: Robot, by: float) -> Robot:
-        """Return the robot whose joint is more, or less, compliant in one direction."""
+        """Return the robot with the compliance of a joint changed in one direction."""
         row, axis = robot.index(self.owner), READING.index(self.name)
         K = robot.frames[row].resistance
         stiffness = np.inf if K is None else float(K[axis, axis])
@@ -96,10 +99,10 @@ class Number:
 
 @dataclass(frozen=True, eq=False)
 class SavedCovariance:
-    """Numbers of a robot file and their covariance.
+    """Parameters of a robot file and their covariance.
 
     Attributes:
-        numbers: k of them.
+        numbers: the k parameters.
         covariance: (k, k) in SI units.
     """
 
@@ -108,12 +111,12 @@ class SavedCovariance:
 
     @property
     def std(self) -> NDArray:
-        """(k,) standard deviations of the numbers."""
+        """(k,) standard deviations of the parameters."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
 
 def covariance_of(fit: MachineFit, robot: Robot) -> SavedCovariance:
-    """Return the covariance of the numbers of a fitted robot's file, to first order."""
+    """Return covariance of the parameters of a fitted robot's file, to first order."""
     numbers = _numbers(fit, robot)
     J = np.zeros((len(numbers), len(fit.x)))
     middle = np.array([n.of(robot) for n in numbers])
@@ -134,10 +137,11 @@ def covariance_of(fit: MachineFit, robot: Robot) -> SavedCovariance:
 
 
 def _value(number: Number, robot: Robot, saved: Robot) -> float:
-    """Return a number's value in a robot near the saved one, 0 if absent."""
+    """Return a parameter's value in a robot near the saved one; 0 if it is absent."""
     if number.kind != FUNCTION:
         return number.of(robot)
-    # a robot nearby may have one function more, with zero numbers in the saved one
+    # the nearby robot may have an additional function, whose coefficients are 0 in the
+    # saved one
     own = saved.functions[int(number.owner)]
     alike = [f for f in saved.functions if _names(f) == _names(own)]
     there = [f for f in robot.functions if _names(f) == _names(own)]
@@ -148,12 +152,12 @@ def _value(number: Number, robot: Robot, saved: Robot) -> float:
 
 
 def _names(function: Function) -> tuple[object, ...]:
-    """Return the properties that distinguish functions of a file."""
+    """Return the properties that distinguish the functions of a file."""
     return function.where, function.variables, function.form, function.kind
 
 
 def _numbers(fit: MachineFit, robot: Robot) -> list[Number]:
-    """Return the numbers of a saved robot that the unknowns change."""
+    """Return the parameters of a saved robot that the unknowns change."""
     numbers = [n for part in fit.unknowns.small for n in _of_frames(part, robot)]
     for one in fit.unknowns.effects:
         effect = one.hypothesis.effect
@@ -168,7 +172,7 @@ def _numbers(fit: MachineFit, robot: Robot) -> list[Number]:
 
 
 def _of_frames(part: Small, robot: Robot) -> list[Number]:
-    """Return numbers of geometric errors or compliances, in the unknowns' order."""
+    """Return parameters of geometric errors or compliances, in the unknowns' order."""
     kind = ERROR if part.name == GEOMETRY else COMPLIANCE
     return [
         Number(kind, robot.frames[row].name, READING[axis])
@@ -177,7 +181,7 @@ def _of_frames(part: Small, robot: Robot) -> list[Number]:
 
 
 def write_covariance(saved: SavedCovariance, path: Path | str) -> None:
-    """Write a covariance as a file of arrays, with the suffix ``.npz``.
+    """Write a covariance as an array file with the suffix ``.npz``.
 
     Raises:
         BadInput: the file cannot be written.
@@ -191,13 +195,13 @@ def write_covariance(saved: SavedCovariance, path: Path | str) -> None:
 
 
 def read_covariance(robot: Robot) -> SavedCovariance | None:
-    """Return the covariance that a robot's file names.
+    """Return the covariance from the file that a robot names.
 
     Returns:
-        None if the file names none.
+        The covariance; None if the robot names no file.
 
     Raises:
-        BadInput: the named file does not exist, or is no covariance of this robot.
+        BadInput: the named file does not exist, or is not a covariance of this robot.
     """
     path = robot.diagnosis.get("covariance")
     if not path:
@@ -212,22 +216,24 @@ def read_covariance(robot: Robot) -> SavedCovariance | None:
         values = [number.of(robot) for number in numbers]
     except FileNotFoundError:
         raise BadInput(f"{path}: no such file; {expected}") from None
-    except Exception:  # a damaged archive raises various exceptions
+    except Exception:  # a damaged archive may raise any exception
         raise BadInput(f"{path}: found other content, {expected}") from None
     if C.shape != (len(values), len(values)) or not np.isfinite(C).all():
-        raise BadInput(f"{path}: found shape {C.shape}, expected {len(values)} squared")
+        raise BadInput(
+            f"{path}: found shape {C.shape}, expected {len(values)} rows and columns"
+        )
     return SavedCovariance(numbers, C)
 
 
 def known_covariance(robot: Robot) -> SavedCovariance:
-    """Return all information of a robot's file on the uncertainty of its numbers.
+    """Return all information on the uncertainty of the parameters in a robot's file.
 
     Returns:
-        The covariance that the file names; numbers that it lacks have the ``tolerance``
-        of frames and the ``std`` of functions, as independent.
+        The covariance that the file names.  Parameters that it lacks are independent,
+        with the ``tolerance`` of frames and the ``std`` of functions.
 
     Raises:
-        BadInput: as :func:`read_covariance`.
+        BadInput: for the same reasons as in :func:`read_covariance`.
     """
     saved = read_covariance(robot) or SavedCovariance((), np.zeros((0, 0)))
     further = {

@@ -1,7 +1,8 @@
-"""The robot saved by a diagnosis: numbers, uncertainty, and range of validity.
+"""The robot saved by a diagnosis: parameters, uncertainty, and range of validity.
 
-The posterior covariance of all numbers is written to a separate file; geometric errors
-have their standard deviation as ``tolerance``, functions as ``std``.
+The posterior covariance of all parameters is written to a separate file.  In the robot
+file, ``tolerance`` is the standard deviation of geometric errors, ``std`` that of
+functions.
 """
 
 import hashlib
@@ -25,10 +26,10 @@ from validation.diagnosis.unknowns import Small
 
 
 def corrected(diagnosis: Diagnosis) -> Robot:
-    """Return the machine found, as it is saved.
+    """Return the robot to be saved.
 
     Returns:
-        The fitted robot with the range of its data, the point measured, the uncertainty
+        The fitted robot with the range of its data, the measured point, the uncertainty
         of its geometric errors, and a record of the diagnosis.
     """
     campaign, robot = diagnosis.campaign, _with_tolerances(diagnosis.fit)
@@ -45,10 +46,11 @@ def corrected(diagnosis: Diagnosis) -> Robot:
 
 
 def functions_of(diagnosis: Diagnosis) -> list[list[Function]]:
-    """Return the learned functions, with their numbers and standard deviations.
+    """Return the learned functions, with coefficients and standard deviations.
 
     Returns:
-        For every learned function one of a robot file, or several of one kind.
+        For every learned function, one function of a robot file, or several of one
+        kind.
     """
     fit, units = diagnosis.fit, diagnosis.campaign.motion_units
     learned = []
@@ -84,8 +86,8 @@ def _with_tolerances(fit: MachineFit) -> Robot:
     for part, own in fit.unknowns.places:
         if not isinstance(part, Small) or part.name != GEOMETRY:
             continue
-        # a component that no reading depends on is as uncertain as its prior, which is
-        # that of the other components of its kind
+        # a component on which no reading depends is as uncertain as its prior, which is
+        # the prior of the other components of its kind
         unseen = np.repeat(
             [part.std[part.axis // 3 == kind].max(initial=0.0) for kind in (0, 1)], 3
         )
@@ -121,7 +123,7 @@ def _record(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _digest(campaign: Campaign) -> str:
-    """Return a digest of a campaign's commands and readings, which identifies it."""
+    """Return a digest of a campaign's commands and readings, to identify it."""
     text = hashlib.sha256()
     for values in (campaign.coordinates, campaign.loads, campaign.measured):
         text.update(np.round(values, 12).tobytes())
@@ -129,7 +131,7 @@ def _digest(campaign: Campaign) -> str:
 
 
 def save(diagnosis: Diagnosis, path: Path | str) -> None:
-    """Write the machine found as a robot file, with its covariance in another file.
+    """Write the machine found as a robot file, and its covariance to another file.
 
     Args:
         diagnosis: the diagnosis.

@@ -1,4 +1,4 @@
-"""Scores of elements that may be added to a model, at given standard deviations."""
+"""Scores of candidate elements, at given prior standard deviations."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -17,15 +17,17 @@ from validation.diagnosis.states import MORE, State
 from validation.diagnosis.weighted_readings import WeightedReadings
 from validation.diagnosis.whitening import Whitening
 
-BEAM = 6  # number of elements that are tried in a model
-OF_NAME = 2  # largest number of them with the same name
-_VARIABLES = 4  # variables whose products with others are scored
-_WIDEST = 600  # most columns of a function at several places, for memory
-_HALVINGS = 6  # halvings of a shape parameter's step; the fit refines it further
+BEAM = 6  # largest number of elements that are tried in a model
+OF_NAME = 2  # largest number of tried elements with the same name
+_VARIABLES = 4  # number of variables whose products with other variables are scored
+# largest number of columns of a function at several places, which limits memory
+_WIDEST = 600
+# number of halvings of a shape parameter's step; the fit refines the parameter further
+_HALVINGS = 6
 
 
 class Scores:
-    """Scores of all candidates, given a model of the same readings."""
+    """Scores of all candidates for a given model of the same readings."""
 
     def __init__(self, readings: WeightedReadings) -> None:
         """Store the readings; scores are computed on first use."""
@@ -48,17 +50,17 @@ class Scores:
 
     @cached_property
     def _library(self) -> Dense:
-        """Effects of the library."""
+        """Effects of the library, prepared for scoring."""
         return self._dense(self.columns.library)
 
     @cached_property
     def _explicit(self) -> Dense:
-        """Functions at several places, in the sampled cells."""
+        """Functions at several places in the sampled cells, prepared for scoring."""
         own = self.readings.cells[self.columns.sampled]
         return Dense(self.columns.explicit, own, self._whiten_sample[1])
 
     def _dense(self, elements: list[Element]) -> Dense:
-        """Return elements to be scored in the fitted cells."""
+        """Return elements prepared for scoring in the fitted cells."""
         return Dense(elements, self.readings.cells, self.readings.whiten)
 
     def _gain(self, e: Element, base: State) -> float:
@@ -121,7 +123,7 @@ class Scores:
 
     @property
     def _more(self) -> float:
-        """Number of all readings over that of the sampled rows."""
+        """Ratio of the number of all readings to the number of sampled readings."""
         return len(self.readings.sampled) / max(int(self.readings.sampled.sum()), 1)
 
     def _element(self, one: Candidate, log_prior: float) -> Element | None:
@@ -145,7 +147,7 @@ class Scores:
             if len(shape.names) * count <= _WIDEST and not forms.is_screw(shape)
         ]
         best: list[tuple[float, Element]] = []
-        for candidate in tried:  # one by one: each may have hundreds of columns
+        for candidate in tried:  # one by one, because each may have hundreds of columns
             e = self._made.get(candidate)
             e = e or self.functions.element(candidate, priors[candidate.shape])
             if e is not None:

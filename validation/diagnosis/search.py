@@ -1,4 +1,4 @@
-"""Search over models: a beam search with exchange of elements.
+"""Search for the best model: a beam search with exchange of elements.
 
 Steps:
 
@@ -18,20 +18,23 @@ from validation.diagnosis.states import Models, State
 from validation.diagnosis.weighted_readings import WeightedReadings
 
 Update = Callable[[str, int, int], None]
-Tried = tuple[tuple[Element, ...], State]  # elements; model that gives start values
-_MOST = 5  # largest number of elements of a model, as the docs state
-_KEPT = 3  # width of the beam: number of models kept
+# elements to fit, and the model that gives start values
+Tried = tuple[tuple[Element, ...], State]
+_MOST = 5  # largest number of elements of a model, as stated in docs/diagnosis.md
+_KEPT = 3  # width of the beam: number of models that are kept
 _LOOKED = 2  # number of models of the beam for which functions are scored
-_FORMS = 4  # number of models whose function is tried in all forms
-# decrease of the log posterior accepted for a larger model, if two are needed
+_FORMS = 4  # number of models whose last function is tried in all forms
+# accepted decrease of the log posterior for a larger model, in case two elements are
+# needed together
 _DROP = 1.0
-# rounds of exchanges; without the machine's memory in the model they do not end
+# number of rounds of exchanges; they do not end if the machine has a memory that no
+# model has
 _ROUNDS = 3
-_NEAR = 15.0  # log posterior: error of an estimate at fixed standard deviations
+_NEAR = 15.0  # error of an estimated log posterior at fixed standard deviations
 
 
 class Search:
-    """Models of one set of readings and weights, and the search over them."""
+    """Models for one set of readings and weights, and the search among them."""
 
     def __init__(self, readings: WeightedReadings) -> None:
         """Fit the models without elements."""
@@ -63,7 +66,7 @@ class Search:
         return sorted(self.seen.values(), key=lambda s: -s.score)
 
     def _keep(self, states: Iterable[State]) -> None:
-        """Store models whose estimates support their claims."""
+        """Store the models in which no effect is at its bounds."""
         for state in states:
             if state.supported:
                 self.seen[frozenset(origins(state.elements)), state.mode] = state
@@ -97,7 +100,7 @@ class Search:
         return kept
 
     def _without_nuisance(self, states: Sequence[State]) -> list[State]:
-        """Return the models, and each with fewer groups of nuisance parameters."""
+        """Return models, and each of them with fewer groups of nuisance parameters."""
         less = [
             self.models.state(s.elements, mode, s)
             for s in states
@@ -132,7 +135,7 @@ class Search:
         return self.relinearisation.relinearised(self.models.best(elements, start))
 
     def _best(self) -> State:
-        """Return the model of largest log posterior."""
+        """Return the model with the largest log posterior."""
         return max(self.seen.values(), key=lambda s: s.score)
 
     def _exchange(self, best: State) -> None:
@@ -148,8 +151,8 @@ class Search:
             for less in self._without_nuisance([base])[1:]:
                 listed += self.scores.best_to_add(less, functions=False)
             listed.sort(key=lambda one: -one[0])
-            # other forms of the same effect are always tried: their estimates have
-            # similar errors
+            # other forms of the same effect are always tried, because their estimates
+            # have similar errors
             near = {
                 e.origin: e
                 for w, e in listed
@@ -162,7 +165,7 @@ class Search:
             self._keep(self._refined((elements, base) for elements in tried))
 
     def _refined(self, tried: Iterable[Tried]) -> list[State]:
-        """Fit models; optimise modes and linearise again for the best ones."""
+        """Fit models; for the best ones optimise the mode and linearise again."""
         new = [self.models.state(elements, s.mode, s) for elements, s in tried]
         new.sort(key=lambda s: -s.score)
         best = [self._fitted(s.elements, s) for s in new[:_KEPT]]

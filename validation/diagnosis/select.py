@@ -1,6 +1,6 @@
-"""Select a model of the deviations: effects of the library and functions.
+"""Selection of a model of the deviations: effects of the library and functions.
 
-A model is a set of elements with or without geometric errors and springs
+A model is a set of elements, with or without geometric errors and springs
 (:mod:`.states`).  The search (:mod:`.search`) visits many models, and each has a
 posterior weight.  The result describes the best model; the probability of a name is the
 sum of the weights of the models that contain it.
@@ -34,14 +34,19 @@ from validation.diagnosis.states import State, prediction_gain
 from validation.diagnosis.unknowns import Small
 from validation.diagnosis.weighted_readings import NONE, WeightedReadings
 
-_EQUAL = 3.0  # log posterior, odds of 20: smaller differences do not decide
-_CLAIMED = 0.9  # probability of functions above which the best model must have them
-_SAME = 1.0  # squared whitened difference that no reading shows
-_LISTED = 20  # number of models in the result: the others have negligible weight
+# difference of the log posterior (odds of 20) below which neither model is preferred
+_EQUAL = 3.0
+# probability of functions from which on the best model must contain them
+_CLAIMED = 0.9
+# squared whitened difference of predictions that is too small to be visible
+_SAME = 1.0
+_LISTED = 20  # number of models in the result; the others have negligible weight
 _COMPARED = 60  # number of models whose predictions are compared
-_FEWEST = 5  # least number of blocks for cross-validation of functions
-_AGAIN = 3  # searches with other noise in common: it hardly changes after the first
-_SURE = 2.0  # standard errors: false functions reached 1.8, true ones at least 6.9
+_FEWEST = 5  # smallest number of blocks for cross-validation of functions
+# number of searches with updated shared noise, which hardly changes after the first
+_AGAIN = 3
+# standard errors of the gain; false functions reached 1.8, true ones at least 6.9
+_SURE = 2.0
 
 
 def select(
@@ -55,8 +60,10 @@ def select(
         columns: columns of all N measured cells.
         z: (n,) whitened residual of the fitted cells.
         cells: (N,) mask of the fitted cells; no other reading is used.
-        update: function called with the stage, steps done, and steps in total.
-        common: [rad, m] noise that cells of a measurement share, over tau, if known.
+        update: function called with the stage, the finished steps and the number of
+            steps.
+        common: [rad, m] noise that cells of a measurement share, over tau; None if
+            unknown.
 
     Returns:
         The best model, and the posterior probabilities.
@@ -87,13 +94,13 @@ def select(
 
 
 def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
-    """Build the result from all visited models."""
+    """Return the result from all visited models."""
     states = _confirmed(search, _merged(states))
     weights = np.array([s.score for s in states])
     weights = np.exp(weights - logsumexp(weights))
     learned = np.array([_functions(s) > 0 for s in states])
     if learned[0] and not learned.all() and weights[learned].sum() < _CLAIMED:
-        # a function is dropped if the model without it predicts equally well
+        # functions are dropped if the model without them predicts equally well
         first = int(np.argmin(learned))
         order = [first, *(k for k in range(len(states)) if k != first)]
         states, weights = [states[k] for k in order], weights[order]
@@ -136,7 +143,7 @@ def _small(search: Search, best: State, tau: float) -> tuple[Small, ...]:
 
 
 def _findings(search: Search, best: State, good: NDArray) -> tuple[str, ...]:
-    """Return findings about the noise: scale, repeatability, memory."""
+    """Return sentences on the noise: scale, repeatability, memory."""
     campaign, readings = search.columns.campaign, search.readings
     row, component = (axis[readings.cells] for axis in np.nonzero(campaign.cells))
     point = np.zeros(len(row), dtype=int)
@@ -153,7 +160,7 @@ def _findings(search: Search, best: State, good: NDArray) -> tuple[str, ...]:
 
 
 def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
-    """Return the probability of an effect; finite motions count only alone."""
+    """Return the probability of an effect; finite motions count only if alone."""
     has = [
         any(e.name == name for e in s.elements)
         and (len(s.elements) == 1 or not LIBRARY[name].finite)
@@ -163,12 +170,13 @@ def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
 
 
 def _confirmed(search: Search, states: list[State]) -> list[State]:
-    """Remove the best models whose functions fail cross-validation."""
+    """Return the models without the best ones whose functions fail cross-validation."""
     blocks, models = search.columns.block[search.readings.cells], search.models
     while len(np.unique(blocks)) >= _FEWEST and len(states) > 1:
         best = states[0]
         learned = [e for e in best.elements if not e.name]
-        # each function, and all together: two functions can compensate each other
+        # each function, and all functions together, because two functions can
+        # compensate each other
         rests = [best.without([e]) for e in learned]
         sure = [
             prediction_gain(best, models.state(rest, best.mode, best), blocks)
@@ -185,14 +193,15 @@ def _confirmed(search: Search, states: list[State]) -> list[State]:
 
 
 def _merged(states: Sequence[State]) -> list[State]:
-    """Return models of distinct predictions, best first.
+    """Return models with distinct predictions, best first.
 
-    Of equal models the one with fewer functions is kept: a function with the same
-    columns as an effect of the library is that effect.  Errors of the measuring device
-    are an exception, because the machine may have them as well.
+    Among models with equal predictions, the one with fewer functions is kept: a
+    function with the same columns as an effect of the library is that effect.  Errors
+    of the measuring device are an exception, because the machine may have the same
+    error.
     """
     every = _best_first(states)
-    # models without functions are kept in case no function is confirmed
+    # models without functions are kept in case that no function is confirmed
     bare = [s for s in every if not _functions(s)][:_LISTED]
     compared = every[:_COMPARED]
     kept: list[State] = []
@@ -243,7 +252,7 @@ def _refined(e: Element) -> str:
 
 
 def _rank(state: State) -> int:
-    """Return the order in which models of equal predictions are preferred."""
+    """Return the order in which models with equal predictions are preferred."""
     own = [e.name for e in state.elements if e.name]
     return _functions(state) + 2 * sum(LIBRARY[name].device_alone for name in own)
 
@@ -261,7 +270,7 @@ def _same(one: State, other: State) -> bool:
 
 
 def _models(states: Sequence[State], weights: NDArray) -> tuple[Model, ...]:
-    """Return the models by their names, best first."""
+    """Return the models by the names of their effects, best first."""
     total: dict[tuple[tuple[str, ...], tuple[str, ...]], float] = {}
     for state, weight in zip(states, weights, strict=True):
         effects = tuple(sorted(e.name for e in state.elements if e.name))

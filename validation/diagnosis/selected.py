@@ -20,7 +20,7 @@ class Learned:
         candidate: places, variables and form.
         equivalent: other places and variables with the same predictions.
         std: (m,) prior standard deviations of the unknowns of :class:`.Sensitivities`.
-        probability: probability of all models with a function of these variables.
+        probability: probability that a model has a function of these variables.
         range_error: error in extrapolation; None if it cannot be estimated.
     """
 
@@ -33,12 +33,12 @@ class Learned:
 
 @dataclass(frozen=True)
 class Model:
-    """A model and its probability.
+    """A model of the deviations and its probability.
 
     Attributes:
         effects: names of the library's effects.
-        functions: descriptions.
-        probability: posterior.
+        functions: descriptions of its functions.
+        probability: posterior probability.
     """
 
     effects: tuple[str, ...]
@@ -51,16 +51,15 @@ class Selected:
     """Result of :func:`.select.select`.
 
     Attributes:
-        hypotheses: hypotheses of the best model, first the measuring frame if it is
-            unknown.
+        hypotheses: hypotheses of the best model; an unknown measuring frame is first.
         values: (k,) estimates of their unknowns, in the order of the hypotheses.
         functions: functions of the best model.
         small: geometric errors and springs in use.
-        noise: scale and findings.
+        noise: scale of the noise, and sentences on it.
         weights: (n,) probability that a cell is good.
-        models: models by names, best first.
+        models: models by the names of their effects, best first.
         probability: probability of each effect of the library in any visited model.
-        unknowns: [-] number of well determined unknowns, with the measuring frame.
+        unknowns: [-] number of well-determined unknowns, including the measuring frame.
         states: the visited models, best first.
     """
 

@@ -1,14 +1,14 @@
-"""How readings respond to candidate functions.
+"""Responses of the readings to candidate functions.
 
 ======  ===============  =========  ==================================================
 symbol  code             shape      meaning
 ======  ===============  =========  ==================================================
 a       ``sensitivity``  (R, 6)     change of the reading per unit of a component
 P       ``basis``        (R, p)     columns of a form in a variable
-T       ``mixed``        (p, q)     numbers of the form per unknown of the search
+T       ``mixed``        (p, q)     coefficients of the form per unknown of the search
 ======  ===============  =========  ==================================================
 
-A component of a candidate adds a times P T to the readings.
+A component of a candidate adds a times P T, times its unknowns, to the readings.
 """
 
 from collections.abc import Iterator
@@ -35,20 +35,23 @@ from validation.diagnosis.candidates import (
 from validation.diagnosis.function_forms import CandidateShape
 from validation.diagnosis.responses import Responses
 
-_STIFF = 0.1  # relative to a spline's size: prior size of its linear part, per step
-_RANK = 1e-8  # relative size of a power above the rounding of those below it
-# relative to the largest load: step for a derivative, in which the model is linear
+# relative to a spline's size: prior size of its linear part, per step between knots
+_STIFF = 0.1
+# relative size of a power, after removal of lower powers, that is above rounding
+_RANK = 1e-8
+# relative to the largest load: step of the derivative of a model that is linear in the
+# load
 _STEP = 1e-3
-_BENT = 64  # columns that are cached for forms whose shape parameter is being fitted
-# relative to the largest unknown: below it the readings do not depend on it
+_BENT = 64  # number of cached columns of forms whose shape parameter is being fitted
+# relative to the largest unknown: smaller unknowns do not affect the readings
 _NOTHING = 1e-9
 
 
 class Sensitivities:
-    """Derivatives of readings with a component at any place; the rows' variables."""
+    """Derivatives of readings by a component at any place; variables of the rows."""
 
     def __init__(self, conditions: Conditions, response: Responses) -> None:
-        """Store R rows as declared, and their response."""
+        """Store R rows of declared conditions, and their responses."""
         self.conditions, self._response = conditions, response
         self.rows = np.arange(len(conditions))
         self._origin = conditions.postures.platform[:, :3, 3]
@@ -56,7 +59,7 @@ class Sensitivities:
         self._raw = lru_cache(maxsize=_BENT)(self._unmixed)
 
     def take(self, rows: NDArray) -> "Sensitivities":
-        """Return the sensitivities for some rows, with forms normalised over all."""
+        """Return the sensitivities of selected rows; forms keep their normalisation."""
         other = copy(self)
         other.rows, other._origin = self.rows[rows], self._origin[rows]
         r = self._response
@@ -64,9 +67,9 @@ class Sensitivities:
         return other
 
     def about(self, conditions: Conditions, response: Responses) -> "Sensitivities":
-        """Return the sensitivities for conditions changed by effects.
+        """Return the sensitivities for conditions that effects have changed.
 
-        Forms are normalised as before.
+        Forms are normalised as before the change.
         """
         other = copy(self)
         other.conditions, other._response = conditions, response
@@ -74,7 +77,7 @@ class Sensitivities:
 
     @property
     def wrenches(self) -> NDArray:
-        """(R, n, 6) [N m, N] through every joint as declared, in its axes."""
+        """(R, n, 6) [N m, N] declared wrench through every joint, in its axes."""
         return self._response.wrenches
 
     @cached_property
@@ -115,14 +118,14 @@ class Sensitivities:
         size = np.sqrt(np.mean(raw**2, axis=0))
         mixed = np.diag(1 / np.where(size > 0, size, 1.0))
         if shape.form == "powers" and len(shape.names) > 1:
-            # so that a power does not imitate the one below it
+            # removes the lower powers from each power
             Q, R = np.linalg.qr(raw * np.diag(mixed))
-            # at most as many powers can be determined as there are rows
+            # at most as many powers as rows can be determined
             good = np.flatnonzero(np.abs(np.diag(R)) > _RANK * np.sqrt(len(raw)))
             mixed = mixed[:, good] @ np.linalg.inv(R[np.ix_(good, good)])
             mixed *= np.sqrt(len(raw))
         elif shape.form == "spline":
-            # the prior of its values: rough ones are unlikely
+            # the prior of a spline's values makes rough splines improbable
             stiff = roughness(len(shape.names)) + _STIFF * np.eye(len(shape.names))
             mixed = np.linalg.inv(np.linalg.cholesky(stiff)).T
             mixed /= np.sqrt(np.mean((raw @ mixed) ** 2) * mixed.shape[1])
@@ -142,7 +145,7 @@ class Sensitivities:
         return raw
 
     def _wrench(self, name: str) -> NDArray:
-        """Return the (R,) [N m or N] load of a joint as declared."""
+        """Return the (R,) [N m or N] declared load of a joint."""
         frame, _, component = name.removeprefix("wrench.").rpartition(".")
         row = self.conditions.robot.index(frame)
         return self._response.wrenches[:, row, LOADS.index(component)]
@@ -150,12 +153,13 @@ class Sensitivities:
     def changes(self, one: Candidate, x: NDArray | None = None) -> NDArray:
         """Return the (R, 6, m) [rad, m] contribution of a candidate, per unknown.
 
-        ``x`` (m,) are the values at which it is linearised.  If it is (m + 1,), the
-        last is the change of the shape parameter, which then has a column as well.
+        ``x`` (m,) are the values of the unknowns at which it is linearised.  If ``x``
+        is (m + 1,), the last value is the change of the shape parameter, which then has
+        a column too.
         """
         m = len(self.axes(one))
         by = 0.0 if x is None or len(x) == m else float(x[-1])
-        # unknown by unknown in memory, in the order of computation
+        # memory is ordered unknown by unknown, as it is used in the computation
         blocks = [columns.T[:, :, None] * s for s, columns in self._factors(one, by)]
         if x is not None and len(x) > m:
             step = _STEP * float(one.shape.bends[0])
@@ -164,7 +168,7 @@ class Sensitivities:
         return np.moveaxis(np.concatenate(blocks), 0, 2)
 
     def moved(self, one: Candidate, x: NDArray, by: float = 0.0) -> NDArray:
-        """Return the (R, 6) [rad, m] contribution of a candidate with numbers x (m,).
+        """Return the (R, 6) [rad, m] contribution of a candidate with unknowns x (m,).
 
         The shape parameter is changed by ``by``.
         """
@@ -199,11 +203,12 @@ class Sensitivities:
                 yield self.sensitivity(part.where, component, one.kind), columns
 
     def fitted(self, one: Candidate, x: NDArray, std: NDArray) -> list[Function]:
-        """Return the functions of a robot file with their numbers.
+        """Return functions of a robot file with fitted coefficients.
 
-        One for each part of a candidate that the readings depend on; for each session,
-        if some lack a variable of it.  ``x`` is (m,) or (m + 1,), see :meth:`changes`;
-        ``std`` are its standard deviations, taken as independent.
+        There is one function for each part of a candidate on which the readings depend,
+        and for each session if some sessions lack one of its variables.  ``x`` is (m,)
+        or (m + 1,), see :meth:`changes`; ``std`` has the standard deviations, taken as
+        independent.
         """
         functions, at = [], 0
         m, given, sure = len(self.axes(one)), dict(one.shape.given), {}
@@ -243,7 +248,7 @@ class Sensitivities:
         return functions
 
     def _sessions(self, variables: tuple[str, ...]) -> tuple[str | None, ...]:
-        """Return the sessions in which variables are known, None for all."""
+        """Return sessions in which variables are known; None stands for all rows."""
         conditions = self.conditions
         if variables[0].startswith("wrench.") or conditions.session is None:
             return (None,)
@@ -256,7 +261,7 @@ class Sensitivities:
 def in_cells(
     sensitivities: Sensitivities, one: Candidate, campaign: Campaign
 ) -> NDArray:
-    """Return (N, m) change of a campaign's measured cells over sigma per unknown."""
+    """Return (N, m) changes of a campaign's measured cells over sigma per unknown."""
     changes = np.moveaxis(sensitivities.changes(one), 2, 0) / campaign.sigma
     columns = changes.reshape(len(changes), -1)
     if not campaign.cells.all():

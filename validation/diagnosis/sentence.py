@@ -1,4 +1,4 @@
-"""Result of a diagnosis in sentences."""
+"""Result of a diagnosis as sentences."""
 
 import math
 from collections.abc import Sequence
@@ -23,14 +23,14 @@ WORDS = {GEOMETRY: "geometric errors", SPRINGS: "springs"}
 
 
 def sentence(diagnosis: Diagnosis) -> str:
-    """Return the sentences that the evidence supports."""
+    """Return the sentences that describe the verdict and the errors."""
     if diagnosis.setup:
         faults = "; ".join(one.sentence for one in diagnosis.setup)
         return f"The campaign is set up wrongly: {faults}"
-    where = {  # rows of the errors before and after
+    where = {  # rows of the errors before and after, by method
         "split": "held-out rows",
         "folds": f"rows held out in {len(diagnosis.held.folds)} folds",
-        "none": "the rows fitted, too few to hold any out",
+        "none": "the fitted rows (too few to hold any out)",
     }[diagnosis.held.how]
     before = f"{diagnosis.before.normalised:.2f} sigma"
     kept = f"on {where} the residual is {before} before"
@@ -66,13 +66,13 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 
 def titles(diagnosis: Diagnosis) -> list[str]:
-    """Return place and variables of each learned function."""
+    """Return the title (place and variables) of each learned function."""
     every = functions_of(diagnosis)
     return [function.title for functions in every for function in functions]
 
 
 def calibration_text(tally: Calibration) -> str:
-    """Return how often the method is right on this design, in words."""
+    """Return the error rates of the method on this design as text."""
 
     def counts(words: dict[str, int]) -> str:
         return ", ".join(f"{name} {n}" for name, n in sorted(words.items()))
@@ -90,7 +90,7 @@ def calibration_text(tally: Calibration) -> str:
 
 
 def open_text(open_: NDArray) -> str:
-    """Return a line on the number of rows whose pose is free within clearances."""
+    """Return line with the number of rows whose pose clearances leave undetermined."""
     return (
         f"clearances leave the pose undetermined in {int(open_.sum())} of "
         f"{len(open_)} rows (marked open): there one of the poses of least "
@@ -100,7 +100,7 @@ def open_text(open_: NDArray) -> str:
 
 
 def formula(function: Function) -> str:
-    """Return a function's text by component: numbers times columns."""
+    """Return a function as text by component: coefficients times columns."""
     names = [name.rpartition(".")[2] for name in function.variables]
     words = []
     for component in function.components:
@@ -115,7 +115,7 @@ def formula(function: Function) -> str:
 
 
 def _column_text(function: Function, key: str, names: Sequence[str]) -> str:
-    """Return the text of a column of a function's form."""
+    """Return one column of a function's form as text."""
     form, given = function.form, function.parameters
     head, _, word = key.rpartition(".")
     if form == "knee":

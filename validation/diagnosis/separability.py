@@ -1,9 +1,9 @@
-"""Effects that a campaign's design can distinguish, before any fit.
+"""Effects that a campaign's design can distinguish, computed before any fit.
 
-An effect changes the readings by a combination of its signature's columns A.  The part
-that nuisance parameters (an unknown registration) can imitate is lost, so they are
-projected out first.  With P_f the projection on the signature of effect f, |P_f A_e| /
-|A_e| is the share of effect e that f can imitate.
+An effect changes the readings by a combination of the columns A of its signature.
+Nuisance parameters (such as an unknown registration) can imitate a part of it, so they
+are projected out first.  With P_f the projection on the signature of effect f, |P_f
+A_e| / |A_e| is the share of effect e that f can imitate.
 
 Sources:
     Bjoerck, Golub (1973), Numerical methods for computing angles between linear
@@ -19,25 +19,27 @@ from numpy.typing import ArrayLike, NDArray
 
 from validation.diagnosis.signatures import UNSEEN
 
-LIKE = 0.98  # cosine above which a design cannot distinguish
-SEEN = 3.0  # [sigma] norm above which a signature is detectable
-ROUNDING = 1e-9  # relative size that is rounding: of a direction that others imitate
-_RANK = 1e-3  # relative size that is zero for signatures, because they are secants
+LIKE = 0.98  # cosine above which a design cannot distinguish two signatures
+SEEN = 3.0  # [sigma] norm from which on a signature is detectable
+# relative size of a direction that other columns imitate except for rounding
+ROUNDING = 1e-9
+# relative size that counts as zero for signatures, because they are secants
+_RANK = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Separability:
-    """Visibility of each effect, and its similarity to others.
+    """Visibility of each effect, and its similarity to other effects.
 
     Attributes:
-        names: m effects.
-        strength: (m,) [sigma] length of an effect's signature at plausible sizes of its
-            unknowns, all rows together, before nuisance parameters are projected out.
-        left: (m,) share of it after the projection.
+        names: names of the m effects.
+        strength: (m,) [sigma] norm of an effect's signature at plausible sizes of its
+            unknowns, over all rows, before nuisance parameters are projected out.
+        left: (m,) share of the norm that remains after the projection.
         unknowns: (m,) number of unknowns.
-        rank: (m,) number of them that the design can distinguish.
-        cosine: (m, m) of the smallest angle between two signatures: 1 if a combination
-            of one equals a combination of the other.
+        rank: (m,) number of unknowns that the design can distinguish.
+        cosine: (m, m) cosine of the smallest angle between two signatures; 1 if a
+            combination of one equals a combination of the other.
         shared: (m, m) share of the row's effect that the column's effect can imitate.
     """
 
@@ -51,25 +53,25 @@ class Separability:
 
     @property
     def visible(self) -> NDArray:
-        """(m,) bool: exceeds the noise at a plausible size."""
+        """(m,) bool, True if an effect of plausible size exceeds the noise."""
         return self.strength * self.left >= SEEN
 
     @property
     def traced(self) -> NDArray:
-        """(m,) bool: would exceed the noise if it were large enough."""
+        """(m,) bool, True if an effect of sufficient size would exceed the noise."""
         return (self.strength * self.left >= UNSEEN) & (self.rank > 0)
 
     @property
     def shows_at(self) -> NDArray:
-        """(m,) factor on plausible sizes that exceeds the noise; inf if none does."""
+        """(m,) factor on plausible sizes that exceeds the noise; inf without one."""
         size = np.where(self.traced, self.strength * self.left, 0.0)
         return np.divide(SEEN, size, out=np.full(len(size), np.inf), where=size > 0)
 
     def classes(self) -> list[tuple[str, ...]]:
-        """Return the effects that imitate each other completely, in both directions.
+        """Return the classes of effects that imitate each other completely.
 
         Returns:
-            Classes of two and more; a verdict can only name the class.
+            Classes of two and more effects; a verdict can only name the class.
         """
         alike = (self.shared > LIKE) & (self.shared.T > LIKE)
         alike &= np.outer(self.traced, self.traced)
@@ -87,13 +89,13 @@ class Separability:
         return groups
 
     def imitated(self) -> list[tuple[str, str]]:
-        """Return pairs (a, b) with the span of a in that of b, but not conversely."""
+        """Return pairs (a, b) with the span of a inside the span of b, not reverse."""
         one_way = (self.shared > LIKE) & (self.shared.T <= LIKE)
         one_way &= np.outer(self.traced, self.traced)
         return [(self.names[i], self.names[j]) for i, j in np.argwhere(one_way)]
 
     def overlapping(self) -> list[tuple[str, str]]:
-        """Return pairs of which neither imitates the other, but parts of them do."""
+        """Return pairs of effects that imitate each other only in part."""
         part = (self.cosine > LIKE) & (self.shared <= LIKE) & (self.shared.T <= LIKE)
         part &= np.outer(self.visible, self.visible)
         return [(self.names[i], self.names[j]) for i, j in np.argwhere(part) if i < j]
@@ -102,14 +104,15 @@ class Separability:
 def compare_signatures(
     columns: Mapping[str, NDArray], nuisance: NDArray | None = None
 ) -> Separability:
-    """Return the angles between signatures.
+    """Return the comparison of the signatures of effects.
 
     Args:
-        columns: (N, k) by effect: change of the readings over sigma at plausible sizes.
-        nuisance: (N, p) columns that are always fitted, over sigma.
+        columns: for each effect (N, k), changes of the readings over sigma at plausible
+            sizes.
+        nuisance: (N, p) columns of nuisance parameters, over sigma.
 
     Returns:
-        The comparison.
+        Strengths, shares and angles of all signatures.
     """
     names, left = tuple(columns), dict(columns)
     if nuisance is not None:
@@ -142,15 +145,15 @@ def _basis(columns: NDArray, whole: float) -> NDArray:
 def orthonormal_basis(
     columns: NDArray, rank: float = ROUNDING, floor: ArrayLike = 0.0
 ) -> NDArray:
-    """Return an orthonormal basis of columns, independent of their units.
+    """Return an orthonormal basis of columns, independent of the units of the columns.
 
     Args:
-        columns: (N, k).
-        rank: relative singular value below which normalised columns are dependent.
-        floor: length up to which a column counts as zero; one number, or (k,).
+        columns: (N, k) columns.
+        rank: relative singular value below which normalised columns count as dependent.
+        floor: norm up to which a column counts as zero; one value, or (k,).
 
     Returns:
-        (N, r) orthonormal.
+        (N, r) orthonormal columns.
     """
     size = np.linalg.norm(columns, axis=0)
     kept = columns[:, size > floor] / size[size > floor]

@@ -1,8 +1,8 @@
-"""The sequence of models that leads to a fitted robot, each judged on held-out rows.
+"""The sequence of models that leads to a fitted robot, tested on held-out rows.
 
-The models are added in a fixed order: as declared, pose of the device, geometric
-errors, springs, effects of the library, learned functions.  Each has the unknowns of
-those before it and is fitted as a whole; the last is the fitted robot.
+The models are in a fixed order: declared, pose of the device, geometric errors,
+springs, effects of the library, learned functions.  Each model has the unknowns of the
+models before it and is fitted as a whole; the last one is the fitted robot.
 """
 
 from collections.abc import Sequence
@@ -22,19 +22,21 @@ LEARNED = "learned effects"
 _TERMS = (
     "declared", "registration", GEOMETRY, SPRINGS, "library effects", LEARNED,
 )  # fmt: skip
-_DECLARED, _REGISTRATION, _LIBRARY, _LEARNED = 0, 1, 4, 5  # indices of terms
-# of a model in the sequence: last term, number of learned functions
+# indices of terms of the sequence
+_DECLARED, _REGISTRATION, _LIBRARY, _LEARNED = 0, 1, 4, 5
+# position of a model in the sequence: its last term, and its number of learned
+# functions
 Place = tuple[int, int]
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Root mean square errors over some rows.
+    """Root mean square errors over selected rows.
 
     Attributes:
-        position: [m] error of the components measured.
-        rotation: [rad] error of the components measured.
-        normalised: [-] error of the components measured over sigma.
+        position: [m] error of the measured translations.
+        rotation: [rad] error of the measured rotations.
+        normalised: [-] error of all measured components over sigma.
     """
 
     position: float
@@ -51,7 +53,7 @@ def errors_of(
 
 
 def rms(values: NDArray) -> float:
-    """Return the root mean square of finite values; NaN without any."""
+    """Return the root mean square of the finite values; NaN if there are none."""
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
 
@@ -61,11 +63,11 @@ class Step:
     """A model of the sequence and its errors.
 
     Attributes:
-        term: the term that it adds: ``"declared"``, ``"registration"``, ``"geometry"``,
+        term: term that it adds: ``"declared"``, ``"registration"``, ``"geometry"``,
             ``"springs"``, ``"library effects"`` or, for each function, ``"learned
             effects"``.
-        unknowns: [-] number of added unknowns; with a prior, those the readings
-            determine.
+        unknowns: [-] number of added unknowns; for unknowns with a prior, the number
+            that the readings determine.
         error: error on the held-out rows.
     """
 
@@ -79,8 +81,8 @@ class Stage:
     """A model of the sequence on the rows of one fold.
 
     Attributes:
-        unknowns: unknowns as in :class:`Step`.
-        residual: (R, 6) [rad, m] of the fold's rows, NaN elsewhere.
+        unknowns: number of added unknowns, as in :class:`Step`.
+        residual: (R, 6) [rad, m] residual of the fold's rows, NaN elsewhere.
     """
 
     unknowns: float
@@ -90,16 +92,16 @@ class Stage:
 def stages(
     campaign: Campaign, fit: MachineFit, rows: NDArray, held: NDArray
 ) -> dict[Place, Stage]:
-    """Fit the models that lead to a fitted robot; judge each on held-out rows.
+    """Fit the models that lead to a fitted robot; test each on held-out rows.
 
     Args:
         campaign: campaign of R rows.
         fit: the last model of the sequence.
-        rows: (R,) bool, rows that were fitted.
-        held: (R,) bool, rows that judge.
+        rows: (R,) bool, True for fitted rows.
+        held: (R,) bool, True for held-out rows.
 
     Returns:
-        One for each step that the fitted robot has, in order; the last is ``fit``.
+        One stage for each step of the fitted robot, in order; the last is ``fit``.
     """
     shown, known = dict[Place, Stage](), 0.0
     finite = _has_finite_motions(fit.unknowns)
@@ -124,7 +126,7 @@ def _has_finite_motions(unknowns: Unknowns) -> bool:
 
 
 def _models(unknowns: Unknowns) -> dict[Place, Unknowns]:
-    """Yield the unknowns of the models up to a robot's; absent steps are left out."""
+    """Yield unknowns of the models that precede a robot; absent steps are omitted."""
     device = tuple(one for one in unknowns.effects if one.device)
     now = replace(unknowns, effects=(), small=(), functions=())
     models = {(_DECLARED, 0): now}
@@ -151,11 +153,11 @@ def _start(unknowns: Unknowns, fit: MachineFit) -> NDArray:
 def pooled(
     campaign: Campaign, folds: list[dict[Place, Stage]], rows: NDArray
 ) -> list[Step]:
-    """Return the sequence judged on rows (R,) bool of all folds together.
+    """Return the sequence tested on rows (R,) bool of all folds together.
 
     Returns:
-        The steps, in order; the last is the error of the diagnosis.  A fold without a
-        step uses the step before it.
+        The steps, in order; the last has the error of the diagnosis.  If a fold lacks a
+        step, the step before it is used.
     """
     steps = []
     for place in sorted(set().union(*folds)):
@@ -171,7 +173,7 @@ def pooled(
 
 
 def joined(reached: Sequence[Stage]) -> NDArray:
-    """Return the (R, 6) [rad, m] residual of a stage of all folds, on their rows."""
+    """Return the (R, 6) [rad, m] residual of one stage of all folds, on their rows."""
     residual = reached[0].residual
     for stage in reached[1:]:
         residual = np.where(np.isnan(stage.residual), residual, stage.residual)

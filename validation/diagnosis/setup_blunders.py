@@ -25,20 +25,23 @@ from validation.diagnosis.setup_corrections import (
     corrections,
 )
 
-_ROWS = 40  # number of rows that judge corrections
-# share of the cells, the smallest: blunders of single readings do not count
+_ROWS = 40  # number of rows by which corrections are compared
+# share of the cells with the smallest residuals, so that single blunders do not count
 _TRIMMED = 0.9
 _MOST = 3  # largest number of simultaneous blunders
 _BEAM = 4  # number of sets of corrections that are followed
-# of the residual: if it falls below, only this set of corrections is followed
+# relative to the residual at the start: below it, only this set is followed further
 _CLEAR = 0.1
-# relative to the residual: a further correction is followed if it falls below
+# relative to the residual before it: below it, a further correction is followed
 _LESS = 0.9
-_DECISIVE = 0.5  # relative to the residual: blunders are reported if it falls below
-_NEEDED = 1.5  # factor on the residual without a correction, above which it is needed
-_FAR = 10.0  # times the spread of the readings: no unit of the positions explains it
-_NOISE = 3.0  # [sigma] residual below which no blunder is searched
-_LEAST = 100.0  # least decrease of chi-square for each blunder
+# relative to the residual at the start: below it, blunders are reported
+_DECISIVE = 0.5
+# ratio of the residual without a correction to that with it, above which it is needed
+_NEEDED = 1.5
+# relative to the spread of the readings: larger distances are not due to units
+_FAR = 10.0
+_NOISE = 3.0  # [sigma] residual below which the search for blunders ends
+_LEAST = 100.0  # smallest decrease of chi-square for each reported blunder
 
 Corrections = tuple[Correction, ...]
 
@@ -50,8 +53,8 @@ class SetupBlunder:
     Attributes:
         kind: ``sign``, ``quarter_turn``, ``exchanged``, ``unit``, ``transposed`` or
             ``quaternion``.
-        columns: columns of the campaign's table, by name.
-        before: [sigma] residual without its correction, all others made.
+        columns: names of the columns of the campaign's table.
+        before: [sigma] residual with all corrections except this one.
         after: [sigma] residual with all corrections.
         sentence: advice on what to check.
     """
@@ -70,12 +73,12 @@ def setup_blunders(
 
     Args:
         campaign: measured deviations.
-        conditions: its R rows as the robot's file declares the machine.
+        conditions: conditions of its R rows, as declared in the robot file.
 
     Returns:
-        The blunders; none if the residual does not fall to half.  Residuals are the
+        The blunders; none if the residual does not decrease to half.  A residual is the
         root mean square over the smaller nine tenths of the cells, in sigma, after the
-        device's pose is fitted if it is unknown.
+        pose of the device is fitted if it is unknown.
     """
     rows = _sample(campaign)
     if not len(rows):
@@ -96,7 +99,7 @@ def setup_blunders(
 
 
 def _blunder(correction: Correction, before: float, after: float) -> SetupBlunder:
-    """Return a blunder with its sentence."""
+    """Return a blunder with a sentence that describes it."""
     columns = correction.columns
     fit, s = ("fits", "") if len(columns) == 1 else ("fit", "s")
     sentence = (
@@ -108,7 +111,7 @@ def _blunder(correction: Correction, before: float, after: float) -> SetupBlunde
 
 
 def _search(judge: "_Judge", start: float) -> tuple[Corrections, float]:
-    """Return the corrections of least residual, by a beam search, and the residual."""
+    """Return the corrections with the least residual, found by a beam search."""
     tried = corrections(judge.campaign)
     best: tuple[Corrections, float] = ((), start)
     beam = [best]
@@ -138,7 +141,9 @@ def _needed(
         fewer = _without(chosen, one)
         without = judge.residual(fewer)
         rivals = [without]
-        # where springs hardly respond, small loads are no better than zero loads
+        # if the springs hardly respond to the load, small loads fit no better than zero
+        # loads
+
         if one.array == "loads":
             rivals.append(judge.residual(fewer, loads=0.0))
         if min(rivals) < _NEEDED * left:
@@ -152,7 +157,7 @@ def _without(chosen: Sequence[Correction], one: Correction) -> Corrections:
 
 
 def _sample(campaign: Campaign) -> NDArray:
-    """Return rows spread evenly over those that can judge a set-up."""
+    """Return rows, evenly spaced among those by which a set-up can be tested."""
     cells = campaign.cells
     enough = np.any if campaign.registration == "known" else np.all
     usable = cells[:, :3].all(axis=1) | enough(cells[:, 3:], axis=1)
@@ -161,7 +166,7 @@ def _sample(campaign: Campaign) -> NDArray:
 
 
 class _Judge:
-    """Residuals of set-ups on the readings of some rows."""
+    """Residuals of assumed set-ups on a sample of rows."""
 
     def __init__(self, campaign: Campaign, conditions: Conditions) -> None:
         self.campaign, self.given = campaign, as_given(campaign)
@@ -173,15 +178,16 @@ class _Judge:
     def residual(
         self, made: Corrections, *, loads: float = 1.0, stated: bool = False
     ) -> float:
-        """Return the trimmed rms with corrections made.
+        """Return the trimmed rms of the residual with given corrections.
 
         Args:
-            made: corrections of the campaign as given.
+            made: corrections that are applied to the campaign as given.
             loads: factor on all loads.
-            stated: whether sigma is as stated, for any correction of lengths.
+            stated: whether the stated sigma is used even if a correction scales
+                lengths.
 
         Returns:
-            [sigma], infinite where a command cannot be reached.
+            [sigma] residual; infinite if a command cannot be reached.
         """
         setup = self.given
         for correction in made:
@@ -210,12 +216,12 @@ class _Judge:
         return float(np.sqrt(np.mean(kept**2)))
 
     def _moved(self, setup: SetUp) -> Conditions | None:
-        """Return the conditions of a set-up; None where a command cannot be reached."""
+        """Return the conditions of a set-up; None if a command cannot be reached."""
         moved, given = replace(self.conditions, load=setup.loads), self.given
         if setup.places is not given.places or setup.axes is not given.axes:
             wide = np.nanstd(setup.points, axis=0).max()
             if np.std(setup.places, axis=0).max() > _FAR * wide:
-                return None  # and it may take long to find that it is out of reach
+                return None  # a target that is out of reach may take long
             poses = np.hstack([setup.places, rotation_vector(setup.axes)])
             postures, _ = place_many(moved.robot, poses)
         elif setup.coordinates is not given.coordinates:
@@ -236,7 +242,7 @@ class _Judge:
     def _device(
         self, setup: SetUp, points: NDArray, turns: NDArray, own: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Return rotation (3, 3) and shift (3,) [m] of the device, or fit them."""
+        """Return the rotation (3, 3) and translation (3,) [m] of the device."""
         if self.campaign.registration == "known":
             return np.eye(3), np.zeros(3)
         read, seen = points[own], setup.points[own]

@@ -18,7 +18,7 @@ from stiffness.screws import rotation_matrix
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.signatures import loaded_components
 
-_UNITS = {  # factors between units that are confused
+_UNITS = {  # factors between units that are often confused
     "length": (25.4, 1e3),  # inches, millimetres
     "angle": (180 / np.pi,),  # degrees
     "load": (9.81, 1e3),  # kilograms, kilonewtons
@@ -26,20 +26,22 @@ _UNITS = {  # factors between units that are confused
 
 
 def _rolled(turns: Rotation, by: int) -> Rotation:
-    """Return the rotations with the parts of their quaternions shifted."""
+    """Return rotations whose quaternion components are shifted cyclically."""
     return Rotation.from_quat(np.roll(turns.as_quat(), by, axis=-1))
 
 
 _MISREAD = (
     ("transposed", "transposed", Rotation.inv),
-    # if x y z w is read as w x y z, the parts x y z w hold y z w x
+    # if (x, y, z, w) is read in the order w x y z, the result has the components y z w
+    # x
+
     ("quaternion", "with the quaternion's w taken last, not first",
      partial(_rolled, by=1)),
     ("quaternion", "with the quaternion's w taken first, not last",
      partial(_rolled, by=-1)),
 )  # fmt: skip
-# columns, the array of a SetUp that they fill, the correction in words, and whether it
-# is of the deviation alone
+# columns, the array of a SetUp with these columns, the correction in words, and whether
+# only the deviation changes
 _LENGTHS = (
     ("pose.t", "places", "", False),
     ("meas.t", "points", ", as positions", False),
@@ -57,14 +59,14 @@ class SetUp:
     """Assumed commands and readings.
 
     Attributes:
-        coordinates: (R, n) [rad or m] commanded, of every joint.
+        coordinates: (R, n) [rad or m] commanded coordinates of all joints.
         places: (R, 3) [m] commanded positions of the platform, if poses are commanded.
         axes: (R, 3, 3) commanded axes of the platform.
-        loads: (R, 6) [N m, N].
+        loads: (R, 6) [N m, N] loads on the platform.
         points: (R, 3) [m] measured positions, base axes; NaN if not measured.
-        turns: (R, 3, 3) the platform's measured axes; NaN if not measured.
-        nominal: points and turns of the commands as given in the file.
-        sigma: (R, 6) [rad, m] of the readings.
+        turns: (R, 3, 3) measured axes of the platform; NaN if not measured.
+        nominal: commanded positions and axes as given in the file.
+        sigma: (R, 6) [rad, m] standard deviations of the readings.
     """
 
     coordinates: NDArray
@@ -82,12 +84,13 @@ class Correction:
     """A correction of one blunder.
 
     Attributes:
-        kind: kind in one word.
-        columns: columns of the campaign's table that it changes.
+        kind: kind of the blunder in one word.
+        columns: columns of the campaign's table that the correction changes.
         what: the correction in words, for a sentence.
         array: name of the array of :class:`SetUp` that it changes.
         change: function of that array, or of its deviation from the command.
-        deviation: whether the deviation is changed.
+        deviation: whether the correction changes the deviation, not the absolute
+            readings.
         sigma: factor on the sigma of positions.
     """
 
@@ -100,7 +103,7 @@ class Correction:
     sigma: float = 1.0
 
     def apply(self, given: SetUp) -> SetUp:
-        """Return the set-up corrected."""
+        """Return a set-up with this correction."""
         values, about = getattr(given, self.array), given.nominal.get(self.array)
         if not self.deviation or about is None:
             values = self.change(values)
@@ -142,7 +145,9 @@ def corrections(campaign: Campaign) -> list[Correction]:
     tried += _of_loads(campaign)
     for stem, array, how, deviation in _LENGTHS:
         for factor, what in _factors("length") if there[stem] else ():
-            # a sigma that grows with its lengths would let any division fit
+            # otherwise sigma would increase with the lengths, and any division would
+            # fit
+
             sigma = min(factor, 1.0) if array == "points" else 1.0
             tried.append(Correction(
                 "unit", _xyz(stem), what + how, array, partial(np.multiply, factor),
@@ -158,7 +163,7 @@ def corrections(campaign: Campaign) -> list[Correction]:
 
 
 def _of_joints(campaign: Campaign) -> Iterator[Correction]:
-    """Yield signs, quarter turns, exchanges and units of commanded coordinates."""
+    """Yield corrections of the signs, origins, order and units of joint coordinates."""
     frames, kinds = campaign.robot.frames, dict[str, list[int]]()
     count = np.arange(len(frames))
     of = partial(Correction, array="coordinates")
@@ -187,7 +192,7 @@ def _of_joints(campaign: Campaign) -> Iterator[Correction]:
 
 
 def _of_loads(campaign: Campaign) -> Iterator[Correction]:
-    """Yield loads that are reactions, or in another unit."""
+    """Yield corrections of loads: reactions instead of loads, and other units."""
     names = tuple(f"load.{name}" for name in loaded_components(campaign))
     factors = [(-1.0, "with their signs reversed"), *_factors("load")]
     for factor, what in factors if names else ():
@@ -196,18 +201,18 @@ def _of_loads(campaign: Campaign) -> Iterator[Correction]:
 
 
 def _xyz(stem: str) -> tuple[str, ...]:
-    """Return three columns of a campaign's table."""
+    """Return the names of three columns of a campaign's table."""
     return tuple(f"{stem}{axis}" for axis in "xyz")
 
 
 def _factors(quantity: str) -> list[tuple[float, str]]:
-    """Yield the factors between units, both ways, and their meaning in words."""
+    """Yield factors between units in both directions, with their description."""
     both = (f for one in _UNITS[quantity] for f in (one, 1 / one))
     return [(factor, f"times {factor:.4g}") for factor in both]
 
 
 def _turned(turns: NDArray, change: Callable[[Rotation], Rotation]) -> NDArray:
-    """Return the (R, 3, 3) rotations changed; NaN stays."""
+    """Return (R, 3, 3) changed rotations; NaN is not changed."""
     read = np.isfinite(turns).all(axis=(1, 2))
     changed = turns.copy()
     changed[read] = change(Rotation.from_matrix(turns[read])).as_matrix()

@@ -33,10 +33,12 @@ from validation.diagnosis.hypotheses import (
 )
 
 _PROBES = 3  # number of random projections that identify equal columns
-_DIGITS = 6  # digits of a projection that must agree
-_PROBED = 4  # number of rows of largest load, and of largest rotation
-_HARDLY = 2.0  # squared whitened change of all readings together that is never visible
-# [sigma] over all readings: smaller changes by an unknown of its own size are 0
+_DIGITS = 6  # number of digits of a projection that must agree
+# number of rows with the largest loads, and with the largest rotations, that are tested
+_PROBED = 4
+# squared whitened change of all readings together, below which it is not visible
+_HARDLY = 2.0
+# [sigma] norm of the change of all readings by a plausible unknown; below it, it is 0
 UNSEEN = 1e-3
 
 
@@ -45,9 +47,9 @@ class Signature:
     """Contribution of one hypothesis to the model, in units of sigma.
 
     Attributes:
-        hypothesis: the hypothesis.
-        offset: (N,) at unknowns zero, on the tangent.
-        columns: (N, k) per unknown.
+        hypothesis: the hypothesis that contributes.
+        offset: (N,) contribution on the tangent, with all unknowns zero.
+        columns: (N, k) contribution for each unit of an unknown.
     """
 
     hypothesis: Hypothesis
@@ -61,15 +63,15 @@ class Signature:
 
 
 def conditions_of(campaign: Campaign) -> Conditions:
-    """Return the conditions of a campaign, as its robot's file declares the machine.
+    """Return the conditions of a campaign, as its robot file declares the machine.
 
     Args:
         campaign: campaign of R rows.
 
     Returns:
-        R conditions; a covariate that some sessions lack is NaN there.  Covariates
-        ``gravity.x``, ``.y``, ``.z`` [m/s^2], if given, are the weight's known
-        direction in each row.
+        R conditions.  A covariate that some sessions lack is NaN in these sessions. The
+        covariates ``gravity.x``, ``.y``, ``.z`` [m/s^2] are the known direction of the
+        weight in each row.
 
     Raises:
         BadInput: a function of the robot depends on an absent covariate.
@@ -100,18 +102,18 @@ def conditions_of(campaign: Campaign) -> Conditions:
 
 
 def loaded_components(campaign: Campaign) -> list[str]:
-    """Return the components of the load that are not zero in every row."""
+    """Return the components of the load that are nonzero in at least one row."""
     return [name for name, w in zip(LOAD, campaign.loads.T, strict=True) if w.any()]
 
 
 def whiten(campaign: Campaign, deviation: NDArray) -> NDArray:
-    """Return (N, ..) deviations (R, 6, ..) of measured cells in units of sigma."""
+    """Return (N, ..) deviations of the measured cells, divided by sigma."""
     some = deviation[campaign.cells]
     return some / campaign.sigma[campaign.cells].reshape(-1, *[1] * (some.ndim - 1))
 
 
 def fingerprints(columns: NDArray) -> list[tuple[float, ...]]:
-    """Return keys of columns (n, k), equal for columns of equal direction."""
+    """Return keys of columns (n, k); columns of the same direction have equal keys."""
     probes = np.random.default_rng(0).normal(size=(_PROBES, len(columns)))
     seen = probes @ columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     seen *= np.sign(seen[0])
@@ -122,31 +124,31 @@ class Tangents:
     """First derivatives of a campaign's readings in every unknown of every effect.
 
     Attributes:
-        campaign: campaign of R rows, N measured cells.
-        derivatives: derivatives of the readings in its rows.
-        declared: (N,) readings without effects, whitened.
+        campaign: campaign of R rows with N measured cells.
+        derivatives: derivatives of the readings in these rows.
+        declared: (N,) whitened readings of the declared model.
     """
 
     def __init__(self, campaign: Campaign, derivatives: Derivatives) -> None:
-        """Store the readings of the declared model in the measured cells."""
+        """Compute the readings of the declared model in the measured cells."""
         self.campaign, self.derivatives = campaign, derivatives
         self.declared = whiten(campaign, derivatives.declared)
 
     def model(self, effects: Mapping[str, Values], *, finite: bool = False) -> NDArray:
-        """Return (N,) whitened readings with effects, by :meth:`.Derivatives.model`."""
+        """Return (N,) whitened readings with effects (:meth:`.Derivatives.model`)."""
         return whiten(self.campaign, self.derivatives.model(effects, finite=finite))
 
     def rows_of(self, session: str | None) -> NDArray:
-        """Return (N, 1): 1 in the cells of a session, else 0; 1 in all for None."""
+        """Return (N, 1), 1 in the cells of a session and 0 elsewhere; None: all 1."""
         row = np.nonzero(self.campaign.cells)[0]
         if session is None or self.campaign.session is None:
             return np.ones((len(row), 1))
         return (self.campaign.session[row] == session)[:, None].astype(float)
 
     def at_start(self, hypothesis: Hypothesis) -> Signature:
-        """Return a hypothesis to first order at its start values.
+        """Return the first-order contribution of a hypothesis at its start values.
 
-        It has numbers for all rows, or for every session.  NaN without a solution.
+        The unknowns apply to all rows, or to one session each.  NaN without a solution.
         """
         sessions = sessions_of(hypothesis)
         one = self._at_start(in_one_session(hypothesis, sessions[0])[0])
@@ -154,7 +156,7 @@ class Tangents:
         return Signature(hypothesis, one.offset, columns)
 
     def _at_start(self, hypothesis: Hypothesis) -> Signature:
-        """Return a hypothesis with numbers for all rows, at its start values."""
+        """Return the contribution of a hypothesis whose unknowns apply to all rows."""
         if not hypothesis.slots:
             offset = np.zeros_like(self.declared)
             if not self._invisible(hypothesis):
@@ -190,14 +192,14 @@ class Tangents:
         return bool(np.mean(size**2) * len(self.declared) < _HARDLY)
 
     def _column(self, effect: str, slot: Slot, shapes: dict[str, float]) -> NDArray:
-        """Return the (N,) derivative by one slot of an effect, at its start values."""
+        """Return the (N,) derivative by one unknown, at the start values."""
         begun = whiten(self.campaign, self.derivatives.begun(effect, slot, shapes))
         return _seen((begun - self.declared) / (STEP * slot.unknown.scale), slot)
 
     def about(
         self, hypothesis: Hypothesis, x: NDArray, others: Mapping[str, Values]
     ) -> Signature:
-        """Return a hypothesis to first order about x (k,), other effects acting."""
+        """Return the contribution of a hypothesis about x (k,), with other effects."""
         robot = self.derivatives.conditions.robot
 
         def model(values: NDArray) -> NDArray:
@@ -217,6 +219,6 @@ class Tangents:
 
 
 def _seen(column: NDArray, slot: Slot) -> NDArray:
-    """Return an (N,) derivative, zero if its unknown's own size is not visible."""
+    """Return an (N,) derivative; zero if a plausible unknown is not visible."""
     size = np.linalg.norm(column) * slot.unknown.scale
     return np.zeros_like(column) if size < UNSEEN else column

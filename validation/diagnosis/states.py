@@ -27,9 +27,11 @@ from validation.diagnosis.gaussian import (
 from validation.diagnosis.prior_sizes import Grouped, Sizes, best_sizes
 from validation.diagnosis.weighted_readings import NARROW, WeightedReadings
 
-Mode = tuple[bool, bool]  # geometric errors in use, springs in use
+# whether geometric errors are in use, whether springs are in use
+Mode = tuple[bool, bool]
 MORE = math.log(2.0)  # each further element halves the prior probability
-IN_USE = math.log(10.0)  # prior odds against geometry, and against springs: 10
+# prior odds of 10 against geometric errors, and against springs
+IN_USE = math.log(10.0)
 _GROUPS = 4  # number of groups of nuisance parameters
 
 
@@ -39,12 +41,12 @@ class State:
 
     Attributes:
         elements: effects and functions.
-        mode: whether geometry and springs are in use.
+        mode: whether geometric errors are in use, and whether springs are in use.
         used: (k,) mask of the nuisance parameters in use.
         sizes: standard deviations and posterior of all unknowns.
         score: log posterior, up to a constant.
-        tau: true over stated sigma.
-        readings: the readings that it models.
+        tau: ratio of the true to the stated sigma.
+        readings: readings that the model describes.
     """
 
     elements: tuple[Element, ...]
@@ -56,7 +58,7 @@ class State:
     readings: WeightedReadings
 
     def _columns(self) -> NDArray:
-        """Return (n, k) columns of all unknowns; not cached, as they may be large."""
+        """Return (n, k) columns of all unknowns; they are too large for a cache."""
         r = self.readings
         return np.hstack([r.small[:, self.used], *(r.own(e) for e in self.elements)])
 
@@ -66,13 +68,13 @@ class State:
 
     @cached_property
     def marginal(self) -> Marginal:
-        """Model with its unknowns marginalised, in the fitted cells."""
+        """Model with marginalised unknowns, in the fitted cells."""
         flat = self.readings.flat
         return marginalise(self._columns(), self.sizes.std, self._z(), flat)
 
     @cached_property
     def sample_marginal(self) -> Marginal:
-        """Model with its unknowns marginalised, in the sampled rows."""
+        """Model with marginalised unknowns, in the cells of the sampled rows."""
         some = self.readings.sampled
         if some.all():
             return self.marginal
@@ -93,7 +95,7 @@ class State:
 
     @cached_property
     def left(self) -> NDArray:
-        """(n,) residual of independent noise, unweighted."""
+        """(n,) residual, whitened so that its noise is independent, without weights."""
         return (self.readings.z - self.fitted) / self.readings.root
 
     def own(self, k: int) -> slice:
@@ -104,7 +106,7 @@ class State:
 
     @property
     def errors(self) -> NDArray:
-        """(n, 6) [rad, m] geometric errors of the campaign's frames."""
+        """(n, 6) [rad, m] geometric errors of the robot's frames."""
         columns = self.readings.columns
         small = columns.nuisance.take(self.used)
         errors = np.zeros((len(columns.campaign.robot.frames), 6))
@@ -118,7 +120,7 @@ class State:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Sorted names of effects, and variables of functions."""
+        """Sorted names of the effects, and of the variables of functions."""
         names = [
             e.name or "of " + ", ".join(e.candidate.parts[0].variables)
             for e in self.elements
@@ -127,12 +129,12 @@ class State:
 
     @property
     def supported(self) -> bool:
-        """Whether no effect is at its bounds."""
+        """Whether no effect has its values at the bounds."""
         means = [self.sizes.mean[self.own(k)] for k in range(len(self.elements))]
         return not any(map(_at_bounds, self.elements, means))
 
     def sizes_for(self, elements: Sequence[Element]) -> dict[int, float]:
-        """Return the standard deviations by group of another model with elements."""
+        """Return standard deviations of the groups, for another model with elements."""
         own = self.sizes.of_group
         found = {g: s for g, s in own.items() if g < _GROUPS}
         for k, e in enumerate(self.elements):
@@ -141,14 +143,14 @@ class State:
         return found
 
     def expected_squares(self) -> NDArray:
-        """Return the (n,) expected squared residuals, unweighted."""
+        """Return (n,) expected squared residuals, without weights."""
         X = self._columns()
         spread = np.einsum("ij,ij->i", X @ self.sizes.covariance, X)
         return self.left**2 + spread * self.tau**2 / self.readings.weights
 
 
 def _at_bounds(e: Element, mean: NDArray) -> bool:
-    """Return whether all numbers of an effect, or one of its shape, are at a bound."""
+    """Return whether all values, or a shape parameter, of an effect are at a bound."""
     if not e.name or not e.columns.shape[1]:
         return False
     at, x = (mean <= e.lower) | (mean >= e.upper), e.values(mean)
@@ -162,7 +164,7 @@ def _at_bounds(e: Element, mean: NDArray) -> bool:
 
 
 def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
-    """Return the gain in prediction of one model over another, in standard errors.
+    """Return how much better one model predicts than another, in standard errors.
 
     Each block (n,) of readings is predicted by a fit to the others.  The gain is that
     of the log predictive densities on average or, if larger, of signed ranks (Wilcoxon
@@ -184,7 +186,7 @@ def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
 
 
 class Models:
-    """Models of weighted readings, each fitted once."""
+    """Models of weighted readings, each fitted only once."""
 
     def __init__(self, readings: WeightedReadings) -> None:
         """Start with an empty cache."""
@@ -192,14 +194,14 @@ class Models:
         self._states: dict[object, State] = {}
 
     def forget(self) -> None:
-        """Drop cached results: models and products of columns."""
+        """Release cached models and products of columns."""
         for state in self._states.values():
             state.forget()
         self._states.clear()
         self.readings.forget()
 
     def modes(self) -> list[Mode]:
-        """Return the combinations of nuisance parameters in use."""
+        """Return combinations of groups of nuisance parameters that may be in use."""
         small = self._small
         springs = [False, True] if small.spring.any() else [False]
         geometry = [False, True] if (~small.spring).any() else [False]
@@ -211,7 +213,7 @@ class Models:
     ) -> State:
         """Return the model with optimised standard deviations, from a cache.
 
-        The optimisation starts at those of ``start``.
+        The optimisation starts at the standard deviations of ``start``.
         """
         key = frozenset(elements), mode
         if key not in self._states:
@@ -219,7 +221,7 @@ class Models:
         return self._states[key]
 
     def best(self, elements: tuple[Element, ...], start: State) -> State:
-        """Return the best mode among those that differ in one group at most."""
+        """Return the best model among modes that differ in at most one group."""
         g, s = start.mode
         near = [m for m in self.modes() if m in {(g, s), (not g, s), (g, not s)}]
         states = [self.state(elements, m, start) for m in near]
@@ -253,7 +255,7 @@ class Models:
         return State(elements, mode, used, sizes, score, tau, self.readings)
 
     def _linear(self, elements: tuple[Element, ...], used: NDArray) -> Grouped:
-        """Return the nuisance parameters in use and the elements' unknowns."""
+        """Return the columns of the nuisance parameters in use and of the elements."""
         readings, small = self.readings, self._small
         z = readings.without_offsets(elements)
         with_small, inner = readings.products(elements)
@@ -278,7 +280,7 @@ class Models:
     def _score(
         self, elements: Sequence[Element], sizes: Sizes, used: NDArray, tau: float
     ) -> float:
-        """Return the log posterior up to a constant."""
+        """Return the log posterior of a model, up to a constant."""
         small, count = self._small, self.readings.count
         score = -0.5 * (float(deviance(sizes.squares, count)) + sizes.log_det)
         score -= sizes.cost

@@ -1,4 +1,4 @@
-"""Search of a diagnosis, from readings to the unknown numbers of a machine.
+"""Search of a diagnosis, from readings to the unknown parameters of a machine.
 
 Steps:
 
@@ -43,12 +43,16 @@ from validation.diagnosis.weighted_readings import NONE
 
 Update = Callable[[str, int, int], None]
 FINITE = next(name for name, effect in LIBRARY.items() if effect.finite)
-_SEARCHED = 2000  # rows by which models are chosen; all are fitted
-_TURNS = 6  # most repetitions of the search without gross blunders
-_BENDS = 1  # repetitions with second-order terms of geometric errors
-_GROSS = 30.0  # medians of all rows, from which a row is a gross blunder
-_CLEARLY = 2.0  # standard errors by which time must predict other spans better
-_BENT = 0.3  # [sigma] change of a reading by finite geometric errors, from which on
+# number of rows by which models are selected; the selected model is fitted to all rows
+_SEARCHED = 2000
+# largest number of repetitions of the search, each without the gross blunders found
+_TURNS = 6
+_BENDS = 1  # number of repetitions with second-order terms of geometric errors
+_GROSS = 30.0  # relative to the median rms of all rows: smallest rms of a gross blunder
+# number of standard errors by which functions of time must predict other rows better
+_CLEARLY = 2.0
+# [sigma] change of a reading by finite geometric errors above which terms are added
+_BENT = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,12 +60,12 @@ class Traced:
     """Result of the search for effects and functions.
 
     Attributes:
-        campaign: campaign of R rows; sigma is as large as the search estimated, of a
-            blunder many times as large, and so is the noise in common.
-        conditions: conditions of all rows, registered, with what finite geometric
-            errors add.
-        used: (R,) bool, rows that were fitted.
-        outliers: (R,) bool, rows whose readings are blunders, left out.
+        campaign: campaign of R rows, with the estimated sigma and noise in common; the
+            sigma of a blunder is many times larger.
+        conditions: registered conditions of all rows, with the second-order terms of
+            geometric errors.
+        used: (R,) bool, whether a row was fitted.
+        outliers: (R,) bool, whether a row has a blunder and is excluded.
         selected: models with their probabilities.
         columns: columns of the campaign's cells.
     """
@@ -75,12 +79,12 @@ class Traced:
 
     @property
     def fitting(self) -> Campaign:
-        """The rows fitted."""
+        """The rows that were fitted."""
         return self.campaign.take(self.used)
 
     @cached_property
     def unknowns(self) -> Unknowns:
-        """The unknown numbers of the machine, with their priors."""
+        """The unknown parameters of the machine, with their priors."""
         found, effects, at = self.selected, [], 0
         unknown = self.campaign.registration == "unknown"
         for k, h in enumerate(found.hypotheses):
@@ -97,13 +101,13 @@ class Traced:
 
     @property
     def _alone(self) -> bool:
-        """Whether the best model has one element: finite motions then are a claim."""
+        """Whether the best model has one element; finite motions are then a claim."""
         found = self.selected
         device = self.campaign.registration == "unknown"
         return len(found.hypotheses) - device + len(found.functions) == 1
 
     def rivals(self, most: int = 3) -> list[Unknowns]:
-        """Return machines of other effects than the best model's, likeliest first."""
+        """Return machines with other effects than the best, the most probable first."""
         states = self.selected.states
         own = frozenset(e.name for e in states[0].elements if e.name)
         found: dict[frozenset[str], Unknowns] = {}
@@ -126,7 +130,7 @@ class Traced:
         return list(found.values())
 
     def _device_frames(self, hypothesis: Hypothesis) -> list[Acting]:
-        """Return the measuring frame as it was found, one for each session."""
+        """Return the estimated measuring frame, one hypothesis for each session."""
         base = np.broadcast_to(self.conditions.base, (len(self.campaign), 6))
         own = {}
         for session in self.campaign.sessions or (None,):
@@ -138,7 +142,7 @@ class Traced:
 
 
 def _acting(hypothesis: Hypothesis, values: NDArray) -> list[Acting]:
-    """Return a hypothesis at work, in each session for which it has numbers."""
+    """Return a hypothesis with its values, in each session with parameters."""
     own = [(in_one_session(hypothesis, s), s) for s in sessions_of(hypothesis)]
     return [Acting(there, values[places], s) for (there, places), s in own]
 
@@ -151,17 +155,18 @@ def trace(
 
     Args:
         campaign: campaign of R rows.
-        fitted: (R,) bool, the rows that are read.
-        declared: declared model of all rows.
-        update: called with the step's name, the number done and their total.
+        fitted: (R,) bool, rows that the search may read.
+        declared: declared model, for all rows.
+        update: function called with the name of the step, the number of finished parts,
+            and the number of all parts.
         odds: factors on the prior odds of effects and functions, see
             :class:`.columns.Columns`.
 
     Returns:
-        The effects found, and the fitted machine with them.
+        The effects that were found, and the fitted machine with these effects.
 
     Raises:
-        BadInput: the measuring frame is not known and cannot be found.
+        BadInput: the measuring frame is unknown and cannot be estimated.
     """
     fitted = fitted & ~impossible_rows(campaign) & campaign.cells.any(axis=1)
     if campaign.registration == "unknown":
@@ -197,14 +202,14 @@ def trace(
 
 
 def _searched_rows(campaign: Campaign, fitted: NDArray) -> NDArray:
-    """Return (R,) bool, rows by which models are chosen: all, or a random part."""
+    """Return (R,) bool, rows for the selection of models: all, or a random sample."""
     chosen = np.zeros(len(campaign), dtype=bool)
     chosen[fitted] = drawn(campaign.measured_at_once[fitted], _SEARCHED)
     return chosen
 
 
 def _without_outlying(traced: Traced, fit: MachineFit) -> tuple[Traced, MachineFit]:
-    """Return the machine fitted without blunders among the rows that were not drawn."""
+    """Return the fitted machine without blunders among the rows outside the sample."""
     others = traced.used & ~np.isin(np.arange(len(traced.used)), traced.columns.row)
     if not others.any():
         return traced, fit
@@ -220,7 +225,7 @@ def _without_outlying(traced: Traced, fit: MachineFit) -> tuple[Traced, MachineF
 def _with_its_errors(
     campaign: Campaign, declared: Declared, derivatives: Derivatives, fitted: NDArray
 ) -> Derivatives:
-    """Return derivatives at conditions with second-order terms of geometric errors."""
+    """Return derivatives with the second-order terms of geometric errors."""
     conditions, seen = derivatives.conditions, hidden(campaign, ~fitted)
     alone = dict.fromkeys([*LIBRARY, FUNCTION], 0.0)
     columns = Columns(campaign, derivatives, odds=alone)
@@ -229,7 +234,7 @@ def _with_its_errors(
         z = whiten(campaign, campaign.measured - predict(conditions).deviation)
         known = cells & np.isfinite(z)
         selected = select(columns, z[known], known, common=NONE)
-        # a fit takes long, so the linear estimates are compared with the limit
+        # a fit takes long, so the errors of the linear estimate are tested first
         near = selected.states[0].errors
         if declared.bent(seen, conditions, near, _BENT / 3) is None:
             break
@@ -244,7 +249,7 @@ def _with_its_errors(
 
 
 def _errors(fit: MachineFit) -> NDArray:
-    """Return the (n, 6) [rad, m] geometric errors found in addition to the declared."""
+    """Return (n, 6) [rad, m] the estimated minus the declared geometric errors."""
     return np.asarray(fit.robot.errors - fit.unknowns.robot.errors)
 
 
@@ -258,7 +263,7 @@ def _gross(campaign: Campaign, fit: MachineFit, used: NDArray) -> NDArray:
 
 
 def _searched(columns: Columns, z: NDArray, cells: NDArray, update: Update) -> Selected:
-    """Return result of the search; functions of time must predict clearly better."""
+    """Return result of the search; functions of time must improve the prediction."""
     # time is correlated with all slow changes and does not repeat on another day: it is
     # accepted only if it predicts other periods clearly better; without candidates
     # their effects must not be estimated as noise
@@ -276,7 +281,7 @@ def _traced(
     campaign: Campaign, conditions: Conditions, fitted: NDArray, cells: NDArray,
     selected: Selected, columns: Columns,
 ) -> Traced:  # fmt: skip
-    """Return the effects found, with the estimated sigma and the rows with blunders."""
+    """Return the found effects, the estimated sigma, and the rows with blunders."""
     weights = np.ones(len(columns.row))
     weights[cells] = cell_weights(selected.weights)
     sigma = campaign.sigma.copy()
@@ -302,18 +307,20 @@ def _traced(
 
 
 def _fitted(traced: Traced) -> MachineFit:
-    """Return the machine found, without effects that the readings do not support."""
+    """Return the fitted machine, without effects that the readings do not support."""
     fit = fit_machine(traced.campaign, traced.unknowns, traced.used)
     while True:
         weak = [one for one in fit.unknowns.effects if not supported(fit, one)]
         if not weak:
             return fit
-        # the weakest first: two effects that do the same are both uncertain
+        # the weakest effect first: of two equivalent effects, both have a large
+        # uncertainty
+
         one = min(weak, key=lambda e: _size(fit, e))
         fit = fit_machine(traced.campaign, fit.unknowns.without(one), traced.used)
 
 
 def _size(fit: MachineFit, one: Acting) -> float:
-    """Return the [sigma^2] squared change of the fitted readings by an effect."""
+    """Return the squared change [sigma^2] of the fitted readings due to an effect."""
     x, _, slopes = fit.own(one)
     return float(np.sum((slopes @ x) ** 2))

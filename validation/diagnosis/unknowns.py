@@ -1,4 +1,4 @@
-"""The unknown numbers of a machine, and the robot that has them.
+"""The unknown parameters of a machine, and the robot that has them.
 
 A diagnosis determines the numbers that a robot file lacks: effects of the library,
 geometric errors, compliances of joints, functions.  Together they are a vector x, and
@@ -26,10 +26,13 @@ from validation.diagnosis.responses import responses
 from validation.diagnosis.sensitivities import Sensitivities
 from validation.diagnosis.signatures import conditions_of
 
-_WIDE = 1e3  # plausible sizes of an effect's unknown: standard deviation of its prior
-_BEND = 0.5  # standard deviation of a function's shape parameter; and its bound
-_HELD = 1e-12  # plausible sizes: standard deviation of an unknown with a declared value
-STEP = 1e-4  # relative to a number's size: step for its derivative
+_WIDE = 1e3  # prior standard deviation of an effect's unknown, in plausible sizes
+# largest change, and prior standard deviation, of a function's shape parameter,
+# relative to its value
+_BEND = 0.5
+# standard deviation of an unknown with a declared value, in plausible sizes
+_HELD = 1e-12
+STEP = 1e-4  # relative to a parameter's size: step of the derivative
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +43,8 @@ class Small:
         name: ``"geometry"`` or ``"springs"``.
         frame: (k,) row of the frame in the robot.
         axis: (k,) component of the screw there, 0 to 5.
-        std: (k,) [rad, m] or [rad/(N m), m/N] of the prior about the declared value.
+        std: (k,) [rad, m] or [rad/(N m), m/N] prior standard deviations about the
+            declared values.
     """
 
     name: str
@@ -53,20 +57,21 @@ class Small:
 
     @property
     def bounds(self) -> tuple[NDArray, NDArray]:
-        """(k,) lower and upper bounds; springs only add compliance."""
+        """(k,) lower and upper bounds; a spring can only add compliance."""
         least = -np.inf if self.name == GEOMETRY else 0.0
         return np.full(len(self), least), np.full(len(self), np.inf)
 
 
 @dataclass(frozen=True, eq=False)
 class Acting:
-    """An effect of the library, in all rows or in those of one session.
+    """An effect of the library that acts in all rows or in one session.
 
     Attributes:
-        hypothesis: the frames and the unknowns.
-        mean: (k,) mean of the prior, and start of a fit.
-        session: the only session in which it acts, None for all.
-        device: whether it is the pose of a measuring frame, which is always unknown.
+        hypothesis: the effect with its frames and unknowns.
+        mean: (k,) prior means, which are also the start values of a fit.
+        session: session in which the effect acts, None for all sessions.
+        device: whether the effect is the pose of a measuring frame, which is always
+            unknown.
     """
 
     hypothesis: Hypothesis
@@ -79,24 +84,24 @@ class Acting:
 
     @property
     def std(self) -> NDArray:
-        """(k,) standard deviations of the prior, so wide that it is flat."""
+        """(k,) prior standard deviations, so large that the prior is flat."""
         unknowns = [slot.unknown for slot in self.hypothesis.slots]
         wide = [(_HELD if u.upper == u.lower else _WIDE) * u.scale for u in unknowns]
         return np.array(wide)
 
     @property
     def bounds(self) -> tuple[NDArray, NDArray]:
-        """(k,) lower and upper bounds of the library."""
+        """(k,) lower and upper bounds, from the library."""
         return self.hypothesis.bounds
 
 
 @dataclass(frozen=True, eq=False)
 class LearnedFunction:
-    """A function of the machine whose coefficients are unknown.
+    """A function of the machine with unknown coefficients.
 
     Attributes:
-        candidate: places, variables and form.
-        coefficients: (m,) standard deviations of their prior.
+        candidate: places, variables and form of the function.
+        coefficients: (m,) prior standard deviations of the coefficients.
     """
 
     candidate: Candidate
@@ -107,12 +112,12 @@ class LearnedFunction:
 
     @property
     def std(self) -> NDArray:
-        """(m,) or (m + 1,) standard deviations; the last is the shape parameter's."""
+        """(m,) or (m + 1,) prior standard deviations; the last is of the shape."""
         return np.concatenate([self.coefficients, _BEND * self.candidate.shape.bends])
 
     @property
     def bounds(self) -> tuple[NDArray, NDArray]:
-        """(m,) or (m + 1,) bounds, lower and upper; the last are the shape's."""
+        """(m,) or (m + 1,) lower and upper bounds; the last are of the shape."""
         upper = np.full(len(self), np.inf)
         upper[len(self.coefficients) :] = self.std[len(self.coefficients) :]
         return -upper, upper
@@ -123,14 +128,15 @@ Part = Acting | Small | LearnedFunction
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """The unknown numbers x of a robot, with their prior.
+    """The unknown parameters x of a robot, with their prior.
 
     Attributes:
-        robot: robot as declared, with the effects of its file.
+        robot: declared robot with the effects of its file.
         effects: effects of the library, including the registration.
         small: geometric errors and joint compliances.
-        functions: learned ones.
-        sensitivities: with the normalisation of functions; None without functions.
+        functions: learned functions.
+        sensitivities: sensitivities that contain the normalisation of functions; None
+            without functions.
     """
 
     robot: Robot
@@ -144,7 +150,7 @@ class Unknowns:
 
     @cached_property
     def places(self) -> list[tuple[Part, slice]]:
-        """Parts of x, in order, with their slices."""
+        """Parts of x in their order, with their slices."""
         parts: list[Part] = [*self.effects, *self.small, *self.functions]
         ends = np.cumsum([len(part) for part in parts]).tolist()
         return [
@@ -157,24 +163,24 @@ class Unknowns:
 
     @property
     def mean(self) -> NDArray:
-        """(k,) mean of the prior, and start of a fit."""
+        """(k,) prior means, which are also the start values of a fit."""
         zeros = np.zeros(len(self) - sum(len(one) for one in self.effects))
         return np.concatenate([*(one.mean for one in self.effects), zeros])
 
     @property
     def std(self) -> NDArray:
-        """(k,) standard deviation of the prior."""
+        """(k,) prior standard deviations."""
         return np.concatenate([np.zeros(0), *(part.std for part, _ in self.places)])
 
     @property
     def bounds(self) -> tuple[NDArray, NDArray]:
-        """(k,) lower and upper."""
+        """(k,) lower and upper bounds."""
         both = [np.zeros((2, 0)), *(np.array(part.bounds) for part, _ in self.places)]
         lower, upper = np.hstack(both)
         return lower, upper
 
     def robot_at(self, x: NDArray) -> Robot:
-        """Return the robot with numbers x (k,), which is saved and judged."""
+        """Return the robot with parameters x (k,), which is tested and saved."""
         robot, functions = self.robot, list(self.robot.functions)
         for part, own in self.places:
             if isinstance(part, Small):
@@ -192,7 +198,7 @@ class Unknowns:
         return robot
 
     def _effects_at(self, x: NDArray) -> dict[str | None, dict[str, dict[str, float]]]:
-        """Return effects added to those of the file, for all rows or a session."""
+        """Return the effects to add to those of the file, for all rows or a session."""
         found: dict[str | None, dict[str, dict[str, float]]] = {}
         for one in self.effects:
             values = one.hypothesis.public(
@@ -204,10 +210,10 @@ class Unknowns:
         return found
 
     def slopes(self, campaign: Campaign, x: NDArray) -> NDArray:
-        """Return the change of the readings per unknown, by the linear model at x (k,).
+        """Return the derivatives of the readings by x (k,), by the linear model.
 
         Returns:
-            (R, 6, k) [rad, m] per unit of x; zero without a solution.
+            (R, 6, k) [rad, m] for each unit of x; zero in rows without a solution.
         """
         robot = self.robot_at(x)
         conditions = _linear(conditions_of(replace(campaign, robot=robot)))
@@ -248,7 +254,7 @@ class Unknowns:
 
 
 def effects_in(robot: Robot, session: str | None) -> Mapping[str, Values]:
-    """Return effects of a robot's file in all rows, or those of one session alone."""
+    """Return effects of a robot's file in all rows, or those of one session only."""
     if session is None:
         return robot.effects
     return robot.session_effects.get(session, {})
@@ -257,7 +263,7 @@ def effects_in(robot: Robot, session: str | None) -> Mapping[str, Values]:
 def with_effects_in(
     robot: Robot, session: str | None, effects: Mapping[str, Values]
 ) -> Robot:
-    """Return a robot with other effects in all rows, or in one session alone."""
+    """Return a robot with other effects in all rows, or in one session only."""
     if session is None:
         return replace(robot, effects=effects)
     sessions = {**robot.session_effects, session: effects}
@@ -265,7 +271,7 @@ def with_effects_in(
 
 
 def _linear(conditions: Conditions) -> Conditions:
-    """Return the linear model, with closed chains' clearances held at rest."""
+    """Return the linear model, in which the clearances of closed chains are fixed."""
     conditions = replace(conditions, exact=False)
     loose = virtual_joints(conditions.robot).cones.shape[1]
     if loose and conditions.robot.closures and conditions.rest is None:
@@ -274,7 +280,7 @@ def _linear(conditions: Conditions) -> Conditions:
 
 
 def _resting_as(conditions: Conditions, held: Conditions) -> Conditions:
-    """Return conditions with the rest positions of others; a foundation has none."""
+    """Return conditions with other rest positions; a base compliance has none."""
     assert held.rest is not None
     rest = np.zeros_like(conditions.errors)
     for row, frame in enumerate(conditions.robot.frames):

@@ -1,4 +1,4 @@
-"""The verdict from probabilities of models."""
+"""The verdict of a diagnosis, from the probabilities of models."""
 
 from assembly.model.statuses import (
     AMBIGUOUS,
@@ -18,10 +18,11 @@ Sets = tuple[tuple[tuple[str, ...], float], ...]
 
 
 def by_names(selected: Selected) -> Sets:
-    """Return probabilities of models by their effects, likeliest first.
+    """Return the probabilities of sets of effects, the most probable first.
 
     Returns:
-        Names and probabilities; for a model with a function, ``"function"`` is last.
+        Names of the effects and the probability of each set; for a model with a
+        function, ``"function"`` is the last name.
     """
     weights: dict[tuple[str, ...], float] = {}
     for model in selected.models:
@@ -39,14 +40,14 @@ def verdict(
 
     Args:
         selected: models with their probabilities.
-        names: names of the library's effects of the fitted machine.
+        names: names of the library effects of the fitted machine.
         functions: whether the model has functions.
         small: whether the model has geometric errors or springs.
-        more_than_noise: whether the model's residual is more than noise.
+        more_than_noise: whether the residual of the model exceeds the noise.
 
     Returns:
         ``"none_needed"``, ``"explained"``, ``"learned"``, ``"ambiguous"`` or
-        ``"outside_library"``, and the claimed names.
+        ``"outside_library"``, and the names of the claimed effects.
     """
     if more_than_noise:
         return OUTSIDE_LIBRARY, ()

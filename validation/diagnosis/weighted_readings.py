@@ -1,4 +1,4 @@
-"""Readings and columns of the fitted cells, weighted, with cached inner products."""
+"""Weighted readings and columns of the fitted cells, with cached inner products."""
 
 from collections.abc import Sequence
 
@@ -10,8 +10,8 @@ from validation.diagnosis.elements import Element
 from validation.diagnosis.prior_sizes import Eigen
 
 NARROW = 50  # largest number of columns of an element whose fitted cells are cached
-_RANK = 1e-9  # relative singular value of a dependent column
-NONE = (0.0, 0.0)  # no noise in common
+_RANK = 1e-9  # relative singular value below which a column depends on others
+NONE = (0.0, 0.0)  # standard deviations of the shared noise if there is no such noise
 
 
 class WeightedReadings:
@@ -21,15 +21,15 @@ class WeightedReadings:
         columns: columns of all N cells.
         given: (n,) whitened residual of the fitted cells.
         cells: (N,) mask of the fitted cells.
-        weights: (n,) relative precision, 1 for a good reading.
-        common: [rad, m] standard deviations of the platform's rotation and translation
-            that all cells of a measurement share, over tau.
-        sampled: (n,) cells of the rows by which functions are scored first.
-        whiten: map of the fitted cells to independent noise.
-        flat: (n, f) orthonormal columns of the measuring frame.
+        weights: (n,) relative precisions, 1 for a reading that is not a blunder.
+        common: [rad, m] standard deviations, divided by tau, of the platform's rotation
+            and translation that all cells of a measurement share.
+        sampled: (n,) bool, cells of the rows by which functions are scored first.
+        whiten: map from the fitted cells to cells of independent noise.
+        flat: (n, f) orthonormal columns of the measuring frame, which has a flat prior.
         z: (n,) whitened residual without the measuring frame.
         small: (n, k) columns of the nuisance parameters without the measuring frame.
-        gram: (k, k) their inner products.
+        gram: (k, k) inner products of the columns ``small``.
         count: number of independent readings.
     """
 
@@ -37,7 +37,7 @@ class WeightedReadings:
         self, columns: Columns, z: NDArray, cells: NDArray, weights: NDArray,
         common: tuple[float, float] = NONE,
     ) -> None:  # fmt: skip
-        """Apply the weights and project out the measuring frame."""
+        """Apply the weights, and project out the measuring frame."""
         self.columns, self.cells, self.weights = columns, cells, weights
         self.given, self.common = z, common
         self.sampled = columns.sampled[cells]
@@ -47,7 +47,9 @@ class WeightedReadings:
         norm = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
         left, size, _ = np.linalg.svd(flat / norm, full_matrices=False)
         self.flat = left[:, size > _RANK * size.max(initial=0.0)]
-        # of the noise's covariance, and of the likelihood without the measuring frame
+        # log determinants of the noise's covariance, and of the likelihood without the
+        # frame
+
         seen = np.append(norm, size[: self.flat.shape[1]])
         self.log_det = self.whiten.log_det + 2 * float(np.log(seen).sum())
         self.z = self._without_flat(self.whiten(z))
@@ -62,7 +64,7 @@ class WeightedReadings:
         return columns - self.flat @ (self.flat.T @ columns)
 
     def sample(self, common: tuple[float, float]) -> "WeightedReadings":
-        """Return the sampled rows alone, with given noise in common."""
+        """Return the readings of the sampled rows only, for a given shared noise."""
         cells, some = self.cells.copy(), self.sampled
         cells[cells] = some
         return WeightedReadings(
@@ -70,7 +72,7 @@ class WeightedReadings:
         )
 
     def own(self, e: Element) -> NDArray:
-        """Return an element's (n, m) columns in the fitted cells."""
+        """Return the (n, m) columns of an element in the fitted cells."""
         if e in self._own:
             return self._own[e]
         B = self._without_flat(self.whiten(e.columns[self.cells]))
@@ -79,7 +81,7 @@ class WeightedReadings:
         return B
 
     def products(self, elements: Sequence[Element]) -> tuple[NDArray, NDArray]:
-        """Return inner products of m columns: (k, m) with nuisance columns, (m, m)."""
+        """Return inner products of m columns: with nuisance columns (k, m); (m, m)."""
         for i, e in enumerate(elements):
             missing = [o for o in (None, *elements[: i + 1])
                        if (e, o) not in self._inner]  # fmt: skip
@@ -109,6 +111,6 @@ class WeightedReadings:
         return z
 
     def forget(self) -> None:
-        """Drop cached columns and inner products."""
+        """Release cached columns and inner products."""
         for one in (self._own, self._inner, self._eigen):
             one.clear()

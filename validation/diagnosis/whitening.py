@@ -1,8 +1,8 @@
 r"""Transformation of noise that the points of a measurement share to independent noise.
 
 A measurement reads several points of the platform together.  The noise of its cells,
-over the stated sigma, is e + L n: e independent of variance 1/w, and n of k independent
-standard normal numbers that all its cells share.
+divided by the stated sigma, is e + L n.  Here e is independent noise of variance 1/w,
+and n are k independent standard normal numbers that all cells of the measurement share.
 
 ======  ==============  =======  =====================================================
 symbol  code            shape    meaning
@@ -12,8 +12,8 @@ L       ``loadings``    (n, k)   change of the cells over sigma per number in co
 W       ``matrix``      (n, n)   block-diagonal, W (w^-1 + L L') W' = 1
 ======  ==============  =======  =====================================================
 
-Of all such W this is the nearest to w^1/2: W = (1 + K K')^-1/2 w^1/2 with K = w^1/2 L,
-by the singular values of the blocks of K.
+Among all such W, this W is the nearest to w^1/2: W = (1 + K K')^-1/2 w^1/2 with K =
+w^1/2 L.  It is computed from the singular values of the blocks of K.
 """
 
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ class Whitening:
 
     Attributes:
         root: (n,) square roots of the relative precisions.
-        matrix: (n, n) W, sparse; None if no noise is in common.
+        matrix: (n, n) sparse matrix W; None if there is no shared noise.
         log_det: ln det (1 + K K').
     """
 
@@ -42,24 +42,24 @@ class Whitening:
     log_det: float = 0.0
 
     def __call__(self, values: NDArray) -> NDArray:
-        """Return W times (n,) or (n, m) values over sigma."""
+        """Return W times (n,) or (n, m) values that are divided by sigma."""
         if self.matrix is not None:
             return np.asarray(self.matrix @ values)
         return values * (self.root if values.ndim == 1 else self.root[:, None])
 
     def inverse(self, values: NDArray) -> NDArray:
-        """Return the (n,) values over sigma that the map transforms to given ones."""
+        """Return the (n,) values over sigma that the map transforms to given values."""
         if self.matrix is not None:
             return np.asarray(spsolve(self.matrix, values))
         return values / self.root
 
 
 def whitening(root: NDArray, loadings: NDArray | None, visit: NDArray) -> Whitening:
-    """Return the map of n cells; diagonal without loadings.
+    """Return the map of n cells; it is diagonal without loadings.
 
-    ``root`` (n,) are square roots of the relative precisions, ``loadings`` (n, k)
-    changes over sigma per number in common, ``visit`` (n,) is equal for cells of a
-    measurement.
+    ``root`` (n,) are square roots of the relative precisions.  ``loadings`` (n, k) are
+    changes of the cells, divided by sigma, for each shared number.  ``visit`` (n,) is
+    equal for all cells of a measurement.
     """
     if loadings is None or not loadings.any():
         return Whitening(root)
@@ -80,7 +80,7 @@ def whitening(root: NDArray, loadings: NDArray | None, visit: NDArray) -> Whiten
 
 
 def _of_one_size(visit: NDArray) -> Iterator[NDArray]:
-    """Yield (V, m) cells of all measurements of m cells, for every m."""
+    """Yield (V, m) cells of all measurements that have m cells, for every m."""
     order = np.argsort(visit, kind="stable")
     _, start, count = np.unique(visit[order], return_index=True, return_counts=True)
     for size in np.unique(count).tolist():
@@ -89,7 +89,7 @@ def _of_one_size(visit: NDArray) -> Iterator[NDArray]:
 
 
 def whitening_of(campaign: Campaign, cells: NDArray) -> Whitening:
-    """Return the map of cells (R, 6) bool by a campaign's sigma and noise in common."""
+    """Return the map of cells (R, 6) bool for the noise of a campaign."""
     row, _ = np.nonzero(cells)
     loadings = None
     if campaign.common is not None:
@@ -99,9 +99,10 @@ def whitening_of(campaign: Campaign, cells: NDArray) -> Whitening:
 
 
 def independent(campaign: Campaign, residual: NDArray) -> NDArray:
-    """Return a residual (R, 6) [rad, m] over its noise, independent in the N cells.
+    """Return residual (R, 6) [rad, m] of the N cells, transformed to independent noise.
 
-    (N,), of unit variance if it is noise; values that are not finite count as zero.
+    The result (N,) has unit variance if the residual is noise.  Values that are not
+    finite count as zero.
     """
     cells = campaign.cells
     z = np.nan_to_num(residual[cells] / campaign.sigma[cells])
@@ -109,7 +110,7 @@ def independent(campaign: Campaign, residual: NDArray) -> NDArray:
 
 
 def size_of_noise(campaign: Campaign) -> NDArray:
-    """Return (R, 6) [rad, m] standard deviation of readings, with noise in common."""
+    """Return (R, 6) [rad, m] standard deviations of the readings, with shared noise."""
     if campaign.common is None:
         return campaign.sigma
     return np.sqrt(campaign.sigma**2 + np.sum(campaign.common**2, axis=2))
@@ -120,19 +121,20 @@ def platform_motions(campaign: Campaign, reading: NDArray) -> NDArray | None:
 
     Args:
         campaign: campaign of R rows.
-        reading: (R, 6, 6) change of the readings per screw of the platform at its
+        reading: (R, 6, 6) change of the readings for each screw of the platform at its
             origin, base axes.
 
     Returns:
-        (R, 6, 6) [rad, m] per rotation about the centre of the points measured, and per
-        translation; None if no measurement reads several points.
+        (R, 6, 6) [rad, m] change for each rotation about the centre of the measured
+        points, and for each translation; None if no measurement reads several points.
     """
     visit = campaign.measured_at_once[campaign.cells.any(axis=1)]
     if len(np.unique(visit)) == len(visit):
         return None
     centre = np.unique(campaign.targets, axis=0).mean(axis=0)
     place = campaign.transforms[:, campaign.robot.index(campaign.robot.platform)]
-    screws = np.tile(np.eye(6), (len(campaign), 1, 1))  # screw by motion
+    # row of a screw, column of a motion
+    screws = np.tile(np.eye(6), (len(campaign), 1, 1))
     arm = place[:, :3, :3] @ centre
     screws[:, 3:, :3] = np.swapaxes(np.cross(np.eye(3), -arm[:, None]), 1, 2)
     return np.asarray(reading @ screws)

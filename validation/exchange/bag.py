@@ -1,7 +1,7 @@
 """Import of ROS bags: points, poses and transforms, read by ``rosbags``.
 
 A bag is a rosbag2 folder (SQLite or MCAP) or a ROS 1 ``.bag``.  A reading is named by
-its topic and its frame; its time is the message's stamp; lengths are in metres.
+its topic and its frame; its time is the stamp of the message; lengths are in metres.
 """
 
 import os
@@ -36,7 +36,7 @@ def read_bag(path: Path | str, oriented: bool = False) -> list[Reading]:
         oriented: whether orientations are read; otherwise they are ignored.
 
     Returns:
-        The readings in the order recorded.
+        The readings in the recorded order.
 
     Raises:
         BadInput: ``rosbags`` is not installed, the bag cannot be read, or it has no
@@ -62,7 +62,7 @@ def read_bag(path: Path | str, oriented: bool = False) -> list[Reading]:
                     )
     except BadInput:
         raise
-    except Exception as error:  # any error of a third-party reader
+    except Exception as error:  # a third-party reader may raise any exception
         reason = one_line(str(error), 120) or type(error).__name__
         raise BadInput(f"{path}: not a readable bag: {reason}") from None
     if not readings:
@@ -87,13 +87,14 @@ def _places(message: Any) -> Iterator[tuple[str, Any, Any, Any]]:
 def _reading(
     path: str, number: int, names: tuple[str, ...], header: Any, place: Any, turn: Any
 ) -> Reading:
-    """Return one point of a bag; ``line`` is the message's number."""
+    """Return one point of a bag; ``line`` of the reading is the message's number."""
     position = np.array([place.x, place.y, place.z], dtype=float)
     if np.isnan(position).any():
         position[:] = np.nan  # the device saw no target
     elif not (np.abs(position) <= LARGEST).all():
         raise BadInput(
-            f"{path}: message {number}: found {position.tolist()}, expected a place [m]"
+            f"{path}: message {number}: found {position.tolist()}, "
+            "expected a position [m]"
         )
     time = header.stamp.sec + 1e-9 * header.stamp.nanosec
     rotation, where = None, f"{path}: message {number}"

@@ -1,4 +1,4 @@
-"""The two texts of an imported campaign: its table, and ``campaign.toml``."""
+"""Texts of an imported campaign: its table, and ``campaign.toml``."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,20 +13,21 @@ from validation.exchange.device_frame import DeviceFrame
 from validation.exchange.reading import Reading
 from validation.exchange.targets_file import TargetsFile
 
-Rows = Sequence[tuple[int, Mapping[str, Reading]]]  # command, and readings by target
+# number of the command, and readings by target
+Rows = Sequence[tuple[int, Mapping[str, Reading]]]
 
 
 def columns_of(
     commands: Commands, rows: Rows, gaps: NDArray, turns: NDArray, frame: DeviceFrame,
     names: Sequence[str],
 ) -> dict[str, NDArray]:  # fmt: skip
-    """Return the columns of the campaign's table, SI.
+    """Return the columns of the campaign's table, in SI units.
 
     Args:
         commands: the commands.
-        rows: rows of the campaign.
-        gaps: (R, T, 3) [m] deviation of each target; NaN if not read.
-        turns: (R, 3) [rad] of the platform; NaN if not read.
+        rows: rows of the campaign: number of the command, and readings by target.
+        gaps: (R, T, 3) [m] deviation of each target; NaN if it was not read.
+        turns: (R, 3) [rad] rotation of the platform; NaN if it was not read.
         frame: pose of the device.
         names: names of the targets.
 
@@ -64,7 +65,7 @@ def spreads(rows: Rows, frame: DeviceFrame, names: Sequence[str]) -> NDArray:
         names: names of the targets.
 
     Returns:
-        (R, T, 3) [m], NaN if not stated.
+        (R, T, 3) [m] standard deviations; NaN if not stated.
     """
     sigma = np.full((len(rows), len(names), 3), np.nan)
     for i, (_, readings) in enumerate(rows):
@@ -75,14 +76,14 @@ def spreads(rows: Rows, frame: DeviceFrame, names: Sequence[str]) -> NDArray:
 
 
 def labels_of(commands: Commands, rows: Rows) -> list[str]:
-    """Return the ids of the rows: the command's, numbered if it occurs again.
+    """Return the ids of the rows: the command's id, numbered if it occurs again.
 
     Args:
         commands: the commands.
         rows: rows of the campaign.
 
     Returns:
-        A label for each.
+        A label for each row.
     """
     seen: dict[int, int] = {}
     labels = []
@@ -104,13 +105,14 @@ def declaration(
     """Return the text of ``campaign.toml``.
 
     Args:
-        declared: the targets file.
+        declared: content of the targets file.
         folder: folder of the campaign.
-        spread: (..., 3) [m] stated with the readings, NaN if not.
+        spread: (..., 3) [m] standard deviations stated with the readings; NaN if not
+            stated.
         turned: whether orientations were read.
 
     Returns:
-        The text.
+        The text of the file.
 
     Raises:
         BadInput: neither a reading nor the targets file states a standard deviation.
@@ -129,7 +131,7 @@ def declaration(
     if not np.isfinite(spread).all() and declared.noise is None:
         raise BadInput(
             f"{declared.file}: noise: missing; expected one standard deviation "
-            "[m], because some readings have none of their own"
+            "[m], because some readings state none"
         )
     if declared.noise is not None:
         lines += ["[noise]", f"position = {declared.noise!r}"]

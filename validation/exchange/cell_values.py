@@ -14,7 +14,7 @@ _NO_READING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---"}
 
 
 def missing(cell: str) -> bool:
-    """Return whether a cell means that nothing was read."""
+    """Return whether a cell states that there is no reading."""
     return cell.lower() in _NO_READING
 
 
@@ -24,8 +24,8 @@ class CellValues:
 
     Attributes:
         sheet: the table.
-        header: its columns.
-        writing: declared format, used where the table states none.
+        header: columns of the table.
+        writing: declared format, used where the table does not state one.
     """
 
     sheet: Sheet
@@ -38,7 +38,7 @@ class CellValues:
         return self.number(line, name, cell) * self.unit(self.header.columns[k].unit)
 
     def unit(self, stated: str) -> float:
-        """Return unit [m] of a column: its own, else as declared, else the file's."""
+        """Return column's unit [m]: its own, else the declared one, else the file's."""
         path, declared, found = self.sheet.file, self.writing.unit, self.header.unit
         if not stated and declared and found:
             if LENGTHS[found] != LENGTHS[declared]:
@@ -59,7 +59,7 @@ class CellValues:
         return LENGTHS[unit]
 
     def number(self, line: int, column: str, cell: str) -> float:
-        """Return a cell's finite number."""
+        """Return the finite number in a cell."""
         decimal = self.sheet.decimal
         value = parse_number(cell, decimal)
         if abs(value) <= LARGEST:

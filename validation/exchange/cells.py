@@ -1,7 +1,7 @@
 """Text and cells of a device's table, in the encodings of common programs.
 
-Excel and Leica write UTF-16 or Latin-1, others UTF-8; a cell that begins with an
-apostrophe is text in Excel.
+Excel and Leica write UTF-16 or Latin-1, other programs UTF-8.  A cell that begins with
+an apostrophe is text in Excel.
 """
 
 import codecs
@@ -15,22 +15,22 @@ from pathlib import Path
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.table import read_bytes
 
-_MARKS = (";", "\t", ",")  # marks between cells, the likeliest first
+_MARKS = (";", "\t", ",")  # separators between cells, the most probable first
 _BLANK = " "
 # largest number of characters of a cell; the search for units in it is quadratic
 _LONGEST = 1000
-_SAMPLE = 2000  # number of lines by which the mark between cells is found
+_SAMPLE = 2000  # number of lines by which the separator between cells is found
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """A table in cells.
+    """A table as cells.
 
     Attributes:
-        file: its path, for messages.
-        decimal: its decimal mark.
-        rows: for each line its number and its cells, without quotes and blanks
-            around them; comments and blank lines are left out.
+        file: path of the file, for messages.
+        decimal: decimal mark of the table.
+        rows: for each line its number and its cells, without quotes and surrounding
+            blanks; comments and blank lines are left out.
     """
 
     file: str
@@ -49,7 +49,7 @@ def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
         The table.
 
     Raises:
-        BadInput: the file cannot be read, is no text, or has no rows.
+        BadInput: the file cannot be read, is not text, or has no rows.
     """
     lines = [
         (number, line.strip(" \r\n"))
@@ -74,7 +74,7 @@ def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
 def _with_names_of_words(
     lines: Sequence[tuple[int, str]], rows: Sequence[tuple[int, list[str]]]
 ) -> list[tuple[int, list[str]]]:
-    """Return rows with a header of words joined, where two blanks separate cells."""
+    """Return rows with the words of each heading joined, if blanks separate cells."""
     usual = Counter(len(cells) for _, cells in rows).most_common(1)[0][0]
     return [
         (number, wide)
@@ -104,12 +104,14 @@ def _text(path: Path | str) -> str:
         if "\0" not in text:
             return text
         line = text.count("\n", 0, text.index("\0")) + 1
-        raise BadInput(f"{path}: line {line} holds NUL; expected a text file")
-    raise BadInput(f"{path}: not UTF-16 as it begins; expected a text file")
+        raise BadInput(
+            f"{path}: line {line}: found the character NUL; expected a text file"
+        )
+    raise BadInput(f"{path}: not UTF-16 despite its byte order mark; expected text")
 
 
 def _mark(lines: Sequence[str], decimal: str) -> str:
-    """Return the mark between cells of most lines; the likeliest of several."""
+    """Return the separator of cells in most lines; the most probable of several."""
     for mark in _MARKS:
         if 2 * sum(mark in line for line in lines) < len(lines):
             continue
@@ -126,6 +128,6 @@ def _cells(line: str, mark: str) -> list[str]:
         line = re.sub(r"\s+(?=\[)", "", line.replace("\t", _BLANK).strip())  # X [mm]
     try:
         row = next(csv.reader([line], delimiter=mark, skipinitialspace=True))
-    except csv.Error:  # a quote without end: no table
+    except csv.Error:  # a quote without an end shows that the text is not a table
         row = line.split(mark)
     return [cell.strip().strip('"').removeprefix("'").strip() for cell in row]

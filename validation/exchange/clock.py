@@ -1,4 +1,4 @@
-"""Times of devices and controllers, in seconds."""
+"""Conversion of the times of devices and controllers to seconds."""
 
 import re
 from datetime import UTC, datetime
@@ -15,15 +15,15 @@ _CLOCK = re.compile(r"\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?(?: ?[APap][Mm])?")
 
 
 def parse_time(place: str, text: str, writing: Writing) -> float:
-    """Return the [s] of a time: seconds, time of day, ISO 8601, 14 digits, or date.
+    """Return a time [s]: seconds, time of day, ISO 8601, 14 digits, or date and time.
 
     Args:
         place: file and line, for messages.
-        text: the cell, or date and time.
-        writing: its decimal mark, and the order of dates with slashes.
+        text: content of the cell, or date and time.
+        writing: format: decimal mark, and order of day and month in dates with slashes.
 
     Returns:
-        Seconds on the file's own clock; only differences have a meaning.
+        Seconds on the clock of the file; only differences have a meaning.
 
     Raises:
         BadInput: the text has none of these forms.
@@ -60,18 +60,18 @@ def parse_time(place: str, text: str, writing: Writing) -> float:
 
 
 def _dated(year: str, month: str, day: str, clock: str) -> float:
-    """Return the [s] of a date and a time of day, 10:30:00.25 or 9:30:00 PM."""
+    """Return the time [s] of a date and a time of day, 10:30:00.25 or 9:30:00 PM."""
     clock = clock.replace(",", ".")
     half = clock[-2:].upper() if clock[-1:] in {"M", "m"} else ""
     clock = clock[: len(clock) - len(half)].strip()
     style = ("%I:%M:%S" if half else "%H:%M:%S") + (".%f" if "." in clock else "")
     if "." in clock:
-        clock = clock[: clock.index(".") + 7]  # microseconds are the finest possible
+        clock = clock[: clock.index(".") + 7]  # the finest resolution is a microsecond
     suffix = " %p" if half else ""
     text = f"{year}-{month}-{day} {clock} {half}".strip()
     return _seconds(text, f"%Y-%m-%d {style}{suffix}")
 
 
 def _seconds(text: str, style: str) -> float:
-    """Return the [s] since 1970 of a time in UTC."""
+    """Return the time [s] since 1970 of a text in UTC."""
     return datetime.strptime(text, style).replace(tzinfo=UTC).timestamp()

@@ -18,11 +18,11 @@ _NUMBERED = re.compile("(?:quaternion|quat|q)([0-3])")
 _ANGLE = re.compile("(?:euler|rotation|rot|orientation|ori|angle|r)([xyz])")
 _NAMED_ANGLES = {
     "roll": "x", "pitch": "y", "yaw": "z", "omega": "x", "phi": "y", "kappa": "z",
-    "c": "x", "b": "y", "a": "z",  # KUKA's names
+    "c": "x", "b": "y", "a": "z",  # KUKA's names of the angles
 }  # fmt: skip
 _UNIT = re.compile(
     r"\[\s*([^\]]*?)\s*\]|\(\s*([^)\d][^)]*?)\s*\)"
-)  # not the 95 of U(95)
+)  # does not match the 95 of U(95)
 _UNIT_AFTER = re.compile(r"\s*[_ /]\s*(mm|um|cm|in|m|deg|mrad|rad)$", re.IGNORECASE)
 LENGTH_UNITS = ("mm", "m", "um", "cm", "in")
 _WORDS = {"meter": "m", "millimeter": "mm", "centimeter": "cm", "micrometer": "um",
@@ -39,7 +39,7 @@ class Column:
             ``"name"``, ``"time"``, or ``""`` for an ignored column.
         axis: x, y, z, or w of a quaternion.
         unit: unit stated in the column's name, or empty.
-        target: the target of the column, or empty.
+        target: name of the target, or empty.
     """
 
     kind: str
@@ -55,7 +55,7 @@ def column_of(cell: str) -> Column:
         cell: cell of the header.
 
     Returns:
-        Its meaning, without a target.
+        The meaning, without a target.
     """
     stated = _UNIT.search(cell)
     unit = (stated[1] or stated[2] or "") if stated else ""
@@ -90,7 +90,7 @@ def unit_word(text: str) -> str:
         text: text such as Millimeters, inch, ° or mm.
 
     Returns:
-        The name, empty if it is no unit of length or angle.
+        The short name; empty if the text is not a unit of length or angle.
     """
     word = text.strip().strip("[]()").lower().replace("metre", "meter")
     if len(word) > 2:

@@ -1,4 +1,4 @@
-"""The commands of an import, row by row."""
+"""The table of commands of an import."""
 
 import re
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ from validation.exchange.clock import parse_time
 from validation.exchange.reading import Writing
 
 _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]$")
-# of a temperature difference
+# units of a temperature difference, with factors to K
 _TEMPERATURES = {"K": 1.0, "degC": 1.0, "°C": 1.0, "C": 1.0}
 _INCHES = {"cm": 1e-2, "in": 0.0254, "inch": 0.0254}
 
@@ -28,10 +28,10 @@ class Commands:
     """Commands of a machine.
 
     Attributes:
-        file: the table, for messages.
+        file: path of the table, for messages.
         ids: labels, unique.
-        times: (C,) [s] of each command, NaN without one.
-        columns: (C,) in SI by the name that a campaign has for it.
+        times: (C,) [s] time of each command; NaN without a time.
+        columns: (C,) values in SI units, by the name of the campaign's column.
         postures: postures of the declared robot, one for each command.
     """
 
@@ -47,17 +47,17 @@ def read_commands(path: Path | str, robot: Robot, writing: Writing) -> Commands:
 
     Args:
         path: a table with ``id``, ``q.<frame>`` or ``pose.*``, and optionally ``time``,
-            ``load.*``, ``cov.*``; in SI, or with a unit such as ``[deg]``.  Covariates
-            other than time and temperature are taken unchanged, in any unit.
-        robot: the robot that was commanded.
+            ``load.*``, ``cov.*``, in SI units or with a unit such as ``[deg]``.
+            Covariates other than time and temperature are taken unchanged, in any unit.
+        robot: the commanded robot.
         writing: format of numbers and times.
 
     Returns:
-        The commands, every configuration placed.
+        The commands, with the posture of every configuration.
 
     Raises:
-        BadInput: an unknown column, a cell that is no number, an id given twice, or a
-            configuration that the robot cannot reach.
+        BadInput: a column is unknown, a cell is not a number, an id occurs twice, or
+            the robot cannot reach a configuration.
     """
     sheet = read_sheet(path, writing.commands_decimal)
     writing = replace(writing, decimal=sheet.decimal)
@@ -81,7 +81,7 @@ def read_commands(path: Path | str, robot: Robot, writing: Writing) -> Commands:
         )
     if "id" not in header:
         raise BadInput(f'{path}: line 1: missing column "id"')
-    ids: dict[str, int] = {}  # the line of each label
+    ids: dict[str, int] = {}  # line of each label
     times = np.full(len(rows) - 1, np.nan)
     columns = {n: np.empty(len(rows) - 1) for n in header if n not in {"id", "time"}}
     for i, (line, cells) in enumerate(rows[1:]):
@@ -114,12 +114,12 @@ def _check_label(place: str, label: str, seen: Mapping[str, int]) -> None:
     if label in seen:
         raise BadInput(
             f"{place}: found {quoted(label)}, already the label of line "
-            f"{seen[label]}; expected another"
+            f"{seen[label]}; expected a different label"
         )
 
 
 def _decimal_hint(cell: str, decimal: str) -> str:
-    """Return the key for the decimal mark of a cell with the other mark."""
+    """Return a hint on the decimal mark of a cell that has the other mark."""
     other = "," if decimal == "." else "."
     if not np.isfinite(parse_number(cell, other)):
         return ""
@@ -127,7 +127,7 @@ def _decimal_hint(cell: str, decimal: str) -> str:
 
 
 def _factor(path: Path | str, name: str, column: str, robot: Robot) -> float:
-    """Return the factor to SI of a column's numbers."""
+    """Return the factor from the unit of a column to SI."""
     stated = _UNIT.search(column)
     if not stated:
         return 1.0
@@ -142,7 +142,7 @@ def _factor(path: Path | str, name: str, column: str, robot: Robot) -> float:
 
 
 def _units(name: str, robot: Robot) -> Mapping[str, float] | None:
-    """Return the units that a column may have, with factors; None for any unit."""
+    """Return the units that a column may have, with factors; None if any is allowed."""
     lengths = UNITS["command_position"] | _INCHES
     if name in {"time", "cov.time"}:
         return UNITS["time"]

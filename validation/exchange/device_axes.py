@@ -1,8 +1,8 @@
-"""Checks of the unit of lengths and of the axes of an export.
+"""Checks of the unit of lengths and of the axes of a device's export.
 
 A wrong unit multiplies all distances by one factor.  A left-handed export is a mirror
-image, which no pose of the device explains.  Both are refused, never corrected: the
-same setting of the device may affect data that cannot be checked here.
+image, which no pose of the device explains.  Both are refused and never corrected,
+because the same setting of the device may affect data that cannot be checked here.
 
 Sources:
     Umeyama (1991), Least-squares estimation of transformation parameters between two
@@ -21,30 +21,34 @@ from validation.exchange.device_frame import robust_frame, scatter_of
 from validation.exchange.reading import LENGTHS
 
 _UNITS = {**LENGTHS, "ft": 0.3048}
-# relative to the scatter: another reading is accepted if less remains
+# accepted scatter of corrected readings, relative to the scatter of uncorrected
+# readings
 _FAR_BETTER = 0.25
 _SCALED = 0.02  # largest relative scatter of distance ratios with one unit factor
-# accepted error of the factor of two units, since the robot has errors too
+# relative accepted error of the factor between two units, because the robot has errors
+# too
 _UNIT = 0.05
-_PAIRED = 10  # number of following readings, to each of which the distance is taken
+# number of following readings to which the distance of each reading is computed
+_PAIRED = 10
 # relative to the declared distance of two targets: larger differences are reported
 _APART = 0.1
-_MIRRORED = np.array([1.0, -1.0, 1.0])  # any axis: a rotation makes them equal
+# reversal of one axis; reversals of other axes differ by a rotation only
+_MIRRORED = np.array([1.0, -1.0, 1.0])
 
 
 def check_axes(
     file: Path, measured: NDArray, nominal: NDArray, known: bool
 ) -> None:  # fmt: skip
-    """Reject lengths in another unit, mirrored axes, and exchanged axes.
+    """Reject lengths in a wrong unit, mirrored axes, and exchanged axes.
 
     Args:
         file: the targets file, for messages.
         measured: (N, 3) [m] readings, device axes.
         nominal: (N, 3) [m] nominal positions, base axes.
-        known: whether the device's axes are the base's.
+        known: whether the device's axes are equal to the base's.
 
     Raises:
-        BadInput: another unit or other axes fit far better.
+        BadInput: a different unit or different axes fit far better.
     """
     scatter = _scatter(measured, nominal, known)
     factor, meant = _units_of(_factor(measured, nominal, known))
@@ -76,8 +80,8 @@ def check_targets(
 
     Args:
         file: the targets file, for messages.
-        places: (3,) [m] of each target, platform axes, by name.
-        measured: (R, T, 3) [m] their readings, row by row; NaN if not read.
+        places: (3,) [m] declared position of each target by name, platform axes.
+        measured: (R, T, 3) [m] positions of the targets in each row; NaN if not read.
 
     Returns:
         Remarks on pairs whose distance differs from the declared one.
@@ -113,7 +117,7 @@ def check_targets(
 
 
 def _units_of(factor: float) -> tuple[float, str]:
-    """Return a factor of two units near a factor, with their names; else 1 and ""."""
+    """Return the nearest factor between two units, and their names; or 1 and empty."""
     found = [
         (_UNITS[b] / _UNITS[a], f"as {b} taken for {a}", a, b)
         for a, b in permutations(_UNITS, 2)
@@ -124,10 +128,11 @@ def _units_of(factor: float) -> tuple[float, str]:
 
 
 def _factor(measured: NDArray, nominal: NDArray, known: bool) -> float:
-    """Return the ratio of nominal to measured distances; robust against blunders."""
+    """Return the ratio of nominal to measured distances, robust against blunders."""
     if known:
         pairs = [(measured, nominal)]
-    else:  # between readings, independent of the device's pose
+    # between readings, because these distances do not depend on the device's pose
+    else:
         shifts = range(1, min(len(measured), _PAIRED))
         pairs = [
             (measured - np.roll(measured, k, axis=0), nominal - np.roll(nominal, k, 0))
@@ -140,7 +145,7 @@ def _factor(measured: NDArray, nominal: NDArray, known: bool) -> float:
 
 
 def _scatter(measured: NDArray, nominal: NDArray, known: bool) -> float:
-    """Return the scatter [m] about the best frame, or about the base's own."""
+    """Return the scatter [m] about the best frame, or about the known base."""
     if known:
         return scatter_of(np.linalg.norm(measured - nominal, axis=1))
     return robust_frame(measured, nominal)[1]
@@ -149,7 +154,7 @@ def _scatter(measured: NDArray, nominal: NDArray, known: bool) -> float:
 def _check_known_axes(
     file: Path, measured: NDArray, nominal: NDArray, scatter: float
 ) -> None:
-    """Reject device axes that are exchanged or reversed axes of the base."""
+    """Reject device axes that are exchanged or reversed relative to the base."""
     best, found = scatter, ""
     for order, signs in product(permutations(range(3)), product((1, -1), repeat=3)):
         tried = _scatter(measured[:, list(order)] * signs, nominal, known=True)

@@ -14,37 +14,39 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-_GROSS = 20.0  # times the scatter of all readings: impossible for a machine
-_BETTER = 0.25  # relative to the misfit: an exchange is accepted if less remains
-_MOST = 6  # largest number of targets whose exchanges are all tried: 720
+# multiple of the scatter of all readings that is impossible for a machine
+_GROSS = 20.0
+# relative to the misfit: largest misfit with which an exchange is accepted
+_BETTER = 0.25
+_MOST = 6  # largest number of targets whose exchanges are all tried, 720 of them
 
 
 @dataclass(frozen=True, eq=False)
 class DeviceFrame:
-    """Base axes seen from the device's pose: base = rotation @ device + shift.
+    """Pose of the base in the device's axes: base = rotation @ device + shift.
 
     Attributes:
-        rotation: (3, 3).
-        shift: (3,) [m].
+        rotation: (3, 3) rotation from the device's to the base's axes.
+        shift: (3,) [m] origin of the device in base axes.
     """
 
     rotation: NDArray
     shift: NDArray
 
     def to_base(self, points: NDArray) -> NDArray:
-        """Return the (..., 3) [m] points of the device in base axes."""
+        """Return (..., 3) [m] points, given in device axes, in base axes."""
         return points @ self.rotation.T + self.shift
 
 
 def fit_frame(measured: NDArray, nominal: NDArray) -> DeviceFrame:
-    """Return the frame that brings measured points nearest to nominal ones.
+    """Return the frame that brings measured points nearest to nominal points.
 
     Args:
-        measured: (N, 3) [m] device axes.
-        nominal: (N, 3) [m] base axes.
+        measured: (N, 3) [m] points in device axes.
+        nominal: (N, 3) [m] points in base axes.
 
     Returns:
-        The frame of least squares.
+        The least-squares frame.
     """
     a, b = measured.mean(axis=0), nominal.mean(axis=0)
     U, _, Vt = np.linalg.svd((measured - a).T @ (nominal - b))
@@ -54,20 +56,20 @@ def fit_frame(measured: NDArray, nominal: NDArray) -> DeviceFrame:
 
 
 def spans_a_plane(points: NDArray) -> bool:
-    """Return whether (N, 3) points are not on one line, so that they fix a frame."""
+    """Return whether (N, 3) points determine a frame: they are not on one line."""
     sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     return len(points) > 2 and bool(sizes[1] > 1e-6 * sizes[0] > 0)
 
 
 def robust_frame(measured: NDArray, nominal: NDArray) -> tuple[DeviceFrame, float]:
-    """Return the frame without gross readings, and the scatter about it.
+    """Return the frame fitted without gross readings, and the scatter about it.
 
     Args:
-        measured: (N, 3) [m] device axes.
-        nominal: (N, 3) [m] base axes.
+        measured: (N, 3) [m] points in device axes.
+        nominal: (N, 3) [m] points in base axes.
 
     Returns:
-        The frame, and [m] the scatter of one component.
+        The frame, and the scatter [m] of one component.
     """
     kept = np.ones(len(measured), dtype=bool)
     for _ in range(20):
@@ -82,27 +84,28 @@ def robust_frame(measured: NDArray, nominal: NDArray) -> tuple[DeviceFrame, floa
 
 
 def scatter_of(gaps: NDArray) -> float:
-    """Return the [m] robust scatter of (N,) distances; rounding where all are zero."""
+    """Return the [m] robust scatter of (N,) distances; at least the rounding error."""
     # the median length of a Gaussian vector in space is 1.538 of one component's sigma
     return float(np.median(gaps)) / 1.538 + 1e-12
 
 
 def is_gross(gap: float, scatter: float) -> bool:
-    """Return whether a distance [m] is beyond the scatter [m]."""
+    """Return whether a distance [m] is too large for the scatter [m]."""
     return gap > _GROSS * scatter
 
 
 def exchanged_throughout(
     measured: Sequence[NDArray], nominal: Sequence[NDArray]
 ) -> tuple[int, ...] | None:
-    """Return an order of the targets that fits far better than the given one.
+    """Return an order of the targets that fits far better than the given order.
 
     Args:
-        measured: for each target (R, 3) [m] device axes, NaN where not read.
-        nominal: for each target (R, 3) [m] base axes.
+        measured: for each target (R, 3) [m] in device axes, NaN where not read.
+        nominal: for each target (R, 3) [m] in base axes.
 
     Returns:
-        For each target the index of the actual one; None if the names are right.
+        For each target the index of the target that was read; None if the names are
+        right.
     """
     count = len(measured)
     if not 2 <= count <= _MOST:
@@ -123,15 +126,16 @@ def exchanged_throughout(
 def exchanged_here(measured: NDArray, nominal: NDArray, scatter: float) -> (
     tuple[int, ...] | None
 ):  # fmt: skip
-    """Return the targets of one row that were confused.
+    """Return the targets of one row that were exchanged.
 
     Args:
-        measured: (k, 3) [m] in base axes.
-        nominal: (k, 3) [m].
-        scatter: [m] of all readings.
+        measured: (k, 3) [m] points in base axes.
+        nominal: (k, 3) [m] points in base axes.
+        scatter: [m] scatter of all readings.
 
     Returns:
-        For each target the index of the actual one; None if none was confused.
+        For each target the index of the target that was read; None if none was
+        exchanged.
     """
     count = len(measured)
     own = np.linalg.norm(measured - nominal, axis=1).max(initial=0.0)

@@ -1,10 +1,10 @@
-"""Exports of measuring devices: points by name, in any table that states its units.
+"""Exports of measuring devices: points by name, in a table that states its units.
 
 Accepted are SpatialAnalyzer text (``collection::group::point``), exports of Leica,
-FARO, API, Vicon and OptiTrack software, and plain tables: blanks, tabs, semicolons or
-commas between cells, a header or none, lines before it.  The reader does not guess:
-units are stated in the table or in the targets file; a decimal comma and orders of
-dates and angles in the targets file.
+FARO, API, Vicon and OptiTrack software, and plain tables: cells separated by blanks,
+tabs, semicolons or commas, with or without a header, and with lines before it.  The
+reader does not guess.  Units are stated in the table or in the targets file; a decimal
+comma and the orders of dates and angles are stated in the targets file.
 """
 
 from collections.abc import Mapping, Sequence
@@ -37,15 +37,17 @@ def read_device_table(
 
     Args:
         path: the file.
-        writing: declared format, used where the file states none.
-        targets: (3,) [m] by name, platform axes; a table may have columns for each of
-            them.
+        writing: declared format, used where the file does not state one.
+        targets: (3,) [m] position of each target by name, platform axes; a table may
+            have columns for each target.
 
     Returns:
-        The readings in their order; a row of several targets yields several readings.
+        The readings in the order of the file; a row with several targets yields several
+        readings.
 
     Raises:
-        BadInput: no coordinates, no unit, or a cell that is no number or no time.
+        BadInput: the file has no coordinates or no unit, or a cell is neither a number
+            nor a time.
     """
     sheet = read_sheet(path, writing.decimal)
     writing = replace(writing, decimal=sheet.decimal)
@@ -65,7 +67,7 @@ def read_device_table(
 
 
 def _lacking(cells: Sequence[str]) -> str:
-    """Return the first axis that a line of names does not have."""
+    """Return the first axis that is not among the headings of a line."""
     words = " ".join(cells).lower().split()
     return next((axis for axis in "xyz" if axis not in words), "x")
 
@@ -77,7 +79,7 @@ def _is_data(cells: Sequence[str], decimal: str) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _HeadedRows:
-    """Rows under a header, converted to readings."""
+    """Rows below a header, which are converted to readings."""
 
     values: CellValues
 
@@ -86,7 +88,7 @@ class _HeadedRows:
         header = self.values.header
         place = f"{self.values.sheet.file}: line {line}"
         while len(cells) > len(header.cells) and not cells[-1]:
-            cells = cells[:-1]  # a mark at the end of the line
+            cells = cells[:-1]  # the line ends with a separator
         if len(cells) != len(header.cells):
             raise BadInput(
                 f"{place}: found {len(cells)} cells, expected {len(header.cells)} as "
@@ -103,14 +105,14 @@ class _HeadedRows:
         return readings
 
     def _time(self, place: str, parts: list[tuple[str, str]]) -> float:
-        """Return the [s] of a row, NaN without a time, from date and time of day."""
+        """Return time [s] of a row from its date and time of day; NaN without one."""
         stamp = " ".join(cell for _, cell in sorted(parts))
         if missing(stamp.strip()):
             return np.nan
         return parse_time(place, stamp, self.values.writing)
 
     def _has_place(self, own: list[int]) -> bool:
-        """Return whether columns hold a point: x, y, z, each once."""
+        """Return whether columns hold a point, with x, y and z once each."""
         columns = self.values.header.columns
         axes = [columns[k].axis for k in own if columns[k].kind == "axis"]
         twice = [axis for axis in axes if axes.count(axis) > 1]
@@ -139,13 +141,13 @@ class _HeadedRows:
                 wide = writing.coverage if kind == "U" else 1.0
                 sigma["xyz".index(axis)] = self._spread(line, k, value / wide)
         if np.isnan(position).any():
-            position[:] = np.nan  # a point without one of its coordinates
+            position[:] = np.nan  # a coordinate is missing
         rotation = self._rotation(line, cells, own) if writing.oriented else None
         file = self.values.sheet.file
         return Reading(file, line, names, position, sigma, time, rotation)
 
     def _spread(self, line: int, k: int, value: float) -> float:
-        """Return a standard deviation [m]; zero by rounding counts as not stated."""
+        """Return a standard deviation [m]; NaN if it was rounded to zero."""
         if value < 0:
             name = self.values.header.cells[k]
             place = f"{self.values.sheet.file}: line {line}, {name}"
@@ -153,7 +155,7 @@ class _HeadedRows:
         return value if value > 0 else np.nan
 
     def _rotation(self, line: int, cells: list[str], own: list[int]) -> NDArray | None:
-        """Return the target's axes seen from the device's; None without them."""
+        """Return the target's axes in the device's axes; None if they were not read."""
         header, writing = self.values.header, self.values.writing
         place = f"{self.values.sheet.file}: line {line}"
         kind, at = orientation_columns(header.columns, own)

@@ -1,4 +1,4 @@
-"""The header of a device's table: its position, and the target of each column."""
+"""The header of a device's table: its line, and the target of each column."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -24,10 +24,10 @@ class Header:
     """The columns of a table.
 
     Attributes:
-        first: index of the first row of data among the rows of the sheet.
-        cells: cells of the header as written; empty without one.
-        columns: their meaning.
-        unit: unit of lengths, as stated before the header, or empty.
+        first: index of the first row of data among the rows of the table.
+        cells: cells of the header as written; empty without a header.
+        columns: meaning of each column.
+        unit: unit of lengths that is stated before the header, or empty.
         unit_line: line of the unit, for messages.
     """
 
@@ -41,11 +41,11 @@ class Header:
 def find_header(
     rows: Sequence[tuple[int, list[str]]], targets: Iterable[str]
 ) -> Header | None:
-    """Return the header of a table, after the lines before it.
+    """Return the header of a table, which may follow other lines.
 
     Args:
-        rows: rows of the sheet, by line.
-        targets: their names.
+        rows: rows of the table, by line.
+        targets: names of the targets.
 
     Returns:
         The header; None if no row names x, y and z.
@@ -76,10 +76,10 @@ def find_header(
 
 
 def without_header(rows: Sequence[tuple[int, list[str]]], decimal: str) -> Header:
-    """Return the start of rows without header, and the unit stated before them.
+    """Return the start of rows without a header, and the unit stated before them.
 
     Args:
-        rows: rows of the sheet, by line.
+        rows: rows of the table, by line.
         decimal: the decimal mark.
 
     Returns:
@@ -95,15 +95,15 @@ def without_header(rows: Sequence[tuple[int, list[str]]], decimal: str) -> Heade
 def _by_target(
     cells: Sequence[str], before: Sequence[tuple[int, list[str]]], targets: list[str]
 ) -> list[Column]:
-    """Return columns of a table with several targets a row; empty for other tables.
+    """Return the columns of a table with several targets in a row; else empty.
 
-    Targets are named in the columns, or in a row above them; if there are as many
-    groups of columns as targets, their order is used.
+    Targets are named in the columns, or in a row above them.  If there are as many
+    groups of columns as targets, the order of the targets is used.
 
     Args:
         cells: cells of the header.
-        before: the rows above it.
-        targets: their names.
+        before: rows above the header.
+        targets: names of the targets.
 
     Returns:
         The columns.
@@ -115,7 +115,8 @@ def _by_target(
     plain = [column_of(cell) for cell in cells]
     for _, above in reversed(before):
         labels = _filled(above, len(cells))
-        exact = set(labels) & set(targets)  # a body, not its markers arm:1, arm:2
+        # a body, not its markers such as arm:1, arm:2
+        exact = set(labels) & set(targets)
         found = [
             label if label in exact else _only(label, [*{*targets} - exact])
             for label in labels
@@ -135,7 +136,7 @@ def _by_target(
 
 
 def _by_order(columns: Sequence[Column], targets: list[str]) -> list[Column]:
-    """Assign groups of x, y, z to the targets in order, if their numbers are equal."""
+    """Assign groups of x, y, z to the targets in order, if there is one for each."""
     groups = -1
     ordered = []
     for column in columns:
@@ -148,7 +149,7 @@ def _by_order(columns: Sequence[Column], targets: list[str]) -> list[Column]:
 
 
 def _complete(columns: Sequence[Column], least: int = 1) -> bool:
-    """Return whether every target that has a coordinate has all three, once."""
+    """Return whether every target with a coordinate has all three coordinates once."""
     axes: dict[str, str] = {}
     for column in columns:
         if column.kind == "axis" and column.target:
@@ -174,14 +175,14 @@ def _of_target(cell: str, targets: Sequence[str]) -> tuple[Column, str]:
 
 
 def _only(label: str, targets: Sequence[str]) -> str:
-    """Return the target that a label names, as in arm:SMR1; empty if it names none."""
+    """Return the target that a label names, as in arm:SMR1; empty if there is none."""
     words = re.split(r"[:./|\s]+", label)
     found = [target for target in targets if target in words or target == label]
     return found[0] if len(found) == 1 else ""
 
 
 def _with_kinds(cells: list[str], above: Sequence[str]) -> list[str]:
-    """Return column names with the kind above: Rotation, Position (OptiTrack)."""
+    """Return column names with the kind from the line above: Rotation, Position."""
     kinds = [word if word.lower() in _KINDS else "" for word in above]
     if not any(kinds) or len(above) > len(cells):
         return cells
@@ -190,7 +191,7 @@ def _with_kinds(cells: list[str], above: Sequence[str]) -> list[str]:
 
 
 def _filled(cells: Sequence[str], count: int) -> list[str]:
-    """Return the labels of merged cells: an empty one has the label before it."""
+    """Return the labels of merged cells: an empty cell has the label before it."""
     labels: list[str] = []
     for cell in [*cells, *[""] * count][:count]:
         labels.append(cell or (labels[-1] if labels else ""))
@@ -198,12 +199,12 @@ def _filled(cells: Sequence[str], count: int) -> list[str]:
 
 
 def _stated(rows: Sequence[tuple[int, list[str]]]) -> tuple[int, str]:
-    """Return line and unit of lengths stated before a header; 0 and empty if none."""
+    """Return line and unit of lengths stated before a header; 0 and empty if absent."""
     for line, cells in rows:
         if match := _STATED.search(" ".join(cells)):
             words = re.findall(r"[A-Za-zµμ]+", match[1])[:4]
             units = [unit for w in words if (unit := unit_word(w)) in LENGTH_UNITS]
-            if units:  # the "in" of "units in mm" is a preposition
+            if units:  # the "in" of "units in mm" is a preposition, not inches
                 return line, next((u for u in units if u != "in"), "in")
     return 0, ""
 
@@ -214,7 +215,7 @@ def _is_number(cell: str, decimal: str = ".") -> bool:
 
 
 def by_target(columns: Sequence[Column]) -> Mapping[str, list[int]]:
-    """Return the columns of each target; without a target, under the empty name.
+    """Return the columns of each target; columns without a target have an empty name.
 
     Args:
         columns: columns of a table.

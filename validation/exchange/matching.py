@@ -16,15 +16,17 @@ class Match:
     """Readings assigned to targets and commands.
 
     Attributes:
-        how: ``"name"``, ``"time"`` or ``"order"``: the method of the assignment.
-        rows: for each row of the campaign its command and its readings by target;
-            a target read again at a command makes a further row.
-        strangers: readings of other points, such as points on the ground.
+        how: method of the assignment: ``"name"``, ``"time"`` or ``"order"``.
+        rows: for each row of the campaign its command and its readings by target; a
+            second reading of a target at a command makes a second row.
+        strangers: readings of points that are not targets, such as points on the
+            ground.
         unmatched: readings of targets without a command.
         missing: readings without a position.
-        duplicates: readings that a file has twice, with equal digits; left out.
-        copies: readings that another file has too, with equal digits; kept, as a device
-            of few digits repeats them.
+        duplicates: readings that occur twice in a file, with equal digits; they are
+            left out.
+        copies: readings that occur in two files, with equal digits; they are kept,
+            because a device with few digits may repeat them.
     """
 
     how: str
@@ -42,19 +44,20 @@ def match(
     targets: Iterable[str],
     window: float,
 ) -> Match:
-    """Assign readings to commands: by name, else by time, else by order.
+    """Assign readings to commands: by name, otherwise by time, otherwise by order.
 
     Args:
-        readings: readings in the order taken.
+        readings: readings in the order of measurement.
         commands: commands in the order given.
-        targets: their names.
-        window: [s] between a command and its readings.
+        targets: names of the targets.
+        window: [s] largest time between a command and its readings.
 
     Returns:
-        The rows.
+        The assigned rows, and the readings that were not assigned.
 
     Raises:
-        BadInput: no reading of a target, a reading of two targets, or no assignment.
+        BadInput: no target was read, a reading names two targets, or the readings
+            cannot be assigned.
     """
     ours = _of_targets(readings, list(targets))
     lost = {id(reading) for reading, _ in ours}
@@ -102,7 +105,7 @@ def match(
 
 
 def _repeated(readings: Sequence[Reading]) -> str:
-    """Return the reading that occurs twice, if this makes them too many."""
+    """Return a hint on the first reading that occurs twice, for a message."""
     seen: dict[object, Reading] = {}
     for reading in readings:
         digits = (reading.names, reading.position.tobytes(), str(reading.time))
@@ -121,7 +124,7 @@ def _same(a: Reading, b: Reading) -> bool:
 def _of_targets(
     readings: Sequence[Reading], targets: list[str]
 ) -> list[tuple[Reading, str]]:
-    """Return the readings of targets; unnamed ones belong to a single target."""
+    """Return the readings of targets; unnamed readings belong to a single target."""
     ours = []
     for reading in readings:
         named = [part for part in reading.names if part in targets]
@@ -143,7 +146,7 @@ def _of_targets(
 
 
 def _nearest(reading: Reading, commands: Commands, window: float) -> int:
-    """Return row of the command nearest in time, -1 if none is within the window."""
+    """Return the row of the command nearest in time; -1 if none is in the window."""
     gaps = np.abs(commands.times - reading.time)
     return int(np.argmin(gaps)) if gaps.min() <= window else -1
 

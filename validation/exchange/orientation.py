@@ -1,4 +1,4 @@
-"""Orientations of a device: quaternions, or three angles in a stated order.
+"""Orientations read by a device: quaternions, or three angles in a stated order.
 
 They transform the target's axes to the device's: p_device = R p_target.
 """
@@ -16,19 +16,21 @@ from validation.exchange.column_names import QUATERNION, Column
 
 ROTATION_VECTOR = "rotation_vector"
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180}
-_FAR_BETTER = 0.25  # relative to the scatter: the inverse is accepted if less remains
-_GROSS = 20.0  # times the scatter: readings left out of the mean
-_MEDIAN = 1.538  # median length of a Gaussian vector in space, of one component's sigma
-_ROUNDING = 1e-12  # [rad] scatter of rounding
+# accepted scatter of inverse rotations, relative to the scatter of the given rotations
+_FAR_BETTER = 0.25
+_GROSS = 20.0  # multiple of the scatter above which a reading is left out of the mean
+# ratio of the median length of a Gaussian vector in space to the sigma of one component
+_MEDIAN = 1.538
+_ROUNDING = 1e-12  # [rad] smallest scatter, due to rounding
 _UNIT_NORM = 0.01  # accepted error of the norm of rounded quaternions
 
 
 def orders() -> tuple[str, ...]:
-    """Return the possible values of ``orientation`` in a targets file.
+    """Return the accepted values of ``orientation`` in a targets file.
 
     Returns:
-        They are ``rotation_vector`` and the 24 orders of three angles, small letters
-        about fixed axes, capital letters about rotating axes.
+        ``rotation_vector``, and the 24 orders of three angles: small letters for fixed
+        axes, capital letters for moving axes.
     """
     axes = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
     return (ROTATION_VECTOR, *axes, *(axis.upper() for axis in axes))
@@ -48,7 +50,8 @@ def orientation_columns(
     """
     w = {columns[k].axis: k for k in own if columns[k].kind == "quaternion"}
     angles = {columns[k].axis: k for k in own if columns[k].kind == "angle"}
-    if "w" in w:  # Rotation X, Y, Z next to a W are no angles
+    # if the columns contain W, then Rotation X, Y, Z are parts of a quaternion
+    if "w" in w:
         w = angles | w
     if set(w) >= set(QUATERNION):
         return "quaternion", {axis: w[axis] for axis in QUATERNION}
@@ -58,17 +61,17 @@ def orientation_columns(
 
 
 def from_quaternion(place: str, values: Sequence[float]) -> NDArray:
-    """Return the (3, 3) target axes seen from the device's, from a quaternion w x y z.
+    """Return the target's axes (3, 3) in the device's axes, from a quaternion w x y z.
 
     Args:
         place: file and line, for messages.
         values: w, x, y, z.
 
     Returns:
-        The rotation.
+        The rotation matrix.
 
     Raises:
-        BadInput: its norm is not 1.
+        BadInput: the norm of the quaternion is not 1.
     """
     w, x, y, z = values
     norm = float(np.linalg.norm(values))
@@ -80,15 +83,15 @@ def from_quaternion(place: str, values: Sequence[float]) -> NDArray:
 def from_angles(
     place: str, angles: Mapping[str, float], order: str | None
 ) -> NDArray:  # fmt: skip
-    """Return the (3, 3) target axes seen from the device's, from three angles [rad].
+    """Return the target's axes (3, 3) in the device's axes, from three angles [rad].
 
     Args:
         place: file and line, for messages.
-        angles: angles by axis, in the order of the columns.
+        angles: angles about each axis, in the order of the columns.
         order: order in the targets file, or None.
 
     Returns:
-        The rotation.
+        The rotation matrix.
 
     Raises:
         BadInput: no order is declared.
@@ -109,13 +112,13 @@ def from_angles(
 
 @dataclass(frozen=True, eq=False)
 class Turns:
-    """Orientations of one target as deviations of the platform.
+    """Orientations of one target, as deviations of the platform.
 
     Attributes:
-        deviation: (R, 3) [rad] rotation vector of actual against nominal, base axes;
-            NaN if not read.
-        mount: (3, 3) the target's axes seen from the platform's.
-        scatter: [rad] of one component.
+        deviation: (R, 3) [rad] rotation vector from nominal to actual orientation, base
+            axes; NaN if not read.
+        mount: (3, 3) the target's axes in the platform's axes.
+        scatter: [rad] scatter of one component.
     """
 
     deviation: NDArray
@@ -126,14 +129,14 @@ class Turns:
 def turns_of(
     file: Path, seen: NDArray, base: NDArray, nominal: NDArray, mount: NDArray | None
 ) -> Turns:
-    """Return the deviations of orientations read.
+    """Return the deviations of the orientations of one target.
 
     Args:
         file: the targets file, for messages.
-        seen: (R, 3, 3) the target's axes seen from the device's; NaN if not read.
-        base: (3, 3) the device's axes seen from the base's.
-        nominal: (R, 3, 3) the platform's axes, of the declared robot.
-        mount: the target's axes seen from the platform's; None: fitted.
+        seen: (R, 3, 3) the target's axes in the device's axes; NaN if not read.
+        base: (3, 3) the device's axes in the base's axes.
+        nominal: (R, 3, 3) the platform's axes for the declared robot.
+        mount: the target's axes in the platform's axes; None if they are to be fitted.
 
     Returns:
         The deviations.
@@ -154,7 +157,7 @@ def turns_of(
 
 
 def _turns(read: NDArray, nominal: NDArray, mount: NDArray | None) -> Turns:
-    """Return deviations about a declared or fitted mount, without a check."""
+    """Return the deviations with a declared or fitted mount, without a check."""
     taken = np.isfinite(read).all(axis=(1, 2))
     seen = Rotation.from_matrix(np.swapaxes(nominal[taken], 1, 2) @ read[taken])
     if mount is None:

@@ -1,4 +1,4 @@
-"""Readings in the base's axes: pose of the device, and impossible readings."""
+"""Transformation of readings to base axes: pose of the device, impossible readings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -24,10 +24,12 @@ from validation.exchange.orientation import turns_of
 from validation.exchange.reading import Reading
 from validation.exchange.targets_file import TargetsFile
 
-_ASTRAY = 0.1  # relative to the spread of the commands: larger than any machine's error
+# relative to the spread of the commands: larger scatter is not due to the machine
+_ASTRAY = 0.1
 _HERE = DeviceFrame(np.eye(3), np.zeros(3))
 
-Rows = Sequence[tuple[int, Mapping[str, Reading]]]  # command, and readings by target
+# number of the command, and readings by target
+Rows = Sequence[tuple[int, Mapping[str, Reading]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,14 +38,14 @@ class Placed:
 
     Attributes:
         frame: pose of the device.
-        scatter: [m] of one component of all readings.
-        read: (R, T) whether a target has a possible reading.
+        scatter: [m] scatter of one component of all readings.
+        read: (R, T) bool, True if a target has a possible reading.
         gaps: (R, T, 3) [m] deviation of each target, base axes; NaN if not read.
-        turns: (R, 3) [rad] of the platform, base axes; NaN if not read.
-        mounts: (3,) [rad] rotation vector from the platform's axes to those of each
+        turns: (R, 3) [rad] rotation of the platform, base axes; NaN if not read.
+        mounts: (3,) [rad] rotation vector from the platform's axes to the axes of each
             target whose orientation was read.
-        left_out: impossible readings, in words.
-        remarks: other inconsistencies, in words.
+        left_out: descriptions of impossible readings.
+        remarks: descriptions of other inconsistencies.
     """
 
     frame: DeviceFrame
@@ -60,16 +62,16 @@ def place(declared: TargetsFile, commands: Commands, rows: Rows) -> Placed:
     """Estimate the pose of the device, and transform the readings to base axes.
 
     Args:
-        declared: the targets file.
+        declared: content of the targets file.
         commands: the commands.
         rows: readings by command.
 
     Returns:
-        The deviations.
+        The readings as deviations.
 
     Raises:
-        BadInput: the readings do not determine the device's pose, or fit far better in
-            another unit, mirrored, or with targets exchanged.
+        BadInput: the readings do not determine the device's pose, or they fit far
+            better in a different unit, mirrored, or with exchanged targets.
     """
     names = list(declared.places)
     T = np.array([commands.postures[command].platform for command, _ in rows])
@@ -111,7 +113,7 @@ def place(declared: TargetsFile, commands: Commands, rows: Rows) -> Placed:
 
 
 def _misfit(nominal: NDArray, measured: NDArray, scatter: float) -> list[str]:
-    """Return a remark on readings that do not follow the commands, with a reason."""
+    """Return a remark with a possible reason if readings do not follow the commands."""
     spread = np.linalg.norm(nominal - nominal.mean(axis=(0, 1)), axis=2)
     reach = float(np.sqrt(np.mean(spread**2)))
     if scatter < _ASTRAY * reach:
@@ -132,7 +134,7 @@ def _misfit(nominal: NDArray, measured: NDArray, scatter: float) -> list[str]:
 
 
 def _mean(turns: NDArray) -> NDArray:
-    """Return the (R, 3) mean of (R, T, 3) over the targets read; NaN without any."""
+    """Return the (R, 3) mean of (R, T, 3) over the read targets; NaN without any."""
     read = np.isfinite(turns).all(axis=2)
     total = np.where(read[..., None], turns, 0.0).sum(axis=1)
     count = read.sum(axis=1)[:, None]
@@ -143,7 +145,7 @@ def _turns(
     declared: TargetsFile, commands: Commands, rows: Rows, nominal: NDArray,
     frame: DeviceFrame, name: str, left_out: list[str],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return (R, 3) [rad] deviations by a target's orientations, and its mount."""
+    """Return (R, 3) [rad] deviations by the orientations of a target, and its mount."""
     seen = np.full((len(rows), 3, 3), np.nan)
     for i, (_, readings) in enumerate(rows):
         rotation = readings[name].rotation if name in readings else None
@@ -169,7 +171,7 @@ def _turns(
 def _suspects(
     base: NDArray, nominal: NDArray, read: NDArray, scatter: float, names: list[str]
 ) -> list[tuple[int, str]]:
-    """Return the targets of one command at impossible positions, and the reasons."""
+    """Return the targets of one command at impossible positions, with reasons."""
     suspects = []
     ks = np.flatnonzero(read)
     order = exchanged_here(base[ks], nominal[ks], scatter)

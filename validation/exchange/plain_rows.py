@@ -1,4 +1,4 @@
-"""Rows of a device's table without a header: names, then numbers."""
+"""Rows of a device's table without a header: names, followed by numbers."""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,8 +10,10 @@ from validation.campaign.dialect import parse_number
 from validation.exchange.cell_values import CellValues, missing
 from validation.exchange.reading import Reading
 
-_COUNTERS = 3  # columns that may precede the targets': a counter, a time
-_ALIKE = 0.1  # relative to the scatter of distances: right columns leave less
+# largest number of columns before the targets' columns: a counter, a time
+_COUNTERS = 3
+# relative to the scatter of distances: largest scatter for the right columns
+_ALIKE = 0.1
 
 
 def read_plain_rows(
@@ -22,16 +24,16 @@ def read_plain_rows(
     """Return the readings of rows without a header.
 
     Args:
-        values: values of the cells.
-        rows: rows by line; a name and x, y, z, or only numbers: of one point, or of all
-            targets in their order.  Further cells are ignored.
-        targets: (3,) [m] by name, platform axes.
+        values: reader of the cells' values.
+        rows: rows by line, with a name and x, y, z, or with numbers only: of one point,
+            or of all targets in their order.  Further cells are ignored.
+        targets: (3,) [m] position of each target by name, platform axes.
 
     Returns:
-        The readings in their order.
+        The readings in the order of the file.
 
     Raises:
-        BadInput: a row has too few numbers, or a cell is none.
+        BadInput: a row has too few numbers, or a cell is not a number.
     """
     decimal = values.sheet.decimal
     if len(targets) > 1 and all(_nameless(cells, decimal) for _, cells in rows):
@@ -49,15 +51,15 @@ def _nameless(cells: Sequence[str], decimal: str) -> bool:
 def _first_column(
     rows: Sequence[Sequence[str]], decimal: str, targets: Mapping[str, NDArray]
 ) -> int:
-    """Return the first column of x, y, z in rows of numbers alone.
+    """Return the index of the first coordinate in rows of numbers only.
 
-    A counter or a time may precede them.  If that column is left out, the distances of
-    the targets agree with the declared ones.
+    A counter or a time may precede the coordinates.  They do if the distances between
+    targets agree with the declared ones without that column.
 
     Args:
         rows: rows of cells.
         decimal: the decimal mark.
-        targets: (3,) [m] each, platform axes.
+        targets: (3,) [m] position of each target, platform axes.
 
     Returns:
         Index of the column.
@@ -81,7 +83,7 @@ def _first_column(
 
 
 def _of_one(values: CellValues, line: int, cells: list[str], counted: bool) -> Reading:
-    """Return a row of names, then x, y, z; ``counted``: a first integer is a name."""
+    """Return a row with a name, then x, y, z; ``counted``: an integer may be a name."""
     names, cells = [], list(cells)
     decimal = values.sheet.decimal
     while cells and not np.isfinite(parse_number(cells[0], decimal)):
@@ -102,7 +104,7 @@ def _of_all(
     values: CellValues, line: int, cells: list[str], first: int,
     targets: Mapping[str, NDArray],
 ) -> list[Reading]:  # fmt: skip
-    """Return a row of numbers alone: x, y, z of each target in order."""
+    """Return a row of numbers only: x, y, z of each target in order."""
     found = len(cells) - first
     if found < 3 * len(targets):
         raise BadInput(
@@ -118,7 +120,7 @@ def _of_all(
 def _reading(
     values: CellValues, line: int, xyz: list[str], names: tuple[str, ...]
 ) -> Reading:
-    """Return a reading of three cells."""
+    """Return the reading in three cells."""
     position = nothing = np.full(3, np.nan)
     if not any(map(missing, xyz)):
         numbers = [values.number(line, a, c) for a, c in zip("xyz", xyz, strict=True)]

@@ -7,21 +7,23 @@ from numpy.typing import NDArray
 from forcefit.inputs.errors import quoted
 
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "inch": 0.0254}
-LARGEST = 1e12  # largest number in a table
+LARGEST = 1e12  # largest accepted absolute value of a number in a table
 
 
 @dataclass(frozen=True)
 class Writing:
-    """Declared format of an export, used where the export states none.
+    """Declared format of an export, used where the export does not state it.
 
     Attributes:
-        unit: unit of lengths, None if the header states it.
-        decimal: the decimal mark of exports.
-        commands_decimal: decimal separator of the table of commands.
-        dates: ``"day_first"`` or ``"month_first"`` for dates with slashes, or None.
-        coverage: ratio of an uncertainty (U95, U) to one standard deviation.
-        orientation: order of three angles (:func:`.orientation.orders`), or None.
-        angle_unit: unit of angles if the header states none, or None.
+        unit: unit of lengths; None if the header states it.
+        decimal: decimal mark of exports.
+        commands_decimal: decimal mark of the table of commands.
+        dates: ``"day_first"`` or ``"month_first"`` for dates with slashes; None if
+            undeclared.
+        coverage: ratio of a stated uncertainty (U95, U) to one standard deviation.
+        orientation: order of three angles (:func:`.orientation.orders`); None if
+            undeclared.
+        angle_unit: unit of angles; None if the header states it.
         oriented: whether orientations are read; otherwise they are ignored.
     """
 
@@ -40,13 +42,13 @@ class Reading:
     """One point that a device read.
 
     Attributes:
-        file: its file, for messages.
-        line: its line there.
-        names: parts of its name, the point's own last.
+        file: path of the file, for messages.
+        line: line in the file.
+        names: parts of the point's name; the last part is the point's own name.
         position: (3,) [m] in the device's axes; NaN if the device saw no target.
-        sigma: (3,) [m] one standard deviation, NaN where not stated.
-        time: [s] on the clock of the file, NaN without one.
-        rotation: (3, 3) the target's axes seen from the device's, or None.
+        sigma: (3,) [m] standard deviation of each coordinate; NaN where not stated.
+        time: [s] time on the clock of the file; NaN without a time.
+        rotation: (3, 3) the target's axes in the device's axes; None if not read.
     """
 
     file: str

@@ -1,4 +1,4 @@
-"""The targets file of an import: targets, and format of the exports."""
+"""The targets file of an import: positions of targets, and format of the exports."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -25,18 +25,18 @@ class TargetsFile:
     """The content of a targets file.
 
     Attributes:
-        file: its path.
-        robot: robot as declared.
-        robot_name: built-in name, or path from the targets file's folder.
-        places: (3,) [m] of each target, platform axes.
-        registration: ``"unknown"``: the device's pose is unknown, or ``"known"``: its
-            axes are the base's.
-        window: [s] between a command and its readings.
-        noise: [m] one standard deviation of a reading that states none, or None.
-        noise_rotation: [rad] the same for an orientation; None if none is read.
-        rotations: (3,) [rad] rotation vector from the platform's axes to a target's, if
-            declared; others are fitted.
-        writing: notation of the exports.
+        file: path of the file.
+        robot: the declared robot.
+        robot_name: name of a built-in robot, or path relative to the targets file.
+        places: (3,) [m] position of each target, platform axes.
+        registration: ``"unknown"`` if the device's pose is unknown; ``"known"`` if its
+            axes are the base's axes.
+        window: [s] largest time between a command and its readings.
+        noise: [m] standard deviation of a reading that states none; None if undeclared.
+        noise_rotation: [rad] standard deviation of an orientation; None if undeclared.
+        rotations: (3,) [rad] rotation vectors from the platform's axes to the axes of a
+            target, where declared; others are fitted.
+        writing: format of the exports.
     """
 
     file: Path
@@ -55,23 +55,25 @@ def read_targets(path: Path | str) -> TargetsFile:
     """Read a targets file.
 
     Args:
-        path: a TOML file with ``robot``, ``[targets]`` (name = [x, y, z] in m), and, to
-            change defaults, ``unit``, ``decimal``, ``dates``, ``coverage``,
+        path: a TOML file with ``robot`` and ``[targets]`` (name = [x, y, z] in m).
+            Optional keys are ``unit``, ``decimal``, ``dates``, ``coverage``,
             ``registration``, ``window``, ``noise``, ``noise_rotation``,
             ``orientation``, ``angle_unit``, ``[rotations]``.
 
     Returns:
-        The content.
+        The content of the file.
 
     Raises:
-        BadInput: a key is unknown, missing, or has an invalid value.
+        BadInput: a key is unknown or missing, or has an invalid value.
     """
     root = read_toml(path)
     name = root.text("robot", expected="a built-in robot or a robot file")
     table = root.table("targets")
     places = {key: table.array(key, (3,), "m", largest=1e4) for key in table.content}
     if not places:
-        raise root.bad("targets", "found none, expected at least one name = [x, y, z]")
+        raise root.bad(
+            "targets", "found no target, expected at least one name = [x, y, z]"
+        )
     for key in places:
         if not key or set(key) & set(".:,"):
             raise table.bad("", f"found {quoted(key)}, expected no . , : in a name")
@@ -111,7 +113,7 @@ def read_targets(path: Path | str) -> TargetsFile:
 
 
 def _choice(root: Table, key: str, valid: Iterable[str]) -> str | None:
-    """Return one of several words, None if not given."""
+    """Return the word given for a key; None if the key is absent."""
     return root.choice(key, valid) if root.has(key) else None
 
 
@@ -127,7 +129,7 @@ def _decimals(root: Table) -> tuple[str, str]:
 
 
 def _rotations(root: Table, places: Mapping[str, NDArray]) -> dict[str, NDArray]:
-    """Return the (3,) [rad] rotation vectors of targets, platform axes."""
+    """Return the declared (3,) [rad] rotation vectors of targets, platform axes."""
     if not root.has("rotations"):
         return {}
     table = root.table("rotations")

@@ -1,4 +1,4 @@
-"""``forcefit validation import``: a tracker's files and the commands as a campaign."""
+"""``forcefit validation import``: a campaign from a device's files and commands."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -27,7 +27,8 @@ from validation.exchange.placing import Placed, place
 from validation.exchange.reading import Reading
 from validation.exchange.targets_file import TargetsFile, read_targets
 
-_MOST_LEFT_OUT = 0.2  # largest share of all readings; more means another error
+# largest share of readings that may be left out; a larger share has another cause
+_MOST_LEFT_OUT = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,19 +36,19 @@ class Import:
     """A campaign made of a device's files.
 
     Attributes:
-        robot: its name.
+        robot: name of the robot.
         how: method of assignment of readings to commands: ``"name"``, ``"time"``,
             ``"order"``.
         header: columns of the table.
-        cells: its rows.
+        cells: rows of the table.
         declaration: text of ``campaign.toml``.
         frame: pose of the device.
-        scatter: [m] of one component about the declared robot.
-        readings: number of readings used.
-        left_out: readings not used, with the reason, in words.
-        mounts: (3,) [rad] rotation vector from the platform's axes to those of each
+        scatter: [m] scatter of one component about the declared robot.
+        readings: number of used readings.
+        left_out: readings that are not used, with the reason as text.
+        mounts: (3,) [rad] rotation vector from the platform's axes to the axes of each
             target whose orientation was read.
-        remarks: other inconsistencies, in words.
+        remarks: descriptions of other inconsistencies.
     """
 
     robot: str
@@ -80,7 +81,7 @@ class Import:
         }
 
     def text(self) -> str:
-        """Return a few lines for people."""
+        """Return the summary as a few lines of text."""
         lines = [
             f"{self.robot}: {self.readings} readings in {len(self.cells)} rows, joined "
             f"to commands by {self.how}",
@@ -98,21 +99,21 @@ def import_readings(
     files: Sequence[Path | str], targets: Path | str, commands: Path | str,
     folder: Path | str,
 ) -> Import:  # fmt: skip
-    """Make a campaign of a device's files.
+    """Make a campaign from a device's files.
 
     Args:
         files: exports of the device, or ROS bags.
         targets: the targets file (:mod:`validation.exchange.targets_file`).
         commands: the table of commands (:mod:`validation.exchange.commands_table`).
-        folder: to be written; it must be absent or empty.
+        folder: folder to be written; it must be absent or empty.
 
     Returns:
-        The campaign written.
+        The campaign as written.
 
     Raises:
-        BadInput: a file breaks a rule, the readings fit far better in another unit,
-            mirrored or with targets exchanged, or too many would be left out; no file
-            is written then.
+        BadInput: a file violates a rule, the readings fit far better in a different
+            unit, mirrored or with exchanged targets, or too many readings would be left
+            out.  No file is written in these cases.
     """
     folder = Path(folder)
     check_new_folder(folder)
@@ -140,7 +141,7 @@ def _read(file: Path | str, declared: TargetsFile) -> list[Reading]:
 def _campaign(
     declared: TargetsFile, commands: Commands, joined: Match, folder: Path, total: int
 ) -> Import:
-    """Return the campaign's two texts, and the readings left out."""
+    """Return the two texts of the campaign, and the readings left out."""
     names = list(declared.places)
     placed = place(declared, commands, joined.rows)
     left_out = _left_out(joined, placed, total)
@@ -170,7 +171,7 @@ def _campaign(
 
 
 def _left_out(joined: Match, placed: Placed, total: int) -> list[str]:
-    """Return the readings left out of the campaign, in words; refuse too many."""
+    """Return descriptions of the readings left out; refuse if there are too many."""
     why = {"time": "no command is near it in time"}.get(
         joined.how, "its name contains no id of a command"
     )
@@ -194,7 +195,7 @@ def _left_out(joined: Match, placed: Placed, total: int) -> list[str]:
 
 
 def _remarks(declared: TargetsFile, joined: Match, placed: Placed) -> list[str]:
-    """Return remarks on readings in the campaign."""
+    """Return remarks on the readings in the campaign."""
     remarks = []
     if joined.copies:
         remarks.append(

@@ -1,4 +1,4 @@
-"""Effects that a campaign can show and cannot show, before any diagnosis.
+"""Effects that a campaign can and cannot show, before any diagnosis.
 
 Begin with ``inspection.py``.
 """

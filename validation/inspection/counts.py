@@ -1,4 +1,4 @@
-"""Numbers of a campaign's rows, loads, readings and covariates."""
+"""Counts and ranges of a campaign's rows, loads, readings and covariates."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,7 +7,7 @@ from validation.campaign.campaign import LOAD, READING, Campaign
 
 
 def row_counts(kinds: NDArray) -> dict:
-    """Return how many rows each kind has."""
+    """Return the number of kinds; the least, median and most rows of a kind."""
     _, rows = np.unique(kinds, return_counts=True)
     return {"count": len(rows), "rows_each": [rows.min(), np.median(rows), rows.max()]}
 
@@ -28,7 +28,7 @@ def load_counts(c: Campaign) -> dict:
 
 
 def reading_counts(c: Campaign) -> dict:
-    """Return number of cells, size and sigma of each component."""
+    """Return the number of cells, the size and the sigma of each component."""
     counts = {}
     for k, name in enumerate(READING):
         cells = c.cells[:, k]
@@ -45,7 +45,7 @@ def reading_counts(c: Campaign) -> dict:
 
 
 def covariate_counts(c: Campaign) -> dict:
-    """Return range and levels of each covariate, and the ones correlated with it."""
+    """Return range, levels and correlated covariates of each covariate."""
     return {
         name: {
             "range": [x.min(), x.max()],
@@ -62,7 +62,7 @@ def covariate_counts(c: Campaign) -> dict:
 
 
 def correlation(x: NDArray, y: NDArray) -> float:
-    """Return correlation of two columns; 0 if one of them does not vary."""
+    """Return the correlation of two columns; 0 if one of them does not vary."""
     x, y = x - x.mean(), y - y.mean()
     size = float(np.linalg.norm(x) * np.linalg.norm(y))
     return float(x @ y) / size if size > 0 else 0.0

@@ -14,9 +14,10 @@ from validation.inspection.remark import CAREFUL, FINE, LOST, Remark
 from validation.inspection.repeat_remarks import on_repeats
 from validation.inspection.repeats import RepeatNoise
 
-_EXPANSION = 2.4e-5  # [1/K] of aluminium, about the largest of a machine's materials
-_TOGETHER = 0.9  # correlation above which two covariates count as one
-# fraction of the robot's size; larger deviations are hardly manufacturing errors
+# [1/K] expansion of aluminium, which is nearly the largest among materials of machines
+_EXPANSION = 2.4e-5
+_TOGETHER = 0.9  # correlation above which two covariates cannot be distinguished
+# relative to the robot's size; larger deviations are hardly manufacturing errors
 _UNIT = 0.02
 
 
@@ -32,7 +33,7 @@ def remarks_on(
         noise: noise computed from the repeats; None without repeats.
 
     Returns:
-        Remarks.
+        The remarks.
     """
     remarks = [
         *_on_readings(campaign), *_on_configurations(campaign, visits),
@@ -44,12 +45,12 @@ def remarks_on(
 
 
 def _on_readings(campaign: Campaign) -> list[Remark]:
-    """Return remarks on components never measured, constant, rounded or too large."""
+    """Return remarks on unmeasured, constant, rounded and too large components."""
     remarks = []
     measured, sigma = campaign.measured, campaign.sigma
     absent = ", ".join(campaign.not_measured)
     if absent:
-        text = f"Never measured: {absent}. Effects that only they show cannot be found."
+        text = f"Never measured: {absent}. Effects on these alone cannot be found."
         remarks.append(Remark("readings", LOST, text))
     for k, name in enumerate(READING):
         column = measured[campaign.cells[:, k], k]
@@ -94,12 +95,12 @@ def _on_configurations(campaign: Campaign, visits: Revisits) -> list[Remark]:
         remarks.append(Remark("configurations", LOST, text))
     elif still:
         text = f"Never moved: {', '.join(quoted(s) for s in still[:6])}. An offset " \
-               "there looks like a link of another length or angle."  # fmt: skip
+               "there is indistinguishable from a wrong length or angle."  # fmt: skip
         remarks.append(Remark("configurations", LOST, text))
     if visits.order == "back to back" and count > 1:
         text = (
             "Every configuration was measured without a break: changes with time "
-            "look like effects of the configuration."
+            "cannot be distinguished from effects of the configuration."
         )
         remarks.append(Remark("configurations", LOST, text))
     return remarks
@@ -110,8 +111,8 @@ def _on_loads(campaign: Campaign) -> list[Remark]:
     loads = campaign.loads
     if not loads.any():
         text = (
-            "No load was applied: compliance and clearances show at most through the "
-            "machine's own weight and internal forces, a wrong load not at all."
+            "No load was applied: compliance and clearances are visible only by the "
+            "machine's weight and internal forces; an error of the load is not visible."
         )
         return [Remark("load", LOST, text)]
     remarks = []
@@ -126,8 +127,8 @@ def _on_loads(campaign: Campaign) -> list[Remark]:
         remarks.append(Remark("load", LOST, text))
     elif twice == 0:
         text = (
-            "No configuration was measured under two loads: what the load does and "
-            "what the configuration does are distinguished by the model alone."
+            "No configuration was measured under two loads: effects of the load and "
+            "effects of the configuration are distinguished by the model alone."
         )
         remarks.append(Remark("load", CAREFUL, text))
     else:
@@ -142,7 +143,7 @@ def _on_loads(campaign: Campaign) -> list[Remark]:
 
 
 def _on_temperature(campaign: Campaign) -> list[Remark]:
-    """Return remarks on whether thermal expansion can show."""
+    """Return remarks on whether thermal expansion is visible."""
     temperature = campaign.covariates.get("temperature")
     if temperature is None:
         text = (
@@ -153,7 +154,7 @@ def _on_temperature(campaign: Campaign) -> list[Remark]:
     if span == 0.0:
         value = float(temperature[0])
         what = (
-            "thermal expansion looks exactly like longer links"
+            "thermal expansion has the same effect as longer links"
             if value
             else "thermal expansion has no effect"
         )
@@ -173,13 +174,13 @@ def _on_temperature(campaign: Campaign) -> list[Remark]:
 
 
 def _on_approach(campaign: Campaign) -> list[Remark]:
-    """Return remarks on whether friction can show."""
+    """Return remarks on whether friction is visible."""
     side = campaign.covariates.get("approach")
     if side is None:
         text = "No cov.approach: friction can be neither found nor excluded."
         return [Remark("approach", LOST, text)]
     if np.ptp(side) == 0.0:
-        text = "Every row was approached from one side: friction looks like an offset."
+        text = "Every row was approached from one side: friction equals an offset."
         return [Remark("approach", LOST, text)]
     both = _in_both(campaign.configuration, side)
     if not both:
@@ -194,7 +195,7 @@ def _on_approach(campaign: Campaign) -> list[Remark]:
 
 
 def _on_time(campaign: Campaign) -> list[Remark]:
-    """Return remarks on whether a drift can show."""
+    """Return remarks on whether a drift is visible."""
     if np.ptp(campaign.covariates.get("time", np.zeros(1))) == 0.0:
         text = (
             "No cov.time, or the same in every row: a drift can be neither found nor "

@@ -25,11 +25,11 @@ class DesignSignatures:
     """Changes of the readings over sigma, by unknowns of plausible size.
 
     Attributes:
-        columns: (N, k) changes by effect.  Each frame has its own unknowns; clearance
-            is the same in all joints; the load decides the position within it.
+        columns: (N, k) changes by effect.  Each frame has separate unknowns; clearance
+            is the same in all joints, and the load determines the position within it.
         nuisance: (N, p) changes by an unknown registration.
-        untestable: reason why an effect has no columns, by effect.
-        unregistered: why the registration cannot be estimated; empty if it can.
+        untestable: reason why an effect has no columns, by name of the effect.
+        unregistered: reason why the registration cannot be estimated; empty if it can.
     """
 
     columns: dict[str, NDArray]
@@ -43,15 +43,16 @@ def design_signatures(
 ) -> DesignSignatures:
     """Return the signatures of all effects of the library on a campaign.
 
-    An unknown registration is estimated first, to compute the signatures in the axes of
-    the measuring device.  If it cannot be estimated, the base's axes are used.
+    An unknown registration is estimated first, so that the signatures are computed in
+    the axes of the measuring device.  If it cannot be estimated, the base's axes are
+    used.
 
     Args:
         campaign: campaign of N measured cells.
-        progress: called with the number of effects done and their total.
+        progress: called with the number of finished effects and their total.
 
     Returns:
-        The signatures.
+        The signatures of all effects.
     """
     conditions, unregistered = conditions_of(campaign), ""
     if campaign.registration == "unknown":
@@ -81,7 +82,7 @@ def design_signatures(
             if np.isfinite(column).all():
                 columns[name] = column
             else:
-                untestable[name] = "the model has no answer in some rows"
+                untestable[name] = "the model has no solution in some rows"
     progress(len(LIBRARY), len(LIBRARY))
     nuisance = np.zeros((int(campaign.cells.sum()), 0))
     if campaign.registration == "unknown":
@@ -102,8 +103,8 @@ def changes_between_repeats(
         signatures: signatures of the library's effects on the campaign.
 
     Returns:
-        The columns of :func:`validation.inspection.repeats.slow_changes`, and those of
-        thermal expansion and friction in each configuration.
+        The columns of :func:`validation.inspection.repeats.slow_changes`, and the
+        columns of thermal expansion and friction in each configuration.
     """
     slow = slow_changes(campaign)
     acts = {"temperature": "thermal_expansion", "approach": "friction_hysteresis"}
@@ -114,7 +115,7 @@ def changes_between_repeats(
 
 
 def _one_each(every: list[Hypothesis]) -> dict[str, Hypothesis]:
-    """Return one hypothesis for each effect; the middle one of several shapes."""
+    """Return one hypothesis for each effect; of several shapes the middle one."""
     hypotheses: dict[str, Hypothesis] = {}
     for name in dict.fromkeys(h.effect for h in every):
         of = [h for h in every if h.effect == name]
@@ -129,7 +130,7 @@ def _one_each(every: list[Hypothesis]) -> dict[str, Hypothesis]:
 
 
 def _at_plausible_sizes(tangents: Tangents, hypothesis: Hypothesis) -> NDArray:
-    """Return (N, k) changes of the readings by one unknown at a time, at its size."""
+    """Return (N, k) changes of the readings by unknowns of plausible size, one each."""
     effect = LIBRARY[hypothesis.effect]
     shapes = {n: s.start for s in hypothesis.slots if s.shape for n in s.names}
     rest = {
@@ -150,5 +151,5 @@ def _at_plausible_sizes(tangents: Tangents, hypothesis: Hypothesis) -> NDArray:
 
 
 def _given(campaign: Campaign, covariate: str) -> bool:
-    """Return whether a covariate is given and not zero in every row."""
+    """Return whether a covariate is present and not zero in every row."""
     return bool(np.any(campaign.covariates.get(covariate, 0.0)))

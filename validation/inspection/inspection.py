@@ -1,4 +1,4 @@
-"""Inspection of a campaign before any diagnosis: its content, and what it can show."""
+"""Inspection of a campaign before any diagnosis: content and visible effects."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -35,11 +35,12 @@ class Inspection:
         campaign: campaign of R rows.
         repeats: order of rows of the same configuration and load in the session.
         visits: order of rows of the same configuration in the session.
-        noise: noise computed from the repeats; None if nothing was measured twice.
+        noise: noise computed from the repeats; None if no row was measured twice.
         signatures: signatures of the library's effects.
         separability: angles between the signatures.
-        remarks: sentences, those on lost effects first.
-        open: (R,) bool, rows whose pose is free within the declared clearances.
+        remarks: sentences on the design; remarks on lost effects are first.
+        open: (R,) bool, True for rows whose pose is not determined by the declared
+            clearances.
     """
 
     campaign: Campaign
@@ -54,7 +55,7 @@ class Inspection:
     __repr__, _repr_html_ = short_repr, html_table
 
     def table(self) -> dict:
-        """Return the whole inspection in plain values for JSON."""
+        """Return the whole inspection as plain values for JSON."""
         c = self.campaign
         return {
             "campaign": c.name,
@@ -84,7 +85,7 @@ class Inspection:
         }  # fmt: skip
 
     def _effect_table(self) -> dict:
-        """Return how much of each effect would show."""
+        """Return the visibility of each effect."""
         table: dict[str, dict] = {
             name: {"testable": False, "why": why}
             for name, why in self.signatures.untestable.items()
@@ -110,7 +111,7 @@ def inspect_campaign(
 
     Args:
         campaign: campaign to inspect.
-        progress: called with the number of effects done and their total.
+        progress: called with the number of finished effects and their total.
 
     Returns:
         The inspection.
@@ -137,7 +138,7 @@ def inspect_campaign(
 
 
 def _noise_table(c: Campaign, noise: RepeatNoise | None) -> dict | None:
-    """Return noise from repeats and the stated noise, with suspects by their labels."""
+    """Return the noise from repeats, the stated noise, and suspects by their labels."""
     if noise is None:
         return None
     return {

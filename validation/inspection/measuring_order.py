@@ -1,7 +1,7 @@
-"""Order in which a campaign was measured: repeats spread over the session or in a row.
+"""Order of a campaign's repeats: spread over the session, or directly in a row.
 
-Under a slow drift, repeats in a row agree better with each other than with the other
-rows.  Their noise is then smaller than the effect of the drift on the other rows.
+Under a slow drift, repeats directly in a row agree better with each other than with the
+other rows.  Their noise is then smaller than the effect of the drift on the other rows.
 """
 
 from dataclasses import dataclass
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from validation.campaign.campaign import Campaign
 
-_FEW, _MOST = 0.2, 0.8  # shares of repeats that directly follow each other
-_SHORT = 0.1  # share of the session between the first and the last row of a set
+_FEW, _MOST = 0.2, 0.8  # limits of the share of repeats that directly follow each other
+# largest share of the session between first and last row of a set measured in a row
+_SHORT = 0.1
 
 
 @dataclass(frozen=True)
@@ -20,10 +21,10 @@ class Revisits:
     """Order of rows of one kind in the session.
 
     Attributes:
-        sets: number of kinds that were measured more than once.
+        sets: number of sets, that is kinds of rows that were measured more than once.
         rows: number of rows in these sets.
-        others: number of rows in no set.
-        adjacent: share of the repeats that directly follow another one of their set.
+        others: number of rows outside these sets.
+        adjacent: share of the repeats that directly follow another row of their set.
         span: median time from the first to the last row of a set, as a share of the
             session.
     """
@@ -52,14 +53,14 @@ class Revisits:
 
 
 def revisits(campaign: Campaign, kinds: NDArray) -> Revisits:
-    """Return order in the session of rows that were measured more than once.
+    """Return the order in the session of rows that were measured more than once.
 
     Args:
         campaign: campaign of R rows, ordered by ``cov.time`` or else as in the file.
         kinds: (R,) int, such as ``campaign.repeat`` or ``campaign.configuration``.
 
     Returns:
-        The order.
+        The order of the rows.
     """
     clock = session_clock(campaign)
     # rows of several points measured at once count as one row
@@ -86,14 +87,14 @@ def revisits(campaign: Campaign, kinds: NDArray) -> Revisits:
 
 
 def session_clock(campaign: Campaign) -> NDArray:
-    """Return (R,) times from 0 at the first to 1 at the last measurement.
+    """Return (R,) times, from 0 at the first to 1 at the last measurement.
 
     Args:
-        campaign: campaign with a varying ``cov.time``; else the order of its rows is
-            used.
+        campaign: campaign with a varying ``cov.time``; otherwise the order of its rows
+            is used.
 
     Returns:
-        The times.
+        The relative times.
     """
     order = np.arange(len(campaign), dtype=float)
     time = campaign.covariates.get("time", order)

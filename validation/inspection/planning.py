@@ -1,15 +1,15 @@
-r"""Choice of a campaign's rows that discriminate between effects, before measurement.
+r"""Choice of rows that discriminate between effects, before measurement.
 
 An exchange algorithm chooses, out of many possible rows, those for which
 
     sum over e, f of ln(1 + l_ef),
     l_ef = tr(S_ee - S_ef (S_ff + I)^-1 S_fe) / k_e,
 
-is largest.  Here l_ef is the mean non-centrality of effect e where effect f is fitted
-instead (Atkinson and Fedorov's criterion, averaged over a normal prior).  S contains
-the sums over the rows of products of signatures.  The criterion's derivative by the
-weight of a row is known for all rows, so rows of the smallest derivative are exchanged
-for those of the largest.
+Here l_ef is the mean non-centrality of effect e if effect f is fitted instead (the
+criterion of Atkinson and Fedorov, averaged over a normal prior).  S contains the sums
+over the rows of products of signatures.  The derivative of the criterion by the weight
+of a row is known for all rows, so rows with the smallest derivative are exchanged for
+rows with the largest derivative.
 
 Sources:
     Atkinson, Fedorov (1975), The design of experiments for discriminating between two
@@ -36,10 +36,11 @@ from validation.synthetic.design import CampaignDesign, CampaignPlan, plan_campa
 from validation.synthetic.generator import Synthetic
 
 _POOL = 600  # number of rows to choose from
-_TRIED = 4  # rows of the least and of the largest derivative that are tried together
-_BETTER = 1e-3  # increase of the criterion that counts as an improvement
-_AVERAGE = 20  # number of random plans that the plan is compared with
-_PACE = 60.0  # [s] time to measure a row
+# number of rows of smallest and of largest derivative between which exchanges are tried
+_TRIED = 4
+_BETTER = 1e-3  # relative increase of the criterion that counts as an improvement
+_AVERAGE = 20  # number of random plans with which the plan is compared
+_PACE = 60.0  # [s] assumed time for the measurement of a row
 _SWING = 2400.0  # [s] period in which the temperature of a machine rises and falls
 _FEWEST = 8  # minimum number of rows and configurations for held-out rows
 
@@ -51,12 +52,12 @@ class Planned:
     Attributes:
         robot: declared robot.
         plan: rows in the order of measuring.
-        design: quantities that may be varied, and their ranges.
+        design: quantities that may vary, and their ranges.
         sigma: [rad, m] noise of the measuring device.
-        effects: names of the effects compared.
-        apart: (e, e) [-] mean non-centrality of the row's effect, of one sigma for each
-            reading, where the column's effect is fitted instead.
-        random: (e, e) mean of ``apart`` over plans of as many random rows.
+        effects: names of the compared effects.
+        apart: (e, e) [-] mean non-centrality of the row's effect, scaled to one sigma
+            for each reading, if the column's effect is fitted instead.
+        random: (e, e) mean of ``apart`` over plans with as many random rows.
     """
 
     robot: Robot
@@ -78,16 +79,17 @@ def plan_rows(
     Args:
         robot: declared robot.
         rows: number of rows to choose.
-        design: quantities that may be varied, their ranges, and the configurations.
+        design: quantities that may vary, their ranges, and the configurations.
         sigma: [rad, m] noise of the measuring device.
         seed: seed of the random rows to choose from.
-        progress: called with the number of effects done and their total.
+        progress: called with the number of finished effects and their total.
 
     Returns:
         The plan.
 
     Raises:
-        BadInput: the rows are too few to be judged, or hardly any configuration closes.
+        BadInput: there are too few rows, or the closures hold at hardly any
+            configuration.
     """
     if rows < _FEWEST:
         raise BadInput(f"--rows: found {rows}, expected at least {_FEWEST}")
@@ -122,7 +124,7 @@ def _pool(
     robot: Robot, design: CampaignDesign, wanted: int, rng: np.random.Generator
 ) -> CampaignPlan:
     """Return the rows to choose from, within the duration of the required rows."""
-    # the temperature changes slowly: rows at one time have one temperature
+    # the temperature changes slowly, so rows at one time have the same temperature
     plan = plan_campaign(robot, design, rng)
     time = np.array([row.covariates["time"] for row in plan.rows])
     time = (time % (_PACE * wanted)).round(1)
@@ -142,7 +144,7 @@ def rows_as_campaign(
     robot: Robot, plan: CampaignPlan, design: CampaignDesign,
     sigma: tuple[float, float],
 ) -> Campaign:  # fmt: skip
-    """Return a plan as a campaign whose readings are all zero.
+    """Return a plan as a campaign in which all readings are zero.
 
     Args:
         robot: declared robot.
@@ -173,7 +175,7 @@ def rows_as_campaign(
 
 
 def _alike(columns: NDArray) -> NDArray:
-    """Return columns of an effect, scaled to one sigma for each reading in total."""
+    """Return the columns of an effect, scaled to one sigma for each reading."""
     size = np.sqrt(np.mean(np.sum(columns**2, axis=1)))
     return columns / size
 
@@ -189,7 +191,7 @@ def _ordered(plan: CampaignPlan, chosen: NDArray) -> CampaignPlan:
 
 
 class _Criterion:
-    """Discrimination between effects by the chosen rows, and by each further row."""
+    """Criterion of a choice of rows, and its derivatives by the weight of each row."""
 
     def __init__(self, blocks: list[NDArray], rows: int) -> None:
         begin = np.cumsum([0, *(X.shape[1] for X in blocks)])
@@ -197,7 +199,7 @@ class _Criterion:
         self._X = np.hstack(blocks).reshape(rows, -1, begin[-1])
 
     def apart(self, chosen: NDArray) -> NDArray:
-        """Return (e, e) mean non-centrality of one effect where another is fitted."""
+        """Return (e, e) mean non-centralities of one effect if another is fitted."""
         return self._value(chosen)[0]
 
     def _value(self, chosen: NDArray) -> tuple[NDArray, NDArray]:
@@ -222,7 +224,7 @@ class _Criterion:
         return apart, slope
 
     def exchanged(self, start: NDArray) -> NDArray:
-        """Return rows after exchanges of one row each that increase the criterion."""
+        """Return rows after exchanges of single rows that increase the criterion."""
         chosen = start.copy()
         apart, slope = self._value(chosen)
         best, going = _told(apart), True
@@ -243,12 +245,12 @@ class _Criterion:
 
 
 def _told(apart: NDArray) -> float:
-    """Return the criterion."""
+    """Return the value of the criterion."""
     return float(np.nansum(np.log1p(apart)))
 
 
 def table(planned: Planned) -> dict[str, Any]:
-    """Return a plan in plain values: pairs of effects, the hardest pairs first."""
+    """Return a plan as plain values, with the least distinguishable pairs first."""
     names = planned.effects
     pairs = [
         {
@@ -266,23 +268,23 @@ def table(planned: Planned) -> dict[str, Any]:
 
 
 def text(planned: Planned) -> str:
-    """Return the text of a plan, with the five pairs hardest to separate."""
+    """Return the text of a plan, with the five least distinguishable pairs."""
     shown = table(planned)
     lines = [f"{shown['rows']} rows of {shown['configurations']} configurations"]
     lines.append(
-        "least distinguishable pairs, in brackets of as many random rows [sigma]:"
+        "least distinguishable pairs, in brackets for as many random rows [sigma]:"
     )
     for pair in shown["pairs"][:5]:
         sizes = [np.sqrt(pair[key]) for key in ("planned", "random")]
         lines.append(
-            f"  {pair['effect']} where {pair['fitted']} is fitted: "
+            f"  {pair['effect']} if {pair['fitted']} is fitted: "
             f"{sizes[0]:.2g} ({sizes[1]:.2g})"
         )
     return "\n".join(lines)
 
 
 def unmeasured(planned: Planned) -> Synthetic:
-    """Return a plan as a campaign without readings, as a file to be filled in."""
+    """Return a plan as a campaign without readings, for a file to be filled in."""
     missing = np.full((len(planned.plan.rows), 6), np.nan)
     return Synthetic(
         robot=planned.robot, plan=planned.plan,

@@ -1,7 +1,7 @@
 """A sentence on a campaign, and its importance.
 
-The subject is something lost (no analysis can recover it), something that needs care,
-or something that is as it should be.
+A sentence is on something lost, which no analysis can recover; on something that needs
+care; or on something that is as it should be.
 """
 
 from dataclasses import dataclass

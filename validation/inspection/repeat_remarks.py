@@ -9,8 +9,8 @@ from validation.inspection.measuring_order import Revisits, session_clock
 from validation.inspection.remark import CAREFUL, FINE, LOST, Remark
 from validation.inspection.repeats import MOST, RepeatNoise
 
-_FEW = 20  # degrees of freedom; with fewer the noise is known to worse than +-30 %
-_SEVERAL = 4  # number of suspect readings that may have a common cause
+_FEW = 20  # degrees of freedom below which the uncertainty of the noise exceeds 30 %
+_SEVERAL = 4  # number of suspect readings from which on a common cause is likely
 
 
 def on_repeats(
@@ -24,23 +24,26 @@ def on_repeats(
         noise: noise computed from the repeats; None without repeats.
 
     Returns:
-        Remarks.
+        The remarks.
     """
     if noise is None:
         text = (
-            "Nothing was measured twice: the noise cannot be checked, and whether the "
-            "best model fits is judged by the stated sigma alone."
+            "Nothing was measured twice: the noise cannot be checked, and the fit of "
+            "the best model is judged by the stated sigma alone."
         )
         return [Remark("repeats", LOST, text)]
     remarks = []
     if repeats.order == "back to back":
         text = (
-            "Repeats were measured in a row: slow drift does not show in them, the "
-            "noise looks too small and a sound model then looks wrong."
+            "Repeats were measured in a row: they do not contain slow drift. The "
+            "noise from repeats is then too small, and a correct model seems wrong."
         )
         remarks.append(Remark("repeats", CAREFUL, text))
     elif repeats.order == "mixed":
-        text = "Only some repeats are spread over the session: drift shows in part."
+        text = (
+            "Only some repeats are spread over the session: they contain part of "
+            "the drift."
+        )
         remarks.append(Remark("repeats", CAREFUL, text))
     elif repeats.order == "interleaved":
         remarks.append(Remark("repeats", FINE, "Repeats are spread over the session."))
@@ -64,7 +67,7 @@ def on_repeats(
         remarks.append(Remark("repeats", CAREFUL, text))
     for name, chance in noise.taken_out.items():
         if chance < UNLIKELY:
-            text = f"Repeats change with {name}, more than noise does."
+            text = f"Repeats change with {name} by more than the noise."
             remarks.append(Remark("repeats", CAREFUL, text))
     return remarks + _on_suspects(campaign, noise)
 

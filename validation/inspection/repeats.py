@@ -1,16 +1,17 @@
 """Noise of a machine and its measuring device, computed from repeated rows.
 
-Rows of the same configuration and load have a common mean; the residuals are noise and
-changes between the rows.  Slow changes (with time, temperature and side of approach)
-are fitted to all sets together and subtracted, so drift does not count as noise.
+Rows of the same configuration and load have a common mean.  Their residuals contain
+noise and changes between the rows.  Slow changes (with time, temperature and side of
+approach) are fitted to all sets together and subtracted, so drift does not count as
+noise.
 
 ======  =============  =========  ================================================
 symbol  code           shape      meaning
 ======  =============  =========  ================================================
-z       ``whitened``   (N,)       readings / stated sigma, measured cells row by row
+z       ``whitened``   (N,)       readings / stated sigma, measured cells by row
 B       ``slow``       (N, p)     columns of slow changes / sigma
-e       ``rest``       (N,)       z minus its set's mean and the fitted B x
-h       ``leverage``   (N,)       weight of a cell in its own fitted value
+e       ``rest``       (N,)       z minus the mean of its set and the fitted B x
+h       ``leverage``   (N,)       weight of a cell in its fitted value
 ======  =============  =========  ================================================
 
 Sources:
@@ -32,18 +33,19 @@ from validation.diagnosis.separability import orthonormal_basis
 from validation.inspection.measuring_order import session_clock
 
 _LEVEL = 0.01  # probability that a campaign without errors has a suspect row
-MOST = 20  # most suspects that are searched for
+MOST = 20  # largest number of suspects that are searched for
 
 
 @dataclass(frozen=True)
 class Suspect:
-    """A reading too far from its repeats.
+    """A reading that is too far from its repeats.
 
     Attributes:
-        rows: row of the reading; both rows of a set of two, where either may be wrong.
+        rows: row of the reading; for a set of two, both rows, because either may be
+            wrong.
         component: component of the reading.
         size: [-] deleted residual, Student's t.
-        chance: probability that noise alone gives so large a residual in the campaign.
+        chance: probability that noise alone causes a residual as large in the campaign.
     """
 
     rows: tuple[int, ...]
@@ -57,18 +59,18 @@ class RepeatNoise:
     """Noise computed from repeats, with 90 % confidence intervals.
 
     Attributes:
-        ratio: [-] standard deviation over stated sigma, of all components.
+        ratio: [-] standard deviation over stated sigma, for all components together.
         degrees: degrees of freedom of the ratio.
-        interval: interval of the ratio.
+        interval: confidence interval of the ratio.
         plain: the ratio without subtraction of slow changes.
         taken_out: names of the slow changes that were fitted and subtracted, each with
-            the probability that noise alone gives so large a change.
+            the probability that noise alone causes a change as large.
         component: (6,) [rad, m] standard deviations; NaN for components without
             repeats.
         component_degrees: (6,) degrees of freedom.
-        component_interval: (6, 2) [rad, m] intervals.
-        suspects: readings too far from their repeats, excluded from all the figures
-            above.
+        component_interval: (6, 2) [rad, m] confidence intervals.
+        suspects: readings too far from their repeats, which are excluded from all
+            values above.
     """
 
     ratio: float
@@ -87,15 +89,15 @@ def repeat_noise(
 ) -> RepeatNoise | None:
     """Return the noise from a campaign's repeats, with slow changes subtracted.
 
-    They are not subtracted if they need more than half of the degrees of freedom.
+    They are not subtracted if they have more than half of the degrees of freedom.
 
     Args:
         campaign: campaign of N measured cells.
         slow: (N, p) columns over sigma, by name, of changes between repeats; by default
-            those of :func:`slow_changes`.
+            the columns of :func:`slow_changes`.
 
     Returns:
-        The noise; None if nothing was measured twice.
+        The noise; None if no row was measured twice.
     """
     slow = slow_changes(campaign) if slow is None else slow
     suspects: list[Suspect] = []
@@ -113,15 +115,15 @@ def repeat_noise(
 
 
 def slow_changes(campaign: Campaign) -> dict[str, NDArray]:
-    """Return columns of slow changes, alike in every configuration.
+    """Return the columns of slow changes, which are equal in every configuration.
 
     Args:
         campaign: campaign of N measured cells.
 
     Returns:
         (N, p) columns over sigma by name, separate for each component: a settling and a
-        cubic in time (in the file's order if no time is given).  There are also shifts
-        with temperature and side of approach, if these vary.
+        cubic function of time (of the file's order if no time is given).  There are
+        also shifts with temperature and side of approach, if these vary.
     """
     clock = 2 * session_clock(campaign) - 1
     shapes = {
@@ -138,7 +140,7 @@ def slow_changes(campaign: Campaign) -> dict[str, NDArray]:
 
 
 def for_each_component(campaign: Campaign, shapes: NDArray) -> NDArray:
-    """Return the columns that shift the components one by one.
+    """Return columns with separate changes for each component.
 
     Args:
         campaign: campaign of R rows and N measured cells.
@@ -160,7 +162,7 @@ def _sets(campaign: Campaign) -> NDArray:
 
 
 def _repeated_cells(campaign: Campaign, out: set[int]) -> NDArray:
-    """Return (N,) bool, cells with another one in their set, some rows excluded."""
+    """Return (N,) bool: cells with another one in their set, some rows excluded."""
     row, _ = np.nonzero(campaign.cells)
     kept = ~np.isin(row, list(out))
     sets = _sets(campaign)
@@ -194,13 +196,13 @@ class _RepeatFit:
         self.rss = float(self.rest @ self.rest)
 
     def _centred(self, columns: NDArray) -> NDArray:
-        """Return the columns less their mean in every set."""
+        """Return the columns minus their mean in every set."""
         sums = np.zeros((len(self.count), columns.shape[1]))
         np.add.at(sums, self.set, columns)
         return columns - (sums / self.count[:, None])[self.set]
 
     def suspect(self) -> Suspect | None:
-        """Return reading farthest from its repeats; None if noise alone explains it."""
+        """Return the reading farthest from its repeats; None if noise explains it."""
         if self.degrees < 2 or self.rss == 0.0:
             return None
         free = np.maximum(1 - self.leverage, 1e-12)
@@ -217,7 +219,7 @@ class _RepeatFit:
         )
 
     def noise(self, suspects: list[Suspect]) -> RepeatNoise:
-        """Return the noise without the suspects."""
+        """Return the noise computed without the suspects."""
         free, rest = 1 - self.leverage, self.rest**2
         degrees = np.bincount(self.component, free, 6)
         cells = np.maximum(np.bincount(self.component, minlength=6), 1)
@@ -244,7 +246,7 @@ class _RepeatFit:
         )
 
     def _chance(self, name: str) -> float:
-        """Return probability that noise alone gives so large a slow change."""
+        """Return the probability that noise alone causes a slow change as large."""
         others = [B for key, B in self.slow.items() if key != name]
         basis = _basis(others, len(self.z))
         rest = self.z - basis @ (basis.T @ self.z)
@@ -261,6 +263,6 @@ def _basis(blocks: Iterable[NDArray], rows: int) -> NDArray:
 
 
 def _interval(degrees: float) -> tuple[float, float]:
-    """Return 90 % interval of a standard deviation, as factors of its estimate."""
+    """Return the 90 % interval of a standard deviation, as factors of its estimate."""
     low, high = chi2.ppf([0.05, 0.95], degrees)
     return float(np.sqrt(degrees / high)), float(np.sqrt(degrees / low))

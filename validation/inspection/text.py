@@ -40,7 +40,7 @@ def inspection_text(inspection: Inspection) -> str:
 
 
 def _separability_lines(inspection: Inspection) -> list[str]:
-    """Return lines on detectable effects, and on effects that look alike."""
+    """Return lines on detectable effects, and on effects that are indistinguishable."""
     s = inspection.separability
     lines = ["Effects, at plausible sizes, in this design:"]
     shown = [n for n, seen in zip(s.names, s.visible, strict=True) if seen]
@@ -71,7 +71,7 @@ def _separability_lines(inspection: Inspection) -> list[str]:
 
 
 def _reading_lines(c: Campaign) -> list[str]:
-    """Return a line for each component measured."""
+    """Return one line for each measured component."""
     lines = []
     for name, entry in reading_counts(c).items():
         if entry["measured"]:
@@ -86,16 +86,16 @@ def _reading_lines(c: Campaign) -> list[str]:
 
 
 def _load_lines(c: Campaign) -> list[str]:
-    """Return the levels and sizes of the load."""
+    """Return the levels and magnitudes of the load."""
     t = load_counts(c)
     return [
         f"load: {t['levels']} levels, up to {t['force'][1]:.4g} N and "
-        f"{t['moment'][1]:.4g} N m, {t['unloaded_rows']} rows without"
+        f"{t['moment'][1]:.4g} N m, {t['unloaded_rows']} rows without load"
     ]
 
 
 def _covariate_lines(c: Campaign) -> list[str]:
-    """Return a line with the range of each covariate."""
+    """Return one line for each covariate, with its range."""
     return [
         f"{name}: {t['range'][0]:.4g} ... {t['range'][1]:.4g}, {t['levels']} levels"
         for name, t in covariate_counts(c).items()
@@ -110,7 +110,7 @@ def _noise_lines(c: Campaign, noise: RepeatNoise | None) -> list[str]:
     lines = [
         f"noise from repeats: {noise.ratio:.2f} ({low:.2f} ... {high:.2f}, 90 %) times "
         f"the stated sigma, {noise.degrees} degrees of freedom; "
-        f"{noise.plain:.2f} with slow changes left in"
+        f"{noise.plain:.2f} with slow changes included"
     ]
     for k, name in enumerate(READING):
         if np.isfinite(noise.component[k]):

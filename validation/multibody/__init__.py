@@ -1,4 +1,4 @@
-"""The forced assembly in Exudyn, independent of the model except for the robot.
+"""Simulation of the forced assembly in Exudyn; it shares only the robot's data.
 
 Begin at ``simulation.py``.
 """

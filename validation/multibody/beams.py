@@ -1,7 +1,7 @@
 """Beams of the simulation: their axes and the stiffness of their sections.
 
-This module is independent of :mod:`assembly.model.links`, except for a section's
-constants.
+This module is independent of :mod:`assembly.model.links`, except for the constants of a
+section.
 """
 
 import math
@@ -16,7 +16,7 @@ from validation.multibody.motion import turned
 
 
 def beam_span(frame: Frame, link: BeamLink) -> tuple[float, NDArray]:
-    """Return [m] length of a beam, and (3,) its direction in the frame's axes."""
+    """Return the length [m] of a beam, and its direction (3,) in the frame's axes."""
     if link.length is not None and link.axis is not None:
         return link.length, np.array(link.axis)
     x = turned(frame.rotation).T @ frame.translation
@@ -24,7 +24,7 @@ def beam_span(frame: Frame, link: BeamLink) -> tuple[float, NDArray]:
 
 
 def beam_axes(x: NDArray, up: Sequence[float] | None) -> NDArray:
-    """Return axes as columns: along the beam, across, up; y is up by default."""
+    """Return axes of a beam as columns: along it, across, up; y is up by default."""
     x = x / np.linalg.norm(x)
     if up is None:
         up = (0.0, 0.0, 1.0) if math.hypot(x[0], x[2]) < 1e-9 else (0.0, 1.0, 0.0)
@@ -37,8 +37,8 @@ def element_stiffness(link: BeamLink, step: float) -> NDArray:
     """Return EA, GA_y, GA_z, GJ, EI_y, EI_z for elements of a length, corrected.
 
     An element of constant strain lacks the deflection step^3 / 12 EI of its own
-    bending. If its shear stiffness includes it, the tip of a cantilever is exact for
-    any number.
+    bending. If its shear stiffness includes this deflection, the tip of a cantilever is
+    exact for any number of elements.
 
     Args:
         link: the beam.

@@ -1,14 +1,14 @@
-"""The wrench of a bent spring as the gradient of its energy.
+"""The wrench of a deformed spring as the gradient of its energy.
 
 The energy of a link that is a spring is s.K s / 2, with s the logarithm of the motion
 between its ends.  Exudyn applies K s half-way between the ends, which is the gradient
-only to first order in the bending.  Its error as a potential is of the square of the
-rotation, and so is the error of the stiffness of a robot whose springs are bent.  Here
-the gradient is exact, by the inverse of the exponential's derivative.  The
-translational half of this inverse is the derivative of its rotational half along the
-translation (a screw is a dual vector).
+only to first order in the deformation.  The error of this force, and of the stiffness
+of a robot with deformed springs, is of second order in the rotation.  Here the gradient
+is exact, by the inverse of the derivative of the exponential.  The translational part
+of this inverse is the derivative of its rotational part along the translation (a screw
+is a dual vector).
 
-Exudyn calls this function some hundred thousand times, so vectors are tuples of floats.
+Exudyn calls this function about a hundred thousand times, so vectors are tuples.
 
 Sources:
     Selig (2005), Geometric fundamentals of robotics, section 4.5 (the series in
@@ -21,8 +21,8 @@ from collections.abc import Sequence
 _Vector = tuple[float, float, float]
 _BERNOULLI = (1 / 6, -1 / 30, 1 / 42, -1 / 30, 5 / 66, -691 / 2730, 7 / 6,
               -3617 / 510, 43867 / 798, -174611 / 330)  # fmt: skip
-# of 1 - t/2 cot(t/2) over t^2 in t^2; rotations are below a radian, so the error is
-# below (1 / 2 pi)^22
+# coefficients of 1 - t/2 cot(t/2) over t^2, as a power series in t^2; for rotations
+# below one radian the error is below (1 / 2 pi)^22
 _SERIES = tuple(
     abs(B) / math.factorial(2 * k) for k, B in enumerate(_BERNOULLI, 1)
 )  # fmt: skip
@@ -30,16 +30,17 @@ _SLOPES = tuple(2 * k * factor for k, factor in enumerate(_SERIES))[1:]
 
 
 def middle_wrench(K: Sequence[Sequence[float]], screw: Sequence[float]) -> list[float]:
-    """Return the wrench that resists a deformation, read half-way between the ends.
+    """Return the wrench that resists a deformation, half-way between the ends.
 
     Args:
-        K: (6, 6) [N m/rad .. N/m] in the near end's axes.
-        screw: (6,) [rad, m] logarithm of the far end seen from the near one.
+        K: (6, 6) [N m/rad .. N/m] stiffness in the near end's axes.
+        screw: (6,) [rad, m] logarithm of the motion from the near end to the far end.
 
     Returns:
-        (6,) [N m, N] in the ends' mean axes, at half the screw's translation along them
-        from the near end, where Exudyn applies it: the gradient of screw.K screw / 2.
-        At the far end :func:`far_couple` must be added.
+        (6,) [N m, N] in the mean axes of the ends, at the point where Exudyn applies
+        it: half of the screw's translation, along these axes, from the near end.  It is
+        the gradient of screw.K screw / 2.  At the far end :func:`far_couple` must be
+        added.
     """
     a, b, c, d, e, g = screw
     w, v = (a, b, c), (d, e, g)
@@ -54,8 +55,8 @@ def middle_wrench(K: Sequence[Sequence[float]], screw: Sequence[float]) -> list[
     factor, slope = _power_series(_SERIES, square), _power_series(_SLOPES, square)
     across_f, across_m = _cross(w, f), _cross(w, m)
     twice_f = _cross(w, across_f)
-    # at the near end: J^-T K s, with J the left derivative of the exponential; rotated
-    # by half of w it is symmetric
+    # at the near end J^-T K s, with J the left derivative of the exponential; in axes
+    # rotated by half of w this is symmetric
     short = (1 - turn / 2 / math.sin(turn / 2)) / square
     force = _sum(f, short, twice_f)
     by_shift = _cross(v, f)
@@ -68,27 +69,27 @@ def middle_wrench(K: Sequence[Sequence[float]], screw: Sequence[float]) -> list[
 
 
 def far_couple(screw: Sequence[float], force: Sequence[float]) -> list[float]:
-    """Return the couple that Exudyn leaves out at a spring's far end.
+    """Return the couple that Exudyn omits at a spring's far end.
 
-    Exudyn applies the wrench at half the screw's translation from either end.  These
-    two points coincide only without a rotation: a chord is shorter than its arc, across
-    the rotation axis by sin(t/2) / (t/2).  So the wrenches on the two ends are not
-    opposite.
+    Exudyn applies the wrench at half of the screw's translation from either end.  These
+    two points coincide only without a rotation: across the rotation axis, a chord is
+    shorter than its arc by the factor sin(t/2) / (t/2).  So the wrenches on the two
+    ends are not opposite.
 
     Args:
-        screw: (6,) [rad, m] logarithm of the far end seen from the near one.
-        force: (3,) [N] of :func:`middle_wrench`, in the ends' mean axes.
+        screw: (6,) [rad, m] logarithm of the motion from the near end to the far end.
+        force: (3,) [N] force of :func:`middle_wrench`, in the mean axes of the ends.
 
     Returns:
-        (3,) [N m] a moment on the far end, in its own axes.
+        (3,) [N m] moment on the far end, in its axes.
     """
     a, b, c, *_ = screw
     w, v = (a, b, c), (screw[3], screw[4], screw[5])
     turn = math.hypot(*w)
     if not turn:
         return [0.0] * 3
-    # to avoid cancellation: sin x / x - 1 by its series, for x below about half a
-    # radian
+    # for x below about half a radian, sin x / x - 1 is computed by its series to avoid
+    # cancellation
     x = turn * turn / 4
     short = -x / 6 * (1 - x / 20 * (1 - x / 42 * (1 - x / 72 * (1 - x / 110))))
     along = sum(p * q for p, q in zip(w, v, strict=True)) / (turn * turn)
@@ -106,7 +107,7 @@ def _power_series(factors: Sequence[float], x: float) -> float:
 
 
 def _turned_back(w: _Vector, turn: float, vector: _Vector) -> _Vector:
-    """Return a vector in axes rotated by half of w."""
+    """Return a vector in axes that are rotated by half of w."""
     half = turn / 2
     first = math.sin(half) / turn if turn else 0.5
     second = 2 * (math.sin(half / 2) / turn) ** 2 if turn else 0.125

@@ -1,13 +1,13 @@
 """Joint clearances as smooth, conservative contact.
 
 A joint moves freely inside its cones: discs for (TX, TY) and (RX, RY), intervals for TZ
-and RZ.  At distance r from the middle of a cone of size c,
+and RZ, or a ball for (TX, TY, TZ).  At distance r from the middle of a cone of size c,
 
     x = (r^2 - c^2) / 2c,   P = (x + sqrt(x^2 + w^2)) / 2,   energy = k P^2 / 2,
 
-so the force is k P P' r / c: none inside, a stiff spring outside, smooth everywhere,
-also at the middle (where smoothing r - c would be singular).  The width w is at first
-three times c, which centres the joint weakly, and is then reduced to 3e-4.
+so the force is k P P' r / c: zero inside, a stiff spring outside, and smooth
+everywhere, also at the middle (where smoothing of r - c would be singular).  The width
+w is at first three times c, which centres the joint weakly; it is then reduced to 3e-4.
 
 A pin in two bushes touches at two points, at +-h along z.  Each is a disc for the pin's
 axis there, (TX + h RY, TY - h RX), in place of the cone for (RX, RY).
@@ -21,21 +21,25 @@ from assembly.model.robot import Clearance, Frame
 
 TURN_STIFFNESS = 1e9  # [N m/rad] rotational stiffness of the contact
 SHIFT_STIFFNESS = 1e12  # [N/m] translational stiffness of the contact
-# [-] first and last width of the smoothing, in sizes of the cone
+# [-] first and last width of the smoothing, relative to the size of the cone
 WIDE, NARROW = 3.0, 3e-4
 _UNBOUNDED = 0.5  # [rad, m] larger bounds of own motions are checked afterwards
-_CONES = (("tilt", (0, 1)), ("spin", (2,)), ("radial", (3, 4)), ("axial", (5,)))
+_CONES = (
+    ("tilt", (0, 1)), ("spin", (2,)), ("radial", (3, 4)), ("axial", (5,)),
+    ("ball", (3, 4, 5)),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class ClearanceCone:
-    """A disc or an interval that bounds components of a screw.
+    """A disc, an interval or a ball that bounds components of a screw.
 
     Attributes:
-        rows: rows of the screw, which it bounds together.
-        size: [rad or m] > 0.
+        rows: rows of the screw that it bounds together.
+        size: [rad or m] bound, > 0.
         stiffness: [N m/rad or N/m] of the contact.
-        arm: [m] along z from the joint's middle to the contact; radial discs only.
+        arm: [m] distance along z from the joint's middle to the contact, for radial
+            discs.
     """
 
     rows: tuple[int, ...]
@@ -44,7 +48,7 @@ class ClearanceCone:
     arm: float = 0.0
 
     def offsets(self, screw: Sequence[float]) -> list[float]:
-        """Return one or two components [rad or m] of a screw (6,) that it bounds."""
+        """Return the one to three components [rad or m] of a screw that it bounds."""
         if self.arm:
             return [
                 screw[3] + self.arm * screw[1],
@@ -58,21 +62,21 @@ class JointClearance:
     """Possible motions of a joint in addition to its springs.
 
     Attributes:
-        cones: the bounds.
-        free: rows without a bound.
+        cones: the bounds on the motions.
+        free: rows of the screw without a bound.
     """
 
     cones: tuple[ClearanceCone, ...]
     free: tuple[int, ...]
 
     def softened(self, factor: float) -> "JointClearance":
-        """Return the clearance with the stiffness of its contacts times a factor."""
+        """Return the clearance with its contact stiffness multiplied by a factor."""
         cones = (replace(c, stiffness=factor * c.stiffness) for c in self.cones)
         return replace(self, cones=tuple(cones))
 
     @property
     def unlocked(self) -> tuple[int, ...]:
-        """Rows that are not locked."""
+        """Rows of the screw that are not locked."""
         bounded = {row for cone in self.cones for row in cone.rows}
         tilting = {row for cone in self.cones if cone.arm for row in (0, 1)}
         return tuple(sorted(bounded | tilting | {*self.free}))
@@ -81,17 +85,17 @@ class JointClearance:
 def joint_clearance(
     frame: Frame, scale: float = 1.0, bushes: bool = False
 ) -> JointClearance:
-    """Return clearances of a frame's joint, and its own motion if it has no spring.
+    """Return the clearances of a frame's joint, and its free motion without a spring.
 
     Args:
         frame: frame of a robot.
         scale: factor on the clearances.
         bushes: whether a joint with both radial clearance and tilt is a pin in two
-            bushes.  Each has that radial clearance, and their distance allows that
-            tilt.
+            bushes.  Each bush has the radial clearance, and their distance results from
+            the tilt.
 
     Returns:
-        The clearance; without one and without own motion, every row is locked.
+        The clearance; without clearance and without free motion, every row is locked.
     """
     given = frame.clearance or Clearance()
     moves = frame.passive and not frame.compliant
@@ -114,16 +118,16 @@ def joint_clearance(
 def cone_forces(
     cone: ClearanceCone, screw: Sequence[float], width: float
 ) -> Iterator[tuple[int, float]]:
-    """Yield contact forces of a cone on a joint displaced from its middle.
+    """Yield the contact forces of a cone on a joint displaced from its middle.
 
     Args:
         cone: the bound.
         screw: (6,) [rad, m] displacement of the joint.
-        width: [-] of the smoothing, in sizes of the cone.
+        width: [-] width of the smoothing, relative to the size of the cone.
 
     Yields:
-        Rows of the screw and the components [N m or N] of the force along them: the
-        gradient of the energy.
+        Rows of the screw, and the components [N m or N] of the force along these rows:
+        the gradient of the energy.
     """
     offsets = cone.offsets(screw)
     P, root = _overlap(cone, offsets, width)
@@ -143,7 +147,7 @@ def cone_energy(cone: ClearanceCone, screw: Sequence[float], width: float) -> fl
 def _overlap(
     cone: ClearanceCone, offsets: list[float], width: float
 ) -> tuple[float, float]:
-    """Return P and sqrt(x^2 + w^2) of the module's docstring."""
+    """Return P and sqrt(x^2 + w^2) as defined in the module's docstring."""
     squared = sum(u * u for u in offsets)
     x = (squared - cone.size**2) / (2 * cone.size)
     w = width * cone.size

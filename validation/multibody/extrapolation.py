@@ -1,9 +1,9 @@
-"""Central differences extrapolated to step zero, with their uncertainty.
+"""Central differences extrapolated to step zero, with an estimate of uncertainty.
 
-The error of differences has a part of the step's square and a part of rounding over the
-step: the first dominates for large steps, the second for small ones.  Two neighbouring
-steps are extrapolated to step zero.  Of all pairs the one is taken that differs least
-from the one before it; this difference is its uncertainty.
+The error of a difference has a part proportional to the square of the step, and a part
+of rounding over the step.  The first dominates for large steps, the second for small
+steps.  Two neighbouring steps are extrapolated to step zero.  Of all pairs, the one is
+chosen that differs least from the pair before it; this difference is the uncertainty.
 
 Sources:
     Ridders (1982), Accurate computation of F'(x) and F'(x) F''(x).
@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 def without_squares(
     steps: Sequence[float], differences: Sequence[NDArray]
 ) -> list[NDArray]:
-    """Return the neighbouring differences extrapolated to step zero.
+    """Return neighbouring differences extrapolated to step zero.
 
     Args:
-        steps: k of them, falling.
+        steps: k decreasing steps.
         differences: values of the same shape, one for each step.
 
     Returns:
-        k - 1 arrays, without the error of the step's square.
+        k - 1 arrays, without the error proportional to the square of the step.
     """
     squares = [(one / two) ** 2 for one, two in pairwise(steps)]
     pairs = zip(squares, pairwise(differences), strict=True)
@@ -36,11 +36,11 @@ def without_squares(
 def steadiest(
     found: Sequence[NDArray], size: Callable[[NDArray], float]
 ) -> tuple[NDArray, NDArray]:
-    """Return the array that differs least from the one before it.
+    """Return the array that differs least from the array before it.
 
     Args:
         found: at least two arrays of the same shape.
-        size: size of a change, which makes changes comparable.
+        size: function that returns the size of a change, by which changes are compared.
 
     Returns:
         The array, and its absolute change.

@@ -1,10 +1,10 @@
-"""An Exudyn model while it is built: bodies, springs, beams, contacts, closures, loads.
+"""An Exudyn model under construction: bodies, springs, contacts, closures, loads.
 
 Bodies are massless for the static solver.  Places are points and axes fixed to bodies;
 elastic parts and locked joints connect two places.  Exudyn orders screws and wrenches
-[T R]; arguments and results here are [R T] as in the whole library.  The solution is in
-:mod:`validation.multibody.exudyn_solver`, its evaluation in
-:mod:`validation.multibody.exudyn_reading`.
+[T R]; arguments and results here are [R T] as in the whole library.
+:mod:`validation.multibody.exudyn_solver` solves the model,
+:mod:`validation.multibody.exudyn_reading` evaluates it.
 """
 
 import math
@@ -22,25 +22,29 @@ from validation.multibody.contact import NARROW, WIDE, JointClearance, cone_forc
 from validation.multibody.exudyn_parts import Closure, Contact, Elastic, Place
 from validation.multibody.motion import inverse, shifted
 
-_SWAP = np.r_[3:6, 0:3]  # our [R T] <-> Exudyn's [T R]
+_SWAP = np.r_[3:6, 0:3]  # converts our order [R T] to Exudyn's order [T R] and back
 IDLE_STIFFNESS = 1e-6  # [N m/rad, N/m] residual stiffness of free motions
-HOLDING_STIFFNESS = 1e-2  # [N m/rad, N/m] on free motions while closures are closed
-# [N/m] springs of clearances; times 1e-3 in N m/rad, times 1e-6 about own axes
+# [N m/rad, N/m] stiffness of free motions while the closures are closed
+HOLDING_STIFFNESS = 1e-2
+# [N/m] stiffness that centres clearances; times 1e-3 in N m/rad, times 1e-6 about the
+# joint's axis
 _CENTRING = 1e3
 
 
 @dataclass(frozen=True)
 class Regularisation:
-    """Springs and tolerances of the simulation that do not belong to a robot.
+    """Springs and tolerances of the simulation that are not data of a robot.
 
     Attributes:
         closing: [N m/rad, N/m] of the connectors that close the closures; ``inf`` makes
             them joints without freedom, for a robot built closed.
         idle: [N m/rad, N/m] residual stiffness of free motions.
-        narrow: [-] last width of the smoothing of contacts, which centres clearances.
-        tolerance: [m, rad, -] of Newton's last increment; convergence is quadratic.
+        narrow: [-] last width of the contacts' smoothing, which centres clearances.
+        tolerance: [m, rad, -] largest last increment of Newton's method, which
+            converges quadratically.
         contact: factor on the stiffness of contacts.
-        conservative: whether springs act by the gradient of their energy, not half-way.
+        conservative: whether the wrench of a spring is the gradient of its energy
+            instead of Exudyn's wrench half-way.
     """
 
     closing: float
@@ -55,16 +59,17 @@ class Model:
     """An Exudyn model and the state of its solution.
 
     Attributes:
-        robot: its name, for messages.
-        regularisation: springs and tolerances that do not belong to a robot.
-        ground: the base.
-        width: [-] of the contacts' smoothing, in sizes of their cones.
-        deadline: [s] of ``time.monotonic``, after which the solver stops.
-        callback_error: exception of a user function; Exudyn itself reports only that
+        robot: name of the robot, for messages.
+        regularisation: springs and tolerances that are not data of a robot.
+        ground: Exudyn's number of the base.
+        width: [-] width of the contacts' smoothing, relative to the size of their
+            cones.
+        deadline: [s] value of ``time.monotonic`` after which the solver stops.
+        callback_error: exception raised by a user function; Exudyn only reports that
             there was an error.
-        idle: Exudyn's numbers of the springs of free motions, and their axes.
+        idle: Exudyn's numbers of the springs on free motions, and their axes.
         recorded: places whose motion from open to closed is recorded.
-        history: (places, 4, 4) of these places at each step.
+        history: (places, 4, 4) poses of these places at each step.
     """
 
     def __init__(
@@ -88,7 +93,7 @@ class Model:
         self.history: list[NDArray] = []
 
     def discard(self) -> None:
-        """Release the memory, which Exudyn's models and functions otherwise keep."""
+        """Release the memory, which Exudyn's models otherwise keep."""
         self.mbs.SetPreStepUserFunction(0)
         self.mbs.Reset()
         self.container.Reset()
@@ -110,7 +115,7 @@ class Model:
         return int(self.mbs.AddMarker(marker))
 
     def add_spring(self, place: Place, K: NDArray) -> Elastic:
-        """Add a body at the place, held there by a spring; ``inf`` locks an axis."""
+        """Add a body that a spring holds at the place; ``inf`` locks an axis."""
         far = self.add_body(place.built)
         markers = [self.add_marker(place), self.add_marker(far)]
         soft = np.isfinite(np.diag(K))
@@ -120,32 +125,32 @@ class Model:
             self.mbs.AddObject(joint)
         K = np.where(np.outer(soft, soft), K, 0.0)
         spring = self._connect(markers, K)
-        # about or along a single axis Exudyn's own law is the gradient
+        # for a single axis Exudyn's own wrench is the gradient
         if self.regularisation.conservative and soft.sum() > 1:
             self._follow_energy(spring, markers[1], K)
         return Elastic(place, far, (spring,))
 
     def add_idle(self, place: Place, axis: int) -> Elastic:
-        """Return a new body at the place, free along one axis but for a weak spring."""
+        """Return a body at the place, free along one axis except for a weak spring."""
         K = np.diag(np.where(np.arange(6) == axis, HOLDING_STIFFNESS, np.inf))
         spring = self.add_spring(place, K)
         self.idle.append((spring.parts[0], axis))
         return spring
 
     def hold_idle(self, stiffness: float) -> None:
-        """Set the weak springs of free motions."""
+        """Set the stiffness of the weak springs on free motions."""
         for part, axis in self.idle:
             K = np.diag(np.where(np.arange(6) == axis, stiffness, 0.0))
             self.mbs.SetObjectParameter(part, "stiffness", K[np.ix_(_SWAP, _SWAP)])
 
     def rest_idle(self, motions: NDArray) -> None:
-        """Set the rest coordinates (j,) [rad or m] of the free motions' springs."""
+        """Set the rest coordinates (j,) [rad or m] of the springs on free motions."""
         for (part, axis), motion in zip(self.idle, motions, strict=True):
             rest = np.where(np.arange(6) == axis, motion, 0.0)
             self.mbs.SetObjectParameter(part, "offset", rest[_SWAP].tolist())
 
     def add_contact(self, place: Place, clearance: JointClearance) -> Contact:
-        """Add a body at the place within a clearance; a weak spring centres it."""
+        """Add a body within a clearance at the place; a weak spring centres it."""
         clearance = clearance.softened(self.regularisation.contact)
         rows = np.array(clearance.unlocked, dtype=int)
         centring = np.full(6, np.inf)
@@ -165,12 +170,12 @@ class Model:
         return Contact(place, spring.far, clearance)
 
     def set_law(self, connector: int, law: Callable[[list[float]], Any]) -> None:
-        """Set a connector's wrench to any function.
+        """Set the wrench of a connector to a given function.
 
         Args:
-            connector: Exudyn's number of it.
-            law: function of the screw between its ends that returns the wrench half-way
-                between them, (6,) [R T], which resists.
+            connector: Exudyn's number of the connector.
+            law: function that returns the resisting wrench half-way between the ends,
+                (6,) [R T], for the screw between them.
         """
 
         def wrench(
@@ -191,18 +196,18 @@ class Model:
         self, base: Place, length: float, K: NDArray, elements: int,
         inertia: NDArray,
     ) -> tuple[tuple[int, ...], tuple[Place, ...]]:  # fmt: skip
-        """Return the elements along the base's x, clamped there, and their ends.
+        """Return elements of a beam along the base's x, clamped there, and their ends.
 
         Args:
-            base: place of its start.
-            length: [m].
-            K: (6, 6) [N, N m^2] of the section.
+            base: place of the beam's start.
+            length: [m] length of the beam.
+            K: (6, 6) [N, N m^2] stiffness of the section.
             elements: number of them.
-            inertia: (3,) mass [kg/m] and its second moments about y and z [kg m], which
-                only vibrations need.
+            inertia: (3,) mass [kg/m] and its second moments about y and z [kg m]; they
+                are needed for vibrations only.
 
         Returns:
-            The elements' numbers, and the places between them.
+            Exudyn's numbers of the elements, and the places between them.
         """
         section = self.exu.BeamSection()
         section.stiffnessMatrix = K
@@ -269,7 +274,7 @@ class Model:
             raise TimeoutError
 
     def node(self, place: Place) -> Any:
-        """Return Exudyn's node of a place's body."""
+        """Return Exudyn's number of the node of a place's body."""
         return self.mbs.GetObjectParameter(place.body, "nodeNumber")
 
     def transform(self, T: NDArray) -> Any:
@@ -277,7 +282,7 @@ class Model:
         return self.exu.HT(rotation=T[:3, :3], translation=T[:3, 3])
 
     def _follow_energy(self, spring: int, far: int, K: NDArray) -> None:
-        """Set a spring's wrenches to the gradient of its energy, on both its ends."""
+        """Set a spring's wrenches on both ends to the gradient of its energy."""
         rows, lacking = K.tolist(), [0.0] * 3
 
         def law(screw: list[float]) -> list[float]:
@@ -285,9 +290,9 @@ class Model:
             lacking[:] = far_couple(screw, wrench[3:])
             return wrench
 
-        # Exudyn evaluates connectors before loads.  Where it differentiates loads it
+        # Exudyn evaluates connectors before loads.  When it differentiates loads, it
         # moves the far end alone, and the couple must not change; it hardly changes if
-        # the near end moves along
+        # the near end moves too
         load = self.item.LoadTorqueVector(
             markerNumber=far, bodyFixed=True,
             loadVectorUserFunction=lambda mbs, t, load: lacking,

@@ -1,4 +1,4 @@
-"""Parts of a simulation model: places on bodies, and elements between them.
+"""Parts of a simulation model: places on bodies, and elements between places.
 
 Numbers are Exudyn's; screws and wrenches are ordered [R T] as in the whole library.
 """
@@ -26,7 +26,7 @@ class SimulationFailed(RuntimeError):
 
 
 class OutOfTime(SimulationFailed):
-    """The time limit was reached first."""
+    """The simulation stopped because its time limit was reached."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +35,8 @@ class Place:
 
     Attributes:
         body: Exudyn's number of the body.
-        start: (4, 4) pose in which the body is built, seen from the base.
-        local: (4, 4) pose of the place in the body.
+        start: (4, 4) pose in which the body is built, in the base frame.
+        local: (4, 4) pose of the place in the body's frame.
     """
 
     body: int
@@ -45,11 +45,11 @@ class Place:
 
     @property
     def built(self) -> NDArray:
-        """(4, 4) pose in which the place is built, seen from the base."""
+        """(4, 4) pose in which the place is built, in the base frame."""
         return self.start @ self.local
 
     def moved(self, T: NDArray) -> "Place":
-        """Return another place on the same body; ``T`` is its pose in this one."""
+        """Return a place on the same body with pose ``T`` in the frame of this one."""
         return replace(self, local=self.local @ T)
 
 
@@ -60,10 +60,10 @@ class Elastic:
     Attributes:
         near: place on the inner body.
         far: place on the outer body.
-        parts: Exudyn's numbers, of one connector or of the elements of a beam.
+        parts: Exudyn's numbers of one connector, or of the elements of a beam.
         beam: whether the part is a beam.
-        nodes: places along a beam, from base to tip, at equal distances.
-        modes: modes of a meshed body, which is a single part; None otherwise.
+        nodes: places along a beam from base to tip, at equal distances.
+        modes: modes of a meshed body, which is one part; None otherwise.
     """
 
     near: Place
@@ -76,14 +76,14 @@ class Elastic:
 
 @dataclass(frozen=True, eq=False)
 class MeshedSolid:
-    """A link as finite elements, with two rigid interfaces, in its mesh's axes.
+    """A link as finite elements with two rigid interfaces, in the axes of its mesh.
 
     Attributes:
-        nodes: (n, 3) [m].
+        nodes: (n, 3) [m] positions of the nodes.
         stiffness: (3n, 3n) [N/m] sparse; row 3 i + k is direction k of node i.
-        base: (k,) nodes of the interface at the parent's side.
-        tip: (m,) nodes of the interface at the frame's side.
-        centers: (2, 3) [m] points at which base and tip are read.
+        base: (k,) indices of the nodes of the interface on the parent's side.
+        tip: (m,) indices of the nodes of the interface on the frame's side.
+        centers: (2, 3) [m] reference points of base and tip.
     """
 
     nodes: NDArray
@@ -98,8 +98,8 @@ class MeshBody:
     """A solid at its pose in a robot.
 
     Attributes:
-        solid: shared by all links of one shape; it is condensed once.
-        turn: (3, 3) the mesh's axes seen from the frame's.
+        solid: the solid, shared by all links of one shape and condensed once.
+        turn: (3, 3) the mesh's axes in the frame's axes.
     """
 
     solid: MeshedSolid
@@ -108,12 +108,13 @@ class MeshBody:
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Interface modes of a meshed body, seen from its base.
+    """Interface modes of a meshed body, relative to its base.
 
     Attributes:
-        node: Exudyn's number of the node of their coordinates.
-        stiffness: (6, 6) reduced to the modes.
-        wrench: (6, 6) from mode coordinates to the wrench at the tip, frame's axes.
+        node: Exudyn's number of the node of the modes' coordinates.
+        stiffness: (6, 6) stiffness reduced to the modes.
+        wrench: (6, 6) map from mode coordinates to the wrench at the tip, in the
+            frame's axes.
     """
 
     node: int
@@ -128,10 +129,11 @@ class Closure:
     Attributes:
         first: place on the first chain.
         second: place on the second chain.
-        marker: Exudyn's number of the connector's end on the first chain, which is
+        marker: Exudyn's number of the connector's end on the first chain; this end is
             moved.
         connector: Exudyn's number of the connector.
-        closed: (4, 4) nominal pose of the second place in the first when closed.
+        closed: (4, 4) nominal pose of the second place relative to the first when
+            closed.
     """
 
     first: Place
@@ -148,7 +150,7 @@ class Contact:
     Attributes:
         near: place on the inner body.
         far: place on the outer body.
-        clearance: its possible motions.
+        clearance: possible motions of the joint.
     """
 
     near: Place

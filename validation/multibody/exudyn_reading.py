@@ -12,7 +12,7 @@ from validation.multibody.motion import inverse, logarithm, matrix
 
 
 def pose(model: Model, place: Place) -> NDArray:
-    """Return the (4, 4) present pose of a place, seen from the base."""
+    """Return the (4, 4) present pose of a place in the base frame."""
     read, kind = model.mbs.GetObjectOutputBody, model.exu.OutputVariableType
     R = np.reshape(read(place.body, kind.RotationMatrix), (3, 3))
     return matrix(R, read(place.body, kind.Position)) @ place.local
@@ -25,7 +25,7 @@ def closure_error(model: Model, closure: Closure) -> NDArray:
 
 
 def screw_between(model: Model, part: Elastic | Contact) -> NDArray:
-    """Return the (6,) [rad, m] logarithm of the far place seen from the near one."""
+    """Return (6,) [rad, m] logarithm of the motion from the near to the far place."""
     return logarithm(inverse(pose(model, part.near)) @ pose(model, part.far))
 
 
@@ -72,7 +72,7 @@ def wrench(model: Model, part: Elastic) -> NDArray:
 
 
 def closure_wrench(model: Model, closure: Closure, point: NDArray) -> NDArray:
-    """Return the (6,) [N m, N] wrench on the first chain, at a point, in base axes."""
+    """Return the (6,) [N m, N] wrench on the first chain at a point, in base axes."""
     T = pose(model, closure.second)
     own = connector_wrench(model, closure.connector).reshape(2, 3)
     moment, force = (T[:3, :3] @ half for half in own)
@@ -80,7 +80,7 @@ def closure_wrench(model: Model, closure: Closure, point: NDArray) -> NDArray:
 
 
 def connector_wrench(model: Model, number: int) -> NDArray:
-    """Return (6,) [N m, N] product of K and the screw of a connector's outer end."""
+    """Return (6,) [N m, N]: K times the screw of a connector's outer end."""
     kind, read = model.exu.OutputVariableType, model.mbs.GetObjectOutput
     return np.concatenate([
         read(number, kind.TorqueLocal),

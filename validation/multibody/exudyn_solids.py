@@ -1,4 +1,4 @@
-"""Meshed links in an Exudyn model: solids in floating frames with rigid interfaces."""
+"""Meshed links in an Exudyn model: solids in floating frames, with rigid interfaces."""
 
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -19,13 +19,13 @@ from validation.multibody.motion import matrix, shifted
 
 
 def add_mesh(model: Model, place: Place, body: MeshBody) -> Elastic:
-    """Add a meshed body in its floating frame, clamped so that its tip is at the place.
+    """Add a meshed body in a floating frame, clamped so that its tip is at the place.
 
-    Its modes are the static ones of rigid interfaces (Hurty-Craig-Bampton), computed by
-    Exudyn from the full stiffness matrix.
+    Its modes are the static modes of rigid interfaces (Hurty-Craig-Bampton), which
+    Exudyn computes from the full stiffness matrix.
 
     Args:
-        model: the model to be extended.
+        model: model to which the body is added.
         place: pose of the frame while the body is free of stress.
         body: the solid.
 
@@ -57,10 +57,11 @@ def add_mesh(model: Model, place: Place, body: MeshBody) -> Elastic:
 
 
 def _interface(model: Model, number: int, solid: MeshedSolid, side: int) -> int:
-    """Return a marker that moves with an interface, 0 the base and 1 the tip."""
+    """Return a marker that moves with an interface: 0 is the base, 1 the tip."""
     nodes = (solid.base, solid.tip)[side]
     arms = solid.nodes[nodes] - solid.centers[side]
-    # weights whose mean is the centre: an offset would not rotate with the nodes
+    # the weighted mean of the nodes is the centre: an offset would not rotate with the
+    # nodes
     rows = np.vstack([np.ones(len(arms)), arms.T / np.abs(arms).max()])
     weights = np.linalg.lstsq(rows, np.array([1.0, 0.0, 0.0, 0.0]))[0]
     marker = model.item.MarkerSuperElementRigid(
@@ -70,7 +71,7 @@ def _interface(model: Model, number: int, solid: MeshedSolid, side: int) -> int:
 
 
 def _tip_wrenches(body: MeshBody, basis: NDArray, K: NDArray) -> NDArray:
-    """Return the (6, 6) wrench at the tip, frame's axes, of unit mode coordinates."""
+    """Return the (6, 6) wrenches at the tip, in the frame's axes, of unit modes."""
     solid = body.solid
     arms = solid.nodes[solid.tip] - solid.centers[1]
     rigid = np.zeros((len(arms), 3, 6))
@@ -87,13 +88,14 @@ _CONDENSED: WeakKeyDictionary[MeshedSolid, Any] = WeakKeyDictionary()
 
 
 def _floating(fem: Any, solid: MeshedSolid) -> Any:
-    """Return Exudyn's floating body of a solid, condensed at its first use."""
+    """Return the floating body of a solid, condensed at its first use."""
     if solid not in _CONDENSED:
         link = fem.FEMinterface()
         link.nodes = {"Position": solid.nodes}
         link.surface = [{"Name": "none", "Trigs": []}]
         link.stiffnessMatrix = solid.stiffness
-        link.massMatrix = identity(3 * len(solid.nodes), format="csr")  # unused
+        # required by Exudyn, but not used
+        link.massMatrix = identity(3 * len(solid.nodes), format="csr")
         link.ComputeHurtyCraigBamptonModes(
             [solid.base.tolist(), solid.tip.tolist()],
             0,

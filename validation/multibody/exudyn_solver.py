@@ -1,11 +1,11 @@
-"""Exudyn's static solver, from the open robot to its equilibrium, in stages.
+"""Static solution of an Exudyn model in stages, from the open robot to equilibrium.
 
 Closures are closed while loads increase.  Then contacts stiffen, if there are any, and
-free motions are released.  The remaining closure errors are subtracted from the
-closures' targets until they vanish.
+free motions are released.  The remaining closure errors are subtracted from the targets
+of the closures until they vanish.
 
-A solution keeps its time limit: Exudyn counts processor time and stops between two
-steps, and its user functions check the clock.  Exceptions raised there, including
+A solution respects its time limit: Exudyn counts processor time and stops between two
+steps, and its user functions check the clock.  Exceptions in user functions, including
 Ctrl-C, are raised again.
 """
 
@@ -27,19 +27,20 @@ from validation.multibody.exudyn_parts import (
 from validation.multibody.exudyn_reading import closure_error, idle_motions, pose
 from validation.multibody.motion import exponential, inverse, logarithm
 
-_CLOSED = 1e-12  # [rad, m] largest component of a closure error
+_CLOSED = 1e-12  # [rad, m] largest component of a closure error that counts as closed
 _LOAD_STEPS = 4
-_RELEASING_STEPS = 4  # number of steps that release free motions
-# number of steps of the contacts' smoothing, geometrically spaced
+_RELEASING_STEPS = 4  # number of steps in which free motions are released
+# number of steps in which the smoothing of the contacts is reduced, geometrically
+# spaced
 _NARROWING_STEPS = 30
 _CLOSING_STEPS = 30
-# largest number of steps; the residual falls a million times in each
+# largest number of steps; each reduces the residual by a factor of a million
 _RELAXING_STEPS = 4
-_RESTS = 1e-10  # [rad, m] change of free motions at rest
+_RESTS = 1e-10  # [rad, m] change of free motions below which they are at rest
 _STAGES = (
-    "closures are pulled shut and loads grow",
-    "contacts harden and free motions are released",
-    "the last gaps are closed",
+    "closures are closed and loads increase",
+    "contacts stiffen and free motions are released",
+    "the remaining closure errors are removed",
 )
 
 
@@ -49,19 +50,20 @@ def solve(
     """Close the closures in steps, then correct their targets until they are closed.
 
     Args:
-        model: built; afterwards it is in its equilibrium.
-        closures: to be closed.
-        narrow: whether there are contacts, whose smoothing is reduced in between.
-        steps: least number of steps in which closures are closed.
+        model: a built model; afterwards it is in equilibrium.
+        closures: closures to be closed.
+        narrow: whether there are contacts, whose smoothing is reduced after the first
+            stage.
+        steps: smallest number of steps in which closures are closed.
 
     Returns:
-        The shifts with which :func:`close` continues if loads change.
+        The shifts of the targets, with which :func:`close` continues if loads change.
 
     Raises:
         SimulationFailed: no equilibrium was found; :class:`OutOfTime` if the model's
             deadline has passed.
     """
-    shift = np.zeros((2, len(closures), 6))  # of the targets, at 2 times
+    shift = np.zeros((2, len(closures), 6))  # shifts of the targets at 2 times
     model.mbs.SetPreStepUserFunction(_before_step(model, closures, shift))
     model.mbs.Assemble()
     equilibrate(model, 0.0, max(_LOAD_STEPS, steps))
@@ -72,12 +74,12 @@ def solve(
 
 
 def close(model: Model, closures: list[Closure], shift: NDArray) -> None:
-    """Correct the closures' targets until they are closed.
+    """Correct the targets of the closures until they are closed.
 
     Args:
-        model: solved, except for the last gaps.
-        closures: to be closed.
-        shift: (2, closures, 6) [rad, m] of the targets, changed in place.
+        model: model in equilibrium, with remaining closure errors.
+        closures: closures to be closed.
+        shift: (2, closures, 6) [rad, m] shifts of the targets, changed in place.
 
     Raises:
         SimulationFailed: no equilibrium was found.
@@ -99,16 +101,16 @@ def close(model: Model, closures: list[Closure], shift: NDArray) -> None:
 def relax(
     model: Model, closures: list[Closure], idle: Mapping[str, Elastic], shift: NDArray
 ) -> None:
-    """Set the rest positions of free motions' weak springs to the present state.
+    """Set the rest positions of the weak springs on free motions to the present state.
 
-    Otherwise these springs displace the equilibrium.  A robot that is soft along such a
-    motion and bends while moving would then have another stiffness.
+    Otherwise these springs displace the equilibrium.  A robot that is compliant along
+    such a motion, and deforms while it moves, would then have a different stiffness.
 
     Args:
-        model: solved.
-        closures: to be kept closed.
-        idle: the springs of free motions.
-        shift: (2, closures, 6) [rad, m] of the targets, changed in place.
+        model: model in equilibrium.
+        closures: closures to be kept closed.
+        idle: springs on free motions.
+        shift: (2, closures, 6) [rad, m] shifts of the targets, changed in place.
 
     Raises:
         SimulationFailed: no equilibrium was found.
@@ -125,7 +127,7 @@ def relax(
 def _before_step(
     model: Model, closures: list[Closure], shift: NDArray
 ) -> Callable[[Any, float], bool]:
-    """Return Exudyn's function before each step: it moves targets, narrows contacts."""
+    """Return the function that moves targets and narrows contacts before each step."""
     opened = [
         logarithm(inverse(c.first.built @ c.closed) @ c.second.built) for c in closures
     ]
@@ -156,10 +158,10 @@ def equilibrate(model: Model, start: float, steps: int) -> None:
     """Run Exudyn's static solver from the last state, over one unit of its time.
 
     Args:
-        model: assembled.
-        start: 0: closures are closed and loads increase; 1: contacts stiffen; 2: the
-            closures' targets are corrected.
-        steps: first number of steps; a failed step is divided.
+        model: the assembled model.
+        start: 0: closures are closed and loads increase; 1: contacts stiffen; 2:
+            targets of the closures are corrected.
+        steps: initial number of steps; a step that fails is divided.
 
     Raises:
         SimulationFailed: the shortest step fails, or the deadline has passed.
@@ -177,7 +179,7 @@ def equilibrate(model: Model, start: float, steps: int) -> None:
         status = f"no equilibrium while {stage} (Exudyn: {reason})"
         raise SimulationFailed(model.robot, status) from None
     finally:
-        timer.timeout = -1.0  # all models have one timer in common
+        timer.timeout = -1.0  # all models share one timer
     if model.mbs.sys["staticSolver"].output.simulationTimeout:
         model.callback_error = TimeoutError()
     raise_callback_error(model, stage)
@@ -187,11 +189,11 @@ def raise_callback_error(model: Model, stage: str) -> None:
     """Raise the exception of a user function, if there was one.
 
     Args:
-        model: the model of the function.
+        model: model to which the function belongs.
         stage: present stage, for the message.
 
     Raises:
-        OutOfTime: its deadline has passed.
+        OutOfTime: the deadline of the model has passed.
     """
     error, model.callback_error = model.callback_error, None
     if isinstance(error, TimeoutError):
@@ -203,7 +205,7 @@ def raise_callback_error(model: Model, stage: str) -> None:
 
 
 def static_settings(model: Model, start: float, steps: int) -> Any:
-    """Return Exudyn's settings of :func:`equilibrate`."""
+    """Return Exudyn's settings for :func:`equilibrate`."""
     settings = model.exu.SimulationSettings()
     settings.linearSolver.solverType = model.exu.LinearSolverType.EigenSparse
     settings.solution.file.write = False
@@ -214,15 +216,16 @@ def static_settings(model: Model, start: float, steps: int) -> Any:
     static.useLoadFactor = start == 0.0
     static.minimumStepSize = 1e-3
     newton = static.newton
-    newton.residualMode = 1  # of increments, since weak springs make residuals small
+    # judges increments, because weak springs make residuals small
+    newton.residualMode = 1
     newton.absoluteTolerance = newton.relativeTolerance = model.regularisation.tolerance
     newton.maxIterations = 25
-    newton.numericalDifferentiation.relativeEpsilon = 1e-8  # of user functions
+    newton.numericalDifferentiation.relativeEpsilon = 1e-8  # for user functions
     return settings
 
 
 def _record(model: Model) -> None:
-    """Record the present places."""
+    """Record the present poses of the recorded places."""
     if model.recorded:
         model.history.append(np.array([pose(model, place) for place in model.recorded]))
 

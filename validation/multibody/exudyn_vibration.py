@@ -54,7 +54,7 @@ def natural_frequencies(model: Model) -> NDArray:
         model: model in its equilibrium.
 
     Returns:
-        One for each inertia.
+        One frequency for each inertia.
     """
     (M, once), (_, twice) = (_linearised(model, step) for step in (_STEP, 2 * _STEP))
     K = 2 * once - twice

@@ -1,10 +1,10 @@
-"""The platform's compliance by the simulation's own linearised system.
+"""The platform's compliance from the linearised system of the simulation.
 
-Exudyn's residual is differentiated at its equilibrium, with the forces there (loads,
-and reactions of joints and closures) held constant.  It is differentiated along the
-motions that joints and closures allow, so that stiff directions that cannot move add no
-noise. These motions follow the modes of Exudyn's own Jacobian, which separates soft
-from stiff ones, and differences are extrapolated to step zero.
+Exudyn's residual is differentiated at its equilibrium, while the forces there (loads,
+and reactions of joints and closures) are held constant.  It is differentiated along the
+motions that joints and closures allow, so that stiff directions add no noise. These
+motions follow the modes of Exudyn's own Jacobian, which separates compliant from stiff
+motions.  Differences are extrapolated to step zero.
 
 Weak springs hold free motions, so that the model can be solved.  Without them the
 compliance is larger by k X (1 - k B)^-1 X' (Woodbury), which is added.  X and B are the
@@ -32,28 +32,31 @@ from validation.multibody.exudyn_solver import raise_callback_error, static_sett
 from validation.multibody.motion import turned
 from validation.multibody.open_robot import OpenTree
 
-# of Exudyn's coordinates, whose rotations are numbers of size 1; a contact is smoothed
-# within some nm, and pressed by less
+# steps in Exudyn's coordinates, whose rotations are parameters of size 1; a contact is
+# smoothed over some nm, and its penetration is smaller
 _STEPS, _CONTACT_STEPS = (2e-4, 1e-4, 5e-5), (1e-8, 3e-9, 1e-9, 3e-10)
 _GAP_STEP = 1e-5
-_RANK = 1e-7  # relative size below which a gap's derivative counts as zero
-_ROLLS = 1e-4  # of a joint's motion that its idle spring alone does not resist
-_POLISH = 2  # Newton steps at the end, because rounding of closures moves soft robots
+_RANK = 1e-7  # relative size below which a derivative of a closure error counts as zero
+# relative to a joint's motion: smaller stiffness is due to the joint's idle spring
+# alone
+_ROLLS = 1e-4
+# number of Newton steps at the end; rounding of closures moves compliant robots
+_POLISH = 2
 
 
 def linearised_compliance(
     model: Model, tree: OpenTree, platform: str
 ) -> tuple[NDArray, float, bool]:
-    """Return the compliance at the present equilibrium of a model.
+    """Return the compliance of a model at its present equilibrium.
 
     Args:
-        model: solved.
-        tree: its parts.
-        platform: name of its frame.
+        model: model in equilibrium.
+        tree: parts of the model.
+        platform: name of the platform's frame.
 
     Returns:
-        (6, 6) [rad/(N m) .. m/N] of small motions at the platform's present origin,
-        base axes; its uncertainty, of entries over sqrt(C_ii C_jj); and whether the
+        (6, 6) [rad/(N m) .. m/N] for small motions at the platform's present origin,
+        base axes; its uncertainty, for entries over sqrt(C_ii C_jj); and whether the
         equilibrium is stable.
 
     Raises:
@@ -81,9 +84,9 @@ _LAW = "springForceTorqueUserFunction"
 def _freeze(model: Model, closure: Closure) -> None:
     """Hold a closed closure's wrench constant.
 
-    The connector acts half-way between the closed place and a target behind it,
-    displaced by its own deformation, a mm under 1e5 N.  The constant wrench is read at
-    the closed place.
+    The connector acts half-way between the closed place and its target, which differ by
+    the connector's own deformation, about 1 mm under 1e5 N.  The constant wrench is
+    computed at the closed place.
     """
     wrench = connector_wrench(model, closure.connector)
     screw = wrench / model.regularisation.closing
@@ -97,7 +100,7 @@ def _freeze(model: Model, closure: Closure) -> None:
 def _compliance(
     model: Model, motion: Callable[[NDArray, NDArray, float], NDArray], tree: OpenTree
 ) -> tuple[NDArray, float, bool]:
-    """Return V Z (Z'KZ)^-1 Z'V' over the motions Z that keep joints and closures."""
+    """Return V Z (Z'KZ)^-1 Z'V' over the motions Z allowed by joints and closures."""
     solver, settings = model.exu.MainSolverStatic(), static_settings(model, 2.0, 1)
     solver.InitializeSolver(model.mbs, settings)
     count = solver.GetODE2size()
@@ -111,7 +114,7 @@ def _compliance(
         ahead, back = ([forces(q + sign * step * z) for z in Z.T] for sign in (1, -1))
         return Z.T @ (np.array(ahead) - np.array(back)).T / (2 * step)
 
-    # contacts change with the pressure, so no Newton steps are made with them
+    # contacts change with the pressure, so no Newton steps follow
     steps, polish = (_CONTACT_STEPS, 0) if tree.contacts else (_STEPS, _POLISH)
     q = np.array(model.mbs.systemData.GetODE2Coordinates())
     forces(q)
@@ -145,7 +148,7 @@ def _compliance(
 
 def _is_stable(model: Model, K: NDArray, V: NDArray) -> bool:
     """Return whether no motion lowers the potential by more than K's uncertainty."""
-    # the curvature of free motions is rounding, of either sign
+    # the curvature of free motions is due to rounding and has either sign
     K = K + 1e3 * model.regularisation.idle * V[6:].T @ V[6:]
     size = 1.0 / np.sqrt(np.abs(np.diag(K)))
     scaled = (K + K.T) / 2 * np.outer(size, size)
@@ -153,16 +156,17 @@ def _is_stable(model: Model, K: NDArray, V: NDArray) -> bool:
 
 
 def _held(model: Model, K: NDArray, V: NDArray) -> NDArray:
-    """Return the modes' stiffness with the idle springs."""
+    """Return the stiffness of the modes with the idle springs."""
     return K + model.regularisation.idle * V[6:].T @ V[6:]
 
 
 def _by_modes(model: Model, K: NDArray, V: NDArray) -> NDArray:
-    """Return the compliance by the modes' stiffness, without the idle springs."""
+    """Return the compliance from the stiffness of the modes, without idle springs."""
     whole = V @ _solve(_held(model, K, V), V.T)
     k, coupled = model.regularisation.idle, whole[:6, 6:]
     held, ways = np.linalg.eigh(np.eye(len(whole) - 6) - k * whole[6:, 6:])
-    # motions of idle springs alone, such as a rolling rod's, move no other body
+    # motions that only idle springs resist, such as the rolling of a rod, move no other
+    # body
     ways, held = ways[:, held > _ROLLS], held[held > _ROLLS]
     ways = coupled @ ways / np.sqrt(held)
     return whole[:6, :6] + k * ways @ ways.T
@@ -179,7 +183,7 @@ def _solve(K: NDArray, right: NDArray) -> NDArray:
 def _motion(
     model: Model, tree: OpenTree, platform: str, q: NDArray, Z: NDArray, step: float
 ) -> NDArray:
-    """Return derivatives along Z of gaps, of the platform's pose, of idle joints."""
+    """Return derivatives along Z of closure errors, platform pose and idle joints."""
     system, place = model.mbs.systemData, tree.before[platform]
 
     def read(q: NDArray) -> tuple[NDArray, NDArray, NDArray]:

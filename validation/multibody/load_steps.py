@@ -1,10 +1,10 @@
-"""The platform's compliance by small loads, with its uncertainty.
+"""The platform's compliance from small loads, with its uncertainty.
 
 At its equilibrium the simulation is loaded slightly along each axis, in both
-directions, by decreasing steps.  Half the difference of the platform's motions per load
-is the compliance, with an error of the step's square.  The size of this error depends
-on internal motions: a joint may rotate a hundred times as much as the platform.  So the
-differences are extrapolated.
+directions, with decreasing steps.  Half the difference of the platform's motions per
+load is the compliance, with an error proportional to the square of the step.  The size
+of this error depends on internal motions: a joint may rotate a hundred times as much as
+the platform.  So the differences are extrapolated to step zero.
 """
 
 from functools import partial
@@ -20,12 +20,12 @@ from validation.multibody.exudyn_reading import idle_motions, pose
 from validation.multibody.exudyn_solver import close, equilibrate
 from validation.multibody.open_robot import OpenTree
 
-# [rad, m] of the platform: largest step, ratio and number of steps
+# [rad, m] largest step of the platform; ratio and number of steps
 _LARGEST, _RATIO, _SIZES = 4e-3, 5.0, 4
 
 
 def add_step_loads(model: Model, tree: OpenTree, platform: str) -> tuple[int, int]:
-    """Add moment and force on the platform, zero at first, before the solution."""
+    """Add a moment and a force on the platform, zero at first, before the solution."""
     marker = model.add_marker(tree.before[platform])
     item = model.item
     moment = item.LoadTorqueVector(markerNumber=marker, loadVector=[0.0] * 3)
@@ -37,22 +37,23 @@ def stepped_compliance(
     model: Model, tree: OpenTree, platform: str, loads: tuple[int, int], shift: NDArray,
     sizes: NDArray,
 ) -> tuple[NDArray, float]:  # fmt: skip
-    """Return the compliance by differences at the present equilibrium of a model.
+    """Return the compliance of a model at its present equilibrium by differences.
 
     Args:
-        model: solved.
-        tree: its parts.
-        platform: name of its frame.
-        loads: loads of :func:`add_step_loads`.
-        shift: shift for :func:`validation.multibody.exudyn_solver.solve`.
+        model: model in equilibrium.
+        tree: parts of the model.
+        platform: name of the platform's frame.
+        loads: loads from :func:`add_step_loads`.
+        shift: shifts of the targets from
+            :func:`validation.multibody.exudyn_solver.solve`.
         sizes: (6,) [rad or m per N m or N] approximate largest motion under unit loads.
 
     Returns:
-        (6, 6) [rad/(N m) .. m/N] of small motions at the platform's present origin,
-        base axes; and its uncertainty, of entries over sqrt(C_ii C_jj).
+        (6, 6) [rad/(N m) .. m/N] for small motions at the platform's present origin,
+        base axes; and its uncertainty, for entries over sqrt(C_ii C_jj).
 
     Raises:
-        SimulationFailed: no equilibrium nearby, even under the smallest loads.
+        SimulationFailed: there is no equilibrium nearby, even under the smallest loads.
         OutOfTime: the model's deadline has passed; a :class:`SimulationFailed`.
     """
     system, initial = model.mbs.systemData, model.exu.ConfigurationType.Initial
@@ -61,7 +62,8 @@ def stepped_compliance(
     def moved(step: float, unit: NDArray, drift: NDArray) -> tuple[NDArray, ...]:
         for number, part in zip(loads, np.split(step * unit, 2), strict=True):
             model.mbs.SetLoadParameter(number, "loadVector", part.tolist())
-        # targets move with the load: the motion of the last step is a good guess
+        # targets move with the load, so the motion of the last step is a good start
+        # value
         shift[:] = first[1] + step * drift
         system.SetSystemState(start, configuration=initial)
         equilibrate(model, 2.0, 1)
@@ -85,7 +87,7 @@ def stepped_compliance(
             except OutOfTime:
                 raise
             except SimulationFailed:
-                # a large step may leave the range of equilibria
+                # a large step may be outside the range with an equilibrium
                 if step <= _LARGEST / size / _RATIO ** (_SIZES - 3):
                     raise
                 slopes.clear()
@@ -108,5 +110,5 @@ def stepped_compliance(
 
 
 def _relative(sizes: NDArray, change: NDArray) -> float:
-    """Return the largest change of the platform's motion, relative to its size."""
+    """Return the largest change of the platform's motion, relative to the motion."""
     return float((change[:6] / sizes).max())

@@ -1,4 +1,4 @@
-"""Finite rigid motions as 4 by 4 matrices, for the simulation's side of a comparison.
+"""Finite rigid motions as 4 by 4 matrices, for the multibody simulation only.
 
 This module is independent of :mod:`stiffness.screws` on purpose: a mistake in the
 placement of frames must not affect both sides.
@@ -19,13 +19,13 @@ def matrix(rotation: NDArray, translation: ArrayLike) -> NDArray:
 
 
 def turned(rotation_vector: ArrayLike) -> NDArray:
-    """Return the (3, 3) rotation by a vector [rad]."""
+    """Return the (3, 3) rotation matrix of a rotation vector [rad]."""
     return Rotation.from_rotvec(np.array(rotation_vector, dtype=float)).as_matrix()
 
 
 def turn_of(R: NDArray) -> NDArray:
-    """Return (3,) [rad] rotation vector, of length at most pi, of a rotation (3, 3)."""
-    # by the quaternion, whose largest component is computed first (Shepperd 1978)
+    """Return the (3,) [rad] rotation vector, at most pi long, of a rotation (3, 3)."""
+    # by the quaternion; its largest component is computed first (Shepperd 1978)
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R.tolist()
     trace = xx + yy + zz
     largest = max(trace, xx, yy, zz)
@@ -44,12 +44,12 @@ def turn_of(R: NDArray) -> NDArray:
 
 
 def placement(rotation_vector: ArrayLike, translation: ArrayLike) -> NDArray:
-    """Return (4, 4) of a rotation vector [rad] and a translation [m] in old axes."""
+    """Return the (4, 4) pose with a rotation vector [rad] and an origin [m]."""
     return matrix(turned(rotation_vector), translation)
 
 
 def shifted(translation: ArrayLike) -> NDArray:
-    """Return the (4, 4) of a translation alone."""
+    """Return the (4, 4) motion of a translation alone."""
     return matrix(np.eye(3), translation)
 
 
@@ -65,7 +65,7 @@ def exponential(screw: NDArray) -> NDArray:
         screw: (6,) ``[RX RY RZ TX TY TZ]`` [rad, m].
 
     Returns:
-        (4, 4).
+        (4, 4) motion.
     """
     return matrix(turned(screw[:3]), _mean_turn(screw[:3]) @ screw[3:])
 
@@ -74,21 +74,22 @@ def logarithm(T: NDArray) -> NDArray:
     """Return the constant screw that makes a finite motion in unit time.
 
     Args:
-        T: (4, 4) of a rotation by less than pi.
+        T: (4, 4) motion with a rotation of less than pi.
 
     Returns:
-        (6,) [rad, m], the inverse of :func:`exponential`.
+        (6,) [rad, m] screw; the inverse of :func:`exponential`.
     """
     angles = turn_of(T[:3, :3])
     return np.concatenate([angles, np.linalg.solve(_mean_turn(angles), T[:3, 3])])
 
 
 def _mean_turn(angles: NDArray) -> NDArray:
-    """Return (3, 3) mean of rotations by t times a rotation vector, t from 0 to 1."""
+    """Return (3, 3) mean of the rotations by t times a rotation vector, 0 < t < 1."""
     a = float(np.linalg.norm(angles))
     x, y, z = angles
     W = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    if a < 1e-3:  # the closed form cancels; the next terms are below 1e-15
+    # the closed form cancels; neglected terms of the series are below 1e-15
+    if a < 1e-3:
         first, second = 1 / 2 - a**2 / 24, 1 / 6 - a**2 / 120
     else:
         first, second = 2 * (math.sin(a / 2) / a) ** 2, (a - math.sin(a)) / a**3

@@ -1,8 +1,9 @@
-"""The open robot without stress: bodies in their chains, with errors.
+"""The open robot without stress: bodies along their chains, with geometric errors.
 
-At a frame the body's error acts first, then the link's deformation, then the joint's,
-as in the paper; rotation vector and translation of an error are both in the frame's
-axes.  Passive joints without a spring rotate or slide freely along their own z.
+At a frame the geometric error acts first, then the deformation of the link, then the
+motion of the joint, as in the paper.  Rotation vector and translation of an error are
+both in the frame's axes.  Passive joints without a spring rotate about or slide along
+their z axis freely.
 """
 
 from collections.abc import Mapping
@@ -41,16 +42,15 @@ class Case:
 
     Attributes:
         posture: the robot and its joint coordinates.
-        scale: factor on its geometric errors and clearances.
-        springs: by frame, K_E of links that are springs; see
-            :func:`link_springs`.
-        meshes: meshes by frame, links that are solids.
-        elements: number of elements of each other link, a beam.
+        scale: factor on geometric errors and clearances.
+        springs: K_E by frame, for links that are springs; see :func:`link_springs`.
+        meshes: meshed body by frame, for links that are solids.
+        elements: number of elements of every other link, which is a beam.
         clearances: whether joints have their clearances.
-        bushes: whether pins have two bushes each.
+        bushes: whether a pin is held in two bushes.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
-        couple: (3,) [N m] additional couple on the platform, base axes, by dead forces.
+        couple: (3,) [N m] additional couple of dead forces on the platform, base axes.
     """
 
     posture: PostureLike
@@ -71,12 +71,13 @@ def link_springs(
     given: Mapping[str, NDArray],
     meshes: Mapping[str, MeshBody],
 ) -> dict[str, NDArray]:
-    """Return the stiffness of every link that becomes neither a beam nor a mesh.
+    """Return the stiffness of every link that is neither a beam nor a mesh.
 
     Args:
-        robot: any robot.
+        robot: robot of the simulation.
         links: ``"beam"`` or ``"spring"``.
-        given: K_E (6, 6) [N m/rad .. N/m] by frame.
+        given: K_E (6, 6) [N m/rad .. N/m] by frame, for links whose K_E the robot
+            lacks.
         meshes: solids by frame.
 
     Returns:
@@ -97,7 +98,7 @@ def link_springs(
             springs[frame.name] = given[frame.name]
         else:
             raise BadInput(
-                f"simulate_assembly: the link of frame '{frame.name}' is to be a "
+                f"simulate_assembly: the link of frame '{frame.name}' becomes a "
                 "spring, expected its 6 by 6 matrix in `stiffness`"
             )
     return springs
@@ -105,12 +106,12 @@ def link_springs(
 
 @dataclass(frozen=True, eq=False)
 class OpenTree:
-    """The built model, filled in frame by frame.
+    """Parts of the built model, by frame.
 
     Attributes:
-        platform: (4, 4) nominal platform, seen from the base.
+        platform: (4, 4) nominal platform in the base frame.
         bodies: places of the frames on their bodies, before clearances and springs.
-        before: places of the frames before their own motion.
+        before: places of the frames before the motion of their joints.
         links: elastic bodies by frame.
         joints: joint springs by frame.
         idle: the springs of free motions by frame.
@@ -132,7 +133,7 @@ def build(model: Model, case: Case) -> OpenTree:
     """Build the open robot without stress, with errors, closures and loads.
 
     Args:
-        model: empty.
+        model: empty model.
         case: the description.
 
     Returns:
@@ -150,7 +151,7 @@ def build(model: Model, case: Case) -> OpenTree:
         place = _add_frame(model, case, frame, after[frame.parent], tree)
         after[frame.name] = place.moved(_own_motion(frame, q))
     for a, b in robot.closures:
-        # the rounding of files is not an error
+        # closure errors due to rounding of files are not geometric errors
         closed = inverse(nominal[a]) @ nominal[b]
         closure = model.add_closure(tree.before[a], tree.before[b], closed)
         tree.closures.append(closure)
@@ -176,7 +177,7 @@ def refuse_helical(robot: Robot) -> None:
 def _add_frame(
     model: Model, case: Case, frame: Frame, parent: Place, tree: OpenTree
 ) -> Place:
-    """Add a body with its error, link and joint; return the place before its motion."""
+    """Add a body with its error, link and joint; return the place before the joint."""
     error = case.scale * frame.geometric_error
     place = parent.moved(placement(frame.rotation, frame.translation))
     place = place.moved(placement(error[:3], error[3:]))
@@ -211,7 +212,7 @@ def _add_frame(
 
 
 def _nominal(posture: PostureLike) -> dict[str, NDArray]:
-    """Return the (4, 4) of every frame without imperfections, before its own motion."""
+    """Return (4, 4) nominal poses of all frames, before the motion of their joints."""
     T: dict[str, NDArray] = {}
     after = {BASE: np.eye(4)}
     for frame, q in zip(posture.robot.frames, posture.coordinates, strict=True):
@@ -222,14 +223,14 @@ def _nominal(posture: PostureLike) -> dict[str, NDArray]:
 
 
 def _own_motion(frame: Frame, q: float) -> NDArray:
-    """Return the (4, 4) motion of the joint about or along z."""
+    """Return the (4, 4) motion of the joint about or along its z axis."""
     if frame.joint == "prismatic":
         return shifted([0.0, 0.0, q])
     return placement([0.0, 0.0, q if frame.joint == "revolute" else 0.0], np.zeros(3))
 
 
 def _add_beam(model: Model, place: Place, frame: Frame, elements: int) -> Elastic:
-    """Add a straight beam, clamped to the place's body so that it ends at the place."""
+    """Add a straight beam, clamped to the place's body, whose tip is at the place."""
     link = frame.link
     assert isinstance(link, BeamLink)
     length, x = beam_span(frame, link)
@@ -244,7 +245,7 @@ def _add_beam(model: Model, place: Place, frame: Frame, elements: int) -> Elasti
 
 
 def _add_couple(model: Model, place: Place, nominal: NDArray, couple: NDArray) -> None:
-    """Add a couple: along each axis an arm of 1 m with a force m x axis / 2."""
+    """Add a couple: two forces m x axis / 2 on an arm of 1 m along each axis."""
     for axis, arm in zip(nominal[:3, :3].T, np.eye(3), strict=True):
         force = np.cross(couple, axis) / 2
         model.add_force(place.moved(shifted(arm)), force)
@@ -255,9 +256,9 @@ def _add_weights(model: Model, robot: Robot, tree: OpenTree, gravity: NDArray) -
     """Add the weights of all masses.
 
     A beam's weight acts at its nodes, with the end moments of a clamped beam under
-    uniform load: the tip of a cantilever is then exact for any number of nodes.  The
-    moments are pairs of forces on arms that rotate with the ends, like the weight of
-    the cubic between the nodes: weight keeps its direction and has a potential.
+    uniform load, so that the tip of a cantilever is exact for any number of nodes.  The
+    moments are pairs of forces on arms that rotate with the ends.  Like weight, they
+    keep their direction and have a potential.
     """
     for frame in robot.frames:
         if frame.mass:

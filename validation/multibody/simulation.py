@@ -1,15 +1,16 @@
 """The forced assembly as a multibody simulation, independent of the linear model.
 
-Every body is placed open and without stress, with its full geometric error.  The
-closures are then closed by force, and Exudyn computes the static equilibrium with
+Every body is placed without stress in the open robot, with its full geometric error.
+The closures are then closed by force, and Exudyn computes the static equilibrium with
 finite rotations.  Only the robot's data and its joint coordinates are shared with the
 virtual-joint model; placement, beams and equilibrium are computed independently.
 
-At a frame the body's error acts first, then the link's deformation, then the joint's,
-as in the paper; rotation vector and translation of an error are both in the frame's
-axes.  Without clearances passive joints rotate or slide freely along their own z.  A
-closure is closed by a connector whose target is corrected until the closure error
-vanishes, so overconstrained rigid loops (parallelograms) are no special case.
+At a frame the geometric error acts first, then the deformation of the link, then the
+motion of the joint, as in the paper.  Rotation vector and translation of an error are
+both in the frame's axes.  Without clearances, passive joints rotate about or slide
+along their z axis freely.  A connector closes each closure; its target is corrected
+until the closure error vanishes, so overconstrained rigid loops (parallelograms) need
+no special treatment.
 
 Sources:
     Gerstmayr (2023), "Exudyn - a C++-based Python package for flexible multibody
@@ -59,19 +60,20 @@ from validation.multibody.open_robot import (
 )
 
 LINKS = ("beam", "spring")
-# [s] largest time of a simulation; the slowest took 26 s on an idle core
+# [s] largest time of a simulation; the slowest known one took 26 s on an idle core
 TIME_LIMIT = 600.0
-_FINEST = 1e-10  # [m, rad, -] smallest tolerance
-# tried in turn; with contacts closures must not be much softer than these, and a rod
-# between two spherical joints may roll by radians under its weight unless it is held
+_FINEST = 1e-10  # [m, rad, -] smallest tolerance of Newton's last increment
+# regularisations that are tried in turn; with contacts, closures must not be much more
+# compliant than contacts, and a rod between two spherical joints may roll by radians
+# under its weight unless it is held
 _TIGHT = (
     Regularisation(1e10, IDLE_STIFFNESS),
     Regularisation(1e10, HOLDING_STIFFNESS),
 )
-# a joint without contact is undetermined within its clearance.  Rounding of forces
-# moves it by 1e-3 m with the first, by 1e-7 m with the third, which is a little
-# smoother.  At small scales clearances have that size too; softer contacts round forces
-# less
+# A joint without contact is undetermined within its clearance.  Rounding of forces
+# moves it by 1e-3 m with the first of these, by 1e-7 m with the third, which smooths a
+# little more. At small scales clearances have this size too; softer contacts reduce the
+# rounding of forces.
 WITH_CLEARANCES = (
     Regularisation(1e12, IDLE_STIFFNESS),
     Regularisation(1e10, IDLE_STIFFNESS, contact=0.1),
@@ -83,22 +85,22 @@ WITH_CLEARANCES = (
 
 @dataclass(frozen=True, eq=False)
 class SimulationModel:
-    """Options for the modelling of links and joints.
+    """Options for the model of links and joints.
 
     Attributes:
-        links: ``"beam"``: links with a section are geometrically exact beams, the
-            others 6 by 6 springs; ``"spring"``: all of them are springs.
-        stiffness: stiffness by frame, K_E (6, 6) [N m/rad .. N/m] at the frame, in its
-            axes, of links that become springs and whose matrix the robot does not give.
-        meshes: meshes by frame, links that are solids of finite elements in a floating
-            frame.
-        elements: beam elements per link.
+        links: ``"beam"``: links with a section are geometrically exact beams, other
+            links are 6 by 6 springs; ``"spring"``: all links are springs.
+        stiffness: K_E (6, 6) [N m/rad .. N/m] by frame, at the frame in its axes, for
+            links that are springs and whose matrix the robot does not give.
+        meshes: meshed body by frame, for links that are solids of finite elements in a
+            floating frame.
+        elements: number of elements of each beam.
         clearances: whether joints have their clearances, scaled like the errors.
-        bushes: whether joints with radial clearance and tilt are pins in two bushes,
-            see :func:`validation.multibody.contact.joint_clearance`, not a disc and a
-            cone.
-        hold: hold free motions from the start; otherwise only if no equilibrium is
-            found without.
+        bushes: whether joints with radial clearance and tilt are pins in two bushes
+            instead of a disc and a cone, see
+            :func:`validation.multibody.contact.joint_clearance`.
+        hold: whether free motions are held from the start; otherwise they are held only
+            if no equilibrium is found.
     """
 
     links: str = "beam"
@@ -123,26 +125,29 @@ _STANDARD = SimulationModel()
 class MultibodyAssembly:
     """A robot assembled by the simulation.
 
-    Rows are frames in the robot's order; screws and wrenches are at the frame, in its
-    axes, zero for a frame without such a spring.
+    Rows are frames in the robot's order.  Screws and wrenches are at the frame, in its
+    axes; they are zero for a frame without the spring.
 
     Attributes:
-        platform_screw: (6,) [rad, m] rotation vector of R_actual R_nominal^T and
-            difference of the platform's origin, base axes.
-        energy: [J] of all links and joint springs.
-        link_screws: (n, 6) [rad, m] deformations: logarithm of the relative motion.
-        link_wrenches: (n, 6) [N m, N] outer wrenches on the links' tips.
+        platform_screw: (6,) [rad, m] rotation vector of R_actual R_nominal^T, and
+            displacement of the platform's origin, base axes.
+        energy: [J] energy of all links and joint springs.
+        link_screws: (n, 6) [rad, m] deformations of the links: logarithms of the
+            relative motion.
+        link_wrenches: (n, 6) [N m, N] wrenches on the tips of the links from outside.
         joint_screws: (n, 6) [rad, m] deformations of the joint springs.
-        joint_wrenches: (n, 6) [N m, N] wrenches on their outer side.
-        clearance_screws: (n, 6) [rad, m] of joints, and own motions of passive ones.
-        closure_wrenches: (closures, 6) [N m, N] of each closure's second chain on its
-            first, at the platform's nominal origin, base axes.
-        transforms: (n, 4, 4) frames seen from the base, before their own motion.
+        joint_wrenches: (n, 6) [N m, N] wrenches on the outer side of the joint springs.
+        clearance_screws: (n, 6) [rad, m] motions of joints within clearances, and free
+            motions of passive joints.
+        closure_wrenches: (closures, 6) [N m, N] wrenches that the second chain of each
+            closure exerts on the first, at the platform's nominal origin, base axes.
+        transforms: (n, 4, 4) frames in the base frame, before the motion of their
+            joints.
         gap: [rad, m] largest component of a closure error.
-        idle_energy: [J] in the springs of free motions; a check, nearly zero.
-        contact_energy: [J] in the compliance of contacts.
-        held: whether free motions are held by 0.01 N m/rad or N/m, since no equilibrium
-            was found without.
+        idle_energy: [J] energy in the springs on free motions; it must be nearly zero.
+        contact_energy: [J] energy in the compliance of contacts.
+        held: whether free motions are held by 0.01 N m/rad or N/m, because no
+            equilibrium was found otherwise.
         seconds: [s] computing time.
     """
 
@@ -165,7 +170,7 @@ class MultibodyAssembly:
 
     @property
     def rigid_energy(self) -> float:
-        """[J] energy with rigid contacts, to first order in their compliance."""
+        """[J] energy for rigid contacts, to first order in the contacts' compliance."""
         return self.energy + 2 * self.contact_energy
 
 
@@ -187,12 +192,12 @@ def simulate_assembly(
         model: options for links and joints.
         load: (6,) [N m, N] on the platform at its origin, base axes, of constant
             direction.
-        gravity: (3,) [m/s^2] base axes: bodies with a mass and beams with a density
-            have weight; other links, of unknown mass, have none.
-        couple: (3,) [N m] additional couple on the platform, base axes.  Forces of
-            constant direction act on arms that rotate with it, so that it has a
-            potential, which a moment has not.
-        time_limit: [s] after which the simulation fails.
+        gravity: (3,) [m/s^2] base axes; bodies with a mass and beams with a density
+            have weight, other links have none because their mass is unknown.
+        couple: (3,) [N m] additional couple on the platform, base axes.  It consists of
+            dead forces on arms that rotate with the platform, so that it has a
+            potential, which a moment about fixed axes has not.
+        time_limit: [s] time after which the simulation fails.
 
     Returns:
         The assembled robot.
@@ -200,7 +205,8 @@ def simulate_assembly(
     Raises:
         BadInput: a spring's stiffness is missing.
         SimulationFailed: no equilibrium was found.
-        OutOfTime: the solution was not found in time; a :class:`SimulationFailed`.
+        OutOfTime: no solution was found within the time limit; a
+            :class:`SimulationFailed`.
     """
     started = time.monotonic()
     given = {name: np.asarray(K, dtype=float) for name, K in model.stiffness.items()}
@@ -231,7 +237,7 @@ def simulate_assembly(
 
 
 def _vector(given: ArrayLike | None, size: int) -> NDArray:
-    """Return the (size,) vector given, or zeros."""
+    """Return the given (size,) vector, or zeros for None."""
     return np.zeros(size) if given is None else np.asarray(given, dtype=float)
 
 
@@ -240,7 +246,7 @@ def _simulate(
 ) -> MultibodyAssembly:
     """Build and solve a model, read its results, and release the memory."""
     robot = case.posture.robot
-    # steps are accepted at the same size relative to the clearances at every scale
+    # relative to the clearances, the accepted increment is the same at every scale
     tolerance = max(regularisation.tolerance * min(case.scale, 1.0), _FINEST)
     regularisation = replace(regularisation, tolerance=tolerance)
     model = Model(*import_exudyn(), robot.name, regularisation)
@@ -256,16 +262,18 @@ def _simulate(
 def simulated_frequencies(
     posture: PostureLike, count: int = 6, elements: int = 8
 ) -> NDArray:
-    """Return natural frequencies of a robot in Exudyn at its nominal pose, drives held.
+    """Return the natural frequencies of a robot in Exudyn at its nominal pose.
 
     Args:
-        posture: see :func:`simulate_assembly`; links with a section are beams with
-            consistent masses, the others must be given by a matrix and have none.
+        posture: see :func:`simulate_assembly`; drives are held.  Links with a section
+            are beams with consistent masses; other links must be given by a matrix and
+            have no mass.
         count: largest number of frequencies.
         elements: number of elements of each beam.
 
     Returns:
-        (k,) [Hz] lowest first; free motions are held by 1e-6 N m/rad or N/m.
+        (k,) [Hz] frequencies, lowest first; free motions are held by 1e-6 N m/rad or
+        N/m.
 
     Raises:
         BadInput: a link's stiffness is unknown.
@@ -306,15 +314,15 @@ def closing_sequence(
     """Return the frames of a robot without clearances while its closures are closed.
 
     Args:
-        posture: see :func:`simulate_assembly`; links with a section are beams, the
-            others must be given by a matrix.
+        posture: see :func:`simulate_assembly`; links with a section are beams, other
+            links must be given by a matrix.
         steps: number of steps that close the closures, at least 4.
         scale: factor on the geometric errors.
-        load: (6,) [N m, N] on the platform, which grows meanwhile.
+        load: (6,) [N m, N] on the platform; it increases while the closures are closed.
 
     Returns:
-        (k, n, 4, 4) frames seen from the base: open and stress-free first, closed
-        last; k is at least ``steps + 1``.
+        (k, n, 4, 4) frames in the base frame: first open and without stress, last
+        closed; k is at least ``steps + 1``.
 
     Raises:
         BadInput: a link's stiffness is unknown.
@@ -346,13 +354,13 @@ def closing_sequence(
 
 
 def without_clearance(robot: Robot) -> Robot:
-    """Return the same robot without clearances, to compare with a simulation.
+    """Return a robot without its clearances, for comparison with a simulation.
 
     Args:
-        robot: any robot.
+        robot: robot with or without clearances.
 
     Returns:
-        The robot; its passive joints move along their z without bound.
+        The robot; its passive joints move about or along their z axis without bounds.
     """
     frames = tuple(replace(frame, clearance=None) for frame in robot.frames)
     return replace(robot, frames=frames)
@@ -361,7 +369,7 @@ def without_clearance(robot: Robot) -> Robot:
 def _read(
     model: Model, robot: Robot, tree: OpenTree, started: float
 ) -> MultibodyAssembly:
-    """Return the equilibrium's screws, wrenches and energies."""
+    """Return the screws, wrenches and energies of the equilibrium."""
     count = len(robot.frames)
     screws = {kind: np.zeros((count, 6)) for kind in ("link", "joint", "clearance")}
     wrenches = {kind: np.zeros((count, 6)) for kind in ("link", "joint")}

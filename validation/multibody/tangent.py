@@ -1,7 +1,7 @@
 """The platform's compliance in the simulation, at an equilibrium, by two methods.
 
-Errors, loads and weight act as in :func:`.simulation.simulate_assembly`; springs act by
-the gradient of their energy, so that the tangent is that of a potential.
+Errors, loads and weight act as in :func:`.simulation.simulate_assembly`.  The wrench of
+a spring is the gradient of its energy, so that the tangent belongs to a potential.
 """
 
 import time
@@ -26,26 +26,28 @@ from validation.multibody.simulation import (
     import_exudyn,
 )
 
-# closures' forces are rounded to 1e-16 of their stiffness, which moves soft robots
+# rounding of the closures' forces is 1e-16 of their stiffness and moves compliant
+# robots
 _REGULARISATIONS = (
     Regularisation(1e8, 1e-8), Regularisation(1e8, 1e-6), Regularisation(1e10, 1e-6)
 )  # fmt: skip
 
-# large load steps may pass a bifurcation and reach an unstable equilibrium
+# a large load step may pass a bifurcation and reach an unstable equilibrium
 _SMALLER_STEPS = (16, 64)
 
 
 @dataclass(frozen=True, eq=False)
 class SimulatedTangent:
-    """A compliance computed by two methods in one simulation.
+    """Compliance of the platform computed by two methods in one simulation.
 
     Attributes:
-        linearised: (6, 6) [rad/(N m) .. m/N] of small motions at the platform's present
-            origin, base axes, by the linearised system.
-        stepped: (6, 6) by small loads; NaN if not requested.
-        linearised_error: [-] uncertainty of the first, of entries over sqrt(C_ii C_jj).
-        stepped_error: [-] uncertainty of the second.
-        platform: (4, 4) present pose of the platform, seen from the base.
+        linearised: (6, 6) [rad/(N m) .. m/N] compliance from the linearised system, for
+            small motions at the platform's present origin, base axes.
+        stepped: (6, 6) compliance from small loads; NaN if not requested.
+        linearised_error: [-] uncertainty of ``linearised``, for entries over sqrt(C_ii
+            C_jj).
+        stepped_error: [-] uncertainty of ``stepped``, likewise.
+        platform: (4, 4) present pose of the platform in the base frame.
         stable: whether the equilibrium is stable.
         seconds: [s] computing time.
     """
@@ -72,27 +74,29 @@ def simulated_tangent(
     """Return the platform's compliance at the equilibrium of errors, load and weight.
 
     Args:
-        posture: the robot's configuration, with its errors.
-        model: model of its links.  Clearances are included if they are in the model, in
-            smoothed contacts of 1e12 N/m; then there are no load steps.
+        posture: the robot's configuration, with its geometric errors.
+        model: model of the links.  Clearances are included if the model has them, as
+            smoothed contacts of 1e12 N/m; there are no load steps then.
         load: (6,) [N m, N] on the platform at its origin, base axes: a dead force, and
             a moment as a couple of dead forces.
         gravity: (3,) [m/s^2] base axes.
         steps: whether small loads are used too.
-        time_limit: [s] of the whole computation.
+        time_limit: [s] largest time of the whole computation.
 
     Returns:
-        Both compliances, at a stable equilibrium unless smaller load steps than usual
-        lead to an unstable one as well.
+        Both compliances.  The equilibrium is stable, unless smaller load steps than
+        usual also lead to an unstable one.
 
     Raises:
         BadInput: a spring's stiffness is missing.
         SimulationFailed: no equilibrium was found.
-        OutOfTime: the solution was not found in time; a :class:`SimulationFailed`.
+        OutOfTime: no solution was found within the time limit; a
+            :class:`SimulationFailed`.
     """
     started = time.monotonic()
     case = _case(posture, model, load, gravity)
-    # without bent springs their law does not matter, and Exudyn's own is faster
+    # without deformed springs their nonlinear law does not matter, and Exudyn's is
+    # faster
     bent = is_bent(posture.robot.errors, load, gravity)
     hard = tuple(r for r in WITH_CLEARANCES if r.contact == 1.0)
     tried = hard[:2] if model.clearances else _REGULARISATIONS
@@ -123,7 +127,7 @@ def _first(
 
 
 def is_bent(*causes: ArrayLike | None) -> bool:
-    """Return whether there are errors, load or weight, so that springs are bent."""
+    """Return whether errors, load or weight deform the springs."""
     return any(np.any(cause) for cause in causes if cause is not None)
 
 

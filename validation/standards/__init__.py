@@ -1,4 +1,4 @@
-"""Accuracy and repeatability by standards, from the repeats of a campaign.
+"""Accuracy and repeatability according to standards, from repeats of a campaign.
 
 Begin with ``figures.py``.
 """

@@ -22,21 +22,21 @@ from validation.standards.iso9283 import (
     position_repeatability,
 )
 
-_MOST_PAIRS = 2000  # most pairs of positions whose distances are evaluated
+_MOST_PAIRS = 2000  # largest number of pairs of positions whose distances are evaluated
 
 
 @dataclass(frozen=True)
 class PoseFigures:
-    """ISO 9283 at one pose, load and side of approach; None where not measured.
+    """ISO 9283 characteristics at one pose, load and side of approach.
 
     Attributes:
-        label: id of the first row.
-        cycles: number of cycles n.
-        accuracy: AP_P [m].
-        repeatability: RP_l [m].
-        angles: AP_a, AP_b, AP_c [rad].
-        angle_repeatability: RP_a, RP_b, RP_c [rad].
-        drift: drift of AP_P [m].
+        label: id of the first row of the pose.
+        cycles: number n of cycles.
+        accuracy: AP_P [m]; None if no positions were measured.
+        repeatability: RP_l [m]; None if no positions were measured.
+        angles: AP_a, AP_b, AP_c [rad]; None if no rotations were measured.
+        angle_repeatability: RP_a, RP_b, RP_c [rad]; None if no rotations were measured.
+        drift: drift of AP_P [m]; None if it cannot be computed.
     """
 
     label: str
@@ -53,7 +53,7 @@ class DistanceFigures:
     """ISO 9283 characteristics of the distance between two poses.
 
     Attributes:
-        labels: ids of the first rows of the poses.
+        labels: ids of the first row of each pose.
         commanded: [m] commanded distance.
         accuracy: AD_P [m], with its sign.
         repeatability: RD [m].
@@ -67,18 +67,18 @@ class DistanceFigures:
 
 @dataclass(frozen=True)
 class StandardFigures:
-    """All characteristics of a campaign by ISO 9283 and ISO 230-2.
+    """All characteristics of a campaign according to ISO 9283 and ISO 230-2.
 
     Attributes:
         campaign: name of the campaign.
         registration: ``"known"`` or ``"unknown"``; AP includes the error of the
-            registration used.
+            registration.
         poses: poses measured at least twice.
-        distances: distances of pairs of poses with equal load, session, point and side
-            of approach.
+        distances: characteristics of pairs of poses with equal load, session, point and
+            side of approach.
         axes: ISO 230-2 characteristics of each reading approached from both sides, by
-            name; separate for each load, session and point, named by the first row's
-            id.
+            name; separate for each load, session and point, which the id of the first
+            row identifies.
     """
 
     campaign: str
@@ -100,7 +100,7 @@ class StandardFigures:
         }
 
     def text(self) -> str:
-        """A table for people, the worst of each in the last line."""
+        """Return table as text, with the worst value of each kind in the last line."""
         rows = {
             pose.label: [
                 pose.cycles,
@@ -113,7 +113,7 @@ class StandardFigures:
         lines = [f"{self.campaign}: ISO 9283, {len(rows)} poses with repeats",
                  *table_lines(head, rows, digits=4)]  # fmt: skip
         if self.registration == "unknown":
-            lines.append("registration unknown: AP includes where the device stood")
+            lines.append("registration unknown: AP includes the position of the device")
         if self.distances:
             worst = max(self.distances, key=lambda pair: abs(pair.accuracy))
             a, b = worst.labels
@@ -140,10 +140,10 @@ def standard_figures(campaign: Campaign) -> StandardFigures:
         campaign: campaign with rows measured more than once.
 
     Returns:
-        The characteristics; ISO 9283 evaluates the sides of approach separately.
+        The characteristics; sides of approach are evaluated separately for ISO 9283.
 
     Raises:
-        BadInput: no row is repeated.
+        BadInput: no row was measured more than once.
     """
     side = campaign.covariates.get("approach", np.ones(len(campaign)))
     group = number_rows(campaign.repeat, side)
@@ -152,7 +152,7 @@ def standard_figures(campaign: Campaign) -> StandardFigures:
     if not sets:
         raise BadInput(
             f"campaign {quoted(campaign.name)}: found no command that was "
-            "measured twice; expected repeats, from which the figures of the "
+            "measured twice; expected repeats, from which the characteristics of the "
             "standards are computed"
         )
     return StandardFigures(
@@ -171,7 +171,7 @@ def _in_time(campaign: Campaign, rows: NDArray) -> NDArray:
 
 
 def _pose(campaign: Campaign, rows: NDArray) -> PoseFigures:
-    """Return ISO 9283 characteristics of one set of repeats."""
+    """Return the ISO 9283 characteristics of one set of repeats."""
     turns, shifts = campaign.measured[rows, :3], campaign.measured[rows, 3:]
     turns, shifts = (d[np.isfinite(d).all(axis=1)] for d in (turns, shifts))
     placed, turned = len(shifts) > 1, len(turns) > 1
@@ -189,7 +189,7 @@ def _pose(campaign: Campaign, rows: NDArray) -> PoseFigures:
 
 
 def _circumstances(campaign: Campaign) -> NDArray:
-    """Return (R,) number of each row's load, session and point, by first use."""
+    """Return (R,) numbers of each row's combination of load, session and point."""
     names = [
         np.unique(column, return_inverse=True)[1]
         for column in (campaign.session, campaign.point)
@@ -199,13 +199,14 @@ def _circumstances(campaign: Campaign) -> NDArray:
 
 
 def _distances(campaign: Campaign, sets: list[NDArray]) -> Iterator[DistanceFigures]:
-    """Yield ISO 9283 characteristics of distances between different poses.
+    """Yield the ISO 9283 characteristics of distances between different poses.
 
-    The standard's cycles go from one pose to the other under one load.  Poses of two
-    loads differ by a deflection, poses of two sessions by the position of the device.
+    The cycles of the standard go from one pose to the other under one load.  Poses
+    under two loads differ by a deflection, poses of two sessions by the position of the
+    device.
 
     Yields:
-        Characteristics of each pair.
+        The characteristics of each pair.
     """
     T = campaign.transforms[:, campaign.robot.index(campaign.robot.platform)]
     nominal = T[:, :3, 3] + np.einsum("rij,rj->ri", T[:, :3, :3], campaign.targets)
@@ -225,7 +226,7 @@ def _distances(campaign: Campaign, sets: list[NDArray]) -> Iterator[DistanceFigu
 
 
 def _axes(campaign: Campaign) -> Iterator[tuple[str, AxisFigures]]:
-    """Yield ISO 230-2 characteristics of each reading, load, session and point."""
+    """Yield the ISO 230-2 characteristics of each reading, load, session and point."""
     apart = _circumstances(campaign)
     for k, name in enumerate(READING):
         for number in range(int(apart.max()) + 1):
@@ -237,7 +238,7 @@ def _axes(campaign: Campaign) -> Iterator[tuple[str, AxisFigures]]:
 
 
 def _axis(campaign: Campaign, k: int) -> AxisFigures | None:
-    """Return characteristics of a reading repeated from both sides; else None."""
+    """Return the characteristics of a reading repeated from both sides, or None."""
     side, values = campaign.covariates.get("approach"), campaign.measured[:, k]
     if side is None:
         return None

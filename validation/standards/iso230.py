@@ -19,13 +19,13 @@ class AxisFigures:
 
     Attributes:
         reversal: B, the largest absolute reversal.
-        mean_reversal: B-bar, with its sign.
-        repeatability_forward: R up.
-        repeatability_backward: R down.
-        repeatability: R, both directions.
-        systematic_deviation: E, both directions.
-        mean_deviation: M, range of the mean of both directions.
-        accuracy: A, both directions.
+        mean_reversal: B-bar, the signed mean reversal.
+        repeatability_forward: R up, the largest repeatability in forward direction.
+        repeatability_backward: R down, the largest repeatability in backward direction.
+        repeatability: R, the largest bidirectional repeatability.
+        systematic_deviation: E, the bidirectional systematic deviation.
+        mean_deviation: M, the range of the mean of both directions.
+        accuracy: A, the bidirectional accuracy.
     """
 
     reversal: float
@@ -41,12 +41,12 @@ class AxisFigures:
 def axis_figures(
     forward: Sequence[ArrayLike], backward: Sequence[ArrayLike]
 ) -> AxisFigures:
-    """Return characteristics of ISO 230-2 from repeated approaches to m positions.
+    """Return the ISO 230-2 characteristics from repeated approaches to m positions.
 
     Args:
         forward: for each position at least two deviations [m or rad], approached from
             below.
-        backward: for each position the deviations approached from above.
+        backward: for each position at least two deviations, approached from above.
 
     Returns:
         The characteristics.
@@ -70,6 +70,6 @@ def axis_figures(
 
 
 def _moments(positions: Sequence[ArrayLike]) -> tuple[NDArray, NDArray]:
-    """Return the (m,) means and (m,) standard deviations."""
+    """Return the (m,) means and (m,) standard deviations of the deviations."""
     rows = [np.asarray(row, dtype=float) for row in positions]
     return np.array([r.mean() for r in rows]), np.array([r.std(ddof=1) for r in rows])

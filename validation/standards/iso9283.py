@@ -9,30 +9,30 @@ Sources:
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-# cycles of each block whose AP is compared with that of the first block
+# number of cycles of each block whose AP is compared with the first block's AP
 DRIFT_CYCLES = 10
 
 
 def position_accuracy(deviations: ArrayLike) -> float:
-    """Return AP_P [m], distance of the commanded position from the mean attained one.
+    """Return AP_P [m], the distance from the commanded to the mean attained position.
 
     Args:
         deviations: (n, 3) [m] attained minus commanded positions.
 
     Returns:
-        The distance.
+        The distance [m].
     """
     return float(np.linalg.norm(np.asarray(deviations, dtype=float).mean(axis=0)))
 
 
 def position_repeatability(deviations: ArrayLike) -> float:
-    """Return RP_l [m], radius of a sphere about the mean: mean distance + 3 S_l.
+    """Return RP_l [m], the radius of a sphere about the mean: mean distance + 3 S_l.
 
     Args:
         deviations: (n, 3) [m] attained minus commanded positions, n >= 2.
 
     Returns:
-        The radius.
+        The radius [m].
     """
     d = np.asarray(deviations, dtype=float)
     lengths = np.linalg.norm(d - d.mean(axis=0), axis=1)
@@ -40,13 +40,13 @@ def position_repeatability(deviations: ArrayLike) -> float:
 
 
 def orientation_accuracy(angles: ArrayLike) -> NDArray:
-    """Return AP_a, AP_b, AP_c (3,) [rad], mean attained minus commanded angles.
+    """Return AP_a, AP_b, AP_c (3,) [rad], the mean attained minus commanded angles.
 
     Args:
         angles: (n, 3) [rad] attained minus commanded angles.
 
     Returns:
-        The differences, with their signs.
+        The differences [rad], with their signs.
     """
     return np.mean(np.asarray(angles, dtype=float), axis=0)
 
@@ -58,7 +58,7 @@ def orientation_repeatability(angles: ArrayLike) -> NDArray:
         angles: (n, 3) [rad] attained minus commanded angles, n >= 2.
 
     Returns:
-        Half of the widths.
+        Half of the width of each range [rad].
     """
     return 3 * np.std(np.asarray(angles, dtype=float), axis=0, ddof=1)
 
@@ -74,21 +74,22 @@ def distance_accuracy(
         commanded: [m] commanded distance.
 
     Returns:
-        Mean attained minus commanded distance, and three standard deviations of it.
+        The mean attained minus commanded distance, and three standard deviations of the
+        distance.
     """
     lengths = np.linalg.norm(np.asarray(first) - np.asarray(second), axis=1)
     return float(lengths.mean() - commanded), float(3 * lengths.std(ddof=1))
 
 
 def accuracy_drift(deviations: ArrayLike, cycles: int = DRIFT_CYCLES) -> float | None:
-    """Return dAP_P [m], largest change of AP_P from the first to a later block.
+    """Return dAP_P [m], the largest change of AP_P from the first to a later block.
 
     Args:
         deviations: (n, 3) [m] attained minus commanded, in the order of measurement.
-        cycles: cycles of a block; an incomplete last block is ignored.
+        cycles: number of cycles of a block; an incomplete last block is ignored.
 
     Returns:
-        The change; None with fewer than two blocks.
+        The change [m]; None if there are fewer than two blocks.
     """
     d = np.asarray(deviations, dtype=float)
     count = len(d) // cycles

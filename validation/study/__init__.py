@@ -1,4 +1,4 @@
-"""Study: all checks of a study file, in one report.
+"""Study: all checks that a study file requests, in one report.
 
 Begin with ``study.py``.
 """

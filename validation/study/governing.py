@@ -1,4 +1,4 @@
-"""Certified error bound with one part of the robot made perfect at a time."""
+"""Certified error bounds of a robot with one part made perfect at a time."""
 
 from dataclasses import replace
 from typing import Any
@@ -9,29 +9,29 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.clearance import own_cone
+from assembly.model.clearance import BOUNDS, own_cone
 from assembly.model.robot import Frame, Robot
 from assembly.solvers.conic import SolverFailed
+from assembly.steps.bolted import bolt_joints
 
 ERROR, CLEARANCE = "geometric error", "clearance"
-_KEYS = ("tilt", "spin", "radial", "axial")  # names of the bounds in clearance_bounds
 
 
 def governing(posture: Posture, assumption: str = "frozen") -> list[dict[str, Any]]:
-    """Return error bounds (27) without one frame's error or one joint's clearance.
+    """Return bounds (27) without one frame's error or one joint's clearance.
 
-    The robot's given errors are used.  Two of them may compensate each other; the bound
-    then increases when one is removed.
+    The robot's given errors are used.  Two of them may compensate each other; removing
+    one then increases the bound.
 
     Args:
         posture: configuration of a robot with errors or clearances.
         assumption: assumption of problem (27).
 
     Returns:
-        For each frame with errors and each joint with clearances: its name (``part``),
-        ``what`` is removed, and the upper bounds ``rotation`` [rad] and ``translation``
-        [m] without it.  The smallest translation is first; bounds are None without a
-        solution.
+        For each frame with errors and each joint with clearances a table: its name
+        (``part``), the removed imperfection (``what``), and the upper bounds
+        ``rotation`` [rad] and ``translation`` [m] without it.  The smallest translation
+        is first; bounds are None without a solution.
     """
     rows: list[dict[str, Any]] = []
     for part, what, robot in _improved(posture.robot):
@@ -50,20 +50,21 @@ def governing(posture: Posture, assumption: str = "frozen") -> list[dict[str, An
 
 
 def _by_translation(row: dict[str, Any]) -> tuple[float, float]:
-    """Return key that sorts the smallest bound first, missing bounds last."""
+    """Return the sort key: smallest bound first, missing bounds last."""
     if row["translation"] is None:
         return (np.inf, np.inf)
     return (row["translation"], row["rotation"])
 
 
 def _improved(robot: Robot) -> list[tuple[str, str, Robot]]:
-    """Return robots that each lack one of the robot's imperfections."""
+    """Yield robots that each lack one of the robot's imperfections."""
     cases = []
+    declared = robot.declared_errors
     for i, frame in enumerate(robot.frames):
-        if robot.errors[i].any():
-            errors = robot.errors.copy()
+        if declared[i].any():
+            errors = declared.copy()
             errors[i] = 0.0
-            cases.append((frame.name, ERROR, robot.with_errors(errors)))
+            cases.append((frame.name, ERROR, bolt_joints(robot.with_errors(errors))))
     for i, frame in enumerate(robot.frames):
         tight = _tight(frame)
         if tight is not None:
@@ -75,7 +76,7 @@ def _improved(robot: Robot) -> list[tuple[str, str, Robot]]:
 def _tight(frame: Frame) -> Frame | None:
     """Return the joint without its clearances; None if it has none."""
     own = own_cone(frame)
-    clearances = [key for k, key in enumerate(_KEYS) if k != own]
+    clearances = [key for k, key in enumerate(BOUNDS) if k != own]
     if not any(getattr(frame.clearance, key, None) for key in clearances):
         return None
     assert frame.clearance is not None

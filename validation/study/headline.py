@@ -1,7 +1,7 @@
 """Conclusions of a study in a few sentences: assembly, pose error and checks.
 
-The first pose error is the certified bound over all positions within the clearances;
-each other one names its assumption on the clearances.
+The first pose error is the certified bound over all positions within the clearances.
+Every other one names its assumption on the clearances.
 """
 
 from typing import Any
@@ -17,8 +17,9 @@ WORST = "frozen"
 _CHECKED = {
     "energy": "energy", "margin": "zone margin", "margin_free": "free zone margin"
 }  # fmt: skip
-_OUTCOMES = ("passed", "failed", "not decided")  # results of a check
-_NO_CLEARANCE = 1e-6  # [-] share of the clearances; less is a rounding error
+_OUTCOMES = ("passed", "failed", "not decided")  # possible results of a check
+# [-] share of the clearances below which the need is a rounding error
+_NO_CLEARANCE = 1e-6
 
 
 def worst_clearance(results: StudyResults) -> dict[str, Any]:
@@ -28,10 +29,10 @@ def worst_clearance(results: StudyResults) -> dict[str, Any]:
         results: results of :func:`validation.study.study.run_study`.
 
     Returns:
-        ``rotation`` [rad] and ``translation`` [m] by ``frozen`` of (27), at the study's
-        pose (``pose``) and the largest over its ``map``, with the number of ``points``
-        with bounds out of all (``of``).  None where there is no bound; infinite where
-        the pose is unbounded.
+        Bounds ``rotation`` [rad] and ``translation`` [m] under the assumption
+        ``frozen`` of (27), at the study's pose (``pose``) and the largest over its
+        ``map``; ``points`` is the number of points with bounds, ``of`` the number of
+        all points.  None where there is no bound; infinite where the pose is unbounded.
     """
     parts = ("rotation", "translation")
     error = results.error.get(WORST)
@@ -50,10 +51,10 @@ def worst_clearance(results: StudyResults) -> dict[str, Any]:
 
 
 def verdict(results: StudyResults) -> str:
-    """Return the conclusions of a study, in a few sentences.
+    """Return the conclusions of a study in a few sentences.
 
-    The pose error is the certified bound within the clearances, and over the map if
-    there is one; the error at least energy follows.
+    The certified pose error within the clearances is first, with its largest value over
+    the map if there is one.  The error at least energy follows.
 
     Args:
         results: results of :func:`validation.study.study.run_study`.
@@ -74,13 +75,13 @@ def verdict(results: StudyResults) -> str:
 
 
 def by_force(results: StudyResults) -> bool:
-    """Return whether the robot can be assembled, and only with elastic deformation.
+    """Return whether the robot can be assembled only with elastic deformation.
 
     Args:
         results: results of :func:`validation.study.study.run_study`.
 
     Returns:
-        False also if the robot cannot be assembled.
+        The answer; False also if the robot cannot be assembled at all.
     """
     if results.solution["status"] != "ok":
         return False
@@ -90,7 +91,7 @@ def by_force(results: StudyResults) -> bool:
 
 
 def _assembly_text(results: StudyResults) -> str:
-    """Return a sentence: the clearances suffice, or the energy needed."""
+    """Return a sentence on the assembly: by clearances, or by force with its energy."""
     zone, assembly = results.solution["zone"], results.assembly
     assert assembly is not None
     if not by_force(results):
@@ -107,13 +108,13 @@ def _assembly_text(results: StudyResults) -> str:
 
 
 def _pose_error_text(results: StudyResults) -> str:
-    """Return the platform's pose error: the certified bound first."""
+    """Return the platform's pose error as text, with the certified bound first."""
     worst = worst_clearance(results)
     screw = results.solution["platform_screw"]
     turn, shift = (float(np.linalg.norm(half)) for half in (screw[:3], screw[3:]))
     at_rest = f"in the least-energy solution it is {_pose_text(turn, shift)} away."
     if worst["pose"] is None:
-        return f"Its pose error within the clearances could not be bounded; {at_rest}"
+        return f"No bound of its pose error within the clearances was found; {at_rest}"
     bound = _bound_text(worst["pose"])
     sentence = [
         f"For all positions within the clearances its platform is {bound} from the "
@@ -132,7 +133,7 @@ def _pose_error_text(results: StudyResults) -> str:
 
 
 def _other_assumptions(results: StudyResults) -> str:
-    """Return bounds of the other assumptions that are over one per cent larger."""
+    """Return bounds under other assumptions if they are over one per cent larger."""
     text = ""
     own = results.error[WORST]
     for assumption, error in results.error.items():
@@ -144,14 +145,14 @@ def _other_assumptions(results: StudyResults) -> str:
 
 
 def _bound_text(bounds: dict[str, float]) -> str:
-    """Return the text of a pose error that is not exceeded."""
+    """Return the text of an upper bound of the pose error."""
     if not all(np.isfinite([bounds["rotation"], bounds["translation"]])):
         return "free to move without bound"
     return f"at most {_pose_text(bounds['rotation'], bounds['translation'])}"
 
 
 def _pose_text(rotation: float, translation: float) -> str:
-    """Return the sizes of a pose error [rad, m] in mm and mrad."""
+    """Return a pose error [rad, m] as text in mm and mrad."""
     return f"{in_unit(translation, 'mm', 3)} and {in_unit(rotation, 'mrad', 3)}"
 
 
@@ -162,7 +163,7 @@ def covered(results: StudyResults) -> list[str]:
         results: results of :func:`validation.study.study.run_study`.
 
     Returns:
-        A phrase for each check; checks with nothing to compare are left out.
+        A phrase for each check; checks without a significant comparison are left out.
     """
     phrases = []
     verdicts = results.verdicts
@@ -184,7 +185,7 @@ def covered(results: StudyResults) -> list[str]:
 
 
 def _checks_text(results: StudyResults) -> str:
-    """Return a sentence on the independent checks, their results and missing checks."""
+    """Return a sentence on independent checks: their results, and missing checks."""
     phrases, missing = covered(results), results.unchecked
     text = "No independent check was requested."
     if phrases:

@@ -13,7 +13,7 @@ from forcefit.page.tables import Cell, Value, table
 from forcefit.results.quantities import unit_of
 from stiffness.screws import WRENCH
 
-# quantities shown as maps: name in the results, words
+# quantities that are shown as maps: name in the results, description
 MAPPED = {
     "translation_error": "largest translation, eq. (27), over all clearances",
     "rotation_error": "largest rotation, eq. (27), over all clearances",
@@ -28,8 +28,8 @@ class Mapped(NamedTuple):
     """A quantity over the grid.
 
     Attributes:
-        key: name in the results.
-        words: name on the page.
+        key: name of the quantity in the results.
+        words: name of the quantity on the page.
         unit: SI unit.
         values: values at the points; NaN without a solution.
     """
@@ -41,7 +41,7 @@ class Mapped(NamedTuple):
 
 
 def mapped(maps: Any) -> Iterator[Mapped]:
-    """Yield the quantities of a study's maps; of pose errors the upper bound.
+    """Yield the quantities of a study's maps; for pose errors the upper bound.
 
     Args:
         maps: data set over the grid.
@@ -90,15 +90,15 @@ def maps_section(maps: Any, summary: dict[str, Any]) -> str:
         summary: result of :func:`validation.study.report.map_summary`.
 
     Returns:
-        Counts, a table of the least, median and largest values with the place of the
-        largest, and the map.  Of more than two axes, the map shows two and holds the
-        others.
+        Counts, a table of smallest, median and largest values with the place of the
+        largest, and the map.  If there are more than two axes, the map shows two of
+        them at fixed values of the others.
     """
     title = "Over the workspace"
     counts = ", ".join(f"{k}: {v}" for k, v in summary["status"].items())
     share = summary["share_assemblable_free"]
     if share is None:
-        return section(title, paragraph(f"{counts}. No point has an answer."))
+        return section(title, paragraph(f"{counts}. No point has a solution."))
     known = [one for one in mapped(maps) if one.key in summary]
     rows: list[list[Cell]] = [
         [one.words, *(Value(v, one.unit) for v in summary[one.key]),
@@ -109,7 +109,7 @@ def maps_section(maps: Any, summary: dict[str, Any]) -> str:
         title,
         paragraph(
             f"{counts}. Assembles rigidly with compliant joints free at "
-            f"{100 * share:.1f} % of the points with an answer."
+            f"{100 * share:.1f} % of the points with a solution."
         ),
         table(["", "least", "median", "largest", "largest at"], rows, "maps"),
         _drawn(maps, known[0]) if known else "",
@@ -117,11 +117,11 @@ def maps_section(maps: Any, summary: dict[str, Any]) -> str:
 
 
 def _drawn(maps: Any, first: Mapped) -> str:
-    """Return map over two axes, with a sentence on the values of the others."""
+    """Return the map over two axes, with a sentence on the values of the others."""
     names = [str(d) for d in maps["energy"].dims if maps.sizes[d] > 1]
     if not names:
         return ""
-    # the axes with the most values; the first of equal ones
+    # the axes with the most values; of equal ones the first
     axes = sorted(sorted(names, key=lambda n: -maps.sizes[n])[:2], key=names.index)
     at = {name: i for name, i in _largest(first).items() if name not in axes}
     held = {name: i for name, i in at.items() if name in names}
@@ -139,12 +139,12 @@ def _drawn(maps: Any, first: Mapped) -> str:
     return paragraph(
         f"The grid has {len(names)} axes: the map is drawn over {axes[0]} and "
         f"{axes[1]}, with {_place(maps, held)}, where the {first.words} is largest. "
-        "The table is of all points."
+        "The table covers all points."
     ) + drawn  # fmt: skip
 
 
 def _largest(one: Mapped) -> dict[str, int]:
-    """Return the index along each axis of the largest value."""
+    """Return the index of the largest value along each axis."""
     values = np.nan_to_num(np.asarray(one.values, dtype=float), nan=-np.inf)
     if not one.key.endswith("_error"):
         values = np.where(np.isposinf(values), -np.inf, values)
@@ -153,7 +153,7 @@ def _largest(one: Mapped) -> dict[str, int]:
 
 
 def _where(maps: Any, one: Mapped) -> str:
-    """Return the text of the place where a map is largest."""
+    """Return the place where a map is largest as text."""
     known = finite(one)
     bounded = bool(np.isfinite(known).all())
     if bounded and np.ptp(known) <= 1e-9 * np.abs(known).max():
@@ -162,7 +162,7 @@ def _where(maps: Any, one: Mapped) -> str:
 
 
 def _place(maps: Any, at: dict[str, int]) -> str:
-    """Return the text of a point's coordinates."""
+    """Return the coordinates of a point as text."""
     return ", ".join(
         f"{name} = {float(maps[name].values[i]):.6g} {_UNITS.get(name, '')}".rstrip()
         for name, i in at.items()

@@ -34,7 +34,7 @@ def platform_section(stiffness: dict[str, Any]) -> str:
         for name, row in shares
     ]
     return (
-        "<h2>Stiffness of the platform K_C</h2><p>Of the nominal robot with its "
+        "<h2>Stiffness of the platform K_C</h2><p>K_C of the nominal robot with its "
         "clearances held at zero, at the platform's origin in base axes [N m/rad, "
         "N/rad, N m/m, N/m]"
         + (f"; {free} free motions" if free else "")

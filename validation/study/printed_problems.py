@@ -1,4 +1,4 @@
-"""Problems (21) and (22) as the paper prints them, solved by cvxpy, for comparison."""
+"""Problems (21) and (22) as the paper prints them, solved by cvxpy for comparison."""
 
 import math
 from typing import Any
@@ -16,8 +16,8 @@ from assembly.model.statuses import (
 )
 from validation.crosscheck.verdict import Check
 
-TOLERANCE = 1e-6  # relative, of energies and margins
-# tolerance of cvxpy's solver: [J], and [-] of a margin
+TOLERANCE = 1e-6  # relative tolerance of energies and margins
+# tolerances of cvxpy's solver: [J] for energies, [-] for margins
 _NOISE_ENERGY, _NOISE_MARGIN = 1e-12, 1e-10
 
 
@@ -32,10 +32,10 @@ def compare_printed(
         zone: forcefit's ``margin`` and ``margin_free``.
 
     Returns:
-        cvxpy's ``energy``, ``platform_screw``, ``margin`` and ``margin_free``; the
-        ``relative_difference`` of each, NaN where nothing can be compared; ``checks``,
-        the verdict on each; ``verdict`` and ``passed``.  If cvxpy finds no solution,
-        only the ``reason``.
+        Plain values: cvxpy's ``energy``, ``platform_screw``, ``margin`` and
+        ``margin_free``; the ``relative_difference`` of each, NaN where nothing can be
+        compared; ``checks``, the verdict on each; ``verdict`` and ``passed``.  If cvxpy
+        finds no solution, only the ``reason``.
     """
     from assembly.linear.reference.as_printed import (
         energy_as_printed,
@@ -71,7 +71,7 @@ def compare_printed(
 
 
 def _energy_check(assembly: Assembly, energy: float) -> Check:
-    """Return check of the energies; both are about zero in an assembly zone."""
+    """Return the check of the energies; inside an assembly zone both are about zero."""
     tight = assembly.energy_without_clearance
     scale = max(assembly.energy, 1e-6 * tight, _NOISE_ENERGY / TOLERANCE)
     return Check(
@@ -81,7 +81,7 @@ def _energy_check(assembly: Assembly, energy: float) -> Check:
 
 
 def _margin_check(ours: float | None, theirs: float | None) -> Check:
-    """Return check of margins; no verdict without margins or without need for one."""
+    """Return the check of a margin; no verdict if a margin is missing or not needed."""
     if ours is None or theirs is None:
         value = 0.0 if ours is theirs else math.inf
         return Check(value, TOLERANCE, signal=False)

@@ -29,7 +29,7 @@ from validation.study.service_section import service_section, service_tile
 from validation.study.study import StudyResults, points_solved
 
 _ASSUMED = (
-    "Motions are small: closures are linear in them; the linearisation error and the "
+    "Motions are small: closures are linearised; the linearisation error and the "
     "cross-check show the error of this assumption.",
     "Links are elastic between their ends; no contact stiffness, friction, temperature "
     "or dynamics.",
@@ -42,10 +42,10 @@ def write_study(results: StudyResults) -> Path:
     """Write ``report.html``, ``results.json`` and ``results.nc`` of a study.
 
     Args:
-        results: of :func:`validation.study.study.run_study`.
+        results: result of :func:`validation.study.study.run_study`.
 
     Returns:
-        The folder.
+        Path of the folder.
 
     Raises:
         BadInput: the folder cannot be written.
@@ -65,7 +65,7 @@ def write_study(results: StudyResults) -> Path:
 
 
 def results_table(results: StudyResults) -> dict[str, Any]:
-    """Return the results of a study, as plain values."""
+    """Return the results of a study as plain values."""
     table: dict[str, Any] = {
         "program": f"forcefit {version('forcefit')}",
         "title": results.study.title,
@@ -93,7 +93,7 @@ def results_table(results: StudyResults) -> dict[str, Any]:
 
 
 def map_summary(maps: Any) -> dict[str, Any]:
-    """Return least, median, largest value of each map, and counts of statuses."""
+    """Return smallest, median and largest value of each map, and counts of statuses."""
     names, counts = np.unique(maps["status"].values.astype(str), return_counts=True)
     summary: dict[str, Any] = {"status": dict(zip(names, counts.tolist(), strict=True))}
     for one in mapped(maps):
@@ -144,14 +144,14 @@ def report_page(results: StudyResults) -> str:
 
 
 def _good(results: StudyResults) -> bool | None:
-    """Return whether the result is favourable; None where force must close it."""
+    """Return whether the result is favourable; None if assembly needs force."""
     if not results.passed:
         return False
     return None if by_force(results) else True
 
 
 def _tiles(results: StudyResults) -> list[Tile]:
-    """Return worst case, governing part, tolerance to tighten, force, checks."""
+    """Return tiles: worst case, governing part, tolerance to tighten, force, checks."""
     if results.assembly is None:
         return [Tile("Assembly", [results.solution["status"]])]
     worst = worst_clearance(results)
@@ -174,7 +174,7 @@ def _tiles(results: StudyResults) -> list[Tile]:
 
 
 def _force_tile(assembly: Assembly) -> Tile:
-    """Return the largest force and the largest moment through a body."""
+    """Return the tile of the largest force and largest moment through a body."""
     wrenches = without_rounding(assembly.tip_wrenches)
     shown: list[str | Value] = []
     names = []
@@ -184,13 +184,13 @@ def _force_tile(assembly: Assembly) -> Tile:
         names.append(assembly.posture.robot.frames[row].name)
         shown += [" and " if shown else "", Value(float(sizes[row]), unit)]
     return Tile("Force and moment of assembly", shown, [
-        f"largest through a body, at {names[0]} and {names[1]}; energy ",
+        f"Largest values through a body, at  {names[0]} and {names[1]}; energy ",
         Value(assembly.energy, "J"), ".",
     ])  # fmt: skip
 
 
 def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Tile]:
-    """Return the part with the largest share of the error, and the gain without it."""
+    """Return tiles of the governing part, and of the tolerance to tighten."""
     known = [
         one for one in results.governing
         if one["translation"] is not None and np.isfinite(one["translation"])
@@ -218,11 +218,11 @@ def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Til
 
 
 def _percent(ratio: float) -> str:
-    """Return a change in per cent."""
+    """Return the change by a factor in per cent."""
     return f"{100 * (ratio - 1):+.0f} %"
 
 
 def _bound(bounds: dict[str, float]) -> list[str | Value]:
-    """Return an upper bound of a pose error."""
+    """Return the text of an upper bound of a pose error."""
     return [Value(bounds["translation"], "m", 3), " and ",
             Value(bounds["rotation"], "rad", 3)]  # fmt: skip

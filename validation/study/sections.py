@@ -22,7 +22,7 @@ from validation.study.study import StudyResults
 
 _CLEARANCE_OF = {
     "frozen": "any position without a change of deformation",
-    "free": "any position; compliant joints also turn about their axis",
+    "free": "any position; compliant joints also rotate about their axis",
     "budget": "any position and deformation of at most 5 % more than the least energy",
 }
 _POSE = ("rad", "rad", "rad", "m", "m", "m")
@@ -32,7 +32,7 @@ _UNITS = {"tx": "m", "ty": "m", "tz": "m", "rx": "rad", "ry": "rad", "rz": "rad"
 
 
 def unchecked_section(results: StudyResults) -> str:
-    """Return section on checks that were not done, and the reasons."""
+    """Return the section on checks that were not done, with the reasons."""
     rows = [[in_words(name), why] for name, why in results.unchecked.items()]
     if not rows:
         return ""
@@ -40,7 +40,7 @@ def unchecked_section(results: StudyResults) -> str:
 
 
 def robot_section(results: StudyResults) -> str:
-    """Return the section with the scene of the forced robot."""
+    """Return the section with a view of the forced robot."""
     if results.assembly is None or "picture" not in results.study.checks:
         return ""
     caption = (
@@ -58,7 +58,7 @@ def robot_section(results: StudyResults) -> str:
 
 
 def _error_body(results: StudyResults) -> ErrorBody | None:
-    """Return translations free within the clearances; None if they are unbounded."""
+    """Return the translations within the clearances; None if they are unbounded."""
     assert results.assembly is not None
     reach = reachable_screws(results.assembly, WORST)
     if reach.unbounded(3):
@@ -70,7 +70,7 @@ def _error_body(results: StudyResults) -> ErrorBody | None:
 
 
 def governing_section(results: StudyResults) -> str:
-    """Return the certified worst case with one part perfect."""
+    """Return the section on the certified worst case with one part perfect."""
     worst = worst_clearance(results)["pose"]
     if worst is None or not results.governing:
         return ""
@@ -95,7 +95,7 @@ def governing_section(results: StudyResults) -> str:
 
 
 def _change(one: dict[str, Any], worst: dict[str, float], part: str) -> list[Any]:
-    """Return a bound without a part, and its change in per cent."""
+    """Return a bound without one part, and its change in per cent."""
     value = one[part]
     if value is None or not np.isfinite([value, worst[part]]).all():
         return ["none" if value is None else Value(value, unit_of(part)), "-"]
@@ -105,7 +105,7 @@ def _change(one: dict[str, Any], worst: dict[str, float], part: str) -> list[Any
 
 
 def solution_section(results: StudyResults) -> str:
-    """Return the assembly at the study's pose, with its certificate."""
+    """Return the section on the assembly at the study's pose, with its certificate."""
     solution = results.solution
     pose = [
         text
@@ -117,7 +117,8 @@ def solution_section(results: StudyResults) -> str:
     ]
     rows: list[list[Any]] = [[in_words(k), str(v)] if isinstance(v, int) else
                              [in_words(k), Value(v)]
-                             for k, v in solution["mobility"].items()]  # fmt: skip
+                             for k, v in solution["mobility"].items()
+                             if type(v) in (int, float)]  # fmt: skip
     zone = solution.get("zone", {})
     for key in ("margin", "margin_free"):
         rows.append([f"{in_words(key)}, eq. (21)", _number(zone.get(key), "")])
@@ -140,7 +141,7 @@ def solution_section(results: StudyResults) -> str:
 
 
 def _linearisation_rows(error: dict[str, Any]) -> list[list[Any]]:
-    """Return rows on the error of linear closures, compared with finite motions."""
+    """Return the rows on the error of linear closures, compared with finite motions."""
     if error["status"] != "ok":
         return [["linearisation error", error["status"]]]
     turn, shift = (float(np.linalg.norm(error[k])) for k in ("rotation", "translation"))
@@ -152,7 +153,7 @@ def _linearisation_rows(error: dict[str, Any]) -> list[list[Any]]:
 
 
 def _pose_error(results: StudyResults) -> str:
-    """Return the bounds of (27) in each assumption."""
+    """Return the table of the bounds (27) under each assumption."""
     rows = [
         [
             assumption,
@@ -176,7 +177,7 @@ def _pose_error(results: StudyResults) -> str:
 
 
 def _wrenches(results: StudyResults) -> str:
-    """Return the wrench through each elastic link."""
+    """Return the table of the wrench through each elastic link."""
     frames = results.solution["frames"]
     elastic = [f.name for f in results.robot.frames if f.link is not None]
     wrenches = without_rounding(
@@ -191,7 +192,7 @@ def _wrenches(results: StudyResults) -> str:
         *(Column(n, u) for n, u in zip(names, WRENCH, strict=True)),
     ]
     return paragraph(
-        "Wrench each elastic link transmits, at its tip in its own axes:"
+        "Wrench that each elastic link transmits, at its tip in its axes:"
     ) + table(head, rows, "wrenches")
 
 
@@ -222,7 +223,7 @@ def reference_section(results: StudyResults) -> str:
 
 
 def stiffness_section(results: StudyResults) -> str:
-    """Return the beam against finite elements."""
+    """Return the section that compares a beam with finite elements."""
     if not results.stiffness:
         return ""
     stiffness = results.stiffness
@@ -259,12 +260,12 @@ def stiffness_section(results: StudyResults) -> str:
 
 
 def _stiffness_unit(i: int, j: int) -> str:
-    """Return SI unit of an entry of a stiffness matrix."""
+    """Return the SI unit of an entry of a stiffness matrix."""
     return ("N m/rad", "N", "N/m")[int(i > 2) + int(j > 2)]
 
 
 def _significant(K: NDArray) -> NDArray:
-    """Return (6, 6) bool: entries above a thousandth of sqrt(K_ii K_jj)."""
+    """Return (6, 6) bool: entries above one thousandth of sqrt(K_ii K_jj)."""
     size = np.sqrt(np.diag(K))
     return np.abs(K) > 1e-3 * np.outer(size, size)
 
@@ -290,7 +291,7 @@ def crosscheck_section(results: StudyResults) -> str:
 
 
 def _slope_chart(check: Any) -> str:
-    """Return differences against the scale of the errors, with a line of slope 2."""
+    """Return the chart of differences over the scale, with a line of slope 2."""
     scales = np.asarray(check.scales)
     traces: list[dict[str, Any]] = []
     for name, values in check.metric.differences.items():
@@ -311,12 +312,12 @@ def _slope_chart(check: Any) -> str:
 
 
 def _slope_text(slope: float) -> str:
-    """Return the slope measured, if there is one."""
+    """Return the measured slope as text, if there is one."""
     if np.isnan(slope):
         return "The two models do not differ here, so there is no slope."
     return f"Measured: {slope:.3f}."
 
 
 def _number(value: float | None, unit: str, digits: int = 6) -> str | Value:
-    """Return a number, or that there is none."""
+    """Return a number with its unit, or "none"."""
     return "none" if value is None else Value(value, unit, digits)

@@ -1,7 +1,7 @@
 """The robot under load and weight: platform deflection, stiffness and frequencies.
 
-The table ``[service]`` of a study file asks for them.  At the study's pose all of them
-are computed; over the grid they are further variables of the maps.
+The table ``[service]`` of a study file requests them.  At the study's pose all of them
+are computed; over the grid they are additional variables of the maps.
 """
 
 from collections.abc import Callable, Mapping
@@ -26,13 +26,13 @@ from forcefit.inputs.table import BadInput, Table
 if TYPE_CHECKING:
     import xarray
 
-_MODES = 1000  # most frequencies that can be asked for, as on the command line
+_MODES = 1000  # largest accepted number of frequencies, as on the command line
 _KEPT = ("stiffness", "eigen_stiffness", "stiffness_condition", "share", "frequency")
 
 
 @dataclass(frozen=True, eq=False)
 class Service:
-    """The results that a study asks for on the robot under load.
+    """Results that a study requests on the robot under load.
 
     Attributes:
         load: (6,) [N m, N] on the platform at its origin, base axes.
@@ -48,22 +48,23 @@ class Service:
 
     @property
     def loaded(self) -> bool:
-        """Whether there is a load or weight."""
+        """Whether there is any load or weight."""
         return bool(self.load.any() or self.gravity.any())
 
 
-def read_service(root: Table, robot: Robot) -> Service | None:
+def read_service(root: Table, robot: Robot, links: bool = True) -> Service | None:
     """Return the table ``[service]`` of a study file; None if it is absent.
 
     Args:
         root: root table of the file.
         robot: robot of the study.
+        links: whether its links given by meshes are solved, and masses are known.
 
     Returns:
-        The results asked for.
+        The requested results.
 
     Raises:
-        BadInput: the table breaks a rule, or asks for frequencies of a robot without
+        BadInput: the table violates a rule, or requests frequencies of a robot without
             mass.
     """
     if not root.has("service"):
@@ -80,7 +81,7 @@ def read_service(root: Table, robot: Robot) -> Service | None:
         raise table.bad(
             "frequencies", f"found {service.frequencies}, expected at most {_MODES}"
         )
-    if service.frequencies:
+    if service.frequencies and links:
         try:
             check_masses(robot)
         except BadInput as error:
@@ -93,13 +94,15 @@ def at_pose(posture: Posture, service: Service, unloaded: Mapping) -> dict[str, 
 
     Args:
         posture: the robot's configuration.
-        service: the results asked for.
+        service: the requested results.
         unloaded: solution without loads, with the keys of ``assembly solve``.
 
     Returns:
-        ``status`` and perhaps ``reason``; ``load`` and ``gravity``; ``frequencies``
-        with the keys of ``assembly frequencies``.  With a load or gravity also
-        ``solution`` with the keys of ``assembly solve``, and ``deflection``: (6,) the
+        ``status`` and, if it failed, ``reason``; ``load`` and ``gravity``;
+        ``frequencies`` with the keys of ``assembly frequencies``.  With a load or
+        gravity also ``solution`` with the keys of ``assembly solve``, and
+        ``deflection``: (6,) the platform's screw with loads minus the screw without
+        loads, both at least energy.
         platform's screw with loads minus that without, with clearances at least energy.
     """
     found: dict[str, Any] = {
@@ -124,18 +127,18 @@ def over_grid(
     maps: "xarray.Dataset", robot: Robot, service: Service,
     grid: Mapping[str, NDArray], progress: Callable[[int, int], None],
 ) -> "xarray.Dataset":  # fmt: skip
-    """Return the maps of a study with those of the robot under load.
+    """Return the maps of a study, with additional maps of the robot under load.
 
     Args:
         maps: maps without loads.
         robot: robot of the study.
-        service: the results asked for.
+        service: the requested results.
         grid: axes of the maps.
-        progress: called with the number of points done and their total.
+        progress: called with the number of finished points and their total.
 
     Returns:
-        The maps with ``deflection``, as in :func:`at_pose`, and ``loaded_status``; also
-        with ``stiffness`` and its further variables, and ``frequency``, if asked for.
+        The maps with ``deflection``, as in :func:`at_pose`, and ``loaded_status``; if
+        requested also ``stiffness`` with its further variables, and ``frequency``.
     """
     targets = grid_targets(grid)
     question = Question(

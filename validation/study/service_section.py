@@ -15,11 +15,11 @@ def service_section(service: dict[str, Any] | None) -> str:
     """Return loads, platform deflection and natural frequencies as HTML.
 
     Args:
-        service: result of :func:`validation.study.service.at_pose`; None for no
-            section.
+        service: result of :func:`validation.study.service.at_pose`; None if not
+            requested.
 
     Returns:
-        A table for the loads and one for the frequencies.
+        A table for the loads and a table for the frequencies.
     """
     if service is None:
         return ""
@@ -32,7 +32,7 @@ def service_section(service: dict[str, Any] | None) -> str:
 
 
 def _loaded(service: dict[str, Any]) -> list[str]:
-    """Return table of the platform under load and weight."""
+    """Return the table of the platform's pose error under load and weight."""
     load = ", ".join(f"{v:.6g}" for v in service["load"])
     weight = ", ".join(f"{v:.6g}" for v in service["gravity"])
     about = paragraph(
@@ -48,12 +48,12 @@ def _loaded(service: dict[str, Any]) -> list[str]:
          Value(service["deflection"][k], _POSE[k], 6)]
         for k in range(6)
     ]  # fmt: skip
-    head = ["", "platform error with load and weight", "of that, by them"]
+    head = ["", "platform error with load and weight", "part due to load and weight"]
     return [about, table(head, rows, "platform under load")]
 
 
 def _frequencies(found: dict[str, Any]) -> str:
-    """Return table of natural frequencies and the parts that move in each mode."""
+    """Return table of natural frequencies, with the parts that deform in each mode."""
     if "frequencies" not in found:
         return paragraph(f"Frequencies: {found['status']}, {found['reason']}.")
     rows: list[list[Cell]] = []
@@ -68,7 +68,7 @@ def _frequencies(found: dict[str, Any]) -> str:
 
 
 def service_tile(service: dict[str, Any] | None) -> list[Tile]:
-    """Return the platform's deflection under load and the lowest frequency."""
+    """Return the tile of the deflection under load, or of the lowest frequency."""
     if service is None:
         return []
     tiles = []

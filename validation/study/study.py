@@ -48,7 +48,7 @@ from validation.study.study_file import Study
 
 Progress = Callable[[str, int, int], None]
 THEORIES = ("euler", "timoshenko")
-_PACKAGES = {  # packages that each check needs, and that write its results
+_PACKAGES = {  # packages that each check needs; its results also name them
     "stiffness": ("pyvista", "pytetwild"),
     "reference": ("cvxpy",),
     "maps": ("xarray", "h5netcdf", "h5py"),
@@ -58,11 +58,11 @@ _PACKAGES = {  # packages that each check needs, and that write its results
 
 @dataclass(frozen=True, eq=False)
 class StudyResults:
-    """Results of a study; results that were not asked for are None.
+    """Results of a study; results that were not requested are None.
 
     Attributes:
         study: content of the study file.
-        robot: robot with the links used.
+        robot: robot with the link stiffnesses that were used.
         solution: solution at the study's pose, with the keys of ``assembly solve``.
         assembly: assembly of the solution; None if the robot cannot be assembled.
         error: bounds (27) by assumption, with the keys of ``assembly error``.
@@ -70,13 +70,13 @@ class StudyResults:
         stiffness: K_E of the beam and of the finite elements, by frame.
         maps: data set over the grid.
         crosscheck: comparison with the multibody simulation.
-        crosscheck_failure: why the simulation failed; empty if it did not.
+        crosscheck_failure: reason why the simulation failed; empty if it did not.
         platform_stiffness: K_C at the pose, with the keys of ``assembly stiffness``.
         governing: bounds (27) with one part made perfect, from
             :func:`validation.study.governing.governing`.
         service: the robot under load, from :func:`validation.study.service.at_pose`.
         closing: (k, n, 4, 4) frames while the simulation closes the closures; None if
-            it cannot.
+            it failed.
     """
 
     study: Study
@@ -98,7 +98,7 @@ class StudyResults:
 
     @property
     def verdicts(self) -> dict[str, str]:
-        """Verdict of each independent check that was asked for.
+        """Verdict of each requested independent check.
 
         ``"passed"``, ``"failed"``, ``"not decided"``, ``"no signal"`` if there is
         nothing to compare, ``"not run"`` if there is no assembly to check.
@@ -115,7 +115,7 @@ class StudyResults:
 
     @property
     def unchecked(self) -> dict[str, str]:
-        """Checks that were not done, and the reasons."""
+        """Checks that were not done, with the reasons."""
         silent = "its errors need neither springs nor clearances at this pose"
         if not self.robot.errors.any():
             silent = "the robot has no geometric errors; [errors] would give it some"
@@ -135,8 +135,8 @@ class StudyResults:
     def passed(self) -> bool:
         """Whether there is a certified solution and every check passed.
 
-        A check with nothing to compare has not passed if it was asked for, or if no
-        other check was run.
+        A check without a signal has not passed if it was requested, or if no other
+        check was run.
         """
         verdicts, missing = self.verdicts, self.unchecked
         ran = [v for v in verdicts.values() if v != NO_SIGNAL]
@@ -153,7 +153,7 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
 
     Args:
         study: study from :func:`validation.study.study_file.read_study`.
-        progress: called with a check's name, the steps done and their total.
+        progress: called with the name of a check, the finished steps and their total.
 
     Returns:
         The results; no file is written.
@@ -163,8 +163,8 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
         ModuleNotFoundError: a package that a check needs is missing.
     """
     wanted = set(study.checks)
-    # before the long computations: raise errors on missing packages and unreachable
-    # poses
+    # missing packages and unreachable poses must be reported before the long
+    # computations
     need(*(one for check in sorted(wanted) for one in _PACKAGES.get(check, ())))
     place_robot(study.robot, pose=study.pose)
     stiffness, robot = None, study.robot
@@ -220,12 +220,12 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
 
 
 def points_solved(maps: Any) -> int:
-    """Return the number of a grid's points that have a solution."""
+    """Return the number of grid points that have a solution."""
     return int((maps["status"] == OK).sum())
 
 
 def _closing(posture: Posture) -> NDArray | None:
-    """Return frames while the closures close; None if links are not known."""
+    """Return frames while the closures close; None if link stiffnesses are unknown."""
     tight = replace(posture, robot=without_clearance(posture.robot))
     try:
         return closing_sequence(tight)
@@ -236,7 +236,7 @@ def _closing(posture: Posture) -> NDArray | None:
 def _compare_links(
     study: Study, progress: Progress
 ) -> tuple[dict[str, dict[str, Any]], Robot]:
-    """Return K_E by beam theory and by finite elements; replace links if asked for."""
+    """Return K_E by beam theory and by finite elements; replace links if requested."""
     compared: dict[str, dict[str, Any]] = {}
     links: dict[str, MatrixLink] = {}
     for done, (name, mesh) in enumerate(study.meshes.items()):

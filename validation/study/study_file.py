@@ -19,6 +19,7 @@ from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_named
 from assembly.model.robot import BeamLink, MeshLink, Robot
 from assembly.robots import BUILT_IN
+from assembly.steps.bolted import bolt_joints, loose_over_poses
 from assembly.sweeps.targets import parse_grid
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from forcefit.results.display import html_table, short_repr
@@ -38,17 +39,17 @@ class Study:
         title: title of the report.
         robot: robot with its errors, before links are replaced.
         errors: sentence on the origin of the errors.
-        source: source of the links' stiffness, ``"beam"`` (as declared) or ``"fea"``.
-        meshes: mesh link by frame, for the comparison and for ``"fea"``.
+        source: source of the links' stiffness, ``"beam"`` (declared) or ``"fea"``.
+        meshes: meshed link by frame, for the comparison and for ``"fea"``.
         accuracy: required accuracy of the finite elements.
-        pose: nominal platform pose of the detailed checks.
-        grid: axes of the maps by pose component; empty for none.
-        scales: scales of the errors in the cross-check; empty for none.
+        pose: nominal platform pose for the detailed checks.
+        grid: axes of the maps by pose component; empty without maps.
+        scales: scales of the errors in the cross-check; empty without a cross-check.
         checks: names of the checks to run.
-        asked: checks that the file asks for by name, by a grid or by scales.
+        asked: checks that the file requests by name, by a grid or by scales.
         folder: folder of the report.
-        files: files that were read: the study's own, a robot's, a surface's.
-        service: results asked for on the robot under load; None for none.
+        files: files that were read: the study file, a robot file, surfaces.
+        service: results requested on the robot under load; None without a table.
     """
 
     title: str
@@ -69,32 +70,37 @@ class Study:
     __repr__, _repr_html_ = short_repr, html_table
 
 
-def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
+def read_study(
+    path: Path | str, folder: Path | str | None = None, *, links: bool = True
+) -> Study:
     """Return a study from its file.
 
     Args:
         path: path of the TOML file.
         folder: folder of the report, instead of the one in the file.
+        links: whether links given by meshes are solved; a study without them cannot be
+            run.
 
     Returns:
-        The study, with all its content checked.
+        The study; its whole content has been checked.
 
     Raises:
-        BadInput: the study file or the robot file breaks a rule.
+        BadInput: the study file or the robot file violates a rule.
     """
     path = Path(path)
     root = read_toml(path)
-    robot = _robot(root, path.parent)
+    robot = _robot(root, path.parent, links)
     robot, errors = _errors(root, robot)
     if root.has("rest") or root.has("mismatch"):
         errors = "; ".join([errors, *robot.remarks])
+    errors = "; ".join([errors, *loose_over_poses(robot)])
     source, meshes, accuracy = _links(root, robot)
     pose = _pose(root)
     grid = root.text("grid", " ").strip()
     by_key = {"maps": "grid", "crosscheck": "scales"}
     asked_by_key = {check for check, key in by_key.items() if root.has(key)}
     scales = _scales(root)
-    service = read_service(root, robot)
+    service = read_service(root, robot, links)
     checks, named = _checks(root, bool(meshes), bool(grid), bool(scales))
     threads = [quoted(frame.name) for frame in robot.frames if frame.pitch]
     if threads and "crosscheck" in checks:
@@ -131,7 +137,7 @@ def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
 
 
 def _files(path: Path, root: Table, meshes: dict[str, MeshLink]) -> tuple[Path, ...]:
-    """Return the files of a study, each once."""
+    """Return the files of a study, each of them once."""
     robot = path.parent / root.text("robot")
     surfaces = (named_solid(mesh.surface)[0] for mesh in meshes.values())
     return tuple(
@@ -139,21 +145,21 @@ def _files(path: Path, root: Table, meshes: dict[str, MeshLink]) -> tuple[Path, 
     )
 
 
-def _robot(root: Table, folder: Path) -> Robot:
-    """Return the robot, built in or from a file, with closures made to hold."""
+def _robot(root: Table, folder: Path, links: bool) -> Robot:
+    """Return the robot, built in or from a file, with closures that hold."""
     name = root.text("robot", expected="a built-in robot or a robot file")
     if name in BUILT_IN:
-        return _closed(root, name)
+        return _closed(root, name, links)
     if not os.path.isfile(folder / name):
         problem = (
-            f"found {quoted(name)}, neither a built-in robot nor a file beside this"
+            f"found {quoted(name)}, neither a built-in robot nor a file in this folder"
         )
         raise root.bad("robot", f"{problem}{nearest(name, BUILT_IN)}")
-    return _closed(root, folder / name)
+    return _closed(root, folder / name, links)
 
 
-def _closed(root: Table, name: Path | str) -> Robot:
-    """Return the robot with closures made to hold as the study's keys ask."""
+def _closed(root: Table, name: Path | str, links: bool) -> Robot:
+    """Return the robot with closures adjusted as the keys of the study request."""
     rest = root.text("rest") if root.has("rest") else None
     mismatch = root.choice("mismatch", ("spring",)) if root.has("mismatch") else None
     own_errors = not root.has("errors")
@@ -175,11 +181,11 @@ def _closed(root: Table, name: Path | str) -> Robot:
 
 
 def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
-    """Return the robot with the errors asked for, and a sentence on them."""
+    """Return the robot with the requested errors, and a sentence on them."""
     if not root.has("errors"):
         return robot, "geometric errors as in the robot file"
     closing = root.has("rest") or root.has("mismatch")
-    fixed = robot.errors if closing else np.zeros_like(robot.errors)
+    fixed = robot.declared_errors if closing else np.zeros_like(robot.errors)
     table = root.table("errors")
     if table.has("explicit"):
         rows = table.table("explicit")
@@ -189,7 +195,7 @@ def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
                 errors[robot.index(frame)] = rows.array(name, (6,), "rad, m")
         table.finish()
         given = "geometric errors given in the study file"
-        return robot.with_errors(fixed + errors), given
+        return bolt_joints(robot.with_errors(fixed + errors)), given
     draw = ErrorDraw(
         _frames(table, robot, [f.name for f in robot.frames]),
         tuple(table.array("least", (6,), "rad, m")),
@@ -204,7 +210,7 @@ def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
     table.finish()
     signs = "all positive" if draw.signs == "literal" else "random signs"
     sentence = f"geometric errors drawn with seed {draw.seed}, {signs}"
-    return robot.with_errors(fixed + draw_errors(robot, draw)), sentence
+    return bolt_joints(robot.with_errors(fixed + draw_errors(robot, draw))), sentence
 
 
 def _frames(table: Table, robot: Robot, default: list[str]) -> tuple[str, ...]:
@@ -216,7 +222,7 @@ def _frames(table: Table, robot: Robot, default: list[str]) -> tuple[str, ...]:
 
 
 def _known(table: Table, key: str, robot: Robot, names: list[str]) -> tuple[str, ...]:
-    """Return full names of frames; the error for an unknown one has its place."""
+    """Return full names of frames; an unknown name is reported with its place."""
     try:
         return frames_named(robot, names)
     except BadInput as error:
@@ -224,7 +230,7 @@ def _known(table: Table, key: str, robot: Robot, names: list[str]) -> tuple[str,
 
 
 def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
-    """Return source of the links' stiffness, and meshes of the beams to compare."""
+    """Return the source of the links' stiffness, and meshes of beams to compare."""
     if not root.has("links"):
         return "beam", {}, 0.005
     table = root.table("links")
@@ -259,7 +265,7 @@ def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
 
 
 def _pose(root: Table) -> dict[str, float]:
-    """Return the pose of the detailed checks; home by default."""
+    """Return the pose for the detailed checks, by default the home pose."""
     if not root.has("pose"):
         return {}
     table = root.table("pose")
@@ -288,7 +294,7 @@ def _scales(root: Table) -> tuple[float, ...]:
 def _checks(
     root: Table, meshes: bool, grid: bool, scales: bool
 ) -> tuple[tuple[str, ...], set[str]]:
-    """Return the checks to run, by default all with input, and those asked for."""
+    """Return the checks to run: by default all with input, and the requested ones."""
     possible = {"stiffness": meshes, "maps": grid, "crosscheck": scales}
     if not root.has("checks"):
         return tuple(c for c in _CHECKS if possible.get(c, True)), set()

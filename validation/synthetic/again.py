@@ -1,6 +1,6 @@
-"""A simulated machine commanded again: its distance from the wanted poses.
+"""Distance of a simulated machine from the wanted poses, for given commands.
 
-The distance is measured at the machine, without noise and without errors of the
+The distance is computed at the machine, without noise and without errors of the
 measuring device, so that a correction is judged independently of its data.
 """
 
@@ -32,14 +32,14 @@ def distances(
     """Return the distances of a machine from the wanted poses.
 
     Args:
-        robot: declared.
-        effects: effects of the machine; those of the device alone have no effect.
+        robot: the declared robot.
+        effects: effects of the machine; effects of the device alone are ignored.
         targets: commands at which the nominal robot would have the wanted poses.
         coordinates: (R, n) [rad or m] nominal coordinates of the commands.
         program: name of the simulation program.
 
     Returns:
-        (R, 2) distance of the reference points [m], and angle [rad].
+        (R, 2) distance of the reference points [m], and rotation angle [rad].
     """
     names = [frame.name for frame in robot.frames]
 

@@ -1,4 +1,4 @@
-"""Temperatures that lag behind the recorded one by a time constant."""
+"""Temperatures that lag behind the recorded temperature by a time constant."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -17,11 +17,11 @@ def with_delays(rows: Sequence[Row], time_constants: Iterable[float]) -> list[Ro
 
     Args:
         rows: rows in the order of time.
-        time_constants: [s] one for each lagged temperature.
+        time_constants: [s] time constant of each lagged temperature.
 
     Returns:
-        Rows with a lagged temperature for each; in the first row it is the recorded
-        one.
+        The rows with one lagged temperature for each time constant; in the first row it
+        equals the recorded one.
     """
     rows = list(rows)
     for late in dict.fromkeys(time_constants):
@@ -32,7 +32,7 @@ def with_delays(rows: Sequence[Row], time_constants: Iterable[float]) -> list[Ro
             step = (row.covariates["time"] - before["time"]) / late
             if step == 0.0:
                 warm = now
-            # the response to a ramp, plus the decay of the difference at its start
+            # response to a ramp, plus the decay of the initial difference
             else:
                 lag = (now - before["temperature"]) / step
                 start = warm - before["temperature"] + lag

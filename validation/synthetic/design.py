@@ -15,32 +15,32 @@ from validation.synthetic.effects import Row
 
 TEMPERATURES = ("swing", "around", "constant")
 _PERIOD = 2400.0  # [s] period of the temperature
-_STEP = 60.0  # [s] between measurements
-_DRAWS = 40  # factor on the number of configurations: largest number of draws
-_DIGITS = 6  # digits of commanded coordinates
+_STEP = 60.0  # [s] time between measurements
+_DRAWS = 40  # largest number of draws, relative to the number of configurations
+_DIGITS = 6  # number of decimal digits of commanded coordinates
 
 
 @dataclass(frozen=True, eq=False)
 class CampaignDesign:
-    """Design of a campaign.
+    """Design of a synthetic campaign.
 
     Attributes:
         configurations: number of distinct configurations.
-        rows: number of measurements, interleaved over the session.
-        reach: [rad] largest change of a revolute drive from its home position; of a
-            prismatic one this times ``size``.
-        size: [m] length for ``reach``.
+        rows: number of measurements, whose configurations alternate over the session.
+        reach: [rad] largest change of a revolute drive from its home position; for a
+            prismatic drive it is multiplied by ``size``.
+        size: [m] length by which ``reach`` is multiplied.
         load: [N] largest force on the platform.
-        levels: levels of the load: ``"many"`` sizes and directions; ``"one"``: always
-            the same force.
+        levels: levels of the load: ``"many"`` for many magnitudes and directions;
+            ``"one"`` for the same force in every row.
         temperature: ``"swing"``: -0.5 ... 6.5 K; ``"around"``: -4 ... 4 K;
             ``"constant"``: 6 K.
-        command: ``"joints"`` or ``"pose"``, the form of commands in the file.
-        humidity: whether a covariate of that name is recorded [%].
-        tilt: [rad] size of a covariate of that name, 0 if it is not recorded.
-        gravity: [m/s^2] recorded, straight down.
-        reference_point: [m] the point measured, where loads act, platform axes.
-        corners: whether in half of the configurations every drive is at an end of its
+        command: form of commands in the file, ``"joints"`` or ``"pose"``.
+        humidity: whether a covariate ``humidity`` [%] is recorded.
+        tilt: [rad] magnitude of a covariate ``tilt``; 0 if it is not recorded.
+        gravity: [m/s^2] recorded gravity, straight down.
+        reference_point: [m] measured point, at which loads act, platform axes.
+        corners: whether half of the configurations have every drive at an end of its
             reach.
     """
 
@@ -83,14 +83,14 @@ class CampaignDesign:
 
 
 def varied_for(design: CampaignDesign, names: Iterable[str]) -> CampaignDesign:
-    """Return a design that varies the covariates of effects.
+    """Return a design that varies the covariates on which effects depend.
 
     Args:
-        design: any design.
+        design: initial design.
         names: names of the effects.
 
     Returns:
-        The design with more conditions, if the effects need them.
+        The design with additional varying conditions, if the effects need them.
     """
     given: dict[str, Any] = {}
     for name in names:
@@ -107,12 +107,12 @@ def varied_for(design: CampaignDesign, names: Iterable[str]) -> CampaignDesign:
 
 @dataclass(frozen=True, eq=False)
 class CampaignPlan:
-    """The rows of a design on a robot.
+    """The rows of a design for a robot.
 
     Attributes:
         rows: rows in the order of measurement.
         configuration: (rows,) number of each row's configuration.
-        commands: (rows, m) as written to the file.
+        commands: (rows, m) values as written to the file.
         columns: names of the m columns.
     """
 
@@ -128,7 +128,7 @@ def plan_campaign(
     """Draw configurations, loads and conditions.
 
     Args:
-        robot: declared.
+        robot: the declared robot.
         design: design of the campaign.
         rng: random number generator of the draws.
 
@@ -136,7 +136,7 @@ def plan_campaign(
         The plan.
 
     Raises:
-        BadInput: hardly any configuration within the reach closes.
+        BadInput: the closures hold at hardly any configuration within the reach.
     """
     coordinates = _configurations(robot, design, rng)
     commands, columns, coordinates = _commands(robot, design, coordinates)
@@ -194,7 +194,8 @@ def _configurations(
         if len(reachable) >= design.configurations:
             return np.array(reachable[: design.configurations])
     raise BadInput(
-        f"{robot.name}: hardly any configuration closes within {design.reach:g} rad of "
+        f"{robot.name}: the closures hold at hardly any configuration within "
+        f"{design.reach:g} rad of "
         "home; expected a smaller reach"
     )
 
@@ -202,7 +203,7 @@ def _configurations(
 def _commands(
     robot: Robot, design: CampaignDesign, coordinates: NDArray
 ) -> tuple[NDArray, tuple[str, ...], NDArray]:
-    """Return the commands as written, their columns, and the resulting coordinates."""
+    """Return commands as in the file, their columns, and the resulting coordinates."""
     driven = [i for i, f in enumerate(robot.frames) if f.actuated]
     if design.command == "joints":
         columns = tuple(f"q.{robot.frames[i].name}" for i in driven)
@@ -221,14 +222,14 @@ def _commands(
 
 
 def _interleaved(design: CampaignDesign, rng: np.random.Generator) -> NDArray:
-    """Return (rows,) configuration of each row: each pass visits all in new order."""
+    """Return (rows,) configurations; each pass visits all of them in a new order."""
     passes = -(-design.rows // design.configurations)
     orders = [rng.permutation(design.configurations) for _ in range(passes)]
     return np.concatenate(orders)[: design.rows]
 
 
 def _loads(design: CampaignDesign, order: NDArray, rng: np.random.Generator) -> NDArray:
-    """Return (rows, 6) [N m, N]: two rows of each configuration repeat a load."""
+    """Return (rows, 6) [N m, N] loads; two rows of each configuration repeat a load."""
     loads = np.zeros((design.rows, 6))
     if design.levels == "one":
         loads[:, 3:] = (design.load * _direction(rng)).round(3)
@@ -246,7 +247,7 @@ def _loads(design: CampaignDesign, order: NDArray, rng: np.random.Generator) -> 
 
 
 def _load(largest: float, rng: np.random.Generator) -> NDArray:
-    """Return the (3,) [N] along an axis, full or half, or in a random direction."""
+    """Return a force (3,) [N]: full or half along an axis, or in a random direction."""
     if rng.random() < 0.5:
         axis = np.zeros(3)
         axis[rng.integers(3)] = rng.choice([-1.0, -0.5, 0.5, 1.0])
@@ -255,7 +256,7 @@ def _load(largest: float, rng: np.random.Generator) -> NDArray:
 
 
 def _direction(rng: np.random.Generator) -> NDArray:
-    """Return a (3,) unit vector of random direction."""
+    """Return a (3,) unit vector in a random direction."""
     vector = rng.normal(size=3)
     return vector / np.linalg.norm(vector)
 

@@ -18,13 +18,13 @@ SLIDING = ("_lead", "_lead_backlash")  # effects of prismatic joints only
 
 
 class NotApplicable(ValueError):
-    """A robot has no place where an effect acts."""
+    """Error: a robot has no place where an effect can act."""
 
 
 def draw_effect(
     name: str, robot: Robot, duration: float, rng: np.random.Generator
 ) -> Hidden:
-    """Return an effect with plausible parameters, at one place or at all.
+    """Return an effect with plausible parameters, at one place or at all places.
 
     Args:
         name: name of the effect.
@@ -37,9 +37,10 @@ def draw_effect(
 
     Raises:
         BadInput: there is no such effect.
-        NotApplicable: the robot has no place where it acts.
+        NotApplicable: the robot has no place where the effect acts.
     """
-    if name not in (*LIBRARY, *OUTSIDE):  # those outside the library are for tests
+    # the effects outside the library are for tests
+    if name not in (*LIBRARY, *OUTSIDE):
         raise BadInput(
             f'effect: found "{name[:60]}", expected one of {", ".join(LIBRARY)}'
         )
@@ -50,11 +51,11 @@ def strengthened(effect: Hidden, factor: float) -> Hidden:
     """Return the effect with its contribution to the readings scaled by a factor.
 
     Args:
-        effect: any effect.
+        effect: effect with its parameters.
         factor: [-] > 0.
 
     Returns:
-        The effect with weaker springs or larger errors.
+        The effect with more compliant springs or larger errors.
     """
     name, given = effect.name, dict(effect.parameters)
     for key, value in given.items():
@@ -66,7 +67,8 @@ def strengthened(effect: Hidden, factor: float) -> Hidden:
         elif name == "contact_stiffening":
             exponent = given[key.removesuffix("coefficient") + "exponent"]
             given[key] = value / factor**exponent
-        elif name == "modulus_scale":  # its compliance is proportional to it
+        # the modulus is in the denominator of the compliance
+        elif name == "modulus_scale":
             given[key] = 1.0 / max(1.0 + factor * (1.0 / value - 1.0), 0.05)
         elif key == "factor":
             given[key] = 1.0 + factor * (value - 1.0)
@@ -76,9 +78,9 @@ def strengthened(effect: Hidden, factor: float) -> Hidden:
 
 
 def _some(frames: list[Frame], rng: np.random.Generator) -> list[str]:
-    """Return one of the frames, or all of them."""
+    """Return one of the frames, or all of them, at random."""
     if not frames:
-        raise NotApplicable("no frame that the effect could act on")
+        raise NotApplicable("the robot has no frame on which the effect acts")
     if rng.random() < 0.5:
         return [frames[rng.integers(len(frames))].name]
     return [frame.name for frame in frames]
@@ -89,7 +91,7 @@ def _beams(robot: Robot) -> list[Frame]:
 
 
 def _bodies(robot: Robot) -> list[Frame]:
-    """Return the beams, or, without beams, all bodies with a length."""
+    """Return the beams or, without beams, all bodies with a length."""
     return _beams(robot) or [f for f in robot.frames if f.translation.any()]
 
 
@@ -106,7 +108,7 @@ def _weight(robot: Robot, duration: float, rng: np.random.Generator) -> Paramete
         isinstance(f.link, BeamLink) and f.link.density for f in robot.frames
     )
     if not heavy:
-        raise NotApplicable("nothing of the robot has a declared mass")
+        raise NotApplicable("no part of the robot has a declared mass")
     tilt = rng.uniform(-0.2, 0.2, 2) if rng.random() < 0.5 else np.zeros(2)
     down = np.array([*np.sin(tilt), -1.0])
     g = 9.81 * down / np.linalg.norm(down)
@@ -143,7 +145,7 @@ def _lengths(robot: Robot, duration: float, rng: np.random.Generator) -> Paramet
 
 
 def _errors(names: list[str], rng: np.random.Generator) -> Parameters:
-    """Return errors of about 1e-4 rad or m, of either sign."""
+    """Return errors of about 1e-4 rad or m, of random sign."""
     signs = rng.choice([-1.0, 1.0], len(names)) * rng.uniform(0.4, 1.0, len(names))
     return dict(zip(names, (1e-4 * signs).tolist(), strict=True))
 
@@ -290,7 +292,7 @@ def _turned(robot: Robot, duration: float, rng: np.random.Generator) -> Paramete
 
 
 def _nothing() -> Parameters:
-    raise NotApplicable("no turning drive")
+    raise NotApplicable("the robot has no revolute drive")
 
 
 def _stand(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:

@@ -2,13 +2,13 @@
 
 A machine is a robot of frames, and most effects are additional frames: an elastic drive
 is a spring after its joint, an encoder error is a finite rotation after it, an elastic
-foundation is a spring below all frames.  Others change a body (a beam is longer or
-softer, a joint has clearance), the load (weight, a load that differs from the recorded
-one), the measuring frame, or the reading alone.
+foundation is a spring below all frames.  Other effects change a body (a beam is longer
+or more compliant, a joint has clearance), the load (weight, a load that differs from
+the recorded one), the measuring frame, or the reading alone.
 
 No code is shared with the effects that a diagnosis fits, because an error in those must
-not affect the data by which they are tested.  Names and parameters are the public ones;
-springs, rotations and translations of joints act about or along their own z.
+not affect the data by which they are tested.  Names and parameters are the public ones.
+Springs, rotations and translations of joints act about or along the joint's z axis.
 """
 
 import math
@@ -26,18 +26,19 @@ from validation.synthetic.laws import ClearanceLaw, PowerLawSpring, TwoStepSprin
 
 SCREW = ("rx", "ry", "rz", "tx", "ty", "tz")
 WRENCH = ("mx", "my", "mz", "fx", "fy", "fz")
-SENSOR = (1e9, 1e10)  # [N m/rad], [N/m] of a force sensor, practically rigid
+SENSOR = (1e9, 1e10)  # [N m/rad], [N/m] stiffness of a force sensor, practically rigid
 Parameters = Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One measurement, as commanded.
+    """One commanded measurement.
 
     Attributes:
-        coordinates: [rad or m] of every joint in the nominal configuration, by frame.
+        coordinates: [rad or m] coordinate of every joint by frame, nominal
+            configuration.
         load: (6,) [N m, N] recorded, at the reference point, base axes.
-        covariates: ``temperature`` [K], ``time`` [s], ``approach`` and any others;
+        covariates: ``temperature`` [K], ``time`` [s], ``approach`` and further ones;
             ``gravity.x`` .. ``gravity.z`` [m/s^2] act as gravity.
     """
 
@@ -48,15 +49,15 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """The simulated machine of a row.
+    """The simulated machine in a row.
 
     Attributes:
-        robot: robot with the frames that effects have added; the load acts and the pose
-            is read at its platform.
+        robot: robot with the frames that effects have added; the load acts at its
+            platform, and the pose of the platform is read.
         coordinates: [rad or m] of every joint, 0 where absent.
-        load: (6,) [N m, N] applied.
+        load: (6,) [N m, N] applied load.
         gravity: (3,) [m/s^2] base axes.
-        laws: by frame, nonlinear laws of its spring or position; see
+        laws: nonlinear laws of springs or positions, by frame; see
             :mod:`validation.synthetic.rest`.
     """
 
@@ -74,9 +75,9 @@ class Rest:
     """Equilibrium of a machine; rows are frames.
 
     Attributes:
-        transforms: (n, 4, 4) before the joint's own motion, seen from the base.
-        joint_wrenches: (n, 6) [N m, N] of joint springs, frame's axes.
-        joint_screws: (n, 6) [rad, m] their deformations.
+        transforms: (n, 4, 4) frames in the base frame, before the joint's own motion.
+        joint_wrenches: (n, 6) [N m, N] wrenches of joint springs, in the frame's axes.
+        joint_screws: (n, 6) [rad, m] deformations of joint springs.
     """
 
     transforms: NDArray
@@ -96,14 +97,14 @@ def insert_after(robot: Robot, name: str, suffix: str, **given: Any) -> Robot:
 
 
 def along_own_axis(frame: Frame, value: float, others: float = 0.0) -> NDArray:
-    """Return a (6,) with a value along a joint's motion, and another elsewhere."""
+    """Return a (6,) with one value along a joint's motion and another elsewhere."""
     screw = np.full(6, others)
     screw[frame.own_axis] = value
     return screw
 
 
 def sprung(frame: Frame, stiffness: float) -> NDArray:
-    """Return the (6, 6) stiffness along a joint's own motion, rigid otherwise."""
+    """Return a (6, 6) stiffness along a joint's motion, rigid in other directions."""
     return np.diag(along_own_axis(frame, stiffness, math.inf))
 
 
@@ -116,7 +117,7 @@ def beam_length(robot: Robot, name: str) -> float:
 
 
 def lengthened(robot: Robot, name: str, change: float) -> Robot:
-    """Return a robot with a body longer by [m], along its own actual axis."""
+    """Return a robot with a body longer by [m] along its actual axis."""
     frame = robot.frame(name)
     if not isinstance(frame.link, BeamLink):  # along the line between its joints
         longer = 1.0 + change / float(np.linalg.norm(frame.translation))
@@ -130,20 +131,20 @@ def lengthened(robot: Robot, name: str, change: float) -> Robot:
 
 
 def with_frame(robot: Robot, frame: Frame) -> Robot:
-    """Return the same robot with the frame of that name replaced."""
+    """Return the robot with the frame of the same name replaced."""
     frames = (frame if f.name == frame.name else f for f in robot.frames)
     return replace(robot, frames=tuple(frames))
 
 
 def misread(machine: Machine, name: str, suffix: str, change: float) -> Machine:
-    """Return a machine with a joint that deviates from its command by [rad or m]."""
+    """Return a machine in which a joint deviates from its command by [rad or m]."""
     screw = along_own_axis(machine.robot.frame(name), change)
     robot = insert_after(machine.robot, name, suffix, geometric_error=screw)
     return replace(machine, robot=robot)
 
 
 def own_compliance(frame: Frame) -> float:
-    """Return the compliance of a declared joint along its own motion, 0 if rigid."""
+    """Return the compliance of a declared joint along its motion; 0 if it is rigid."""
     K = frame.springs
     if K is None or not np.isfinite(K[frame.own_axis, frame.own_axis]):
         return 0.0
@@ -228,7 +229,7 @@ def _joint_clearance(machine: Machine, row: Row, given: Parameters) -> Machine:
     for name in dict.fromkeys(key.rpartition(".")[0] for key in given):
         kinds = ("radial", "axial", "tilt")
         clearance = Clearance(**{k: given.get(f"{name}.{k}") for k in kinds})
-        if robot.closures:  # the simulation computes the joints' positions
+        if robot.closures:  # the simulation computes the positions of the joints
             robot = with_frame(robot, replace(robot.frame(name), clearance=clearance))
             continue
         K = np.repeat(SENSOR, 3)
@@ -263,7 +264,7 @@ def _load_gain(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _body_mass(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Make a body heavier [kg]; its centre moves by moment [kg m] over its mass."""
+    """Make a body heavier [kg]; the centre moves by moment [kg m] over its mass."""
     robot = machine.robot
     keys = ("mass", "moment.x", "moment.y", "moment.z")
     for name in dict.fromkeys(n for key in keys for n in named(given, key)):
@@ -277,11 +278,11 @@ def _body_mass(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _geometric_stiffening(machine: Machine, row: Row, given: Parameters) -> Machine:
-    return machine  # the simulation has it anyway; a linear model lacks it
+    return machine  # the simulation contains this effect; only a linear model lacks it
 
 
 def _registration(pose: NDArray, row: Row, given: Parameters) -> NDArray:
-    """Return the pose seen by a moved measuring frame at a moved point."""
+    """Return the pose of a displaced point in a displaced measuring frame."""
     screw = np.array([given.get(f"base.{k}", 0.0) for k in SCREW])
     tool = [given.get(f"tool.{k}", 0.0) for k in SCREW[3:]]
     measured = pose.copy()
@@ -290,7 +291,7 @@ def _registration(pose: NDArray, row: Row, given: Parameters) -> NDArray:
 
 
 def _device_scale(pose: NDArray, row: Row, given: Parameters) -> NDArray:
-    """Return the pose with all lengths from the device's origin too long."""
+    """Return the pose with all lengths from the device's origin scaled."""
     measured = pose.copy()
     measured[:3, 3] *= given["factor"]
     return measured
@@ -304,7 +305,7 @@ def _drift(reading: NDArray, row: Row, given: Parameters) -> NDArray:
 
 
 def named(given: Parameters, component: str) -> list[str]:
-    """Return frames with a component, as in ``<frame>.<component>``."""
+    """Return the frames of parameters ``<frame>.<component>`` of a component."""
     end = f".{component}"
     return [key.removesuffix(end) for key in given if key.endswith(end)]
 

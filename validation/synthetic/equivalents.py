@@ -1,14 +1,14 @@
 """Effects that a campaign's design cannot distinguish from the hidden ones.
 
 The first-order signature of every public effect, whitened by the noise, is computed by
-the spring program, not by the model under test.  A set of effects whose signatures span
-the contribution of the hidden ones, to within the noise, explains the data as well, so
-naming it is not wrong.
+the spring program, not by the model under test.  A set of effects explains the data as
+well as the hidden ones if its signatures span their contribution to within the noise.
+Naming such a set is therefore not wrong.
 
 Signatures of one rotated drive or lengthened beam depend on the configuration only, and
-those of temperature, approach and contact follow from them: 600 solutions for an arm
-instead of 5000.  Clearance and geometric stiffening have no linear signature and are
-left out.
+those of temperature, approach and contact follow from them.  An arm thus needs 600
+solutions instead of 5000.  Clearance and geometric stiffening have no linear signature
+and are left out.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,8 +24,9 @@ from validation.synthetic.effects import SCREW, WRENCH, Row, own_compliance
 from validation.synthetic.generator import Synthetic
 from validation.synthetic.machine import Hidden, simulate_readings
 
-SAME = 10.0  # residual chi square below which noise hides the difference
-_DRIFTS = (0.1, 0.3, 1.0)  # time constants tried, in durations
+SAME = 10.0  # residual chi-square below which the difference is hidden by noise
+# time constants of a drift that are tried, relative to the duration
+_DRIFTS = (0.1, 0.3, 1.0)
 _STEP = 1e-5  # [rad, m] step of a finite difference
 _GRAM = 1e-3  # [kg, kg m] step of a finite difference
 MOMENTS = ("moment.x", "moment.y", "moment.z")
@@ -38,8 +39,9 @@ class Alternative:
 
     Attributes:
         names: names of the effects.
-        parameters: their number.
-        residual: [-] chi square that they do not explain, without noise.
+        parameters: number of their parameters.
+        residual: [-] chi-square of the noise-free contribution that they do not
+            explain.
     """
 
     names: tuple[str, ...]
@@ -48,14 +50,14 @@ class Alternative:
 
 
 def alternatives(campaign: Synthetic, size: int = 1) -> list[Alternative]:
-    """Return all small sets of public effects, best first.
+    """Return all small sets of public effects, the best set first.
 
     Args:
         campaign: campaign with its hidden effects.
         size: size of the largest sets.
 
     Returns:
-        Sets with their residuals of the contribution of the hidden effects.
+        The sets, with their residuals of the contribution of the hidden effects.
     """
     known = np.isfinite(campaign.readings)
     target = (campaign.added / campaign.sigma)[known]
@@ -73,7 +75,7 @@ def alternatives(campaign: Synthetic, size: int = 1) -> list[Alternative]:
 
 
 def _residual(A: NDArray, target: NDArray) -> float:
-    """Return the squared part of a vector outside the span of columns."""
+    """Return the squared norm of a vector outside the span of columns."""
     norms = np.linalg.norm(A, axis=0)
     A = A[:, norms > 0] / norms[norms > 0]
     if not A.shape[1]:
@@ -91,7 +93,7 @@ def signatures(campaign: Synthetic) -> dict[str, NDArray]:
         campaign: campaign with the design and the noise.
 
     Returns:
-        By name ``(6 rows, parameters)``, drift by its time constant.
+        (6 rows, parameters) arrays by name; a drift has one for each time constant.
     """
     raw = dict(_raw(campaign))
     sigma = np.tile(campaign.sigma, len(campaign.plan.rows))
@@ -103,7 +105,7 @@ def signatures(campaign: Synthetic) -> dict[str, NDArray]:
 
 
 def _raw(campaign: Synthetic) -> Iterator[tuple[str, NDArray]]:
-    """Return the (rows, 6, parameters) by effect."""
+    """Return the (rows, 6, parameters) derivatives by effect."""
     differences = _FiniteDifferences(campaign)
     covariate = {
         name: np.array([row.covariates[name] for row in campaign.plan.rows])[:, None]
@@ -152,7 +154,7 @@ def _of_drives_and_lengths(
 def _of_loads(
     campaign: Synthetic, differences: "_FiniteDifferences"
 ) -> Iterator[tuple[str, NDArray]]:
-    """Return effects of loads: springs, weight, wrong loads."""
+    """Return effects that depend on loads: springs, weight, wrong loads."""
     beams = [f for f in campaign.robot.frames if isinstance(f.link, BeamLink)]
     base = [
         differences.loaded("base_compliance", f"stiffness.{k}", _SOFT, 1 / _SOFT)
@@ -179,7 +181,7 @@ def _of_loads(
 def _of_the_device(
     differences: "_FiniteDifferences", time: NDArray
 ) -> Iterator[tuple[str, NDArray]]:
-    """Return effects of the measuring device: its pose, and its drift."""
+    """Return effects of the measuring device: its pose and its drift."""
     keys = [*(f"base.{k}" for k in SCREW), "tool.tx", "tool.ty", "tool.tz"]
     frame = [differences.unloaded("registration", key, _STEP) for key in keys]
     yield "registration", _columns(frame)
@@ -191,7 +193,7 @@ def _of_the_device(
 
 
 def _columns(screws: Sequence[NDArray]) -> NDArray:
-    """Return the (rows, 6, parameters) of screws."""
+    """Return screws as (rows, 6, parameters)."""
     return np.stack(screws, axis=-1) if screws else np.zeros((0, 6, 0))
 
 
@@ -216,13 +218,13 @@ class _FiniteDifferences:
         return (readings - self._loaded_readings) / step
 
     def unloaded(self, name: str, key: str, step: float) -> NDArray:
-        """Return same for an effect independent of the load, once a configuration."""
+        """Return derivative by an effect independent of the load, by configuration."""
         readings = self._read(self._unloaded, [Hidden(name, {key: step})])
         return ((readings - self._unloaded_readings) / step)[self._of]
 
 
 def _stiffening(softer: NDArray, offset: NDArray) -> NDArray:
-    """Return Hertz contact's columns: offset x load^(2/3), by the drive's spring."""
+    """Return columns of a Hertz contact: offset x load^(2/3), by the drive's spring."""
     # [1/m] makes lengths comparable with angles
     scale = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
     a, b = softer * scale, offset * scale

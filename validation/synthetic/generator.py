@@ -2,11 +2,11 @@
 
 The machine is simulated in Exudyn with finite rotations and geometrically exact beams,
 not by the model that is fitted later.  Each effect has the requested strength: the rms
-of its own contribution to the readings is a multiple of the noise.  Weight and
-geometric stiffening have a fixed strength; for them the noise is set.
+of its contribution to the readings is a multiple of the noise.  Weight and geometric
+stiffening have a fixed strength; with them the noise is adjusted.
 
-The folder written holds the data of a measuring machine.  The hidden effects are stored
-separately, in the layout of the practice campaigns' truth.
+The written folder holds the data of a measuring machine.  The hidden effects are stored
+separately, in the format of the practice campaigns' truth.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -29,13 +29,13 @@ from validation.synthetic.machine import Hidden, simulate_readings
 
 _GIVEN_STRENGTH = ("self_weight", "geometric_stiffening")
 _TRIES = 5
-_DRAWS = 6  # largest number of draws of an effect's parameters, until it is visible
-_CLOSE = 0.05  # relative: accepted difference of a strength from the requested one
+_DRAWS = 6  # largest number of draws of an effect's parameters until it is visible
+_CLOSE = 0.05  # relative accepted difference of a strength from the requested strength
 _MOST = (
     1000.0  # times its plausible size: an effect that needs more is hardly observable
 )
-_SMALL = 1e-2  # scale of errors and load at which the machine is linear
-_BLUNDER = 40.0  # [-] size of an outlier in sigmas
+_SMALL = 1e-2  # scale of errors and load at which the machine is practically linear
+_BLUNDER = 40.0  # [sigma] size of a blunder
 
 Progress = Callable[[str, int, int], None]
 Draw = Callable[[str], Hidden]
@@ -46,18 +46,19 @@ class Synthetic:
     """A synthetic campaign and its hidden effects.
 
     Attributes:
-        robot: declared.
+        robot: the declared robot.
         plan: the commands.
-        reference_point: (3,) [m] platform axes.
+        reference_point: (3,) [m] measured point, platform axes.
         registration: ``"known"``, or ``"unknown"`` with a hidden measuring frame.
-        sigma: (6,) [rad, m] of the noise.
-        readings: (rows, 6) [rad, m] measured deviations, NaN where missing.
-        exact: (rows, 6) [rad, m] the same without noise and blunders.
-        added: (rows, 6) [rad, m] contribution of the hidden effects, without the frame.
-        effects: hidden, with their parameters.
-        strength: strength by name, rms of each effect's own contribution, in sigmas.
+        sigma: (6,) [rad, m] standard deviation of the noise.
+        readings: (rows, 6) [rad, m] measured deviations; NaN where missing.
+        exact: (rows, 6) [rad, m] deviations without noise and blunders.
+        added: (rows, 6) [rad, m] contribution of the hidden effects without the
+            measuring frame.
+        effects: hidden effects with their parameters.
+        strength: rms of each effect's contribution in sigmas, by name.
         outliers: rows with a blunder.
-        hidden_base: (6,) screw of the measuring frame, None if known.
+        hidden_base: (6,) screw of the measuring frame; None if it is known.
     """
 
     robot: Robot
@@ -81,11 +82,12 @@ class Noise:
     """Errors of the readings.
 
     Attributes:
-        rotation: [rad] 1 sigma.
-        position: [m] 1 sigma.
+        rotation: [rad] standard deviation of rotations.
+        position: [m] standard deviation of positions.
         outliers: number of rows with a blunder in one reading.
         missing: share of cells that were not measured.
-        hidden_frame: [rad, m] size of an unknown measuring frame, 0 if known.
+        hidden_frame: [rad, m] size of an unknown pose of the measuring frame; 0 if
+            known.
     """
 
     rotation: float = 1e-5
@@ -103,7 +105,7 @@ class Noise:
 
     @property
     def sigma(self) -> NDArray:
-        """(6,) [rad, m]."""
+        """(6,) [rad, m] standard deviations of the components."""
         return np.repeat([self.rotation, self.position], 3)
 
 
@@ -116,24 +118,24 @@ def generate_campaign(
     program: str = "multibody",
     update: Progress | None = None,
 ) -> Synthetic:
-    """Measure a simulated machine.
+    """Simulate a campaign on a machine with hidden effects.
 
     Args:
-        robot: declared, its geometric errors known.
-        wanted: effects by name, whose parameters are drawn, or effects with parameters;
-            with the multiple of the noise for each alone.
+        robot: the declared robot; its geometric errors are known.
+        wanted: pairs of an effect and the requested multiple of the noise.  An effect
+            is a name, whose parameters are drawn, or has parameters.
         design: design of the campaign.
         noise: errors of the readings.
-        seed: seed of all draws.
+        seed: seed of all random draws.
         program: ``"multibody"`` or, much faster, ``"springs"``.
-        update: function called with a stage, the rows done and their total.
+        update: function called with a stage, the finished rows and their total.
 
     Returns:
         The campaign.
 
     Raises:
-        BadInput: an unknown effect, more blunders than rows, or a design that the robot
-            cannot execute.
+        BadInput: an effect is unknown, there are more blunders than rows, or the robot
+            cannot execute the design.
         NotApplicable: the robot has no place where an effect could act, or the effect
             is hardly visible in every draw.
         SimulationFailed: a row has no equilibrium.
@@ -184,10 +186,10 @@ class _Shown:
 
     Attributes:
         effects: effects with their parameters.
-        strength: strength of each alone, by name, in sigmas.
-        declared: (rows, 6) [rad, m] readings without them.
-        exact: (rows, 6) [rad, m] readings with all of them.
-        sigma: (6,) [rad, m] noise.
+        strength: rms of each effect's contribution in sigmas, by name.
+        declared: (rows, 6) [rad, m] readings without the effects.
+        exact: (rows, 6) [rad, m] readings with all effects.
+        sigma: (6,) [rad, m] standard deviation of the noise.
     """
 
     effects: tuple[Hidden, ...]
@@ -220,8 +222,8 @@ def _shown_effects(
     machine: _SimulatedMachine, wanted: Sequence[tuple[Hidden, float]], sigma: NDArray,
     redraw: Draw | None,
 ) -> _Shown:  # fmt: skip
-    """Return all effects, each scaled to its multiple of the noise."""
-    # effects of fixed strength set the noise, before the others are scaled to it
+    """Return all effects, each scaled to its requested multiple of the noise."""
+    # effects of fixed strength determine the noise before other effects are scaled
     wanted = sorted(wanted, key=lambda pair: pair[0].name not in _GIVEN_STRENGTH)
     declared = machine.read((), "declared")
     if any(effect.name == "geometric_stiffening" for effect, _ in wanted):
@@ -243,8 +245,9 @@ def _shown_effect(
     machine: _SimulatedMachine, effect: Hidden, multiple: float, sigma: NDArray,
     declared: NDArray, redraw: Draw | None,
 ) -> tuple[Hidden, NDArray, NDArray]:  # fmt: skip
-    """Return the effect scaled; draw again while it is hardly visible."""
-    # for example, a force whose line meets a drive's axis does not load its spring
+    """Return the scaled effect; draw again while it is hardly visible."""
+    # an effect may be invisible in a draw: for example, a force whose line meets the
+    # axis of a drive does not load the spring of this drive
     for _ in range(_DRAWS - 1):
         try:
             return _scaled_effect(machine, effect, multiple, sigma, declared)
@@ -288,7 +291,7 @@ def _scaled_effect(
 
 
 def _linear(machine: _SimulatedMachine) -> NDArray:
-    """Return (rows, 6) readings of the machine to first order in errors and load."""
+    """Return (rows, 6) readings of the machine, linear in errors and load."""
     ends = []
     for scale in (_SMALL, -_SMALL):
         small = machine.robot.with_errors(scale * machine.robot.errors)
@@ -300,7 +303,7 @@ def _linear(machine: _SimulatedMachine) -> NDArray:
 def _measured(
     exact: NDArray, sigma: NDArray, noise: Noise, rng: np.random.Generator
 ) -> tuple[NDArray, tuple[int, ...]]:
-    """Return the readings with noise, blunders and gaps; and rows with blunders."""
+    """Return the readings with noise, blunders and gaps, and the rows with blunders."""
     readings = exact + sigma * rng.normal(size=exact.shape)
     blunders = rng.choice(len(exact), noise.outliers, replace=False)
     columns = rng.integers(6, size=noise.outliers)
@@ -317,11 +320,11 @@ def _rms(values: NDArray) -> float:
 
 
 def write_campaign(campaign: Synthetic, folder: Path | str) -> None:
-    """Write campaign.toml, measurements.csv and robot.toml, all or none of them.
+    """Write campaign.toml, measurements.csv and robot.toml; all or none of them.
 
     Args:
-        campaign: to be written; hidden effects are not written.
-        folder: new, or empty.
+        campaign: campaign to be written; hidden effects are not written.
+        folder: new or empty folder.
 
     Raises:
         BadInput: the folder is not empty or cannot be written.

@@ -1,4 +1,4 @@
-"""Nonlinear laws of a simulated joint."""
+"""Nonlinear laws of the joints of a simulated machine."""
 
 from dataclasses import dataclass
 
@@ -10,27 +10,27 @@ class PowerLawSpring:
     """A joint spring with load = coefficient x abs(deflection)^exponent.
 
     Attributes:
-        coefficient: [N m/rad^n or N/m^n].
-        exponent: [-] n, at least 1.
+        coefficient: [N m/rad^n or N/m^n] coefficient.
+        exponent: [-] exponent n, at least 1.
     """
 
     coefficient: float
     exponent: float
 
     def secant(self, deflection: float) -> float:
-        """Return [N m/rad or N/m] secant at a deflection of at least a nanometre."""
+        """Return [N m/rad or N/m] secant stiffness, from a nanometre of deflection."""
         bent = max(abs(deflection), 1e-9)
         return float(self.coefficient * bent ** (self.exponent - 1.0))
 
 
 @dataclass(frozen=True)
 class TwoStepSpring:
-    """A joint spring that is softer, or stiffer, above a load.
+    """A joint spring whose compliance changes above a load.
 
     Attributes:
-        below: [rad/(N m) or m/N] compliance up to the knee.
+        below: [rad/(N m) or m/N] compliance below the knee.
         above: compliance for the part of the load above the knee.
-        knee: [N m or N] > 0.
+        knee: [N m or N] load of the knee, > 0.
     """
 
     below: float
@@ -38,7 +38,7 @@ class TwoStepSpring:
     knee: float
 
     def secant(self, load: float) -> float:
-        """Return [N m/rad or N/m] secant under a load above a millionth of the knee."""
+        """Return [N m/rad or N/m] secant stiffness, from a millionth of the knee."""
         size = max(abs(load), 1e-6 * self.knee)
         more = max(size - self.knee, 0.0)
         return size / (self.below * (size - more) + self.above * more)
@@ -46,10 +46,10 @@ class TwoStepSpring:
 
 @dataclass(frozen=True)
 class ClearanceLaw:
-    """Clearance of a joint on an open chain, where the load determines its position.
+    """Clearance of a joint on an open chain, where the load determines the position.
 
     Attributes:
-        clearance: its bounds.
+        clearance: bounds of the motion.
     """
 
     clearance: Clearance

@@ -36,7 +36,7 @@ class Hidden:
     """An effect that the declared model lacks.
 
     Attributes:
-        name: public name, or one that begins with an underscore.
+        name: public name, or a name with a leading underscore.
         parameters: parameters as in the public formats.
     """
 
@@ -52,22 +52,22 @@ def simulate_readings(
     program: str = "multibody",
     update: Progress | None = None,
 ) -> NDArray:
-    """Return deviations of a simulated machine at the rows of a design, without noise.
+    """Return the deviations of a simulated machine at the rows of a design.
 
-    Rows with the same machine are simulated once.
+    They have no noise.  Rows with the same machine are simulated once.
 
     Args:
-        robot: declared; every joint is tight unless it has a clearance.
+        robot: the declared robot; a joint without declared clearance is tight.
         reference_point: (3,) [m] point at which the load acts and the pose is read,
             platform axes.
         rows: commanded configurations, loads and covariates.
         effects: effects of the machine, which the declared model lacks.
-        program: ``"multibody"``: Exudyn; ``"springs"``: much faster.
-        update: called with the number of machines done and their total.
+        program: ``"multibody"`` for Exudyn, or ``"springs"``, which is much faster.
+        update: called with the number of finished machines and their total.
 
     Returns:
-        (rows, 6) [rad, m] rotation vector of R_actual R_nominal^T and difference of
-        the reference point's position, base axes.
+        (rows, 6) [rad, m] rotation vector of R_actual R_nominal^T, and displacement of
+        the reference point, base axes.
 
     Raises:
         BadInput: the robot has a helical joint.
@@ -102,7 +102,7 @@ def simulate_readings(
 
 
 def acts_on_machine(name: str) -> bool:
-    """Return whether an effect changes the machine, not only the reading."""
+    """Return whether an effect changes the machine and not only the reading."""
     return name in _ALL_CHANGES
 
 
@@ -113,7 +113,7 @@ def with_point(robot: Robot, reference_point: NDArray) -> Robot:
 
 
 def nominal_pose(robot: Robot, row: Row) -> NDArray:
-    """Return the (4, 4) nominal platform of the robot, along its chain."""
+    """Return the (4, 4) nominal platform of the robot, computed along its chain."""
     T, frame = np.eye(4), robot.frame(robot.platform)
     while True:
         own = np.array([0.0, 0.0, row.coordinates.get(frame.name, 0.0)])

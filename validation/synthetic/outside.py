@@ -1,7 +1,7 @@
 """Effects outside the library, to test whether a diagnosis reports them as such.
 
-Each occurs in real machines, and no public effect describes it.  Their names begin with
-an underscore.
+Each effect occurs in real machines, and no public effect describes it.  The names begin
+with an underscore.
 """
 
 import math
@@ -30,7 +30,7 @@ from validation.synthetic.laws import ClearanceLaw, TwoStepSpring
 
 
 def _pose_stiffness(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a drive's compliance of mean (1 + cos 3q), as of a gear mesh."""
+    """Apply a drive's compliance that varies as 1 + cos 3q, as of a gear mesh."""
     robot = machine.robot
     for name, softest in given.items():
         share = 1.0 + math.cos(3 * row.coordinates[name])
@@ -57,7 +57,7 @@ def _swollen(machine: Machine, given: Parameters, cause: float) -> Machine:
 
 
 def _second_harmonic(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply an encoder's error of half the period of eccentricity: a wobbling disc."""
+    """Apply an encoder error that repeats twice in a turn: a wobbling disc."""
     for name in (key[: -len(".amplitude")] for key in given if "amplitude" in key):
         angle = 2 * row.coordinates[name] + given[f"{name}.phase"]
         change = given[f"{name}.amplitude"] * math.sin(angle)
@@ -66,12 +66,12 @@ def _second_harmonic(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _growth(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a beam's growth by a strain per second: wear, or a long creep."""
+    """Apply a beam's growth by a strain per second, as by wear or long creep."""
     return _swollen(machine, given, row.covariates["time"])
 
 
 def _gear(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply waves of a gear to a drive's angle, several a turn."""
+    """Apply waves of a gear to a drive's angle, several in one turn."""
     for name in (key[: -len(".order")] for key in given if key.endswith(".order")):
         angle = given[f"{name}.order"] * row.coordinates[name] + given[f"{name}.phase"]
         change = given[f"{name}.amplitude"] * math.sin(angle)
@@ -104,7 +104,7 @@ def _cable(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _slipped(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a jump of a drive's zero at a time."""
+    """Apply a jump of a drive's zero at an instant."""
     for name in (key[: -len(".at")] for key in given if key.endswith(".at")):
         late = row.covariates["time"] >= given[f"{name}.at"]
         machine = misread(machine, name, "slip", given[f"{name}.jump"] * late)
@@ -112,7 +112,7 @@ def _slipped(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _lead(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply waves of the screw to a slide's position, one per period."""
+    """Apply waves of a screw to a slide's position, one in each period."""
     for name in named(given, "period"):
         turns = row.coordinates[name] / given[f"{name}.period"]
         wave = math.sin(2 * math.pi * turns + given[f"{name}.phase"])
@@ -217,13 +217,13 @@ OUTSIDE = {
     "_gear": "a drive's angle has waves of its gear",
     "_uneven_backlash": "backlash that varies around a turn of a gear",
     "_load_friction": "friction that grows with the size of the load",
-    "_cable": "a cable pulls by what grows with a coordinate",
+    "_cable": "a cable's force increases with a coordinate",
     "_slipped": "a drive's zero jumps at a time",
     "_lead": "a slide's position has waves of its screw",
     "_lead_backlash": "backlash that varies over a turn of a screw",
     "_two_steps": "a joint's compliance changes above some load",
     "_torque_backlash": "backlash on the side to which a drive's load pushes",
-    "_tilting": "the ground turns by a factor of what a sensor reads",
-    "_stand": "the measuring device's stand yields with the square of the load",
+    "_tilting": "the ground rotates in proportion to a sensor's reading",
+    "_stand": "the device's stand deflects with the square of the load",
     "_sag": "the measured target sags with the size of the load",
 }

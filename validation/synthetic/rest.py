@@ -1,15 +1,15 @@
 """Equilibria of a simulated machine with nonlinear laws of its joints.
 
-A law is solved by fixed-point iteration: the machine is simulated with a linear spring
-or an offset in the joint, and the joint's load determines the next spring or offset,
-until the change is below a tolerance.
+A law is solved by fixed-point iteration.  The machine is simulated with a linear spring
+or an offset in the joint; the load of the joint determines the next spring or offset.
+The iteration ends when the change is below a tolerance.
 
 - A stiffening contact has its secant stiffness.  It moves less than its last stiffness
   predicts, so each step reduces the error at least by 1 - 1/n.
 - A joint with clearance is displaced by its load up to its bounds.  On an open chain
-  the load does not depend on the clearance.  A weak spring (grease, seals) keeps it
-  near the middle under small loads: otherwise rounding would decide.
-  near the middle under small loads: otherwise rounding would decide.
+  the load does not depend on the clearance.  A weak spring (grease, seals) keeps the
+  joint near the middle under small loads; otherwise rounding would determine its
+  position.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -33,14 +33,16 @@ from validation.synthetic.effects import (
 from validation.synthetic.laws import ClearanceLaw, PowerLawSpring, TwoStepSpring
 from validation.synthetic.springs import rest_on_springs
 
-# elements of a beam; corrected elements are accurate at these small deflections
+# number of elements of a beam; corrected elements are accurate at these small
+# deflections
 _ELEMENTS = 2
 _STEPS = 60
 _SETTLED = 1e-11  # [rad, m] change of power-law springs at convergence
-# [rad, m] change of clearances at convergence, with the sensor's rounding at small
-# loads
+# [rad, m] change of clearances at convergence; rounding in the force sensor prevents a
+# smaller value at small loads
 _SETTLED_CLEARANCE = 5e-9
-_CENTRING = {"radial": 3e3, "axial": 3e3, "tilt": 3e2, "spin": 3e2}  # [N/m, N m/rad]
+# [N/m, N m/rad] springs that centre clearances
+_CENTRING = {"radial": 3e3, "axial": 3e3, "tilt": 3e2, "spin": 3e2}
 Progress = Callable[[int, int], None]
 _ROWS = {"tilt": [0, 1], "spin": [2], "radial": [3, 4], "axial": [5]}
 
@@ -56,10 +58,10 @@ def rest_poses(
         update: called with the number of machines at rest and their total.
 
     Returns:
-        (k, 4, 4) of their platforms, seen from the base.
+        (k, 4, 4) platforms of the machines in the base frame.
 
     Raises:
-        SimulationFailed: no equilibrium, or the joints' laws do not converge.
+        SimulationFailed: there is no equilibrium, or the joints' laws do not converge.
     """
     poses = np.zeros((len(machines), 4, 4))
     waiting = dict(enumerate(machines))
@@ -81,7 +83,7 @@ def rest_poses(
 
 
 def _updated(machine: Machine, equilibrium: Rest) -> tuple[Machine, float]:
-    """Return the machine with laws evaluated under its loads; change in tolerances."""
+    """Return machine with laws evaluated at its loads, and the change in tolerances."""
     largest, robot = 0.0, machine.robot
     for name, law in machine.laws.items():
         i, frame = robot.index(name), robot.frame(name)
@@ -120,7 +122,7 @@ def _clearance_position(law: ClearanceLaw, wrench: NDArray) -> NDArray:
 
 @dataclass(frozen=True, eq=False)
 class _Placed:
-    """Joint coordinates of a robot, in the form that the simulation needs."""
+    """Robot and joint coordinates in the form that the simulation needs."""
 
     robot: Robot
     coordinates: NDArray

@@ -1,24 +1,24 @@
-"""The same machine with springs at its beams' tips, for all rows together.
+"""Equilibria of machines with springs at the tips of beams, for all rows together.
 
 This is a second, faster program.  Motions are finite and the equilibrium is that of the
-deformed machine, as in the multibody simulation.  A beam is its compliance at its tip
-instead of elements, which differs under large deflections.  Clearances in closed loops
-need the multibody simulation.
+deformed machine, as in the multibody simulation.  A beam is represented by its
+compliance at the tip instead of elements, which differs under large deflections.
+Clearances in closed loops need the multibody simulation.
 
 The unknowns are the passive joints' motions q and the wrench l of each closure.  Given
 these, the springs deform under their wrenches, and the frames follow; the residuals are
 
     r = errors of the closures,        t = moments about passive joints' axes.
 
-Newton's step uses the nominal posture, as springs deform little.  With a_j the axis of
-joint j and s_kj = +1, -1 on the closure's first and second chain,
+Newton's step uses the nominal posture, because springs deform little.  With a_j the
+axis of joint j, and s_kj = +1 or -1 if it is on the first or second chain of closure k,
 
     [ -S       -(s a) ] [ dl ]     [ r ]
     [ (s a)^T    0    ] [ dq ] = - [ t ]
 
-with S the compliance between each pair of closures.  Steps are of least norm, in idle
-rotations and in the wrenches of overconstrained rigid loops.  Screws and wrenches are
-read at the base origin in base axes unless stated otherwise.
+with S the compliance between each pair of closures.  Steps have minimum norm, so idle
+rotations and the wrenches of overconstrained rigid loops are determined.  Screws and
+wrenches are read at the base origin in base axes unless stated otherwise.
 """
 
 from collections.abc import Sequence
@@ -36,9 +36,9 @@ from validation.multibody.simulation import SimulationFailed
 from validation.synthetic.effects import Machine, Rest
 
 _STEPS = 60
-_CONVERGED = 1e-12  # [rad, m] size of the last step
+_CONVERGED = 1e-12  # [rad, m] size of the last step at convergence
 _DIVERGED = 1e3  # [rad, m] coordinate above which the steps diverge
-_RANK = 1e-10  # relative: smaller singular values belong to idle motions
+_RANK = 1e-10  # relative size below which singular values belong to idle motions
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,14 +46,15 @@ class _SpringModel:
     """Arrays of k machines of one structure, with n frames.
 
     Attributes:
-        robot: one of the robots.
-        placed: (k, n, 4, 4) each frame with its error, seen from its parent.
-        compliances: (2, k, n, 6, 6) of links and of joints, at the frame, in its axes.
+        robot: one of the robots, for the structure.
+        placed: (k, n, 4, 4) frames with their errors, relative to their parents.
+        compliances: (2, k, n, 6, 6) compliances of links and joints, at the frame, in
+            its axes.
         nominal: (k, n, 4, 4) nominal frames of the robot.
-        passive: rows whose motion is free.
-        pairs: (closures, 2) rows.
+        passive: rows of the frames whose motion is free.
+        pairs: (closures, 2) rows of the frames that each closure joins.
         signs: (closures, n) +1 on the first chain, -1 on the second.
-        closed: (k, closures, 4, 4) second frame seen from the first, nominally.
+        closed: (k, closures, 4, 4) nominal second frame relative to the first.
     """
 
     robot: Robot
@@ -73,7 +74,7 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
         machines: machines of one structure, without clearances.
 
     Returns:
-        The equilibrium of each.
+        The equilibrium of each machine.
 
     Raises:
         SimulationFailed: a joint has clearance, or there is no equilibrium.
@@ -94,8 +95,8 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
     ends = _forward(parts, q, screws)
     for _ in range(_STEPS):
         carried = _carried(machines, parts, ends, wrenches)
-        # wrenches are read half-way along the deformation: read at an end, they would
-        # not be the derivative of an energy
+        # wrenches are read half-way along the deformation; read at an end, they would
+        # not be the gradient of an energy
         halfway = ends @ np.linalg.inv(_deflections(screws / 2))
         read = _at_frames(halfway, carried)
         new = np.einsum("skaij,skaj->skai", parts.compliances, read)
@@ -115,7 +116,9 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
         if converged and max(np.abs(errors).max(initial=0), step) < _CONVERGED:
             wrench = _at_frames(ends[1], carried[1])
             return [Rest(*one) for one in zip(ends[1], wrench, screws[1], strict=True)]
-    raise SimulationFailed(robot.name, "springs do not come to rest")
+    raise SimulationFailed(
+        robot.name, "the iteration for the equilibrium does not converge"
+    )
 
 
 def _spring_model(machines: Sequence[Machine], q: NDArray) -> _SpringModel:
@@ -132,7 +135,7 @@ def _spring_model(machines: Sequence[Machine], q: NDArray) -> _SpringModel:
     first, second = np.array(pairs, dtype=int).reshape(-1, 2).T
     closed = np.linalg.inv(nominal[:, first]) @ nominal[:, second]
     passive = [i for i, f in enumerate(robot.frames) if f.passive and not f.compliant]
-    known: dict[int, tuple[NDArray, NDArray]] = {}  # frames are shared among rows
+    known: dict[int, tuple[NDArray, NDArray]] = {}  # rows share frames
     for frame in (f for m in machines for f in m.robot.frames):
         if id(frame) not in known:
             known[id(frame)] = _compliances(frame)
@@ -161,7 +164,7 @@ def _compliances(frame: Frame) -> tuple[NDArray, NDArray]:
 
 
 def _placements(screws: NDArray) -> NDArray:
-    """Return the (..., 4, 4) of rotation vectors and translations (..., 6)."""
+    """Return (..., 4, 4) motions of rotation vectors and translations (..., 6)."""
     T = np.zeros((*screws.shape[:-1], 4, 4))
     turns = Rotation.from_rotvec(screws[..., :3].reshape(-1, 3)).as_matrix()
     T[..., :3, :3] = turns.reshape(*screws.shape[:-1], 3, 3)
@@ -171,7 +174,7 @@ def _placements(screws: NDArray) -> NDArray:
 
 
 def _deflections(screws: NDArray) -> NDArray:
-    """Return (..., 4, 4) of springs' screws, translations in half-rotated axes."""
+    """Return (..., 4, 4) motions of springs, with translations in half-rotated axes."""
     half = screws.copy()
     half[..., :3] /= 2
     T = _placements(screws)
@@ -181,16 +184,16 @@ def _deflections(screws: NDArray) -> NDArray:
 
 
 def _chain(robot: Robot, steps: NDArray, ends: NDArray, q: NDArray) -> NDArray:
-    """Return the (k, n, 4, 4) frames by products along the chains.
+    """Return the (k, n, 4, 4) frames as products along the chains.
 
     Args:
-        robot: robot with the tree.
-        steps: (k, n, 4, 4) from the parent's joint.
-        ends: (k, n, 4, 4) after the step, before the joint's own motion.
-        q: (k, n) [rad or m] the joints' own motions.
+        robot: robot with the tree of frames.
+        steps: (k, n, 4, 4) motions from the parent's joint.
+        ends: (k, n, 4, 4) motions after the step, before the joint's motion.
+        q: (k, n) [rad or m] coordinates of the joints.
 
     Returns:
-        Frames before their own motion, seen from the base.
+        Frames in the base frame, before their joint's motion.
     """
     own = np.zeros((*q.shape, 6))
     for i, frame in enumerate(robot.frames):
@@ -207,7 +210,7 @@ def _chain(robot: Robot, steps: NDArray, ends: NDArray, q: NDArray) -> NDArray:
 
 
 def _forward(parts: _SpringModel, q: NDArray, screws: NDArray) -> NDArray:
-    """Return (2, k, n, 4, 4) frames at the bodies' ends, and after joint springs."""
+    """Return (2, k, n, 4, 4) frames at the ends of bodies, and after joint springs."""
     links, joints = _deflections(screws)
     before = _chain(parts.robot, parts.placed @ links, joints, q)
     return np.stack([before @ np.linalg.inv(joints), before])
@@ -223,7 +226,7 @@ def _maps(T: NDArray) -> NDArray:
 
 
 def _axes(parts: _SpringModel, T: NDArray) -> NDArray:
-    """Return the (k, passive, 6) screws of unit motions."""
+    """Return the (k, passive, 6) screws of unit motions of passive joints."""
     own = [parts.robot.frames[i].own_axis for i in parts.passive]
     maps = _maps(T[:, parts.passive])
     columns = [maps[:, k, :, axis] for k, axis in enumerate(own)]
@@ -231,7 +234,7 @@ def _axes(parts: _SpringModel, T: NDArray) -> NDArray:
 
 
 def _newton(parts: _SpringModel, q: NDArray) -> tuple[NDArray, float]:
-    """Return inverses of Newton's matrix, and the compliance that scales wrenches."""
+    """Return inverses of Newton's matrices, and the compliance that scales wrenches."""
     # rows of one configuration and equal springs have the same matrix
     distinct = np.hstack([
         q,
@@ -248,7 +251,7 @@ def _newton(parts: _SpringModel, q: NDArray) -> tuple[NDArray, float]:
     S = np.einsum("an,bn,knij->kaibj", s, s, at_base, optimize=True)
     S = S.reshape(machines, size, size)
     axes = _axes(parts, nominal)
-    # a closure's wrench acts on a joint if the joint is on one of its chains only
+    # a closure's wrench acts on a joint that is on one of its chains only
     A = np.einsum("an,kni->kain", s[:, parts.passive], axes)
     A = A.reshape(machines, size, passive)
     diagonal = np.diagonal(S, axis1=1, axis2=2)
@@ -275,7 +278,7 @@ def _carried(
     gravity = np.array([m.gravity for m in machines])
     if gravity.any():
         _add_weights(machines, gravity, bodies, carried)
-    for i in range(before.shape[1] - 1, -1, -1):  # parents come first
+    for i in range(before.shape[1] - 1, -1, -1):  # parents come before their children
         carried[0, :, i] += carried[1, :, i]
         if robot.parents[i] >= 0:
             carried[1, :, robot.parents[i]] += carried[0, :, i]
@@ -285,7 +288,7 @@ def _carried(
 def _add_weights(
     machines: Sequence[Machine], gravity: NDArray, bodies: NDArray, carried: NDArray
 ) -> None:
-    """Add weights of the first machine's bodies; a beam's at its ends, with moments."""
+    """Add the weights of bodies; a beam's weight acts at its ends, with moments."""
     parents = machines[0].robot.parents
     for i, frame in enumerate(machines[0].robot.frames):
         R, tip = bodies[:, i, :3, :3], bodies[:, i, :3, 3]

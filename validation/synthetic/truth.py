@@ -1,4 +1,4 @@
-"""Hidden effects of a synthetic campaign, in the practice campaigns' layout."""
+"""Hidden effects of a synthetic campaign, in the format of the practice campaigns."""
 
 from typing import Any
 
@@ -51,13 +51,13 @@ def truth_of(
 
     Args:
         campaign: campaign with its hidden effects.
-        verdict: verdict of a correct diagnosis; if absent, that of a design that
-            distinguishes the effects.
-        accept: sets of effects that explain the data equally well.
-        note: explanation.
+        verdict: verdict of a correct diagnosis; by default the verdict for a design
+            that distinguishes the effects.
+        accept: other sets of effects that explain the data equally well.
+        note: explanation for the reader.
 
     Returns:
-        Plain values, keys of the practice campaigns' truth.
+        Plain values with the keys of the practice campaigns' truth.
     """
     names = [effect.name for effect in campaign.effects]
     outside = [OUTSIDE[name] for name in names if name in OUTSIDE]
@@ -124,6 +124,6 @@ def _unit(campaign: Synthetic, effect: str, key: str, frame: str) -> str:
 
 
 def _rms(values: np.ndarray) -> float:
-    """Return the root mean square of the measured values; 1 without any."""
+    """Return the root mean square of the measured values; 1 without values."""
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if known.size else 1.0

@@ -147,12 +147,20 @@ inline Body ReachableSets::body_of(int l, int64_t point, int p, const Real *cent
         if (!held[c][l]) columns.push_back(c);
     const int discs = int(columns.size()) / 2;
     columns.resize(2 * filled(discs), -1);
-    for (int c = 2 * cones.discs; c < nu; ++c)
+    int at = 2 * cones.discs + cones.intervals;
+    for (int c = 2 * cones.discs; c < at; ++c)
         if (!held[c][l]) columns.push_back(c);
     const int intervals = int(columns.size()) - 2 * filled(discs);
     columns.resize(2 * filled(discs) + filled(intervals), -1);
+    Array<int> balls;
+    for (int size : cones.balls) {
+        if (!held[at][l]) balls.push_back(size);
+        for (int c = at; c < at + size; ++c)
+            if (!held[c][l]) columns.push_back(c);
+        at += size;
+    }
     Body body = {
-        point, Cones(filled(discs), filled(intervals), {}), discs, intervals, p, {}, {},
+        point, Cones(filled(discs), filled(intervals), balls), discs, intervals, p, {}, {},
         {}, {}};
     const auto copy = [&](const Real *row, std::vector<double> &to) {
         for (int c : columns) to.push_back(c < 0 ? 0.0 : row[c][l]);
@@ -211,16 +219,17 @@ inline Whole ReachableSets::read_bodies(
 }
 
 // Searches of all bodies in both halves; bodies padded to the same numbers of rows and
-// columns are searched together.
-typedef std::map<std::array<int, 3>, std::vector<Task>> Groups;
+// columns, and of the same balls, are searched together.
+typedef std::map<std::vector<int>, std::vector<Task>> Groups;
 
 inline Groups searches_of(const std::vector<Body> &bodies, const double *tolerance) {
     Groups groups;
     for (const Body &body : bodies) {
         const int p = (body.p + FILLED - 1) / FILLED * FILLED;
+        std::vector<int> size = {p, body.cones.discs, body.cones.intervals};
+        size.insert(size.end(), body.cones.balls.begin(), body.cones.balls.end());
         for (int half = 0; half < 2; ++half)
-            groups[{p, body.cones.discs, body.cones.intervals}].push_back(
-                {&body, 3 * half, tolerance[half]});
+            groups[size].push_back({&body, 3 * half, tolerance[half]});
     }
     return groups;
 }

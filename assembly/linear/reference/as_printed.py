@@ -102,7 +102,7 @@ def _root_of_stiffness(C: NDArray) -> NDArray:
 
 
 def _clearance_constraints(c: Any, bounds: NDArray, factor: NDArray) -> list:
-    """Return the constraints (2)-(5); ``factor`` (n, 4) multiplies the bounds."""
+    """Return the constraints (2)-(5); ``factor`` (n, 5) multiplies the bounds."""
     import cvxpy as cp
 
     constraints = []

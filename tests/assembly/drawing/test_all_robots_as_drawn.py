@@ -1,27 +1,46 @@
-"""Every built-in robot, and those of the literature, frame by frame as bodies."""
+"""Every built-in robot, and those of the literature, converted to bodies and joints."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from assembly.exchange.convert import convert
+from assembly.exchange.robot_files import load_robot
 from assembly.files.robot_file import read_robot
 from assembly.kinematics.mobility import mobility
-from assembly.kinematics.posture import home_posture
+from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
+from assembly.linear.zone import zone_margin
+from assembly.model.frame import between_origins
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.robots import BUILT_IN, load_robot
-from tests.drawn_robots_for_tests import as_drawn
+from assembly.platform_stiffness.vibration import natural_modes
+from assembly.robots import BUILT_IN
+from forcefit.inputs.errors import BadInput
 
 SAME = 1e-12
 LITERATURE = Path(__file__).parents[4] / "shared" / "cases" / "robots"
 OTHERS = ("agile_err", "bennett", "exechon_err", "gpm_err", "prs", "snu_err",
           "tsai_err", "bolted_four_bar")  # fmt: skip
+DRAWN = Path(__file__).parents[3] / "examples" / "drawn"
+ALONE = """
+name = "odd"
+platform = "tip"
+[[frame]]
+name = "arm"
+parent = "base"
+joint = "revolute"
+actuated = true
+[[frame]]
+name = "tip"
+parent = "arm"
+translation = [0.1, 0, 0]
+"""
 
 
 @pytest.fixture(params=[*BUILT_IN, *OTHERS])
-def postures(request, tmp_path):
-    """Of the robot of bodies and of that of frames, at home."""
+def robots(request, tmp_path):
+    """Of bodies and of frames."""
     name = request.param
     if name in BUILT_IN:
         robot = load_robot(name)
@@ -29,24 +48,204 @@ def postures(request, tmp_path):
         pytest.skip(f"{LITERATURE} is not here")
     else:
         robot = read_robot(LITERATURE / f"{name}.toml")
-    (tmp_path / "drawn.toml").write_text(as_drawn(robot))
-    return home_posture(read_robot(tmp_path / "drawn.toml")), home_posture(robot)
+    source = name if name in BUILT_IN else LITERATURE / f"{name}.toml"
+    done = convert(source, tmp_path / "drawn.toml", version=2)
+    assert done.difference < SAME
+    return read_robot(tmp_path / "drawn.toml"), robot
 
 
-def test_any_robot_can_be_written_as_bodies_and_joints(postures):
-    """Place, stiffness, mobility, and the energy of its errors under its weight."""
-    drawn, framed = postures
-    at, expected = (posture.platform[:3, 3] for posture in postures)
+def compare(drawn, framed):
+    """Place, stiffness, mobility, margin, and the energy of errors under the weight."""
+    at, expected = (posture.platform[:3, 3] for posture in (drawn, framed))
     assert np.abs(at - expected).max() < SAME
-    K, reference = (platform_stiffness(posture).stiffness for posture in postures)
+    K, reference = (platform_stiffness(each).stiffness for each in (drawn, framed))
     size = np.sqrt(np.abs(np.diag(reference)).clip(1e-12))
     assert np.abs((K - reference) / np.outer(size, size)).max() < SAME
-    found, counted = (mobility(posture) for posture in postures)
+    found, counted = (mobility(posture) for posture in (drawn, framed))
     assert found.platform_freedoms == counted.platform_freedoms
     assert found.redundant_constraints == counted.redundant_constraints
+    zones = [zone_margin(each, "rigid") for each in (drawn, framed)]
+    # each is certified between its margin and its bound only
+    unsure = sum(zone.margin - zone.bound for zone in zones if zone.margin < np.inf)
+    assert zones[0].margin == pytest.approx(zones[1].margin, SAME, abs(unsure) + SAME)
     gravity = None if "snu" in framed.robot.name else [0, 0, -9.81]  # singular at home
-    solved, least = (solve_assembly(p, gravity=gravity) for p in postures)
+    solved, least = (solve_assembly(p, gravity=gravity) for p in (drawn, framed))
     # what is minimised is energy less work, which is up to 100 times as large
     most = least.energy + abs(least.work)
     assert abs(solved.energy - least.energy) <= SAME * most
     assert abs(solved.work - least.work) <= SAME * most
+
+
+def test_robot_converted_to_bodies_and_joints_is_equal_at_home(robots):
+    compare(*(home_posture(robot) for robot in robots))
+
+
+def test_robot_converted_to_bodies_and_joints_is_equal_elsewhere(robots):
+    """Each drive 0.01 rad or m from home, the platform where the closures lead it."""
+    if "snu" in robots[1].name or "gpm" in robots[1].name:
+        pytest.skip("home is singular, or two drives determine the third")
+    step = {f.name: f.position + 0.01 for f in robots[1].frames if f.actuated}
+    compare(*(place_robot(robot, joints=step) for robot in robots))
+
+
+def test_balls_and_crosses_are_joints_of_several_freedoms(tmp_path):
+    """The 6-UPS has a universal, a prismatic and a spherical joint in each leg."""
+    convert("hexapod", tmp_path / "drawn.toml", version=2)
+    text = (tmp_path / "drawn.toml").read_text()
+    for kind in ("universal", "prismatic", "spherical"):
+        assert text.count(f'type = "{kind}"') == 6
+    assert text.count("[[joint]]") == 18
+    assert text.count("[[body]]") == 13  # the platform, tubes and rods
+    assert 'between = ["base", "leg1.strut"]' in text
+
+
+@pytest.mark.parametrize("name", ["three_upu", "tricept", "agile_eye"])
+def test_drawn_robots_are_equal_after_conversion_to_frames_and_back(name, tmp_path):
+    convert(DRAWN / f"{name}.toml", tmp_path / "frames.toml")
+    convert(tmp_path / "frames.toml", tmp_path / "back.toml", version=2)
+    files = (tmp_path / "back.toml", DRAWN / f"{name}.toml")
+    compare(*(home_posture(load_robot(path)) for path in files))
+
+
+def test_screw_converted_to_bodies_and_joints_keeps_its_pitch_and_names(tmp_path):
+    """A turn of the drive lowers the table by the pitch of 5 mm."""
+    source = LITERATURE.with_name("robots_drawn") / "screw.toml"
+    if not source.exists():
+        pytest.skip(f"{source} is not here")
+    convert(source, tmp_path / "frames.toml")
+    convert(tmp_path / "frames.toml", tmp_path / "drawn.toml", version=2)
+    text = (tmp_path / "drawn.toml").read_text()
+    assert 'name = "column"\ntype = "cylindrical"' in text
+    assert "drive_stiffness = 200.0" in text
+    robot = load_robot(tmp_path / "drawn.toml")
+    turned = place_robot(robot, joints={"bearing": 2 * np.pi})
+    assert turned.pose()["tz"] == pytest.approx(0.4 - 0.005, abs=1e-12)
+
+
+def test_what_bodies_and_joints_cannot_hold_is_reported(run, tmp_path):
+    """Axes of the platform that are not the base's, as of a flange."""
+    status, out, err = run(
+        "convert", "arm6", "-o", tmp_path / "arm.toml", "--format", "2", "--json",
+        tmp_path / "o.json",
+    )  # fmt: skip
+    assert (status, err) == (0, "")
+    assert "left out: axes of the platform, turned by [0, 1.5708, 0] rad" in out
+    rotation = home_posture(load_robot(tmp_path / "arm.toml")).platform[:3, :3]
+    np.testing.assert_allclose(rotation, np.eye(3), atol=1e-15)
+
+
+@pytest.mark.parametrize(("words", "text", "message"), [
+    (["-o", "x.xml", "--format", "2"], "", "--format 2: found together with the file"),
+    (["-o", "x.toml", "--format", "3"], "", "--format: found 3, expected 1 or 2"),
+    # a closure of two frames of one body
+    (["-o", "x.toml", "--format", "2"], '[[frame]]\nname = "spot"\nparent = "arm"\n'
+     'translation = [0.1, 0, 0]\n[[closure]]\nframes = ["tip", "spot"]\n',
+     'closure[1] ("tip", "spot"): found that it connects two frames of one rigid body'),
+    (["-o", "x.toml", "--format", "2"], '[[effect]]\nname = "function"\nwhere = "tip"\n'
+     'kind = "geometric_error"\ncomponents = ["TX"]\nform = "constant"\n'
+     "parameters = { a = 1e-4 }\n", "effect"),
+])  # fmt: skip
+def test_robot_that_format_2_cannot_hold_is_refused_in_one_line(
+    run, tmp_path, monkeypatch, words, text, message
+):
+    monkeypatch.chdir(tmp_path)
+    Path("odd.toml").write_text(ALONE + text)
+    status, out, err = run("convert", "odd.toml", *words)
+    assert (status, out) == (2, "")
+    assert message in err
+    assert err.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["odd.toml"]
+
+
+def test_rounded_closures_are_reported(tmp_path):
+    """Joints of a drawing coincide; here two of them are 1e-8 m apart."""
+    (tmp_path / "rounded.toml").write_text(
+        ALONE.replace(
+            'name = "tip"\nparent = "arm"', 'name = "tip"\nparent = "pin"'
+        ).replace("translation = [0.1, 0, 0]\n", "")
+        + '[[frame]]\nname = "pin"\nparent = "arm"\njoint = "revolute"\n'
+        'translation = [0.1, 0, 0]\n[[frame]]\nname = "rocker"\nparent = "base"\n'
+        'joint = "revolute"\ntranslation = [0.1, 0.2, 0]\n[[frame]]\nname = "end"\n'
+        'parent = "rocker"\ntranslation = [0, -0.2, 1e-8]\n[[closure]]\n'
+        'frames = ["tip", "end"]\n'
+    )
+    done = convert(tmp_path / "rounded.toml", tmp_path / "drawn.toml", version=2)
+    assert any("nominal closure error" in line for line in done.left_out)
+
+
+def test_missing_output_folder_is_refused_before_anything_is_written(tmp_path):
+    with pytest.raises(BadInput, match="no folder"):
+        convert("arm6", tmp_path / "absent" / "arm.toml", version=2)
+
+
+@pytest.mark.parametrize(("old", "new", "message"), [
+    ('between = ["tube", "rod"]', 'between = ["tube", "rood"]',
+     'joint "slide".between: found "rood", expected a body or "base"'),
+    ("axis2 = [0, 1, 0]", "axis2 = [-90, 0, -32]",
+     'joint "upper".axis2: found it parallel to "axis"'),
+    ('type = "prismatic"', 'type = "helical"\npitch = 0', 'pitch: found 0'),
+    ("[[leg]]", '[[body]]\nname = "lost"\n\n[[leg]]', 'body "lost": found no joint'),
+])  # fmt: skip
+@pytest.mark.parametrize("words", [
+    ("assembly", "solve", "bad.toml", "--json", "x.json"),
+    ("assembly", "show", "bad.toml", "--json", "x.json"),
+    ("convert", "bad.toml", "-o", "x.toml", "--format", "2"),
+])  # fmt: skip
+def test_mistake_in_a_drawing_writes_nothing(
+    run, tmp_path, monkeypatch, old, new, message, words
+):
+    monkeypatch.chdir(tmp_path)
+    text = (DRAWN / "three_upu.toml").read_text()
+    assert old in text
+    Path("bad.toml").write_text(text.replace(old, new, 1))
+    status, out, err = run(*words)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.toml"]
+
+
+def test_masses_and_moments_of_inertia_of_one_body_are_joined(tmp_path):
+    """A rigid body has the frequencies of its parts, which do not move against it."""
+    (tmp_path / "heavy.toml").write_text(
+        ALONE.replace(
+            "actuated = true",
+            "actuated = true\njoint_stiffness = [3e4, 3e4, 2e4, 1e7, 1e7, 1e7]",
+        )
+        + "mass = 2.0\ncentre_of_mass = [0.02, 0.01, 0]\n"
+        "inertia = [0.01, 0.02, 0.02, 0.001, 0, 0.002]\nrotation = [0.3, 0.1, 0.2]\n"
+        '[[frame]]\nname = "flange"\nparent = "tip"\ntranslation = [0, 0.2, 0.1]\n'
+        "mass = 1.5\ncentre_of_mass = [0, 0.1, 0]\n"
+    )
+    convert(tmp_path / "heavy.toml", tmp_path / "drawn.toml", version=2)
+    text = (tmp_path / "drawn.toml").read_text()
+    assert text.count("mass = 3.5") == 1
+    assert text.count("inertia = ") == 1
+    found, expected = (
+        natural_modes(home_posture(load_robot(tmp_path / f"{name}.toml"))).frequencies
+        for name in ("drawn", "heavy")
+    )
+    np.testing.assert_allclose(found, expected, rtol=1e-10)
+
+
+def test_directions_of_a_mesh_are_kept(tmp_path):
+    """From base to tip, and of its height, in the axes of the base at home."""
+    mesh = Path(__file__).parents[3] / "meshes" / "distal_plain.stl"
+    (tmp_path / "mesh.toml").write_text(
+        ALONE.replace('name = "tip"\nparent = "arm"\n', 'name = "elbow"\n'
+                      'parent = "arm"\nrotation = [0.4, -0.2, 0.9]\n'
+                      'joint = "revolute"\n'
+                      f'link = {{ mesh = {{ surface = "{mesh}", base = "z=0", tip = '
+                      '"z=0.452", up = [1, 0, 0] }, young = 6e10, poisson = 0.3 }\n'
+                      "up = [0.3, 0.2, 1.0]\n")
+        .replace('parent = "base"\n', 'parent = "base"\nrotation = [0.3, 0.2, 0.1]\n')
+        + '[[frame]]\nname = "tip"\nparent = "elbow"\ntranslation = [0.2, 0, 0]\n'
+    )  # fmt: skip
+    convert(tmp_path / "mesh.toml", tmp_path / "drawn.toml", version=2)
+    found = []
+    for name in ("mesh", "drawn"):
+        robot = load_robot(tmp_path / f"{name}.toml", links=False)
+        (i,) = (i for i, f in enumerate(robot.frames) if f.link is not None)
+        link, R = robot.frames[i].link, home_posture(robot).transforms[i][:3, :3]
+        axis = between_origins(robot.frames[i]) if link.axis is None else link.axis
+        found.append([R @ axis / np.linalg.norm(axis), R @ link.frame_up])
+    np.testing.assert_allclose(found[1], found[0], atol=1e-12)

@@ -556,6 +556,58 @@ REFUSED = {
     "end of a link": (
         'name = "rod"', 'name = "rod"\nto = "lower"',
         'leg "leg".body "rod".to: found "lower", expected a joint of this body'),
+    "a bore without its gap": (
+        "axis2 = [0, 1, 0]", 'axis2 = [0, 1, 0]\nclearance = { length = "30 mm" }',
+        'leg "leg".joint "upper", first bearing.clearance.radial: missing; '),
+    "a bore without length": (
+        "axis2 = [0, 1, 0]",
+        "axis2 = [0, 1, 0]\nclearance = { radial = 1e-5, length = 0 }",
+        'leg "leg".joint "upper", first bearing.clearance.length: found 0, '),
+    "tilt of a bore": (
+        "drive_stiffness = 2e7",
+        "clearance = { radial = 1e-5, length = 0.1, tilt = 1 }",
+        'leg "leg".joint "slide".clearance.tilt: found together with "length", '),
+    "unknown key of a clearance": (
+        "drive_stiffness = 2e7", "clearance = { radial = 1e-5, lenght = 0.1 }",
+        'leg "leg".joint "slide".clearance: unknown key "lenght"; did you '),
+    "length of a ball": (
+        'name = "upper"\ntype = "universal"',
+        'name = "upper"\ntype = "spherical"\nclearance = { length = 0.1 }',
+        'leg "leg".joint "upper".clearance.length: found the clearance of a sh'),
+    "a guide of a cross": (
+        "axis2 = [0, 1, 0]", "axis2 = [0, 1, 0]\nclearance = { guide = { gap = 1 } }",
+        'first bearing.clearance.guide: found one on a revolute joint, expected none'),
+    "a guide with tilt": (
+        "drive_stiffness = 2e7", "clearance = { tilt = 1e-4, guide = { gap = 1e-5 } }",
+        'leg "leg".joint "slide".clearance.tilt: found together with "guide", which '),
+    "a guide without height": (
+        "drive_stiffness = 2e7",
+        "clearance = { guide = { gap = 1e-5, length = 1, width = 1 } }",
+        'leg "leg".joint "slide".clearance.guide.height: missing; expected a finite '),
+    "a guide of negative gap": (
+        "drive_stiffness = 2e7",
+        "clearance = { guide = { gap = [1, -1], length = 1, width = 1, height = 1 } }",
+        'leg "leg".joint "slide".clearance.guide.gap: found -1, expected 2 numbers >='),
+    "a guide and a bore": (
+        "drive_stiffness = 2e7", "clearance = { length = 0.1, guide = { gap = 1e-5 } }",
+        '.clearance.guide: found together with "length", expected one of them'),
+    "three bearings": (
+        "drive_stiffness = 2e7", "clearance = { bearings = [1, 2, 3] }",
+        'leg "leg".joint "slide".clearance.bearings: found [1, 2, 3], expected two t'),
+    "bearings at one place": (
+        "drive_stiffness = 2e7",
+        "clearance = { bearings = [{ z = 0, radial = 1 }, { z = 0, radial = 1 }] }",
+        'leg "leg".joint "slide".clearance.bearings: found both at z = 0 m, expected '),
+    "a bearing without gap": (
+        "drive_stiffness = 2e7",
+        "clearance = { bearings = [{ z = 0, radial = 1 }, { z = 1 }] }",
+        'leg "leg".joint "slide".clearance.bearings[2].radial: missing; expected a '),
+    "radial beside bearings": (
+        "drive_stiffness = 2e7", "clearance = { radial = 1, bearings = [] }",
+        'leg "leg".joint "slide".clearance.radial: found together with "bearings", '),
+    "a pad on a slide": (
+        "drive_stiffness = 2e7", "clearance = { pad = { gap = 1e-5 } }",
+        'leg "leg".joint "slide".clearance.pad: found one on a prismatic joint, exp'),
     "copies": (
         "count = 3", "count = 0",
         'leg "leg".repeat.count: found 0, expected a whole number >= 1'),

@@ -176,6 +176,14 @@ REFUSED = {
     "a clearance whose square is no number": (
         "radial = 29e-6", "radial = 1e-200",
         'frame "elbow".clearance.radial: found 1e-200, expected 0 or'),
+    "a ball beside a radial clearance": (
+        "radial = 29e-6", "ball = 1e-5, radial = 29e-6",
+        'frame "elbow".clearance.radial: found together with "ball", expected one of '
+        "them"),
+    "a ball on a slide": (
+        'joint = "revolute"\nposition = -1.0\n' + PLAY,
+        'joint = "prismatic"\nclearance = { ball = 1e-5 }',
+        'frame "elbow".clearance.ball: found one on a joint that slides, '),
     "a number for a clearance": (
         PLAY, "clearance = 1e-5",
         'frame "elbow".clearance: found 1e-05, expected a table'),

@@ -38,7 +38,7 @@ def bound_by_hand(assembly):
         w, j = assembly.wrenches[i], assembly.joint_wrenches[i]
         total -= w @ robot.errors[i] + w @ C_link[i] @ w / 2 + j @ C_joint[i] @ j / 2
         for size, rows in zip(bounds[i], CONES, strict=True):
-            unbounded = free[i, list(rows)].any() or np.isinf(size)
+            unbounded = free[i, list(rows)].any() or not np.isfinite(size)
             total -= 0.0 if unbounded else size * np.linalg.norm(j[list(rows)])
         total -= np.abs(j) @ free[i]
     return total

@@ -87,7 +87,7 @@ def test_clearances_scaled_by_the_margin_just_assemble():
         if frame.clearance is None:
             return frame
         clearance = vars(frame.clearance)
-        larger = {k: v * factor for k, v in clearance.items() if k != "spin"}
+        larger = {k: v * factor for k, v in clearance.items() if v and k != "spin"}
         return replace(frame, clearance=Clearance(**{**clearance, **larger}))
 
     for factor, inside in ((margin * 1.0001, True), (margin * 0.9999, False)):

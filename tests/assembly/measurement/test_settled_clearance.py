@@ -44,6 +44,17 @@ def test_load_of_any_size_takes_up_clearance_in_its_direction(unit):
     assert undetermined.tolist() == [False]
 
 
+def test_a_ball_rests_at_its_radius_in_the_direction_of_the_load():
+    """The pin is turned by 0.7 rad about x; a cylinder would rest at its corner."""
+    load = np.array([0, 0, 0, 2.0, 1.0, -2.0])
+    settled, undetermined = with_clearances_taken_up(at_home(pin(ball=RADIAL), load))
+    c, s = np.cos(0.7), np.sin(0.7)
+    force = np.array([[1, 0, 0], [0, c, s], [0, -s, c]]) @ load[3:]
+    expected = RADIAL * force / 3
+    np.testing.assert_allclose(settled.errors[0, 0, 3:], expected, rtol=1e-9)
+    assert undetermined.tolist() == [False]
+
+
 def test_clearance_without_load_is_undetermined_and_centred():
     conditions = at_home(pin(radial=RADIAL, axial=AXIAL), [0, 0, 0, 2.0, 0, 0])
     settled, undetermined = with_clearances_taken_up(conditions)

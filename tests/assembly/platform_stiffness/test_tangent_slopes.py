@@ -51,6 +51,18 @@ def test_slope_of_a_pressed_pin_by_its_clearance_is_1_over_the_load():
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
+def test_slope_of_a_pressed_ball_by_its_radius_is_1_over_the_load(state):
+    """Across the load in both directions, and nothing along it."""
+    ball = Frame("ball", clearance=Clearance(ball=1e-4))
+    robot = Robot("ball", "tip", (ball, Frame("tip", "ball")))
+    asked = TangentState(state, [0, 0, 0, 0, 0, 200.0])
+    path = "ball.clearance.ball"
+    slope = stiffness_slopes(design_of(robot), [path], asked=asked)[path]
+    expected = np.diag([1 / 200.0, 1 / 200.0, 0.0])
+    np.testing.assert_allclose(slope[3:, 3:], expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("state", ["contact", "exact"])
 @pytest.mark.parametrize(
     ("path", "step"),
     [

@@ -159,8 +159,8 @@ def test_limits_on_quantities_that_are_not_computed_are_refused():
     bare = replace(whole, margins=False, stress=False)
     bare.check_limits(["energy", "force"])
     for limit, message in (
-        ("margin", "limit margin: the margins were left out"),
-        ("margin_free", "limit margin_free: the margins were left out"),
+        ("margin", "limit margin: the margins are not computed"),
+        ("margin_free", "limit margin_free: the margins are not computed"),
         ("stress", "limit stress: no link of irsbot2 has a shape from which its stress "
                    "follows"),
     ):  # fmt: skip

@@ -92,13 +92,13 @@ def test_draws_without_a_solution_are_reported_with_the_reason():
         if reason is None:
             assert "reason" not in one
             assert (
-                "translation: up to 4.0% of the draws have no answer and are left out"
+                "translation: up to 4.0% of the draws have no solution and are left out"
                 in lines
             )
             assert report["platform"]["tip.TX"]["translation_gain"] > 0.5
             continue
         assert one["reason"] == (
-            "no indices are computed if more than 5% of the draws have no answer: "
+            "no indices are computed if more than 5% of the draws have no solution: "
             "up to 6.0% were left out, and the errors of the other draws are not "
             "independent"
         )
@@ -168,7 +168,7 @@ def test_importance_table_has_um_per_um_for_lengths_and_um_per_mrad_for_angles()
 
 def test_importance_table_reports_left_out_draws_and_further_groups():
     lines = told(["m"] * 18, left_out=0.015)
-    assert "energy: up to 1.5% of the draws have no answer and are left out" in lines
+    assert "energy: up to 1.5% of the draws have no solution and are left out" in lines
     assert lines[-1] == "and 3 more, see --json"
     assert [line.split()[0] for line in lines[-4:-1]] == [
         "group12",

@@ -154,7 +154,7 @@ def test_statistics_and_tolerances_commands_write_results_and_figures(
         (["--errors", "errors.toml", "--seed", "9" * 40], "--seed"),
         (["--errors", "errors.toml", "--limit", "enrgy=3"], 'quantity "enrgy"'),
         (["--errors", "errors.toml", "--limit", "margin=1", "--no-margins"],
-         "the margins were left out"),
+         "the margins are not computed"),
         (["--errors", "errors.toml", "-o", "no/d.nc"], "no folder"),
     ],
 )  # fmt: skip

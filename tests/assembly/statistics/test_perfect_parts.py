@@ -41,6 +41,15 @@ def test_clearance_shares_of_a_pin_sum_to_the_largest_error():
     assert parts["rotation"]["clearances"] == pytest.approx({"pin.tilt": TILT})
 
 
+def test_a_ball_adds_to_the_tilt_of_its_pin():
+    """Both in the same direction: shares b and L t."""
+    translation = perfect_parts(experiment(arm(ball=RADIAL, tilt=TILT)))["translation"]
+    by_kind = translation["clearances"]
+    assert translation["reached"] == pytest.approx(RADIAL + ARM * TILT, abs=2e-6)
+    assert by_kind["pin.ball"] == pytest.approx(RADIAL, rel=1e-3)
+    assert by_kind["pin.tilt"] == pytest.approx(ARM * TILT, rel=1e-3)
+
+
 @pytest.mark.parametrize("name", ["irsbot2", "delta", "hexapod"])
 def test_clearance_shares_of_a_closed_loop_sum_to_the_largest_error(name):
     """Euler's sum for a homogeneous function, for any closures."""

@@ -56,6 +56,24 @@ def test_worst_margin_and_its_bound_equal_sums_along_each_axis():
     assert bound_margin(zone, sources, t * [1, 1, 0, 0]) == pytest.approx(5.0, rel=1e-6)
 
 
+def test_worst_energy_and_margin_of_a_ball_are_below_their_bounds():
+    """Gaps of 3, 2 and 4 balls along x, y, z: their distance; the bounds, their sum."""
+    robot = coaxial_beams(np.zeros(6), (K, K), clearance=Clearance(ball=PLAY))
+    posture, t = home_posture(robot), np.array([3.0, 2.0, 4.0]) * PLAY
+    places = [("two", 3), ("two", 4), ("two", 5)]
+    sources = plan_for(robot, places, [1] * 3, {}).sources
+    prepared, zone = linear_response(posture), prepare_margins(posture, "rigid")
+    corners = random_corners(4, 3)
+    worst = worst_corner(prepared, sources, t, corners).value
+    truth = np.linalg.norm(t) - PLAY
+    assert worst == pytest.approx(K * truth**2 / 4, rel=1e-6)
+    largest = worst_corner(zone, sources, t, corners).value
+    assert largest == pytest.approx(np.sqrt(29), rel=1e-6)
+    bound = K * (t.sum() - PLAY) ** 2 / 4
+    assert bound_energy(prepared, sources, t) == pytest.approx(bound, rel=1e-5)
+    assert bound_margin(zone, sources, t) == pytest.approx(9.0, rel=1e-6)
+
+
 def test_margin_bound_distributes_errors_over_several_clearances():
     """Two pins in series, of 1 and 3 clearances: an error x takes x / 4 of either.
 

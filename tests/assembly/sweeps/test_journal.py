@@ -233,7 +233,7 @@ def test_journal_of_another_sweep_is_refused(whole, tmp_path, other, message):
 def test_file_that_is_no_journal_is_refused_and_kept(tmp_path):
     path = journal_path(tmp_path / "map.nc")
     path.write_text("notes\n")
-    with pytest.raises(BadInput, match="found a file that is no journal of a sweep"):
+    with pytest.raises(BadInput, match="found a file that is not a journal of a sweep"):
         run_sweep(small_sweep(), tmp_path / "map.nc")
     assert path.read_text() == "notes\n"
 

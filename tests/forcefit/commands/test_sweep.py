@@ -235,7 +235,7 @@ def test_ask_sweep_takes_paths_as_text_or_as_paths(tmp_path):
          "NetCDF file of forcefit: .nc"),
         (["-o", "x"], "x: found no ending, expected a NetCDF file of forcefit: .nc"),
         (["-o", "other.nc"], "other.nc: found a file that is not a NetCDF file of "
-         "forcefit; expected one, or no file: it is not overwritten"),
+         "forcefit; expected such a file, or no file: it is not overwritten"),
         (["-o", "measured.nc"], "measured.nc: found a NetCDF file that is not one of a "
          "sweep by forcefit"),
         (["-o", "x.nc", "--figure", "x.xyz"], 'x.xyz: found the ending ".xyz", '

@@ -225,7 +225,8 @@ def test_file_above_64_mib_is_refused(tmp_path):
     path = tmp_path / "large"
     with path.open("wb") as file:
         file.truncate((64 << 20) + 1)
-    assert message(read_text, path) == f"{path}: larger than 64 MiB"
+    expected = "found a file larger than 64 MiB, expected a smaller one"
+    assert message(read_text, path) == f"{path}: {expected}"
 
 
 @pytest.mark.parametrize(("text", "reason"), [

@@ -41,7 +41,7 @@ _MAY = {
     "stiffness/surface/surface_worker.py",  # a temporary folder
     "assembly/files/stored_solutions.py",  # through whole_file
     "assembly/sweeps/dataset.py",  # NetCDF through whole_file
-    "forcefit/commands/assembly.py",  # pixels of a screenshot
+    "forcefit/commands/show.py",  # pixels of a screenshot
     "forcefit/page/page.py",  # into memory
     "assembly/statistics/replay.py",  # likewise
     "validation/study/report.py",  # likewise

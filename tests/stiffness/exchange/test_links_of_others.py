@@ -250,7 +250,7 @@ def test_matrix_that_is_not_of_a_link_is_refused_in_one_line(
 
 
 @pytest.mark.parametrize(("name", "text", "message"), [
-    ("k.mtx", "%%MatrixMarket matrix nonsense\n", "no Matrix Market file"),
+    ("k.mtx", "%%MatrixMarket matrix nonsense\n", "expected a matrix, coordinate"),
     ("k.mtx", "1 1 1 1\n", "line 1: found 4 words"),
     ("k.mtx", "1 1 1 1 x\n", "expected a number"),
     ("k.mtx", "1 1 1 1 1\n1 1 1\n", "line 2: found 3 words, expected node,"),
@@ -263,8 +263,8 @@ def test_matrix_that_is_not_of_a_link_is_refused_in_one_line(
     ("k.pch", "DMIG    A              0       9       1       0\n", "form '9'"),
     ("k.pch", "DMIG,A,1,1,,1,1,1.0\nDMIG,B,1,1,,1,1,1.0\n", "the matrices A, B"),
     ("k.pch", "DMIG,A,1,x,,1,1,1.0\n", "expected a whole number"),
-    ("k.npy", "not numpy", "no matrix of NumPy"),
-    ("k.npz", "not numpy", "no matrix of NumPy"),
+    ("k.npy", "not numpy", "not a matrix of NumPy"),
+    ("k.npz", "not numpy", "not a matrix of NumPy"),
     ("k.odb", "", "found the ending .odb, expected one of"),
 ])  # fmt: skip
 def test_wrong_matrix_file_is_refused_in_one_line(run, name, text, message, tmp_path):

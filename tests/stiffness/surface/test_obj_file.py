@@ -69,14 +69,14 @@ def test_a_concave_polygon_is_cut_into_triangles_inside_it(tmp_path):
 
 
 @pytest.mark.parametrize(("line", "message"), [
-    ("f 1 2 9", r"cube.obj:9: found a face of point 9, expected 1 to 8"),
-    ("f 1 2 0", r"cube.obj:9: found a face of point 0, expected 1 to 8"),
-    ("f -9 2 3", r"cube.obj:9: found a face of point 0, expected 1 to 8"),
+    ("f 1 2 9", r"cube.obj:9: found point 9 in a face, expected points 1 to 8"),
+    ("f 1 2 0", r"cube.obj:9: found point 0 in a face, expected points 1 to 8"),
+    ("f -9 2 3", r"cube.obj:9: found point 0 in a face, expected points 1 to 8"),
     ("f 1 2", r"cube.obj:9: found a face of 2 points"),
     ("f 1 2 x", r"cube.obj:9: found 'f 1 2 x', expected f with numbers"),
     ("v 1 2", r"cube.obj:9: found 'v 1 2', expected v X Y Z"),
     ("v 1 2 z", r"cube.obj:9: found 'v 1 2 z', expected v X Y Z"),
-    ("f 1 2 400000000", r"found a face of point 400000000, expected 1 to 8"),
+    ("f 1 2 400000000", r"found point 400000000 in a face, expected points 1 to 8"),
 ])  # fmt: skip
 def test_wrong_obj_line_is_refused_with_its_number(tmp_path, line, message):
     path = tmp_path / "cube.obj"

@@ -122,9 +122,12 @@ def test_reversed_triangles_are_repaired_and_reported(rng, turned, hollow):
         expected = 1e-3 * 7 / 8
     surface = check_surface(points, triangles, "cube")
     assert surface.volume == pytest.approx(expected)
-    words = [f"{min(turned, 12 - turned)} triangles turned to agree with the rest"]
+    words = [
+        f"{min(turned, 12 - turned)} triangles reoriented to agree with their "
+        "neighbours"
+    ]
     if turned > 6:
-        words.append("the surface was inside out and has been turned")
+        words.append("the surface was inside out and has been reoriented")
     assert surface.repairs == tuple(words)
     edges = {tuple(edge) for edge in directed_edges(surface.triangles)}
     assert edges == {(b, a) for a, b in edges}

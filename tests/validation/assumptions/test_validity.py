@@ -272,7 +272,7 @@ def test_validity_command_reports_which_assumptions_matter(tmp_path):
     }  # fmt: skip
     assert costs["disc and cone, not two bushes"]["matters"]
     assert "--solids" in costs["beams, not solids"]["reason"]
-    assert "no beam with a density" in costs["weight at the links' ends"]["reason"]
+    assert "no beam has a density" in costs["weight at the links' ends"]["reason"]
     assert "above 20 um or 1 %" in outcome.output
 
 

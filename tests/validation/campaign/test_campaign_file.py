@@ -204,7 +204,7 @@ BAD_TABLES = {
     "nothing measured": (HEAD, [ROWS[0].replace("1e-05,2e-05,3e-05", ",,")],
         r'line 2 \(id "m1"\): found no reading in this row; expected'),
     "an id twice": (HEAD, [*ROWS, ROWS[1]],
-        r'line 6, id: found "m2", already the label of line 3; expected another'),
+        r'line 6, id: found "m2", already the label of line 3; expected a '),
     "no label": (HEAD, [ROWS[0].replace("m1", " ")], r"line 2, id: empty"),
     "approach": (HEAD, [ROWS[0][:-1] + "0"],
         r"cov.approach: found 0, expected -1 or 1"),
@@ -249,7 +249,7 @@ BAD_TOML = {
     "unknown key": ({"note": '"x"'}, NOISE, r'unknown key "note"; did you mean "noi'),
     "robot missing": ({"robot": None}, NOISE, r"robot: missing; expected a built-in"),
     "no such robot": ({"robot": '"irsbot3"'}, NOISE,
-        r'robot: found "irsbot3", neither a built-in robot nor a file beside this; '
+        r'robot: found "irsbot3", neither a built-in robot nor a file in this folder; '
         r'did you mean "irsbot2"\?'),
     "no table": ({"measurements": '"m.csv"'}, NOISE, r"m.csv: cannot be read: No such"),
     "a point in mm": ({"reference_point": "[20, 0, 50]"}, NOISE,

@@ -120,7 +120,7 @@ def test_set_up_rows_of_a_single_place_do_not_suffice(machine, run):
     assert code == 1
     assert not out.exists()
     assert not day["suffices"]
-    assert "do not suffice" in said
+    assert "are not sufficient" in said
     assert day["uncertainty"] > 10 * day["left_in_setup"]
 
 
@@ -156,9 +156,7 @@ def test_drift_is_not_carried_over_without_a_clock(machine, run):
     code, said, (day,), out = carried(run, machine, folder, "--setup", "12")
     assert code == 0
     assert day["left_behind"] == ["reading tx of time"]
-    assert (
-        "not carried over, an effect of an earlier session: reading tx of time" in said
-    )
+    assert "not used here, an effect of an earlier session: reading tx of time" in said
     assert 0.9 < day["error"]["normalised"] < 1.3
     assert load_robot(out).functions == ()
 
@@ -188,11 +186,11 @@ def test_set_up_rows_of_the_first_minutes_do_not_determine_a_drift(machine, run)
     assert code == 1
     assert {"sine", "cosine"} & set(day["open"])
     assert 3e-5 < day["uncertainty"] < 3e-4
-    assert "do not suffice" in said
+    assert "are not sufficient" in said
 
 
 @pytest.mark.parametrize(("words", "message"), [
-    (["--setup", "x1"], 'found "x1", which is no row'),
+    (["--setup", "x1"], 'found "x1", expected a row'),
     (["--setup", "1-99"], 'found "1-99", expected rows 1 to 6'),
     (["--setup", "0"], "found no set-up rows"),
     (["--setup", "6"], "nothing but set-up"),

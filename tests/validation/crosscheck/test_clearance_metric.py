@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import tolerance_sources
 from assembly.model.robot import BeamLink, Clearance, Frame, Robot
@@ -173,6 +174,23 @@ def test_misfit_within_the_clearance_stores_no_energy():
     free = simulate_assembly(loose, model=SimulationModel(clearances=True))
     assert free.rigid_energy < 1e-5 * simulate_assembly(tight).energy
     assert np.linalg.norm(free.clearance_screws[0, 3:5]) < 3e-5
+
+
+def test_a_ball_reduces_an_oblique_misfit_as_in_the_exact_model():
+    """As for an axial clearance, the smoothing is left."""
+    posture = coaxial([0, 0, 0, 6e-5, -9e-5, 3e-5], Clearance(ball=3e-5))
+    exact = solve_exact(posture)
+    found = simulate_assembly(posture, model=SimulationModel(clearances=True))
+    assert found.rigid_energy == pytest.approx(exact.energy, rel=3e-3)
+    moved = found.clearance_screws[0, 3:]
+    assert np.linalg.norm(moved) == pytest.approx(3e-5, rel=2e-2)
+    np.testing.assert_allclose(moved, exact.clearance_screws[0, 3:], atol=1e-6)
+
+
+def test_crosscheck_of_a_joint_with_a_ball_passes():
+    posture = coaxial([1e-3, 0, 0, 6e-5, -9e-5, 3e-5], Clearance(ball=3e-5, tilt=5e-4))
+    check = crosscheck(posture, (1.0, 0.5, 0.25), clearances=True)
+    assert check.passed, check.checks
 
 
 @pytest.fixture(scope="module")

@@ -272,7 +272,7 @@ def test_checks_without_signal_are_counted_separately():
     assert result.passed
     outcome = result.text().splitlines()
     counted = f"{len(silent)} of {len(result.checks)}"
-    assert outcome[-1] == f"passed; {counted} checks had nothing to compare"
+    assert outcome[-1] == f"passed; {counted} checks had no signal above the noise"
 
 
 def test_crosscheck_reports_a_failed_simulation_as_a_row():

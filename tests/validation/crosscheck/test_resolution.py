@@ -89,7 +89,7 @@ def test_unloaded_clearance_is_reported_as_unproved():
     assert axial.unproved
     (line,) = (x for x in resolution_text(list(by_name.values())) if "unproved" in x)
     assert axial.name in line
-    assert f"1 of {len(by_name)} numbers" in line
+    assert f"1 of {len(by_name)} parameters" in line
 
 
 @pytest.mark.slow

@@ -69,7 +69,7 @@ def test_diagnose_does_not_save_a_robot_without_findings(tmp_path, run):
         "validation", "diagnose", folder, "--save", tmp_path / "r.toml"
     )
     assert status == 1
-    assert "no error or effect was found that the declared robot lacks" in err
+    assert "no error or effect in addition to the declared ones" in err
     assert not (tmp_path / "r.toml").exists()
 
 

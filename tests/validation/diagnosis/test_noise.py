@@ -67,4 +67,4 @@ def test_common_noise_is_reported_with_its_sizes(common, words):
 
 def test_common_noise_without_repeats_is_reported_as_uncertain():
     (told,) = findings(1.0, 0.03, (0.0, 0), memory=False, common=(0.0, 5e-6))
-    assert "a cause that was not recorded would look the same" in told
+    assert "an unrecorded cause has the same effect" in told

@@ -97,7 +97,7 @@ def test_verdict_sentence_states_the_supporting_findings(
     } | changes)  # fmt: skip
     assert expected in sentence(one)
     one.held = HeldOut("none", (np.ones(2, bool),), "")
-    assert "on the rows fitted, too few to hold any out" in sentence(one)
+    assert "on the fitted rows (too few to hold any out)" in sentence(one)
 
 
 def test_text_states_the_number_of_rows_with_a_free_motion():

@@ -514,7 +514,7 @@ def test_delimiter_is_the_one_of_most_lines(tmp_path):
 def test_binary_file_is_refused(tmp_path):
     path = tmp_path / "a.txt"
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(40) + b"name,x,y,z")
-    with pytest.raises(BadInput, match="holds NUL"):
+    with pytest.raises(BadInput, match="found the character NUL"):
         read_sheet(path)
 
 

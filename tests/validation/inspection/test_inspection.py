@@ -86,7 +86,7 @@ SAYINGS = {
     "no thermometer": ({"temperature": None}, "temperature lost: No cov.temperature"),
     "constant": ({"temperature": np.full(60, 6.0)},
         "temperature lost: The temperature stayed at +6 K in every row: thermal "
-        "expansion looks exactly like longer links."),
+        "expansion has the same effect as longer links."),
     "calibrated": ({"temperature": np.zeros(60)},
         "stayed at +0 K in every row: thermal expansion has no effect."),
     "too even": ({"temperature": np.linspace(0, 0.1, 60)},
@@ -120,8 +120,9 @@ def test_design_without_weaknesses_has_one_remark(rng):
     """The only remark is that each configuration has one load."""
     found = [t for t in texts(sound(rng)) if " fine: " not in t]
     assert found == [
-        "load careful: No configuration was measured under two loads: what the load "
-        "does and what the configuration does are distinguished by the model alone."
+        "load careful: No configuration was measured under two loads: effects of "
+        "the load and effects of the configuration are distinguished by the model "
+        "alone."
     ]
 
 

@@ -48,5 +48,18 @@ def test_governing_rows_exclude_the_own_motion_of_a_joint():
     assert [(one["part"], one["what"]) for one in rows] == [("f1", ERROR)]
 
 
+def test_a_ball_is_one_governing_clearance():
+    """Without it only the error is left, without the error only the ball."""
+    posture = chain((3e-4, None), (0.0, None))
+    first, second = posture.robot.frames
+    ball = replace(second, clearance=Clearance(ball=1e-4))
+    robot = replace(posture.robot, frames=(first, ball))
+    rows = governing(replace(posture, robot=robot))
+    seen = [(one["part"], one["what"]) for one in rows]
+    assert seen == [("f0", ERROR), ("f1", CLEARANCE)]
+    for one, size in zip(rows, (1e-4, 3e-4), strict=True):
+        assert size * (1 - 1e-9) <= one["translation"] <= size + 1e-6
+
+
 def test_perfect_robot_has_no_governing_rows():
     assert governing(chain((0.0, None), (0.0, None))) == []

@@ -1,0 +1,245 @@
+"""The callouts of one feature, as a drawing states them, and their zone."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.callouts.fits import parse_size
+from assembly.callouts.general_tolerances import (
+    linear_tolerance,
+    parse_general,
+    perpendicularity_tolerance,
+)
+from assembly.callouts.zone import Zone, intersection
+from assembly.callouts.zones_of_features import (
+    axis_orientation,
+    axis_position,
+    axis_position_along,
+    plane_orientation,
+    plane_position,
+    point_position,
+    shift_along,
+)
+from forcefit.inputs.table import BadInput
+
+SHAPES = ("axis", "plane", "point")
+# components of a screw that a datum of each shape holds, in its axes
+HELD = {
+    "axis": (0, 1, 3, 4),
+    "plane": (0, 1, 5),
+    "point": (3, 4, 5),
+    "guide": (0, 1, 2, 3, 4),
+    "body": (0, 1, 2, 3, 4, 5),
+}
+LOCATIONS = ("position", "coaxiality", "profile")
+ORIENTATIONS = ("perpendicularity", "parallelism", "angularity")
+_ALONG = 1e-3  # sine of the angle below which two directions are parallel
+_SAME_LENGTH = 1e-6  # [m] a stated length may differ so much from the nominal geometry
+
+
+@dataclass(frozen=True)
+class Datum:
+    """A feature from which others are measured.
+
+    Attributes:
+        frame: name of the frame.
+        shape: one of :data:`HELD`; a guide is an axis that holds the turn about itself
+            too, a body holds all.
+        axis: (3,) unit vector of its axis or normal, in the frame's axes.
+        at: (3,) [m] its middle, in the frame's axes.
+    """
+
+    frame: str
+    shape: str = "axis"
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Callout:
+    """The callouts of one feature of a body, which its joint or frame names.
+
+    Attributes:
+        name: of the feature, such as ``"leg1.bore on tube"``.
+        feature: name of the frame.
+        after: whether the feature is on the body that the frame's joint moves, not on
+            the body before it.
+        datums: A, B, C in this order, at least one.
+        shape: one of :data:`SHAPES`.
+        axis: (3,) unit vector of the axis or the normal, in the frame's axes.
+        extent: [m] length of a bore; two sizes of a face, along its x and y.
+        widths: [m] of each zone, by the words of :data:`LOCATIONS` and
+            :data:`ORIENTATIONS`.
+        hole: size of a hole whose position holds at maximum material, such as
+            ``"12 H7"``; empty if it holds at every size.
+        direction: (3,) unit vector in which the zones are, at right angles to the
+            axis, in the frame's axes; None for all directions.  Of a face: that of its
+            first size.
+        length: [m] distance from datum A and its tolerance to each side, or None.
+        general: general tolerance, such as ``"ISO 2768-mK"``, or empty.
+        distribution: see :meth:`assembly.callouts.zone.Zone.draw`.
+        cp: capability of a normal distribution.
+        at: (3,) [m] the middle of the feature, in the frame's axes.
+    """
+
+    name: str
+    feature: str
+    datums: tuple[Datum, ...]
+    after: bool = False
+    shape: str = "axis"
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    extent: tuple[float, ...] = ()
+    widths: Mapping[str, float] = field(default_factory=dict)
+    hole: str = ""
+    direction: tuple[float, float, float] | None = None
+    length: tuple[float, float] | None = None
+    general: str = ""
+    distribution: str = "uniform"
+    cp: float = 1.0
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def words(self) -> str:
+        """What is called out: ``"position and perpendicularity"``."""
+        found = [*self.widths, *(["length"] if self.length else [])]
+        found += ["general tolerance"] if self.general else []
+        return " and ".join(found)
+
+    @property
+    def first_width(self) -> float:
+        """[m] width of the first zone, or the tolerance of the length to each side."""
+        if self.widths:
+            return next(iter(self.widths.values()))
+        return self.length[1] if self.length else 1.0
+
+    @property
+    def axes(self) -> NDArray:
+        """(3, 3) axes of the feature as columns, in the frame's: z = axis."""
+        if self.shape == "plane" and self.direction is not None:
+            x, z = np.array(self.direction), np.array(self.axis)
+            return np.column_stack([x, np.cross(z, x), z])
+        return axes_along(self.axis)
+
+
+def axes_along(axis: tuple[float, float, float]) -> NDArray:
+    """Return (3, 3) axes as columns with z along a unit vector, unchanged for z."""
+    z = np.array(axis)
+    if np.array_equal(z, [0.0, 0.0, 1.0]):
+        return np.eye(3)
+    x = np.eye(3)[int(np.argmin(abs(z)))]
+    x = x - (x @ z) * z
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def zone_of(callout: Callout, offset: NDArray, datum_axis: NDArray | None) -> Zone:
+    """Return the zone of a feature's deviation relative to its datums.
+
+    Args:
+        callout: of the feature.
+        offset: (3,) [m] from datum A to the feature, in the feature's axes.
+        datum_axis: (3,) unit vector of datum A, its axis or its normal, in the
+            feature's axes; None for a point.
+
+    Returns:
+        The zone in the feature's axes, within the zones of all its callouts.
+
+    Raises:
+        BadInput: a callout does not fit the nominal geometry.
+    """
+    zones = [_zone(callout, kind, width) for kind, width in callout.widths.items()]
+    away = _away(callout.shape, offset, datum_axis)
+    distance = float(np.linalg.norm(away))
+    if callout.length:
+        nominal, tolerance = callout.length
+        if abs(distance - nominal) > _SAME_LENGTH:
+            found = f"found a length of {nominal * 1e3:g} mm"
+            raise BadInput(f"{found}, expected that at home, {distance * 1e3:g} mm")
+        zones.append(shift_along(tolerance, away / distance))
+    if callout.general:
+        zones += _general(callout, away, datum_axis)
+    return intersection(zones)
+
+
+def _zone(callout: Callout, kind: str, width: float) -> Zone:
+    """The zone of one width."""
+    across = callout.direction
+    direction = None if across is None else (np.array(across) @ callout.axes)[:2]
+    location = kind in LOCATIONS
+    if callout.shape == "point":
+        return point_position(width)
+    if callout.shape == "plane":
+        return (plane_position if location else plane_orientation)(
+            width, *callout.extent
+        )
+    (length,) = callout.extent
+    if not location:
+        return axis_orientation(width, length, direction)
+    if direction is not None:
+        return axis_position_along(width, length, direction)
+    bonus = 0.0
+    if callout.hole and kind == "position":
+        bonus = float(np.ptp(parse_size(callout.hole)))
+    return axis_position(width, length, bonus)
+
+
+def _away(shape: str, offset: NDArray, datum_axis: NDArray | None) -> NDArray:
+    """(3,) the offset that a length states: across parallel axes, along a normal."""
+    if shape == "plane":
+        return np.array([0.0, 0.0, offset[2]])
+    if datum_axis is not None and np.linalg.norm(datum_axis[:2]) < _ALONG:
+        return np.array([offset[0], offset[1], 0.0])
+    return offset
+
+
+def _general(callout: Callout, away: NDArray, datum_axis: NDArray | None) -> list[Zone]:
+    """The zones of a general tolerance: the length, and perpendicularity."""
+    linear, geometry = parse_general(callout.general)
+    distance = float(np.linalg.norm(away))
+    zones = [shift_along(linear_tolerance(distance, linear), away / distance)]
+    square = datum_axis is not None and abs(datum_axis[2]) < _ALONG
+    if geometry and square and callout.shape == "axis" and callout.extent:
+        width = perpendicularity_tolerance(callout.extent[0], geometry)
+        zones.append(axis_orientation(width, callout.extent[0]))
+    return zones
+
+
+def check_orientation(
+    callout: Callout, axis: NDArray, datum_axis: NDArray | None, same_shape: bool
+) -> None:
+    """Refuse perpendicularity and parallelism that the nominal geometry does not have.
+
+    Args:
+        callout: of the feature.
+        axis: (3,) unit vector of the feature's axis or normal.
+        datum_axis: (3,) of datum A in the same axes, None for a point.
+        same_shape: whether both are axes, or both planes.
+
+    Raises:
+        BadInput: the angle at home is another one, or the datum is a point.
+    """
+    for kind in set(callout.widths) & set(ORIENTATIONS):
+        if datum_axis is None:
+            raise BadInput(f"found {kind} to a point, expected an axis or a plane as A")
+        cosine = abs(float(axis @ datum_axis))
+        parallel = cosine > np.sqrt(1 - _ALONG**2)
+        square = cosine < _ALONG
+        fits = {
+            "parallelism": parallel if same_shape else square,
+            "perpendicularity": square if same_shape else parallel,
+            "angularity": True,
+        }[kind]
+        if not fits:
+            angle = np.degrees(np.arccos(min(1.0, cosine)))
+            raise BadInput(
+                f"found {kind} where axis or normal and that of datum A are at "
+                f"{angle:.4g} deg at home, expected {_expected(kind, same_shape)} deg; "
+                "angularity is for other angles"
+            )
+
+
+def _expected(kind: str, same_shape: bool) -> int:
+    """[deg] angle of axes or normals."""
+    return 0 if (kind == "parallelism") == same_shape else 90

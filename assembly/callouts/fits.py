@@ -1,0 +1,260 @@
+"""Fits of ISO 286: limits of a hole and a shaft, and the clearance between them.
+
+The tables are those of ISO 286-1:2010 for the letters d to p without finer size steps.
+A step is "over a, up to b": 30 mm belongs to 18-30.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.table import BadInput, quoted
+
+STEPS = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)  # [mm] up to
+GRADES = (5, 6, 7, 8, 9, 10, 11)
+# [um] tolerance of each grade, a row for each step
+_WIDTHS = (
+    (4, 6, 10, 14, 25, 40, 60),
+    (5, 8, 12, 18, 30, 48, 75),
+    (6, 9, 15, 22, 36, 58, 90),
+    (8, 11, 18, 27, 43, 70, 110),
+    (9, 13, 21, 33, 52, 84, 130),
+    (11, 16, 25, 39, 62, 100, 160),
+    (13, 19, 30, 46, 74, 120, 190),
+    (15, 22, 35, 54, 87, 140, 220),
+    (18, 25, 40, 63, 100, 160, 250),
+    (20, 29, 46, 72, 115, 185, 290),
+    (23, 32, 52, 81, 130, 210, 320),
+    (25, 36, 57, 89, 140, 230, 360),
+    (27, 40, 63, 97, 155, 250, 400),
+)
+# [um] fundamental deviation of shafts: the upper one of d to h, the lower one of k to p
+_DEVIATIONS = {
+    "d": (-20, -30, -40, -50, -65, -80, -100, -120, -145, -170, -190, -210, -230),
+    "e": (-14, -20, -25, -32, -40, -50, -60, -72, -85, -100, -110, -125, -135),
+    "f": (-6, -10, -13, -16, -20, -25, -30, -36, -43, -50, -56, -62, -68),
+    "g": (-2, -4, -5, -6, -7, -9, -10, -12, -14, -15, -17, -18, -20),
+    "h": (0,) * 13,
+    "k": (0, 1, 1, 1, 2, 2, 2, 3, 3, 4, 4, 4, 5),
+    "m": (2, 4, 6, 7, 8, 9, 11, 13, 15, 17, 20, 21, 23),
+    "n": (4, 8, 10, 12, 15, 17, 20, 23, 27, 31, 34, 37, 40),
+    "p": (6, 12, 15, 18, 22, 26, 32, 37, 43, 50, 56, 62, 68),
+}
+LETTERS = ("d", "e", "f", "g", "h", "js", "k", "m", "n", "p")
+_ONE = r"([A-Za-z]{1,2})(\d{1,2})"
+_FIT = re.compile(rf"\s*(\d+\.?\d*)\s*(?:mm)?\s*{_ONE}\s*/\s*{_ONE}\s*")
+_SIZE = re.compile(rf"\s*(\d+\.?\d*)\s*(?:mm)?\s*{_ONE}\s*")
+_UM = 1e-6
+_EXPECTED = 'expected a fit such as "12 H7/g6"'
+# share of a normal size outside its limits is 2 Phi(-3 Cp): limits at 3 Cp deviations
+_DEVIATIONS_IN_LIMIT = 3.0
+
+
+class Limits(NamedTuple):
+    """Deviations of a hole or a shaft from the nominal size, [m]."""
+
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A hole and a shaft of the same nominal size.
+
+    Attributes:
+        text: as the drawing states it.
+        size: [m] nominal diameter.
+        hole: deviations of the hole.
+        shaft: deviations of the shaft.
+    """
+
+    text: str
+    size: float
+    hole: Limits
+    shaft: Limits
+
+    @property
+    def diametral(self) -> tuple[float, float]:
+        """[m] least and largest hole minus shaft; negative is interference."""
+        return self.hole.lower - self.shaft.upper, self.hole.upper - self.shaft.lower
+
+    @property
+    def kind(self) -> str:
+        """``"clearance"``, ``"transition"`` or ``"interference"``."""
+        least, most = self.diametral
+        if least >= 0:
+            return "clearance"
+        return "transition" if most > 0 else "interference"
+
+    @property
+    def radial(self) -> tuple[float, float]:
+        """[m] least and largest radial clearance, half the diametral one, >= 0."""
+        least, most = self.diametral
+        return max(0.0, least / 2), max(0.0, most / 2)
+
+    @property
+    def mean_radial(self) -> float:
+        """[m] radial clearance of parts of mean sizes, 0 if they interfere."""
+        return max(0.0, sum(self.diametral) / 4)
+
+    def draw(
+        self, uniform: NDArray, distribution: str = "uniform", cp: float = 1.0
+    ) -> NDArray:
+        """Return random radial clearances; 0 where the parts interfere.
+
+        Args:
+            uniform: (k, 2) numbers between 0 and 1, for the hole and the shaft.
+            distribution: of each size within its limits: ``"uniform"`` or ``"normal"``,
+                centred, not cut at the limits.
+            cp: capability of the normal sizes, (upper - lower) / (6 sigma).
+
+        Returns:
+            (k,) [m].
+        """
+        from scipy.special import ndtri
+
+        sizes = []
+        for column, limits in zip(uniform.T, (self.hole, self.shaft), strict=True):
+            middle, half = np.mean(limits), (limits.upper - limits.lower) / 2
+            if distribution == "uniform":
+                relative = 2.0 * column - 1.0
+            else:
+                relative = ndtri(np.maximum(column, 2.0**-54))
+                relative /= _DEVIATIONS_IN_LIMIT * cp
+            sizes.append(middle + half * relative)
+        return np.asarray(np.maximum(0.0, (sizes[0] - sizes[1]) / 2))
+
+
+def parse_fit(text: str) -> Fit:
+    """Return the fit that a text states.
+
+    Args:
+        text: nominal size in mm, hole and shaft, such as ``"12 H7/g6"``.
+
+    Returns:
+        The fit, of any kind.
+
+    Raises:
+        BadInput: it is no fit, or one that the tables do not have.
+    """
+    match = _FIT.fullmatch(text)
+    if match is None:
+        raise BadInput(f"found {quoted(text)}, {_EXPECTED}")
+    size, hole, hole_grade, shaft, shaft_grade = match.groups()
+    if not hole.isupper() or not shaft.islower():
+        fault = "capital letters are holes, small letters shafts"
+        raise BadInput(f"found {quoted(text)}, {_EXPECTED}: {fault}")
+    return Fit(
+        text.strip(), float(size) * 1e-3, limits_of(float(size), hole, int(hole_grade)),
+        limits_of(float(size), shaft, int(shaft_grade)),
+    )  # fmt: skip
+
+
+def clearance_fit(text: str) -> Fit:
+    """Return a fit whose parts have clearance at least for some sizes.
+
+    Raises:
+        BadInput: see :func:`parse_fit`; or the parts always interfere.
+    """
+    fit = parse_fit(text)
+    if fit.kind == "interference":
+        least, most = (1e6 * x for x in fit.diametral)
+        raise BadInput(
+            f"found {quoted(text)}, an interference fit ({least:.0f} to {most:.0f} "
+            "um), "
+            'expected a clearance or transition fit; write type = "fixed" without '
+            "clearance for a press fit"
+        )
+    return fit
+
+
+def parse_size(text: str) -> Limits:
+    """Return the deviations of one size, such as ``"12 H7"`` or ``"20 k6"``.
+
+    Raises:
+        BadInput: it is no such text, or one that the tables do not have.
+    """
+    match = _SIZE.fullmatch(text)
+    if match is None:
+        raise BadInput(f'found {quoted(text)}, expected a size such as "12 H7"')
+    return limits_of(float(match[1]), match[2], int(match[3]))
+
+
+def limits_of(size: float, letter: str, grade: int) -> Limits:
+    """Return the deviations of a hole (capital letter) or a shaft (small letter).
+
+    Args:
+        size: [mm] nominal, over 0 to 500.
+        letter: d e f g h js k m n p, or D to P for a hole.
+        grade: 5 to 11; K, M, N of grades 6 to 8 and P of 6 and 7 only.
+
+    Returns:
+        The deviations.
+
+    Raises:
+        BadInput: the tables have no such entry.
+    """
+    name = f"{letter}{grade}"
+    small = letter.lower()
+    if small not in LETTERS or letter not in (small, small.upper()):
+        known = " ".join(LETTERS)
+        raise BadInput(
+            f"found {quoted(name)}, expected one of the letters {known}, or the same "
+            "as capitals for a hole (ISO 286)"
+        )
+    if grade not in GRADES:
+        raise BadInput(f"found {quoted(name)}, expected a grade from 5 to 11 (ISO 286)")
+    if not 0 < size <= STEPS[-1]:
+        fault = f"found a nominal size of {size:g} mm"
+        raise BadInput(f"{fault}, expected over 0 and up to {STEPS[-1]} mm (ISO 286)")
+    step = int(np.searchsorted(STEPS, size))
+    if letter == small:
+        lower, upper = _shaft(step, small, grade)
+    else:
+        lower, upper = _hole(step, small, grade)
+    return Limits(lower * _UM, upper * _UM)
+
+
+def _width(step: int, grade: int) -> float:
+    """[um] tolerance of a grade."""
+    return float(_WIDTHS[step][grade - GRADES[0]])
+
+
+def _shaft(step: int, letter: str, grade: int) -> tuple[float, float]:
+    """[um] lower and upper deviation of a shaft."""
+    width = _width(step, grade)
+    if letter == "js":
+        return -width / 2, width / 2
+    deviation = float(_DEVIATIONS[letter][step])
+    if letter in "defgh":
+        return deviation - width, deviation
+    if letter == "k" and grade > 7:
+        deviation = 0.0
+    return deviation, deviation + width
+
+
+def _hole(step: int, letter: str, grade: int) -> tuple[float, float]:
+    """[um] lower and upper deviation of a hole."""
+    # D to H mirror the shafts.  K, M, N and P have ES = -ei + Delta with Delta = IT(n)
+    # - IT(n-1) over 3 mm, except M6 of 250-315.
+    width = _width(step, grade)
+    if letter == "js":
+        return -width / 2, width / 2
+    deviation = float(_DEVIATIONS[letter][step])
+    if letter in "defgh":
+        return -deviation, -deviation + width
+    finest, coarsest = 6, 7 if letter == "p" else 8
+    if not finest <= grade <= coarsest:
+        name = f"{letter.upper()}{grade}"
+        raise BadInput(
+            f"found {quoted(name)}, expected {letter.upper()} of a grade from "
+            f"{finest} to {coarsest}: the table has no others"
+        )
+    delta = width - _width(step, grade - 1) if step else 0.0
+    upper = -deviation + delta
+    if (letter, grade, STEPS[step]) == ("m", 6, 315):
+        upper = -9.0
+    return upper - width, upper

@@ -1,0 +1,60 @@
+"""Random points in products of unit balls, from uniform numbers."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+VOLUMES = {1: 2.0, 2: np.pi, 3: 4 * np.pi / 3}  # of unit balls, by dimension
+
+
+def in_balls(
+    uniform: NDArray, dimensions: tuple[int, ...], distribution: str = "uniform",
+    s: float = 0.0,
+) -> NDArray:  # fmt: skip
+    """Return points in a product of unit balls from uniform numbers.
+
+    Args:
+        uniform: (k, m or more) independent, between 0 and 1.
+        dimensions: of each ball, m in all.
+        distribution: ``"uniform"``, ``"truncated"``, or ``"normal"`` (also outside).
+        s: standard deviation of each coordinate of the normal ones.
+
+    Returns:
+        (k, m).
+    """
+    ends = np.cumsum(dimensions)
+    parts = np.split(uniform[:, : ends[-1]], ends[:-1], axis=1)
+    return np.hstack([_in_ball(part, distribution, s) for part in parts])
+
+
+def _in_ball(uniform: NDArray, distribution: str, s: float) -> NDArray:
+    """(k, d) points of a unit ball of dimension d from (k, d) uniform numbers."""
+    from scipy.special import gammainc, gammaincinv
+
+    d = uniform.shape[1]
+    v = abs(2 * uniform[:, 0] - 1) if d == 1 else uniform[:, 0]
+    if distribution == "uniform":
+        radius = v ** (1 / d)
+    else:
+        share = gammainc(d / 2, 0.5 / s**2) if distribution == "truncated" else 1.0
+        radius = s * np.sqrt(2 * gammaincinv(d / 2, np.minimum(v, 1 - 2**-53) * share))
+    if d == 1:
+        return np.asarray(np.copysign(radius, uniform[:, 0] - 0.5))[:, None]
+    angle = 2 * np.pi * uniform[:, 1]
+    across, along = radius, None
+    if d == 3:
+        height = 2 * uniform[:, 2] - 1
+        across, along = radius * np.sqrt(1 - height**2), radius * height
+    plane = [across * np.cos(angle), across * np.sin(angle)]
+    return np.column_stack(plane if along is None else [*plane, along])
+
+
+def ball_variance(d: int, distribution: str, s: float) -> float:
+    """Return the variance of each coordinate in a unit ball of dimension d."""
+    if distribution == "uniform":
+        return 1.0 / (d + 2)
+    if distribution == "normal":
+        return s**2
+    from scipy.special import gammainc
+
+    limit = 0.5 / s**2
+    return float(s**2 * gammainc(d / 2 + 1, limit) / gammainc(d / 2, limit))

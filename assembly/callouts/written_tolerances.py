@@ -1,0 +1,65 @@
+"""Widths, lengths with tolerances, and zones at maximum material, as texts."""
+
+import re
+
+from forcefit.inputs.number_arrays import as_number
+from forcefit.inputs.table import BadInput, describe
+
+_UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
+_NUMBER = r"(\d+\.?\d*|\.\d+)(?:[eE]([-+]?\d+))?"
+_WIDTH = re.compile(rf"\s*{_NUMBER}\s*(m|mm|um|in)\s*(\(M\))?\s*")
+_LENGTH = re.compile(
+    rf"\s*{_NUMBER}\s*(m|mm|um|in)?\s*(?:\+-|\+/-|±)\s*{_NUMBER}\s*(m|mm|um|in)\s*"
+)
+
+
+def parse_width(value: object) -> tuple[float, bool]:
+    """Return the width of a zone, and whether it holds at maximum material.
+
+    Args:
+        value: a number in m, or a text such as ``"0.05 mm"`` or ``"0.05 mm (M)"``.
+
+    Returns:
+        [m] > 0, and whether ``(M)`` follows.
+
+    Raises:
+        BadInput: it is neither.
+    """
+    expected = 'expected a width > 0 such as "0.05 mm"'
+    width, at_most = -1.0, False
+    if not isinstance(value, str):
+        width = as_number(value)
+    elif match := _WIDTH.fullmatch(value):
+        width, at_most = _value(match[1], match[2]) * _UNITS[match[3]], bool(match[4])
+    if not 0 < width < 1.0:
+        raise BadInput(f"found {describe(value)}, {expected}")
+    return width, at_most
+
+
+def parse_length(value: object) -> tuple[float, float]:
+    """Return a length and its tolerance, plus and minus, both in m.
+
+    Args:
+        value: a text such as ``"452 +- 0.1 mm"``.
+
+    Returns:
+        [m] the length, and [m] its tolerance > 0.
+
+    Raises:
+        BadInput: it is no such text, or the tolerance is 0 or not below the length.
+    """
+    expected = 'expected a length such as "452 +- 0.1 mm"'
+    match = _LENGTH.fullmatch(value) if isinstance(value, str) else None
+    if match is None:
+        raise BadInput(f"found {describe(value)}, {expected}")
+    unit = _UNITS[match[6]]
+    length = _value(match[1], match[2]) * (_UNITS[match[3]] if match[3] else unit)
+    tolerance = _value(match[4], match[5]) * unit
+    if not 0 < tolerance < length:
+        raise BadInput(f"found {describe(value)}, {expected}: 0 < tolerance < length")
+    return length, tolerance
+
+
+def _value(digits: str, power: str | None) -> float:
+    """A number of its digits and its power of ten."""
+    return float(f"{digits}e{power or 0}")

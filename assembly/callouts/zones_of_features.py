@@ -1,0 +1,98 @@
+"""Zones of the callouts of a drawing, for axes, planes and points.
+
+The feature's z is its axis or its normal, its origin the middle of the feature.  Widths
+are those of the drawing: a diameter, or the distance between two planes.  The offset of
+an axis at height z is e(z) = (TX + z RY, TY - z RX).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.callouts.zone import Zone
+
+_SIGNS = ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
+
+
+def offset_rows(z: float) -> NDArray:
+    """Return (2, 6) rows of the offset e(z) of an axis at a height z [m]."""
+    return np.array([[0, z, 0, 1.0, 0, 0], [-z, 0, 0, 0, 1.0, 0]])
+
+
+def axis_position(width: float, length: float, bonus: float = 0.0) -> Zone:
+    """Return the zone of an axis within a cylinder: position or coaxiality.
+
+    Args:
+        width: [m] diameter of the cylinder.
+        length: [m] of the bore, > 0.
+        bonus: [m] growth of the diameter from least to largest hole (M); 0 for none.
+
+    Returns:
+        Two discs, at the two ends of the bore: shift and tilt are coupled.
+    """
+    ends = tuple(offset_rows(z) * 2 / width for z in (length / 2, -length / 2))
+    return Zone(ends, bonus / width)
+
+
+def axis_position_along(width: float, length: float, direction: NDArray) -> Zone:
+    """Return the zone of an axis between two planes: position in one direction.
+
+    Args:
+        width: [m] distance of the planes.
+        length: [m] of the bore.
+        direction: (2,) unit vector across the planes, in the feature's x and y.
+    """
+    ends = (direction @ offset_rows(z) * 2 / width for z in (length / 2, -length / 2))
+    return Zone(tuple(row[None] for row in ends))
+
+
+def axis_orientation(
+    width: float, length: float, direction: NDArray | None = None
+) -> Zone:
+    """Return the zone of perpendicularity, parallelism or angularity of an axis.
+
+    Args:
+        width: [m] diameter, or with a direction the distance of two planes.
+        length: [m] of the bore.
+        direction: (2,) unit vector in which the axis may lean; None for all.
+    """
+    tilt = (offset_rows(1.0) - offset_rows(0.0)) * length / width
+    return Zone((tilt if direction is None else (direction @ tilt)[None],))
+
+
+def plane_position(width: float, size_x: float, size_y: float) -> Zone:
+    """Return the zone of a rectangular plane: position or profile.
+
+    Args:
+        width: [m] distance of the two planes of the zone.
+        size_x: [m] full size of the face along its x.
+        size_y: [m] along its y.
+
+    Returns:
+        The octahedron |TZ| + size_y/2 |RX| + size_x/2 |RY| <= width/2.
+    """
+    rows = [
+        np.array([[a * size_y / 2, b * size_x / 2, 0, 0, 0, 1.0]]) for a, b in _SIGNS
+    ]
+    return Zone(tuple(row * 2 / width for row in rows))
+
+
+def plane_orientation(width: float, size_x: float, size_y: float) -> Zone:
+    """Return the zone of parallelism or perpendicularity of a rectangular plane."""
+    rows = [np.array([[size_y / 2, b * size_x / 2, 0, 0, 0, 0]]) for b in (1, -1)]
+    return Zone(tuple(row * 2 / width for row in rows))
+
+
+def point_position(width: float) -> Zone:
+    """Return the zone of a point within a ball of a diameter [m]."""
+    return Zone((np.hstack([np.zeros((3, 3)), np.eye(3)]) * 2 / width,))
+
+
+def shift_along(tolerance: float, direction: NDArray) -> Zone:
+    """Return the zone of a shift within plus and minus a tolerance [m].
+
+    Args:
+        tolerance: [m] to each side.
+        direction: (3,) unit vector, in the feature's axes.
+    """
+    row = np.concatenate([np.zeros(3), np.asarray(direction, dtype=float)])
+    return Zone((row[None] / tolerance,))

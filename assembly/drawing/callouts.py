@@ -1,0 +1,106 @@
+"""Callouts of drawn bodies, on the frames that their joints become."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.callouts.callout import Callout, Datum
+from assembly.drawing.drawing import Drawing, DrawnCallout, DrawnJoint
+from assembly.drawing.parts import parts_of
+from assembly.drawing.tree import Step
+from assembly.model.placed_frames import PlacedFrame, own_motion
+
+_ROUNDING = 1e-12
+# what a joint of each type holds as a datum; the others are axes
+_DATUM_SHAPES = {
+    "planar": "plane",
+    "spherical": "point",
+    "prismatic": "guide",
+    "fixed": "body",
+}
+Vector = tuple[float, float, float]
+
+
+def frame_callouts(
+    drawing: Drawing, steps: Sequence[Step], placed: Sequence[PlacedFrame]
+) -> tuple[Callout, ...]:
+    """Return the callouts of a drawing, on frames instead of joints.
+
+    Args:
+        drawing: of bodies and joints.
+        steps: of its tree.
+        placed: the frames with their home poses.
+
+    Returns:
+        In the order of the drawing; axes and directions in the axes of the frames.
+    """
+    passed = {s.edge.item.name: s for s in steps if isinstance(s.edge.item, DrawnJoint)}
+    poses = {frame.name: (pose, pose @ own_motion(frame)) for frame, pose in placed}
+    return tuple(_of_frames(drawn, passed, poses) for drawn in drawing.callouts)
+
+
+def frame_fits(steps: Sequence[Step]) -> dict[str, str]:
+    """Return the fits of the joints of a tree, by frame."""
+    return {
+        part.name: part.numbers.fit
+        for step in steps if isinstance(step.edge.item, DrawnJoint)
+        for part in parts_of(step.edge.item, step.reverse) if part.numbers.fit
+    }  # fmt: skip
+
+
+def _of_frames(
+    drawn: DrawnCallout, passed: Mapping[str, Step],
+    poses: Mapping[str, tuple[NDArray, NDArray]],
+) -> Callout:  # fmt: skip
+    """One callout on the side of a frame that is on its body."""
+    callout = drawn.callout
+    frame, after, joint = _side(passed[callout.feature], drawn.body)
+    pose = poses[frame][after]
+    R = pose[:3, :3]
+    across = joint.across if callout.shape == "plane" else drawn.direction
+    datums = []
+    for datum in callout.datums:
+        name, other, of_datum = _side(passed[datum.frame], drawn.body)
+        of = poses[name][other]
+        axis = _vector(of[:3, :3].T @ _axis(of_datum, drawn.body))
+        shape = _DATUM_SHAPES.get(of_datum.kind, "axis")
+        datums.append(Datum(name, shape, axis, _point(of, of_datum)))
+    return replace(
+        callout, feature=frame, after=after, datums=tuple(datums),
+        axis=_vector(R.T @ _axis(joint, drawn.body)),
+        direction=None if across is None else _vector(R.T @ np.array(across)),
+        at=_point(pose, joint),
+    )  # fmt: skip
+
+
+def _side(step: Step, body: str) -> tuple[str, bool, DrawnJoint]:
+    """The frame of a joint at a body, whether after its motion, and the joint."""
+    joint = step.edge.item
+    assert isinstance(joint, DrawnJoint)
+    after = step.start[0] != body
+    return parts_of(joint, step.reverse)[-1 if after else 0].name, after, joint
+
+
+def _axis(joint: DrawnJoint, body: str) -> NDArray:
+    """(3,) the axis on a body, base axes at home."""
+    second = joint.kind == "universal" and body == joint.second
+    return joint.axis2 if second else joint.axis
+
+
+def _point(pose: NDArray, joint: DrawnJoint) -> Vector:
+    """The joint's point seen from a frame: not its origin where it is a contact."""
+    point = pose[:3, :3].T @ (joint.at - pose[:3, 3])
+    x, y, z = (float(v) + 0.0 for v in np.where(abs(point) < _ROUNDING, 0.0, point))
+    return x, y, z
+
+
+def _vector(vector: NDArray) -> Vector:
+    """A vector without rounding of its zeros and ones; an axis has no sense."""
+    rounded = np.where(abs(vector) < _ROUNDING, 0.0, vector)
+    rounded = np.where(abs(abs(rounded) - 1) < _ROUNDING, np.sign(rounded), rounded)
+    if np.array_equal(abs(rounded), [0.0, 0.0, 1.0]):
+        rounded = abs(rounded)
+    x, y, z = (float(v) + 0.0 for v in rounded)
+    return x, y, z

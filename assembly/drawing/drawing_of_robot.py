@@ -1,0 +1,304 @@
+"""A robot of frames and closures as a drawing: bodies and joints at home.
+
+Begin with :func:`drawing_of_robot`.  ``frames.py`` makes frames of a drawing again.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.drawing.drawing import (
+    Drawing,
+    DrawnBody,
+    DrawnJoint,
+    JointNumbers,
+)
+from assembly.drawing.joint_types import FoundJoint, found_joints, has_mass
+from assembly.drawing.links import beam_start, drawn_link
+from assembly.drawing.parts import joint_axes, parts_of
+from assembly.drawing.rigid_bodies import RigidBodies, rigid_bodies
+from assembly.kinematics.nominal import size_of
+from assembly.kinematics.posture import Posture, home_posture
+from assembly.model.inertia import joined_bodies
+from assembly.model.robot import (
+    BASE,
+    Frame,
+    LibraryLink,
+    Robot,
+)
+from forcefit.inputs.table import BadInput, quoted
+from forcefit.results.display import rounded
+from stiffness.screws import rotation_vector, transform
+
+_SAME = 1e-12  # [lengths, rad] error below which points and axes are the same
+# fields of a frame that a drawing holds
+_HELD = {
+    "name", "parent", "translation", "rotation", "joint", "actuated", "position",
+    "limits", "geometric_error", "tolerance", "clearance", "joint_stiffness", "link",
+    "locked_at",
+    "mass", "centre_of_mass", "inertia", "pitch",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnRobot:
+    """A robot as a drawing.
+
+    Attributes:
+        drawing: its bodies and joints.
+        frames: name that the frame of each joint has in the robot of the drawing;
+            those of balls, cylindrical and planar joints have other axes, and none.
+        left_out: in words what a drawing cannot hold.
+    """
+
+    drawing: Drawing
+    frames: Mapping[str, str]
+    left_out: tuple[str, ...]
+
+
+def drawing_of_robot(robot: Robot) -> DrawnRobot:
+    """Return a robot as bodies and joints by points and axes of its home pose.
+
+    Args:
+        robot: any robot.
+
+    Returns:
+        The drawing, and what it leaves out.
+
+    Raises:
+        BadInput: a drawing cannot hold the robot.
+    """
+    posture = home_posture(robot)
+    rigid = rigid_bodies(robot)
+    end = rigid.after[robot.index(robot.platform)]
+    if end == 0:
+        raise BadInput(f"{robot.name}: found a platform fixed to the base")
+    # effects name frames
+    sheet = _Sheet(posture, rigid, found_joints(posture, rigid, not robot.has_effects))
+    _add_bodies(sheet)
+    for i, frame in enumerate(robot.frames):
+        if frame.link is not None:
+            _add_link(sheet, i)
+        if has_mass(frame) and rigid.before[i] != 0:
+            _add_mass(sheet, i)
+    sheet.joints.extend((found.joint, *found.bodies) for found in sheet.found)
+    joints = [
+        replace(joint, first=sheet.name_of(first), second=sheet.name_of(second))
+        for joint, first, second in sheet.joints
+    ]
+    drawing = Drawing(
+        robot.name, sheet.name_of(end), posture.platform[:3, 3],
+        tuple(sheet.bodies.values()), tuple(joints), robot.description,
+    )  # fmt: skip
+    return DrawnRobot(drawing, _frames(sheet), tuple(_left_out(sheet)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Sheet:
+    """What is drawn so far.
+
+    Attributes:
+        posture: the robot at home.
+        rigid: its rigid bodies.
+        found: its joints.
+        bodies: those of the drawing by number; the base is not among them.
+        joints: of the drawing, with the numbers of their two bodies.
+        same: bodies at the near end of a link, and the body that has it.
+    """
+
+    posture: Posture
+    rigid: RigidBodies
+    found: list[FoundJoint]
+    bodies: dict[int, DrawnBody] = field(default_factory=dict)
+    joints: list[tuple[DrawnJoint, int, int]] = field(default_factory=list)
+    same: dict[int, int] = field(default_factory=dict)
+
+    def name_of(self, k: int) -> str:
+        """Name of a body by its number."""
+        k = self.same.get(k, k)
+        return self.bodies[k].name if k else BASE
+
+    def new_name(self, name: str, joint: bool) -> str:
+        """The name, with an addition where another body or joint has it."""
+        taken = {j.name for j, _, _ in self.joints} | {f.joint.name for f in self.found}
+        if not joint:
+            taken = {body.name for body in self.bodies.values()} | {BASE}
+        while name in taken:
+            name += "_"
+        return name
+
+
+def _frames(sheet: _Sheet) -> dict[str, str]:
+    """Return the name of each joint's frame in the new robot."""
+    names = {}
+    for found in sheet.found:
+        if len(found.rows) == 1 or found.joint.kind == "universal":
+            parts = parts_of(found.joint)
+            for row, part in zip(found.rows, parts, strict=True):
+                names[sheet.posture.robot.frames[row].name] = part.name
+    return names
+
+
+def _left_out(sheet: _Sheet) -> list[str]:
+    """Return in words what a drawing cannot hold."""
+    posture, robot = sheet.posture, sheet.posture.robot
+    lost = []
+    turned = rotation_vector(posture.platform[:3, :3])
+    if np.abs(turned).max() > _SAME:
+        numbers = ", ".join(f"{rounded(angle):.6g}" for angle in turned)
+        lost.append(
+            f"axes of the platform, turned by [{numbers}] rad from the base's at home: "
+            "in the new file its rotation there is 0"
+        )
+    moved = [
+        quoted(found.joint.name) for found in sheet.found if len(found.rows) > 1
+        and np.abs(posture.coordinates[list(found.rows)]).max() > 1e-9
+    ]  # fmt: skip
+    if moved:
+        names = ", ".join(moved)
+        lost.append(f"coordinates at home of {names}: they are 0 in the new file")
+    grounded = [
+        quoted(frame.name) for i, frame in enumerate(robot.frames)
+        if has_mass(frame) and sheet.rigid.before[i] == 0
+    ]  # fmt: skip
+    if grounded:
+        lost.append(f"masses that are fixed to the base: {', '.join(grounded)}")
+    if posture.mismatch > _SAME:
+        lost.append(
+            f"the nominal closure error of {posture.mismatch:.2g} rad or m: joints "
+            "coincide exactly in the new file"
+        )
+    for name in sorted({each.name for each in fields(Frame)} - _HELD):
+        given = [quoted(f.name) for f in robot.frames if np.any(getattr(f, name))]
+        lost += [f"{name} of {', '.join(given)}"] if given else []
+    return lost
+
+
+def _add_bodies(sheet: _Sheet) -> None:
+    """Name the bodies: the platform, then the frames at whose joints they end."""
+    robot, rigid = sheet.posture.robot, sheet.rigid
+    numbers = {rigid.after[robot.index(robot.platform)]: robot.platform}
+    first = [i for i, frame in enumerate(robot.frames) if _holds(frame)]
+    every = range(len(robot.frames))
+    for which, rows in (
+        (rigid.before, first), (rigid.before, every), (rigid.after, every)
+    ):  # fmt: skip
+        for i in rows:
+            numbers.setdefault(which[i], robot.frames[i].name)
+    numbers.pop(0, None)
+    named = {
+        robot.frames[row].name: found.joint.name
+        for found in sheet.found for row in found.rows
+    }  # fmt: skip
+    needed = {k for found in sheet.found for k in found.bodies}
+    needed |= {k for i, k in enumerate(rigid.before) if _holds(robot.frames[i])}
+    needed |= {k for i, k in enumerate(rigid.starts) if robot.frames[i].link}
+    needed.add(rigid.after[robot.index(robot.platform)])
+    for k, name in sorted(numbers.items()):
+        if k in needed:
+            sheet.bodies[k] = DrawnBody(
+                sheet.new_name(named.get(name, name), joint=False)
+            )
+
+
+def _holds(frame: Frame) -> bool:
+    """Whether a frame's body has a mass or a link."""
+    return has_mass(frame) or frame.link is not None
+
+
+def _add_mass(sheet: _Sheet, i: int) -> None:
+    """Add the mass and moments of inertia of a frame to its body."""
+    frame, T = sheet.posture.robot.frames[i], sheet.posture.transforms[i]
+    R, k = T[:3, :3], sheet.rigid.before[i]
+    body = sheet.bodies[k]
+    J = R @ frame.inertia @ R.T
+    own = frame.mass, R @ frame.centre_of_mass + T[:3, 3], (J + J.T) / 2
+    if has_mass(body):
+        own = joined_bodies([(body.mass, body.centre, body.inertia), own])
+    mass, centre, inertia = own
+    sheet.bodies[k] = replace(body, mass=mass, centre=centre, inertia=inertia)
+
+
+def _new_body(sheet: _Sheet, name: str) -> int:
+    """Add a body, and return its number."""
+    k = 1 + max(sheet.bodies, default=0)
+    sheet.bodies[k] = DrawnBody(sheet.new_name(name, joint=False))
+    return k
+
+
+def _at(point: NDArray) -> NDArray:
+    """(4, 4) a point, in axes of the base."""
+    return transform(point, np.eye(3))
+
+
+def _fix(sheet: _Sheet, name: str, first: int, second: int, T: NDArray) -> DrawnJoint:
+    """Add a fixed joint between two bodies, and return it."""
+    name = sheet.new_name(name, joint=True)
+    joint = DrawnJoint(
+        name, "fixed", "", "", T[:3, 3], T[:3, 2], T[:3, 0], T[:3, 0],
+        numbers=(JointNumbers(),),
+    )  # fmt: skip
+    sheet.joints.append((joint, first, second))
+    return joint
+
+
+def _add_link(sheet: _Sheet, i: int) -> None:
+    """Add a link between two joints of its body, fixed ones where there are none."""
+    robot, rigid = sheet.posture.robot, sheet.rigid
+    frame, T = robot.frames[i], sheet.posture.transforms[i]
+    start, end = rigid.starts[i], rigid.before[i]
+    to = _joint_at(sheet, i, end)
+    body = end
+    if to is None or end == 0 or sheet.bodies[end].link is not None:
+        body = _new_body(sheet, f"{frame.name}.link")
+        to = _fix(sheet, f"{frame.name}.tip", body, end, T)
+    begin = beam_start(frame, T)
+    root = _only_joint(sheet, start, i)
+    if root is None or root is to:
+        point = T[:3, 3] if begin is None else begin
+        root = _fix(sheet, f"{frame.name}.root", start, body, _at(point))
+    else:
+        sheet.same[start] = body
+        del sheet.bodies[start]
+    spanned = begin is not None and _distance(sheet, root, begin) < _SAME
+    link = drawn_link(frame, T, joint_axes(to), spanned)
+    ends = root.name, to.name
+    sheet.bodies[body] = replace(sheet.bodies[body], link=link, ends=ends)
+
+
+def _distance(sheet: _Sheet, joint: DrawnJoint, point: NDArray) -> float:
+    """Distance of a joint from a point, over the robot's size."""
+    gap = float(np.abs(joint.at - point).max())
+    return gap / size_of(sheet.posture.robot)
+
+
+def _joint_at(sheet: _Sheet, i: int, body: int) -> DrawnJoint | None:
+    """The joint at the tip of a link, in whose axes it can be read."""
+    frame, T = sheet.posture.robot.frames[i], sheet.posture.transforms[i]
+    for found in sheet.found:
+        joint = found.joint
+        if body not in found.bodies or _distance(sheet, joint, T[:3, 3]) > _SAME:
+            continue
+        same = np.abs(joint_axes(joint)[:3, :3] - T[:3, :3]).max() < _SAME
+        if same or not isinstance(frame.link, LibraryLink):
+            return joint
+    return None
+
+
+def _only_joint(sheet: _Sheet, body: int, i: int) -> DrawnJoint | None:
+    """The joint of a body that has nothing else than it and a link's start."""
+    robot, rigid = sheet.posture.robot, sheet.rigid
+    if (
+        body == 0
+        or body in sheet.same
+        or body == rigid.after[robot.index(robot.platform)]
+    ):
+        return None
+    others = [k for k, f in enumerate(robot.frames) if k != i and (
+        (f.link is not None and body in (rigid.starts[k], rigid.before[k]))
+        or (has_mass(f) and rigid.before[k] == body)
+    )]  # fmt: skip
+    joints = [found.joint for found in sheet.found if body in found.bodies]
+    return joints[0] if len(joints) == 1 and not others else None

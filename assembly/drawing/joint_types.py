@@ -1,0 +1,278 @@
+"""Joints of several freedoms in a robot of frames, each of which has one.
+
+Consecutive passive frames at one point, with nothing on the bodies between them, are a
+universal, spherical, cylindrical or planar joint, where its clearance and springs can
+be those of one joint at every posture.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.drawing.drawing import DrawnBody, DrawnJoint, JointNumbers, perpendicular
+from assembly.drawing.rigid_bodies import RigidBodies, connects
+from assembly.kinematics.nominal import size_of
+from assembly.kinematics.posture import Posture
+from assembly.model.robot import Clearance, Frame, Robot
+from forcefit.inputs.table import BadInput, quoted
+
+_SAME = 1e-12  # [lengths, sine] error below which points and directions are the same
+_PARALLEL = 1e-2  # sine of the angle below which a universal joint is not made
+_TURNS = ("revolute", "revolute")
+# ends of the names that frames of a drawn joint have (``parts.py``)
+_PARTS = {"first", "second", "third", "turn", "slide", "slide_x", "slide_y"}
+
+
+@dataclass(frozen=True, eq=False)
+class FoundJoint:
+    """A joint between two rigid bodies.
+
+    Attributes:
+        joint: as drawn; its bodies have no names yet.
+        rows: frames of which it is made, from the first body to the second; a joint
+            whose last frame has the clearance begins there, and its rows fall.
+        bodies: numbers of the first and the second body.
+    """
+
+    joint: DrawnJoint
+    rows: tuple[int, ...]
+    bodies: tuple[int, int]
+
+
+def found_joints(
+    posture: Posture, bodies: RigidBodies, several: bool
+) -> list[FoundJoint]:
+    """Return the joints of a robot, in the order of its frames.
+
+    Args:
+        posture: the robot at home.
+        bodies: its rigid bodies.
+        several: whether frames may be taken together as joints of several freedoms.
+
+    Returns:
+        The joints, each row of a frame in one of them.
+    """
+    robot = posture.robot
+    following = _following(posture, bodies) if several else {}
+    found: list[FoundJoint] = []
+    done: set[int] = set()
+    names: set[str] = set()
+    for i, frame in enumerate(robot.frames):
+        if not connects(frame) or i in done:
+            continue
+        rows = [i]
+        while rows[-1] in following and len(rows) < 3:
+            rows.append(following[rows[-1]])
+        options = (_several(posture, rows[:n]) for n in (3, 2) if len(rows) >= n)
+        joint, rows = next(filter(None, options), None) or (_single(posture, i), [i])
+        if joint.name in names:
+            joint = replace(joint, name=frame.name)
+        names.add(joint.name)
+        found.append(FoundJoint(joint, tuple(rows), _ends(bodies, rows)))
+        done |= set(rows)
+    return found
+
+
+def _ends(bodies: RigidBodies, rows: list[int]) -> tuple[int, int]:
+    """Numbers of the first and the second body of a joint."""
+    if rows[0] > rows[-1]:
+        return bodies.after[rows[0]], bodies.before[rows[-1]]
+    return bodies.before[rows[0]], bodies.after[rows[-1]]
+
+
+def _following(posture: Posture, bodies: RigidBodies) -> dict[int, int]:
+    """Next frame at the same point, where the body between holds nothing else."""
+    robot, size = posture.robot, size_of(posture.robot)
+    held = Counter(bodies.before[robot.index(robot.platform)] for _ in range(2))
+    for i, frame in enumerate(robot.frames):
+        held.update({bodies.before[i]} if has_mass(frame) else ())
+        if frame.link is not None:
+            held.update((bodies.starts[i], bodies.before[i]))
+        if connects(frame):
+            held.update((bodies.before[i], bodies.after[i]))
+    at = posture.transforms[:, :3, 3]
+    free = [i for i, f in enumerate(robot.frames) if f.passive and f.limits is None]
+    return {
+        i: j
+        for i in free
+        for j in free
+        if i != j
+        and bodies.after[i] == bodies.before[j] != 0
+        and held[bodies.after[i]] == 2
+        and np.abs(at[i] - at[j]).max() <= _SAME * size
+    }
+
+
+def has_mass(body: Frame | DrawnBody) -> bool:
+    """Return whether a body has a mass or moments of inertia."""
+    return bool(body.mass or body.inertia.any())
+
+
+def _single(posture: Posture, i: int) -> DrawnJoint:
+    """The joint of one frame."""
+    frame, T = posture.robot.frames[i], posture.transforms[i]
+    return DrawnJoint(
+        frame.name, frame.joint, "", "", T[:3, 3], T[:3, 2], T[:3, 0], T[:3, 0],
+        frame.actuated, float(posture.coordinates[i]), frame.limits, frame.pitch,
+        (_numbers(frame),),
+    )  # fmt: skip
+
+
+def _numbers(frame: Frame) -> JointNumbers:
+    """Error, clearance and stiffness of a frame, in its axes."""
+    bolt, error = frame.locked_at, frame.geometric_error
+    if bolt is not None:  # the drawing is of the robot before it is bolted
+        if {"rx", "ry", "rz"} & set(bolt.pose):
+            raise BadInput(
+                f"frame {quoted(frame.name)}.locked_at: found a rotation of the "
+                "platform, whose axes a drawing turns; expected its translation, or "
+                "joints"
+            )
+        bolt, error = replace(bolt, screw=np.zeros(6)), error - bolt.screw
+    return JointNumbers(
+        frame.clearance, frame.joint_stiffness, error, frame.tolerance, locked_at=bolt
+    )
+
+
+def _several(posture: Posture, rows: list[int]) -> tuple[DrawnJoint, list[int]] | None:
+    """The joint of two or three frames, None if they are none of the known types."""
+    frames = [posture.robot.frames[i] for i in rows]
+    kinds = tuple(frame.joint for frame in frames)
+    axes = [posture.transforms[i][:3, :3] for i in rows]
+    z = [R[:, 2] for R in axes]
+    across = [float(a @ b) for a, b in pairwise(z)]
+    right = all(abs(cosine) < _SAME for cosine in across)
+    own = [_numbers(frame) for frame in frames]
+    if kinds == _TURNS and abs(across[0]) < np.cos(_PARALLEL):
+        found = _universal(axes, own)
+    elif kinds == (*_TURNS, "revolute") and right:
+        bounds: Sequence[str] = ("radial", "axial", "ball")
+        back = _isotropic(own[-1]) and all(map(_empty, own[:-1]))
+        ball = (axes[::-1], own[::-1]) if back else (axes, own)
+        found = _with_one_contact("spherical", *ball, bounds)
+    elif set(kinds) == {"revolute", "prismatic"} and len(kinds) == 2:
+        same = np.abs(z[0] - z[1]).max() < _SAME
+        bounds = ("radial", "tilt")
+        found = _with_one_contact("cylindrical", axes, own, bounds) if same else None
+    elif kinds == ("prismatic", "prismatic", "revolute"):
+        flat = abs(across[0]) < _SAME and np.abs(np.cross(*z[:2]) - z[2]).max() < _SAME
+        empty = flat and all(map(_empty, own))
+        found = ("planar", axes[2], (JointNumbers(),)) if empty else None
+    else:
+        found = None
+    if found is None:
+        return None
+    kind, R, numbers = found
+    name = _common_name(posture.robot, rows)
+    if R is not axes[0] and kind == "spherical":
+        rows = rows[::-1]  # the contact stays with the body that has it
+    second = R[:, 0] if kind != "universal" else z[1]
+    joint = DrawnJoint(
+        name, kind, "", "", posture.transforms[rows[0]][:3, 3], R[:, 2],
+        perpendicular(R[:, 2], second), second, numbers=numbers,
+    )  # fmt: skip
+    return joint, rows
+
+
+_Found = tuple[str, NDArray, tuple[JointNumbers, ...]] | None
+
+
+def _universal(axes: list[NDArray], own: list[JointNumbers]) -> _Found:
+    """A universal joint, the numbers of each bearing in its axes; None if not exact."""
+    z = [R[:, 2] for R in axes]
+    numbers = []
+    for k, other in ((0, 1), (1, 0)):
+        x = perpendicular(z[k], z[other])
+        new = np.column_stack([x, np.cross(z[k], x), z[k]])
+        turned = _turned(own[k], new.T @ axes[k])
+        if turned is None:
+            return None
+        numbers.append(turned)
+    return "universal", axes[0], tuple(numbers)
+
+
+def _turned(own: JointNumbers, R: NDArray) -> JointNumbers | None:
+    """The numbers in axes turned about z, None where that is not exact."""
+    if np.abs(R - np.eye(3)).max() < _SAME:
+        return own
+    turn = np.kron(np.eye(2), R)
+    K, sigma = own.stiffness, own.tolerance
+    if sigma is not None and (sigma[0] != sigma[1] or sigma[3] != sigma[4]):
+        return None
+    if K is not None:
+        rigid = np.isinf(np.diag(K))
+        if rigid[0] != rigid[1] or rigid[3] != rigid[4]:
+            return None
+        K = turn @ np.where(np.isinf(K), 0.0, K) @ turn.T
+        K = (K + K.T) / 2
+        K[np.abs(K) < _SAME * np.abs(K).max()] = 0.0
+        K[np.diag(rigid)] = np.inf
+    return replace(own, stiffness=K, error=turn @ own.error)
+
+
+def _with_one_contact(
+    kind: str, axes: list[NDArray], own: list[JointNumbers], bounds: Sequence[str]
+) -> _Found:
+    """A joint whose numbers are those of its first frame; None if not exact."""
+    if not all(map(_empty, own[1:])):
+        return None
+    clearance = own[0].clearance or Clearance()
+    given = [key for key, bound in vars(clearance).items() if bound is not None]
+    if not set(given) <= set(bounds):
+        return None
+    K = own[0].stiffness
+    if K is not None:
+        free = [0, 1, 2] if kind == "spherical" else [2, 5]
+        others = K[free].copy()
+        for row, k in enumerate(free):
+            if K[k, k] not in (0.0, np.inf):
+                return None
+            others[row, k] = 0.0
+        if others.any():
+            return None
+        K = K.copy()
+        K[free, free] = 0.0
+    return kind, axes[0], (replace(own[0], stiffness=K),)
+
+
+def _isotropic(own: JointNumbers) -> bool:
+    """Whether only a contact is given that is the same about z from both bodies."""
+    K = own.stiffness
+    even = K is None or (
+        not (np.where(np.isinf(K), 0.0, K) - np.diag(np.where(
+            np.isinf(np.diag(K)), 0.0, np.diag(K)))).any() and K[3, 3] == K[4, 4]
+    )  # fmt: skip
+    given = own.clearance is not None or K is not None
+    return given and even and own.tolerance is None and not own.error.any()
+
+
+def _empty(own: JointNumbers) -> bool:
+    """Whether there is no error, clearance, spring or tolerance."""
+    return (
+        own.clearance is None and own.stiffness is None and own.tolerance is None
+        and not own.error.any()
+    )  # fmt: skip
+
+
+def _common_name(robot: Robot, rows: list[int]) -> str:
+    """What the names of several frames have in common, or the first of them."""
+    names = [robot.frames[i].name for i in rows]
+    stems = {name.rpartition(".")[0] for name in names}
+    if {name.rpartition(".")[2] for name in names} <= _PARTS and len(stems) == 1:
+        return stems.pop()
+    others = {f.name for f in robot.frames if connects(f)}
+    common = "".join(_while_equal(names)).rstrip("._-")
+    taken = not common or common in others
+    return names[0] if taken or names[0].startswith(f"{common}.") else common
+
+
+def _while_equal(names: list[str]) -> Iterator[str]:
+    """The letters with which all names begin."""
+    for letters in zip(*names, strict=False):
+        if len(set(letters)) > 1:
+            return
+        yield letters[0]

@@ -1,0 +1,91 @@
+"""The rigid bodies of a robot of frames and closures.
+
+Frames that nothing moves against each other are one body.  Joints, and fixed frames
+with an error, a clearance or a spring, connect two of them; so do links.
+"""
+
+from dataclasses import dataclass
+
+from assembly.model.robot import Frame, Robot
+from forcefit.inputs.table import BadInput, quoted
+
+
+@dataclass(frozen=True, eq=False)
+class RigidBodies:
+    """Bodies of a robot, by number; that of the base is 0.
+
+    Attributes:
+        before: body that holds each frame's joint, at the tip of its link.
+        after: body that the joint moves.
+        starts: body from which each frame's link begins; ``before`` if it is rigid.
+    """
+
+    before: tuple[int, ...]
+    after: tuple[int, ...]
+    starts: tuple[int, ...]
+
+
+def connects(frame: Frame) -> bool:
+    """Return whether a frame is a joint, or a connection with an error or clearance."""
+    return (
+        frame.joint != "fixed"
+        or frame.clearance is not None
+        or frame.locked_at is not None
+        or frame.joint_stiffness is not None
+        or bool(frame.geometric_error.any())
+        or frame.tolerance is not None
+    )
+
+
+def rigid_bodies(robot: Robot) -> RigidBodies:
+    """Return the rigid bodies of a robot, the frames of each closure in one.
+
+    Args:
+        robot: any.
+
+    Returns:
+        The bodies.
+
+    Raises:
+        BadInput: a closure, joint or link connects a rigid body with itself.
+    """
+    count = len(robot.frames)
+    group = list(range(2 * count + 1))  # before, after, base
+
+    def root(node: int) -> int:
+        while group[node] != node:
+            group[node] = group[group[node]]
+            node = group[node]
+        return node
+
+    def join(a: int, b: int) -> bool:
+        a, b = root(a), root(b)
+        group[max(a, b)] = min(a, b)
+        return a != b
+
+    start = [count + p if p >= 0 else 2 * count for p in robot.parents.tolist()]
+    for i, frame in enumerate(robot.frames):
+        if frame.link is None:
+            join(start[i], i)
+        if not connects(frame):
+            join(i, count + i)
+    for k, (a, b) in enumerate(robot.closures, 1):
+        if not join(*(count + robot.index(name) for name in (a, b))):
+            raise BadInput(_same(f'closure[{k}] ("{a}", "{b}")'))
+    numbers = {root(2 * count): 0}
+    found = [numbers.setdefault(root(n), len(numbers)) for n in range(2 * count)]
+    starts = [numbers[root(node)] for node in start]
+    for i, frame in enumerate(robot.frames):
+        if connects(frame) and found[i] == found[count + i]:
+            raise BadInput(_same(f"frame {quoted(frame.name)}"))
+        if frame.link is not None and starts[i] == found[i]:
+            raise BadInput(_same(f"frame {quoted(frame.name)}.link"))
+    return RigidBodies(tuple(found[:count]), tuple(found[count:]), tuple(starts))
+
+
+def _same(place: str) -> str:
+    """Return the message on a connection between two frames of one body."""
+    return (
+        f"{place}: found that it connects two frames of one rigid body, expected two "
+        "bodies: a file of bodies and joints (format 2) cannot hold it"
+    )

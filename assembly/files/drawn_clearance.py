@@ -1,0 +1,171 @@
+"""Clearance of a joint of a robot file of ``format = 2``: bounds, or contacts."""
+
+from assembly.drawing.contacts import Contact, bearings, guide, largest_roll, pad
+from assembly.drawing.drawing import FREE_ROWS
+from assembly.files.joint_file import read_bounds
+from assembly.files.written_units import without_units
+from assembly.model.clearance import BOUNDS, CONES
+from assembly.model.largest import LARGEST_LENGTH
+from assembly.model.robot import Clearance
+from forcefit.inputs.table import Table, describe, quoted
+
+_LEAST_LENGTH = 1e-9  # [m] a shorter contact would allow tilts of many turns
+_ANGLES = ("tilt", "spin")
+_Clearance = tuple[Clearance | None, tuple[Contact, ...]]
+
+
+def read_drawn_clearance(table: Table, kind: str) -> _Clearance:
+    """The ``clearance`` table of a joint or of a bearing.
+
+    Args:
+        table: of the joint.
+        kind: its type; that of a universal joint's bearing is ``"revolute"``.
+
+    Returns:
+        The bounds of its own frame, None if there are none; and its contacts.
+
+    Raises:
+        BadInput: a rule of the format is broken.
+    """
+    if not table.has("clearance"):
+        return None, ()
+    given = table.table("clearance")
+    inner = Table(dict(given.content), given.file, given.place)
+    for key in (*BOUNDS, "length"):
+        without_units(inner, key, "angle" if key in _ANGLES else "length")
+    bounds = read_bounds(inner, kind)
+    contacts = [key for key in _CONTACTS if inner.has(key)]
+    if len(contacts) > 1:
+        fault = f"found together with {quoted(contacts[0])}"
+        raise inner.bad(contacts[1], f"{fault}, expected one of them")
+    if contacts and inner.has("fit"):
+        fault = f"found together with {quoted(contacts[0])}, expected a radial gap"
+        raise inner.bad("fit", fault)
+    found: _Clearance = bounds, ()
+    for key in contacts:
+        found = _CONTACTS[key](inner, kind, bounds)
+    inner.finish()
+    _refuse_free(inner, found[0], kind)
+    return found
+
+
+def _in_bore(table: Table, kind: str, bounds: Clearance) -> _Clearance:
+    """The bounds without ``radial``, and the contacts of a bore with it."""
+    _refuse_with(table, "length", ("tilt", "ball"))
+    _refuse_without_shaft(table, "length", kind)
+    half = _length(table, "length") / 2
+    gap = table.number("radial", "m", least=0.0, largest=LARGEST_LENGTH)
+    return _of_shaft(bounds), bearings((-half, gap), (half, gap), "bore")
+
+
+def _in_bearings(table: Table, kind: str, bounds: Clearance) -> _Clearance:
+    """The bounds, and the contacts of a shaft in two bearings."""
+    _refuse_with(table, "bearings", ("radial", "tilt", "ball"))
+    _refuse_without_shaft(table, "bearings", kind)
+    value = table.get("bearings")
+    pair = isinstance(value, list) and len(value) == 2
+    if not pair or not all(isinstance(one, dict) for one in value):
+        fault = f"found {describe(value)}, expected two tables"
+        raise table.bad("bearings", f"{fault} {{ z, radial }}")
+    first, second = sorted(_bearing(table, k, one) for k, one in enumerate(value, 1))
+    if second[0] - first[0] <= _LEAST_LENGTH:
+        fault = f"found both at z = {first[0]:g} m"
+        raise table.bad("bearings", f"{fault}, expected a distance between them")
+    return _of_shaft(bounds), bearings(first, second)
+
+
+def _bearing(table: Table, number: int, content: dict) -> tuple[float, float]:
+    """Height and radial gap [m] of one bearing."""
+    inner = Table(dict(content), table.file, f"{table.place}.bearings[{number}]")
+    for key in ("z", "radial"):
+        without_units(inner, key, "length")
+    z = inner.number("z", "m", largest=LARGEST_LENGTH)
+    gap = inner.number("radial", "m", least=0.0, largest=LARGEST_LENGTH)
+    inner.finish()
+    return z, gap
+
+
+def _of_shaft(bounds: Clearance) -> Clearance | None:
+    """The bounds that bearings leave to the joint, None if there are none."""
+    kept = Clearance(axial=bounds.axial, spin=bounds.spin)
+    return None if kept == Clearance() else kept
+
+
+def _refuse_without_shaft(table: Table, key: str, kind: str) -> None:
+    """Reject a bore or bearings of a joint that tilts or moves across its axis."""
+    if not {0, 1, 3, 4}.isdisjoint(FREE_ROWS[kind]):
+        fault = f"found the clearance of a shaft on a {kind} joint"
+        raise table.bad(key, f"{fault}, which has no shaft; expected none")
+
+
+def _in_guide(table: Table, kind: str, bounds: Clearance) -> _Clearance:
+    """The largest roll as a bound, and the contacts of a guide with it."""
+    _refuse_type(table, "guide", kind, "prismatic")
+    _refuse_with(table, "guide", ("radial", "tilt", "spin", "ball"))
+    inner = _sizes(table, "guide", ("gap", "length", "width", "height"))
+    gap = inner.content.get("gap")
+    if isinstance(gap, list):
+        x, y = inner.array("gap", (2,), "m", largest=LARGEST_LENGTH).tolist()
+        if min(x, y) < 0:
+            raise inner.bad("gap", f"found {min(x, y):g}, expected 2 numbers >= 0 [m]")
+    else:
+        x = y = inner.number("gap", "m", least=0.0, largest=LARGEST_LENGTH)
+    length, width, height = (_length(inner, k) for k in ("length", "width", "height"))
+    inner.finish()
+    roll = largest_roll((x, y), width, height)
+    return Clearance(axial=bounds.axial, spin=roll), guide((x, y), length)
+
+
+def _on_pad(table: Table, kind: str, bounds: Clearance) -> _Clearance:
+    """No bounds, and the contacts of a pad."""
+    _refuse_type(table, "pad", kind, "planar")
+    _refuse_with(table, "pad", ("axial", "tilt", "ball"))
+    inner = _sizes(table, "pad", ("gap", "length", "width"))
+    gap = inner.number("gap", "m", least=0.0, largest=LARGEST_LENGTH)
+    length, width = (_length(inner, key) for key in ("length", "width"))
+    inner.finish()
+    return (None if bounds == Clearance() else bounds), pad(gap, length, width)
+
+
+_CONTACTS = {
+    "length": _in_bore, "bearings": _in_bearings, "guide": _in_guide, "pad": _on_pad,
+}  # fmt: skip
+
+
+def _refuse_type(table: Table, key: str, kind: str, of_kind: str) -> None:
+    """Reject contacts of another type of joint."""
+    if kind != of_kind:
+        fault = f"found one on a {kind} joint, expected none"
+        raise table.bad(key, f"{fault}; only a {of_kind} joint has a {key}")
+
+
+def _refuse_with(table: Table, key: str, others: tuple[str, ...]) -> None:
+    """Reject contacts together with bounds of the same motions."""
+    for other in others:
+        if table.has(other):
+            fault = f"found together with {quoted(key)}, which bounds that motion"
+            raise table.bad(other, f"{fault}; expected one of them")
+
+
+def _sizes(table: Table, key: str, keys: tuple[str, ...]) -> Table:
+    """A table of lengths, their units removed."""
+    given = table.table(key)
+    inner = Table(dict(given.content), given.file, given.place)
+    for name in keys:
+        without_units(inner, name, "length")
+    return inner
+
+
+def _length(table: Table, key: str) -> float:
+    """A length of a contact."""
+    return table.number(key, "m", above=_LEAST_LENGTH, largest=LARGEST_LENGTH)
+
+
+def _refuse_free(table: Table, bounds: Clearance | None, kind: str) -> None:
+    """Reject bounds of the free motions of a joint of several freedoms."""
+    free = set(FREE_ROWS[kind])
+    for key, rows in zip(BOUNDS, CONES, strict=True):
+        given = bounds is not None and getattr(bounds, key) is not None
+        if len(free) > 1 and given and not free.isdisjoint(rows):
+            fault = f"found a bound of a free motion of a {kind} joint"
+            raise table.bad(key, f"{fault}, expected none")

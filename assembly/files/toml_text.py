@@ -1,0 +1,62 @@
+"""Values and tables as TOML: numbers with all digits, arrays and tables inline."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from forcefit.inputs.writing import ROBOT_MARK
+
+
+def file_text(
+    values: Mapping[str, Any], tables: Mapping[str, Iterable[Mapping[str, Any]]],
+    diagnosis: Mapping[str, Any] | None = None,
+) -> str:  # fmt: skip
+    """Return the text of a robot file.
+
+    Args:
+        values: of the root table.
+        tables: by kind, each written as ``[[kind]]``.
+        diagnosis: written as ``[diagnosis]`` before them.
+
+    Returns:
+        Lines, the first of which marks files that may be overwritten.
+    """
+    lines = [ROBOT_MARK, *_lines(values)]
+    if diagnosis:
+        lines += ["", "[diagnosis]", *_lines(diagnosis)]
+    for kind, each in tables.items():
+        for table in each:
+            lines += ["", f"[[{kind}]]", *_lines(table)]
+    return "\n".join(lines) + "\n"
+
+
+def _lines(table: Mapping[str, Any]) -> list[str]:
+    """Return a line for each key."""
+    return [f"{key} = {toml_value(value)}" for key, value in table.items()]
+
+
+def toml_value(value: Any) -> str:
+    """Return a value in TOML."""
+    # tomli-w writes every number of an array on its own line
+    if isinstance(value, bool | np.bool_):
+        return str(value).lower()
+    if isinstance(value, str):
+        return f'"{"".join(map(_escaped, value))}"'
+    if isinstance(value, Mapping):
+        inner = ", ".join(f"{_key(k)} = {toml_value(v)}" for k, v in value.items())
+        return "{ " + inner + " }" if inner else "{}"
+    if isinstance(value, Iterable):
+        return "[" + ", ".join(map(toml_value, value)) + "]"
+    return repr(value) if isinstance(value, int) else repr(float(value))
+
+
+def _key(name: str) -> str:
+    """Return a key, in quotes if it would otherwise be read differently."""
+    bare = name and all(c.isascii() and (c.isalnum() or c in "-_") for c in name)
+    return name if bare else toml_value(name)
+
+
+def _escaped(c: str) -> str:
+    """Return a character as written in double quotes."""
+    return f"\\u{ord(c):04x}" if c < " " or c in '"\\\x7f' else c

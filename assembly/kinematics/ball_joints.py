@@ -1,0 +1,79 @@
+"""Ball joints of three revolute frames, counted as a ball at every posture.
+
+Three axes at right angles at home lose a freedom where the middle one has turned by 90
+degrees.  A ball joint does not: its free motions are every turn about its centre.
+"""
+
+from collections import Counter
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.nominal import size_of
+from assembly.model.robot import Robot
+from stiffness.screws import rotation_matrix
+
+_SAME = 1e-9  # [lengths, cosine] error below which points, or right angles, are exact
+
+
+@lru_cache(maxsize=64)
+def ball_joints(robot: Robot) -> tuple[tuple[int, int, int], ...]:
+    """Return rows of three revolute frames that make a ball joint.
+
+    Args:
+        robot: any.
+
+    Returns:
+        Rows of passive frames without springs, each the only child of the one before,
+        with axes through one point, adjacent ones at right angles, and without a
+        mass, a link, a closure or the platform on the bodies between them.
+    """
+    children = Counter(f.parent for f in robot.frames)
+    used = {robot.platform, *(name for pair in robot.closures for name in pair)}
+    bare = {f.name for f in robot.frames if children[f.name] == 1} - used
+    least = _SAME * size_of(robot)
+
+    def follows(i: int) -> bool:
+        frame = robot.frames[i]
+        tilted = rotation_matrix(frame.rotation)[2, 2]
+        return (
+            frame.parent in bare and _turns(robot, i) and not frame.mass
+            and not frame.inertia.any() and frame.link is None
+            and bool(np.abs(frame.translation).max() <= least)
+            and abs(tilted) <= _SAME
+        )  # fmt: skip
+
+    found: list[tuple[int, int, int]] = []
+    for k in range(len(robot.frames)):
+        j = robot.parents[k]
+        i = robot.parents[j] if j >= 0 else -1
+        if i < 0 or any(row in ball for ball in found for row in (i, j)):
+            continue
+        if _turns(robot, i) and follows(j) and follows(k):
+            found.append((int(i), int(j), k))
+    return tuple(found)
+
+
+def _turns(robot: Robot, i: int) -> bool:
+    """Whether a frame's joint is a free turn."""
+    frame = robot.frames[i]
+    return frame.joint == "revolute" and frame.passive and not frame.compliant
+
+
+def with_balls(robot: Robot, T: NDArray, screws: NDArray) -> NDArray:
+    """Return motion screws in which ball joints turn about the base's axes.
+
+    Args:
+        robot: robot of n frames.
+        T: (n, 4, 4) frames seen from the base.
+        screws: (n, 6) of unit joint motions, read at the base's origin.
+
+    Returns:
+        (n, 6) the same spaces of motion; of balls at every posture of dimension 3.
+    """
+    screws = screws.copy()
+    for ball in ball_joints(robot):
+        screws[list(ball), :3] = np.eye(3)
+        screws[list(ball), 3:] = np.cross(T[ball[0], :3, 3], np.eye(3))
+    return screws

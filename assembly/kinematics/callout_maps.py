@@ -1,0 +1,274 @@
+"""Callouts carried to the geometric errors delta l of the frames of a robot.
+
+A body's features deviate from its ideal shape by small screws.  A feature's screw is
+that within its zone plus that of the datum frame, which the datums A, B, C make in this
+order: A holds the components that its shape holds, B those that A leaves free, C the
+last ones.  A feature before its joint is the end of the body: its screw is delta l of
+the frame.  A feature after its joint is where the body begins: all frames that the
+joint's frame carries move relative to it, by minus the screw.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from graphlib import CycleError, TopologicalSorter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.callouts.callout import (
+    HELD,
+    Callout,
+    Datum,
+    axes_along,
+    check_orientation,
+    zone_of,
+)
+from assembly.callouts.zone import Zone
+from assembly.kinematics.posture import Posture
+from assembly.model.placed_frames import own_motion
+from assembly.model.robot import Robot
+from forcefit.inputs.table import BadInput, quoted
+from stiffness.screws import screw_map, transform
+
+_RANK = 1e-9  # singular values below it are rounding
+
+Side = tuple[str, bool]  # a frame, and whether on the body after its joint
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedCallout:
+    """A callout with its zone, and the errors of the frames that it causes.
+
+    Attributes:
+        callout: as the drawing states it.
+        zone: of the feature, in its axes.
+        errors: (n, 6, m) [rad, m] delta l of all frames for unit coordinates of the
+            zone.
+    """
+
+    callout: Callout
+    zone: Zone
+    errors: NDArray
+
+    @property
+    def name(self) -> str:
+        """Name in tables: ``"position of bore 2 on link_a"``."""
+        return f"{self.callout.words} of {self.callout.name}"
+
+
+@dataclass(frozen=True, eq=False)
+class _Bodies:
+    """Rigid bodies of a robot at home, whose features are on sides of frames."""
+
+    robot: Robot
+    before: NDArray  # (n, 4, 4) frames before their joints' motion, base axes
+    after: NDArray  # (n, 4, 4) likewise after it
+    groups: tuple[int, ...]  # body of what each frame carries; the base's is last
+
+    def body(self, side: Side) -> int:
+        """Number of the body of a side."""
+        row = self.robot.index(side[0])
+        return self.groups[row if side[1] else self.robot.parents[row]]
+
+    def pose(self, side: Side) -> NDArray:
+        """(4, 4) the frame at home, before or after its joint."""
+        return (self.after if side[1] else self.before)[self.robot.index(side[0])]
+
+
+def place_callouts(home: Posture) -> tuple[PlacedCallout, ...]:
+    """Return the callouts of a robot, with their effect on the errors of its frames.
+
+    Args:
+        home: home posture of the robot.
+
+    Returns:
+        In the order of the robot's callouts.
+
+    Raises:
+        BadInput: a feature has callouts twice, a datum is not on the feature's body,
+            datums are circular, or a callout does not fit the nominal geometry.
+    """
+    callouts = home.robot.callouts
+    if not callouts:
+        return ()
+    bodies = _bodies(home)
+    sides = {(c.feature, c.after): k for k, c in enumerate(callouts)}
+    if len(sides) < len(callouts):
+        twice = next(
+            c for k, c in enumerate(callouts) if sides[c.feature, c.after] != k
+        )
+        fault = "found the feature twice, expected one [[tolerance]] with all"
+        raise BadInput(_fault(twice, fault))
+    datums = [_datum_sides(bodies, c, sides) for c in callouts]
+    zones = [_zone(bodies, c, d[0], callouts, sides)
+             for c, d in zip(callouts, datums, strict=True)]  # fmt: skip
+    widths = np.cumsum([0, *(sum(zone.dimensions) for zone in zones)])
+    screws = np.zeros((len(callouts), 6, widths[-1]))
+    for k in _order(callouts, datums, sides):
+        # in the feature's axes
+        own = np.zeros((6, widths[-1]))
+        own[:, widths[k] : widths[k + 1]] = zones[k].columns
+        frame = _datum_frame(bodies, callouts[k], datums[k], callouts, sides, screws)
+        screws[k] = own + _to_feature(_feature_pose(bodies, callouts[k])) @ frame
+    errors = np.zeros((len(bodies.robot.frames), 6, widths[-1]))
+    for k, callout in enumerate(callouts):
+        _add_errors(errors, bodies, callout, screws[k])
+    parts = np.split(errors, widths[1:-1], axis=2)
+    return tuple(
+        PlacedCallout(*row) for row in zip(callouts, zones, parts, strict=True)
+    )
+
+
+def _fault(callout: Callout, found: str) -> str:
+    """The message on a callout."""
+    return f"tolerance of {quoted(callout.name)}: {found}"
+
+
+def _bodies(home: Posture) -> _Bodies:
+    """The bodies: frames that are fixed to each other, or meet in a closure."""
+    robot, n = home.robot, len(home.robot.frames)
+    group = list(range(n + 1))  # parent -1, the base, is the last
+
+    def root(i: int) -> int:
+        while group[i] != i:
+            i = group[i]
+        return i
+
+    for i, frame in enumerate(robot.frames):
+        loose = frame.clearance is not None or frame.joint_stiffness is not None
+        if frame.joint == "fixed" and not loose:
+            group[root(i)] = root(int(robot.parents[i]) % (n + 1))
+    for a, b in robot.closures:
+        group[root(robot.index(a))] = root(robot.index(b))
+    pairs = zip(robot.frames, home.coordinates, strict=True)
+    motions = [own_motion(replace(frame, position=float(q))) for frame, q in pairs]
+    after = home.transforms @ np.array(motions)
+    return _Bodies(robot, home.transforms, after, tuple(root(i) for i in range(n + 1)))
+
+
+def _datum_sides(
+    bodies: _Bodies, callout: Callout, sides: Mapping[Side, int]
+) -> list[Side]:
+    """The datums, on the sides of their frames that are on the feature's body."""
+    body = bodies.body((callout.feature, callout.after))
+    found = []
+    for name in (datum.frame for datum in callout.datums):
+        here = [(name, a) for a in (False, True) if bodies.body((name, a)) == body]
+        if not here:
+            fault = f"found the datum {quoted(name)} on another body"
+            fault += ", expected a feature of the same body"
+            raise BadInput(_fault(callout, fault))
+        if name == callout.feature and (name, callout.after) in here:
+            fault = f"found the datum {quoted(name)}, which is the feature itself"
+            fault += ", expected another feature of the body"
+            raise BadInput(_fault(callout, fault))
+        # of two sides of a rigid connection the one that has callouts
+        found.append(next((side for side in here if side in sides), here[0]))
+    return found
+
+
+def _order(
+    callouts: tuple[Callout, ...], datums: list[list[Side]], sides: Mapping[Side, int]
+) -> list[int]:
+    """Callouts, each after those of its datums."""
+    needs = {
+        k: [sides[side] for side in datums[k] if side in sides]
+        for k in range(len(callouts))
+    }
+    try:
+        return list(TopologicalSorter(needs).static_order())
+    except CycleError as error:
+        names = " -> ".join(quoted(callouts[k].name) for k in error.args[1])
+        fault = f"found circular datums: {names}, expected an order"
+        raise BadInput(_fault(callouts[error.args[1][0]], fault)) from None
+
+
+def _feature_pose(bodies: _Bodies, callout: Callout) -> NDArray:
+    """(4, 4) the feature at home: its middle, z along its axis."""
+    pose = bodies.pose((callout.feature, callout.after))
+    return pose @ transform(np.array(callout.at), callout.axes)
+
+
+def _datum_pose(
+    bodies: _Bodies, datum: Datum, side: Side, callouts: tuple[Callout, ...],
+    sides: Mapping[Side, int],
+) -> NDArray:  # fmt: skip
+    """(4, 4) of a datum at home, in the axes of its own callouts if it has any."""
+    if side in sides:
+        return _feature_pose(bodies, callouts[sides[side]])
+    return bodies.pose(side) @ transform(np.array(datum.at), axes_along(datum.axis))
+
+
+def _zone(
+    bodies: _Bodies, callout: Callout, datum: Side, callouts: tuple[Callout, ...],
+    sides: Mapping[Side, int],
+) -> Zone:  # fmt: skip
+    """The zone of a callout relative to its datum A."""
+    pose = _feature_pose(bodies, callout)
+    of_datum = _datum_pose(bodies, callout.datums[0], datum, callouts, sides)
+    shape = callout.datums[0].shape
+    R = pose[:3, :3]
+    offset = R.T @ (pose[:3, 3] - of_datum[:3, 3])
+    axis = None if shape == "point" else R.T @ of_datum[:3, 2]
+    try:
+        planes = (shape == "plane", callout.shape == "plane")
+        check_orientation(callout, np.eye(3)[2], axis, planes[0] == planes[1])
+        return zone_of(callout, offset, axis)
+    except BadInput as error:
+        raise BadInput(_fault(callout, str(error))) from None
+
+
+def _to_feature(pose: NDArray) -> NDArray:
+    """(6, 6) a screw at the base's origin, base axes, at a pose and in its axes."""
+    R = pose[:3, :3]
+    return screw_map(-R.T @ pose[:3, 3], R.T)
+
+
+def _datum_frame(
+    bodies: _Bodies, callout: Callout, datums: list[Side],
+    callouts: tuple[Callout, ...], sides: Mapping[Side, int], screws: NDArray,
+) -> NDArray:  # fmt: skip
+    """(6, M) screw of the datum frame at the base's origin for unit coordinates."""
+    D, free = np.zeros(screws.shape[1:]), np.eye(6)
+    for datum, side in zip(callout.datums, datums, strict=True):
+        pose = _datum_pose(bodies, datum, side, callouts, sides)
+        own = screws[sides[side]] if side in sides else np.zeros_like(D)
+        to_datum = _to_feature(pose)
+        # lengths over the distance from the feature, so that rad and m weigh alike
+        gap = pose[:3, 3] - _feature_pose(bodies, callout)[:3, 3]
+        scale = np.repeat([1.0, 1.0 / max(float(np.linalg.norm(gap)), 1e-3)], 3)[
+            :, None
+        ]
+        held = list(HELD[datum.shape])
+        Q, sizes, _ = np.linalg.svd(scale * (to_datum @ free), full_matrices=False)
+        Q = Q[:, sizes > _RANK * max(sizes[0], 1.0)] if sizes.size else Q
+        u, s, vt = np.linalg.svd(Q[held])
+        rank = int((s > _RANK).sum())
+        missing = (scale * (own - to_datum @ D))[held]
+        y = vt[:rank].T @ ((u[:, :rank].T @ missing) / s[:rank, None])
+        back = np.linalg.solve(to_datum, Q / scale)
+        D = D + back @ y
+        free = back @ vt[rank:].T
+    return D
+
+
+def _add_errors(
+    errors: NDArray, bodies: _Bodies, callout: Callout, screw: NDArray
+) -> None:
+    """Add the errors delta l of a feature's screw (6, M) in its axes."""
+    robot, row = bodies.robot, bodies.robot.index(callout.feature)
+    pose = _feature_pose(bodies, callout)
+    if not callout.after:
+        errors[row] += _carried(pose, bodies.before[row]) @ screw
+        return
+    children = np.flatnonzero(robot.parents == row)
+    if not len(children):
+        fault = "found no frame that its joint carries, expected one or more"
+        raise BadInput(_fault(callout, fault))
+    for child in children:
+        errors[child] -= _carried(pose, bodies.before[child]) @ screw
+
+
+def _carried(old: NDArray, new: NDArray) -> NDArray:
+    """(6, 6) a screw read at one pose, in its axes, at another pose."""
+    return _to_feature(new) @ np.linalg.inv(_to_feature(old))

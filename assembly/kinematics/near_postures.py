@@ -1,0 +1,47 @@
+"""Postures near a posture: a small motion that keeps the closures, then corrected.
+
+Begin with :func:`near_postures`.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.closure_rates import SINGULAR, closure_matrices
+from assembly.kinematics.nominal import Target, follow, mobile, size_of
+from assembly.kinematics.track import Track
+from assembly.model.robot import Robot
+
+
+def near_postures(
+    robot: Robot, q: NDArray, T: NDArray, distance: float, count: int
+) -> Iterator[Track]:
+    """Yield nearby postures, each reached by a random motion of all joints.
+
+    Args:
+        robot: robot of n frames.
+        q: (n,) [rad or m] coordinates of all joints.
+        T: (n, 4, 4) frames seen from the base.
+        distance: [rad or lengths] norm of the motion.
+        count: number of postures.
+
+    Yields:
+        One posture a time, with its closure error.
+    """
+    free = Target(coordinates=np.full((1, len(q)), np.nan))
+    for step in _steps_aside(robot, T, distance, count):
+        yield follow(robot, q + step, free, guess=True)
+
+
+def _steps_aside(robot: Robot, T: NDArray, distance: float, count: int) -> NDArray:
+    """Return (count, n) joint steps that keep the closures at first order."""
+    A = closure_matrices(robot, T[None])[0][0]
+    _, values, Vt = np.linalg.svd(A)
+    rank = int((values > SINGULAR * values[:1]).sum())
+    ways = np.random.default_rng(1).normal(size=(count, len(Vt) - rank))
+    steps = np.zeros((count, len(T)))
+    steps[:, mobile(robot)] = ways @ Vt[rank:]
+    steps *= distance / np.linalg.norm(steps, axis=1, keepdims=True).clip(1e-300)
+    slides = np.array([f.joint == "prismatic" for f in robot.frames])
+    return steps * np.where(slides, size_of(robot), 1.0)

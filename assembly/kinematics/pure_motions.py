@@ -1,0 +1,142 @@
+"""Pure motions of a space of screws: translations, turns, screws of a pitch.
+
+A screw (w, v), read at a point c, is a translation if w = 0, else a turn about an axis
+if w.v = 0, else a screw of pitch 2 pi w.v / w.w, its axis through c + w x v / w.w (Hunt
+1978, Kinematic geometry of mechanisms).  Begin with :func:`pure_motions`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+# of files rounded at 6 digits: parallel rods turn a platform by ten times that error
+_TURN = 1e-4  # [rad] turn of a motion by one length that counts as a translation
+_PITCH = 1e-5  # [lengths] shift for 1 rad that counts as a turn
+
+
+@dataclass(frozen=True, eq=False)
+class PureMotion:
+    """One independent motion of a body.
+
+    Attributes:
+        kind: ``"translation"``, ``"turn"`` or ``"screw"``.
+        direction: (3,) unit vector along it, or of its axis.
+        point: (3,) [m] a point of its axis; None of a translation, and of a turn
+            whose axis may be anywhere.
+        pitch: [m] per turn of a screw, None of the others.
+    """
+
+    kind: str
+    direction: NDArray
+    point: NDArray | None = None
+    pitch: float | None = None
+
+
+def pure_motions(
+    screws: NDArray, at: NDArray, size: float, error: float = 0.0
+) -> list[PureMotion]:
+    """Return independent motions that span a space of screws.
+
+    Translations come first.  The others are turns if all their axes can meet in one
+    point, else principal screws of the system.
+
+    Args:
+        screws: (k, 6) [rad, m] independent, read at a point, base axes.
+        at: (3,) [m] that point.
+        size: [m] reference length by which translations are compared with rotations.
+        error: [rad, lengths] of the screws, which parts must exceed.
+
+    Returns:
+        k of them, in base axes.
+    """
+    w, v = screws[:, :3], screws[:, 3:] / size
+    zero, exact = max(_TURN, error), max(_PITCH, error)
+    U, values, Wt = np.linalg.svd(w, full_matrices=True)
+    turning = int((values > zero).sum())
+    free = U[:, turning:].T @ v
+    slides = [PureMotion("translation", d) for d in _plain_basis(free, zero)]
+    if not turning:
+        return slides
+    axes = _plain_basis(Wt[:turning], zero)
+    # velocities of c for these rotations; translations are free to be added
+    across = _complement(free, zero)
+    rates = axes @ np.linalg.pinv(w, rcond=zero) @ v @ across.T @ across
+    point, anywhere = _common_point(axes, rates, across, exact)
+    if point is None:
+        return slides + _principal_screws(axes, rates, at, size, exact)
+    centre = None if anywhere else at + size * point
+    return slides + [PureMotion("turn", axis, centre) for axis in axes]
+
+
+def _plain_basis(rows: NDArray, zero: float) -> NDArray:
+    """Unit vectors that span the rows, along the base's axes where they can be."""
+    rank = int((np.linalg.svd(rows, compute_uv=False) > zero).sum()) if len(rows) else 0
+    if rank == 3:
+        return np.eye(3)
+    P = np.linalg.pinv(rows, rcond=zero) @ rows if rank else np.zeros((3, 3))
+    basis: list[NDArray] = []
+    for _ in range(rank):
+        # the base's axis nearest to the remaining space
+        k = int(np.argmax(np.round(np.diag(P), 9)))
+        d = P[k] / np.linalg.norm(P[k])
+        d = np.where(np.abs(d) < 1e-12, 0.0, d)
+        basis.append(d / np.linalg.norm(d))
+        P = P - np.outer(d, d)
+    order = sorted(basis, key=lambda d: int(np.argmax(np.round(np.abs(d), 9))))
+    return np.array(order).reshape(-1, 3)
+
+
+def _complement(rows: NDArray, zero: float) -> NDArray:
+    """(3 - rank, 3) orthonormal rows at right angles to all rows."""
+    if not len(rows):
+        return np.eye(3)
+    _, values, Vt = np.linalg.svd(rows)
+    return np.asarray(Vt[int((values > zero).sum()) :])
+
+
+def _common_point(
+    axes: NDArray, rates: NDArray, across: NDArray, zero: float
+) -> tuple[NDArray | None, bool]:
+    """The point through which all axes can pass, nearest to the origin.
+
+    Args:
+        axes: (r, 3) unit vectors.
+        rates: (r, 3) velocities at the origin, without free translations.
+        across: (m, 3) directions in which translations are not free.
+        zero: [lengths] largest difference of velocities that counts as none.
+
+    Returns:
+        (3,) the point, None if there is none; and whether any point will do.
+    """
+    # p x axis must equal the rate, but for free translations
+    rows = np.vstack([across @ -_cross(axis) for axis in axes])
+    goal = np.concatenate([across @ rate for rate in rates])
+    point = np.linalg.lstsq(rows, goal, rcond=zero)[0]
+    if np.abs(rows @ point - goal).max(initial=0.0) > zero:
+        return None, False
+    return point, not np.abs(rows).max(initial=0.0) > zero
+
+
+def _cross(a: NDArray) -> NDArray:
+    """(3, 3) matrix of the product a x."""
+    return np.cross(a, np.eye(3)).T
+
+
+def _principal_screws(
+    axes: NDArray, rates: NDArray, at: NDArray, size: float, zero: float
+) -> list[PureMotion]:
+    """Principal screws: stationary pitches w.v / w.w among all combinations."""
+    Q = axes @ rates.T
+    pitches, mix = eigh((Q + Q.T) / 2, axes @ axes.T)
+    found = []
+    for pitch, m in zip(pitches, mix.T, strict=True):
+        w, v = m @ axes, m @ rates
+        point = at + size * np.cross(w, v) / (w @ w)
+        kind = "screw" if abs(pitch) > zero else "turn"
+        w = w / np.linalg.norm(w)
+        w = w if w[np.argmax(np.round(np.abs(w), 9))] > 0 else -w
+        turn = float(2 * np.pi * pitch * size) if kind == "screw" else None
+        found.append(PureMotion(kind, w, point, turn))
+    return found

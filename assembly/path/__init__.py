@@ -1,0 +1,4 @@
+"""Errors of a robot that moves along a path, by its own inertia; drives held on it.
+
+Begin with :func:`assembly.path.path_errors.path_errors`.
+"""

@@ -1,0 +1,211 @@
+r"""Inertia and weight of a moving beam: equivalent wrenches at its ends, its sections.
+
+A beam moves almost as a rigid body.  Its load per length is then linear along it,
+q(x) = rho A (g - a(x)), and its moment per length is constant, m = -rho (J alpha +
+omega x J omega).  At a cantilever's tip this load causes the same deflection as
+
+    F_x = Q_0 / 2 + Q_1 / 3                M_x = m_x L / 2
+    F_y = Q_0 / 2 + Q_1 (7/20 + phi/3) / (1 + phi) + m_z / (1 + phi)
+    M_z = Q_0 L / 12 + Q_1 L / 8 - L (F_y - m_z) / 2 + ..
+
+and so on, with Q_0 = q(0) L, Q_1 = (q(L) - q(0)) L and phi = 12 E I / (k G A L^2).  For
+phi = 0 this is the consistent mass matrix times the rigid accelerations of both ends.
+What remains of the load acts at the base.
+
+======  =======================================================  ==============
+symbol  meaning                                                  unit
+======  =======================================================  ==============
+x y z   axes of the section: x from base to tip                  -
+q0, q1  load per length at the base, its increase to the tip     N/m
+m       moment per length                                        N
+======  =======================================================  ==============
+
+Sources:
+    Przemieniecki (1968), Theory of Matrix Structural Analysis, chapter 11 (consistent
+    mass, with shear).
+"""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.model.links import link_compliance
+from assembly.model.robot import BeamLink, Frame, beam_axis
+from assembly.path.motion import Motion
+from stiffness.beam.beam import section_axes
+from stiffness.beam.beam_stress import peak_beam_stress, section_stress
+from stiffness.beam.sections import declared_section
+
+_ALONG = 33  # sections; a parabola between two loses 1e-3
+_FEW = 34  # fibres by which the section of largest stress is found
+
+
+@dataclass(frozen=True, eq=False)
+class BeamData:
+    """A beam with a density, as its loads need it.
+
+    Attributes:
+        length: [m].
+        axes: (3, 3) of the section, seen from the frame, in columns.
+        mass: [kg/m].
+        inertia: (3,) [kg m] moments of inertia per length about the section's axes.
+        shear: (2,) [-] phi of bending in the planes x y and x z.
+    """
+
+    length: float
+    axes: NDArray
+    mass: float
+    inertia: NDArray
+    shear: NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class BeamLoad:
+    """Distributed load of a beam at k points, in the axes of its section.
+
+    Attributes:
+        data: the beam.
+        q0: (k, 3) [N/m] at the base.
+        q1: (k, 3) [N/m] increase from base to tip.
+        m: (k, 3) [N] moment per length.
+    """
+
+    data: BeamData
+    q0: NDArray
+    q1: NDArray
+    m: NDArray
+
+    def rows(self, which: NDArray) -> "BeamLoad":
+        """Return the load at a selection of the points."""
+        return replace(self, q0=self.q0[which], q1=self.q1[which], m=self.m[which])
+
+    def at_tip(self) -> NDArray:
+        """Return (k, 6) [N m, N] equivalent wrench at the tip, section's axes."""
+        L, phi = self.data.length, self.data.shear
+        Q0, Q1, m = self.q0 * L, self.q1 * L, self.m
+        wrench = np.zeros((len(Q0), 6))
+        wrench[:, 0] = m[:, 0] * L / 2
+        wrench[:, 3] = Q0[:, 0] / 2 + Q1[:, 0] / 3
+        # a moment about z bends towards y, one about y away from z
+        for plane, across, about, sign in ((0, 1, 2, 1.0), (1, 2, 1, -1.0)):
+            p = phi[plane]
+            of_increase = Q1[:, across] * (7 / 20 + p / 3) / (1 + p)
+            turned = sign * m[:, about] / (1 + p)
+            wrench[:, 3 + across] = Q0[:, across] / 2 + of_increase + turned
+            moment = -Q0[:, across] * L / 12 + Q1[:, across] * L / 8
+            moment += -of_increase * L / 2 + turned * p * L / 2
+            wrench[:, about] = sign * moment
+        return wrench
+
+    def at_base(self, tip: NDArray) -> NDArray:
+        """Return (k, 6) [N m, N] at the base: the whole load less the tip's share.
+
+        Args:
+            tip: of :meth:`at_tip`.
+
+        Returns:
+            Section's axes.
+        """
+        L = self.data.length
+        x = np.array([1.0, 0.0, 0.0])
+        force = self.q0 * L + self.q1 * L / 2
+        moment = np.cross(x, self.q0 * L**2 / 2 + self.q1 * L**2 / 3) + self.m * L
+        moment -= tip[:, :3] + L * np.cross(x, tip[:, 3:])
+        return np.concatenate([moment, force - tip[:, 3:]], axis=1)
+
+    def on_sections(self, tip: NDArray, count: int = _ALONG) -> NDArray:
+        """Return the wrenches through sections, from the base to the tip.
+
+        Args:
+            tip: (k, 6) [N m, N] through the section at the tip, section's axes.
+            count: number of sections, equally spaced.
+
+        Returns:
+            (k, count, 6) [N m, N] of the outer part on the inner.
+        """
+        L, x = self.data.length, np.array([1.0, 0.0, 0.0])
+        s = L * np.linspace(1, 0, count)[:, None]  # distance from the tip
+        q0, q1, m = (part[:, None] for part in (self.q0, self.q1, self.m))
+        F = tip[:, None, 3:] + (q0 + q1) * s - q1 / L * s**2 / 2
+        arms = s * tip[:, None, 3:] + (q0 + q1) * s**2 / 2 - q1 / L * s**3 / 6
+        M = tip[:, None, :3] + np.cross(x, arms) + m * s
+        return np.concatenate([M, F], axis=2)
+
+
+@lru_cache(maxsize=256)
+def beam_data(frame: Frame) -> BeamData | None:
+    """Return the data of a frame's beam; None without a beam or its density."""
+    link = frame.link
+    if not isinstance(link, BeamLink) or not link.density:
+        return None
+    length, axis = beam_axis(frame)
+    axes = section_axes(axis, link.up)
+    section = declared_section(link.section, link.poisson)
+    second = np.array([section.I_y + section.I_z, section.I_y, section.I_z])
+    turned = np.kron(np.eye(2), axes)
+    C = turned.T @ link_compliance(frame) @ turned
+    # the deflection by a force is L^3 / 3 E I + L / k G A, the rotation by a moment
+    # L / E I
+    bending, turning = np.diag(C)[[4, 5]], np.diag(C)[[2, 1]]
+    shear = 12 * (bending - turning * length**2 / 3) / (turning * length**2)
+    return BeamData(
+        length, axes, link.density * section.area, link.density * second, shear
+    )
+
+
+def beam_load(motion: Motion, body: int, gravity: NDArray) -> BeamLoad | None:
+    """Return the inertia and weight of a body's beam.
+
+    Args:
+        motion: motion at k points.
+        body: row of its frame.
+        gravity: (3,) [m/s^2] base axes.
+
+    Returns:
+        The load; None without a beam or its density.
+    """
+    data = beam_data(motion.postures.robot.frames[body])
+    if data is None:
+        return None
+    T = motion.postures.transforms[:, body]
+    R = T[:, :3, :3] @ data.axes
+    tip = T[:, :3, 3]
+    base = tip - data.length * R[:, :, 0]
+
+    def load(points: NDArray) -> NDArray:
+        missing = gravity - motion.acceleration_of(body, points)
+        return data.mass * np.einsum("kji,kj->ki", R, missing)
+
+    q0 = load(base)
+    omega, alpha = (
+        np.einsum("kji,kj->ki", R, part[:, body, :3])
+        for part in (motion.twists, motion.accelerations)
+    )
+    J = data.inertia
+    m = -(J * alpha + np.cross(omega, J * omega))
+    return BeamLoad(data, q0, load(tip) - q0, m)
+
+
+def beam_stress(frame: Frame, load: BeamLoad, tip: NDArray) -> NDArray:
+    """Return the largest von Mises stress along a beam under its distributed load.
+
+    Args:
+        frame: the beam's, of a declared shape.
+        load: at k points.
+        tip: (k, 6) [N m, N] through the section at the tip, in the frame's axes.
+
+    Returns:
+        (k,) [Pa]; 33 sections are compared at a tenth of their fibres, and the worst is
+        evaluated at all.
+    """
+    assert isinstance(frame.link, BeamLink)
+    R = load.data.axes
+    wrenches = load.on_sections(np.hstack([tip[:, :3] @ R, tip[:, 3:] @ R]))
+    _, influence = section_stress(frame.link.section)
+    few = influence[:: max(1, len(influence) // _FEW)]
+    sigma, tau_y, tau_z = (wrenches @ few[:, k].T for k in range(3))
+    size = (sigma**2 + 3 * (tau_y**2 + tau_z**2)).max(axis=2)
+    worst = wrenches[np.arange(len(wrenches)), size.argmax(axis=1)]
+    return peak_beam_stress(frame.link.section, 0.0, worst)[0]

@@ -1,0 +1,90 @@
+"""Inertia and weight of a moving link given by a mesh, as wrenches at its two ends.
+
+The consistent mass matrix of its finite elements, for motions of its two interfaces,
+multiplies the accelerations of both ends.  A difference to the resultant force and
+moment of the rigid link, due to mass beside the line between the ends where it turns,
+is shared by both ends.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.model.mesh_link import mesh_link_mass
+from assembly.path.motion import Motion
+from stiffness.screws import skew
+
+
+def mesh_end_wrenches(
+    motion: Motion, body: int, gravity: NDArray
+) -> tuple[NDArray, NDArray, NDArray]:
+    """Return the inertia and weight of a body's mesh link at its ends.
+
+    Args:
+        motion: motion at k points.
+        body: row of a frame with a mesh link of a density.
+        gravity: (3,) [m/s^2] base axes.
+
+    Returns:
+        (k, 6) [N m, N] at the tip, which is the frame's origin, and at the base, in the
+        frame's axes; and (3,) [m] from base to tip.
+
+    Raises:
+        BadInput: the link was not solved when the robot was loaded.
+    """
+    M, span = mesh_link_mass(motion.postures.robot.frames[body])
+    T = motion.postures.transforms[:, body]
+    R, tip = T[:, :3, :3], T[:, :3, 3]
+    to_frame = np.swapaxes(R, 1, 2)
+
+    def read(vectors: NDArray) -> NDArray:
+        return (to_frame @ vectors[..., None])[..., 0]
+
+    omega, alpha = (
+        read(part[:, body, :3]) for part in (motion.twists, motion.accelerations)
+    )
+    at_tip, at_base = (
+        read(motion.acceleration_of(body, point) - gravity)
+        for point in (tip, tip - R @ span)
+    )
+    e = span / np.linalg.norm(span)
+    # the ends' slopes in a field of acceleration that turning makes
+    slope = alpha + np.cross(e, omega) * (omega @ e)[:, None]
+    wrenches = -np.hstack([slope, at_base, slope, at_tip]) @ M.T
+    base, tip = wrenches[:, :6], wrenches[:, 6:]
+    missing = _rigid(M, span, omega, alpha, at_tip) - tip - _at_tip(base, span)
+    half = missing / 2
+    half[:, :3] += np.cross(span, half[:, 3:]) / 2
+    return tip + half, base + half, span
+
+
+def _at_tip(wrenches: NDArray, span: NDArray) -> NDArray:
+    """Return (k, 6) wrenches at the base, read at the tip."""
+    read = wrenches.copy()
+    read[:, :3] -= np.cross(span, wrenches[:, 3:])
+    return read
+
+
+def _rigid(
+    M: NDArray, span: NDArray, omega: NDArray, alpha: NDArray, at_tip: NDArray
+) -> NDArray:
+    """Return the (k, 6) wrench of the rigid link's inertia and weight at its tip.
+
+    Args:
+        M: (12, 12) mass matrix.
+        span: (3,) [m] from base to tip.
+        omega: (k, 3) [rad/s].
+        alpha: (k, 3) [rad/s^2].
+        at_tip: (k, 3) [m/s^2] acceleration of the tip less gravity.
+
+    Returns:
+        [N m, N].
+    """
+    ends = np.eye(12, 6)
+    ends[6:] = np.eye(6)
+    ends[3:6, :3] = skew(span)
+    rigid = ends.T @ M @ ends
+    wrench = -np.hstack([alpha, at_tip]) @ rigid
+    wrench[:, :3] -= np.cross(omega, omega @ rigid[:3, :3])
+    first = np.array([rigid[2, 4], rigid[0, 5], rigid[1, 3]])  # mass times centre
+    wrench[:, 3:] -= np.cross(omega, np.cross(omega, first))
+    return wrench

@@ -1,0 +1,300 @@
+r"""Velocities and accelerations of all bodies of a robot whose platform follows a path.
+
+======  ======================  ============  =====================================
+symbol  code                    shape         meaning
+======  ======================  ============  =====================================
+S_j     ``screws``              (k, n, 6)     unit motion of joint j, base axes
+q', q'' ``rates``               (k, n)        rates and second derivatives of the
+                                              joint coordinates
+V_j     ``twists``              (k, n, 6)     [omega, v] of body j, v of the point
+                                              of the body at the base's origin
+A_j     ``accelerations``       (k, n, 6)     derivative of V_j with time
+======  ======================  ============  =====================================
+
+With V = sum S_j q'_j over the joints that carry a body, its derivative is
+A = sum S_j q''_j + [V_j, S_j] q'_j.  At a closure the V and A of its two frames are
+equal.  These equations, and those of the prescribed components of the pose, are linear
+in q' and then in q''.  Both have the same matrix.  Its least-norm solution leaves at
+rest what neither closures nor path prescribe, such as the spin of a rod between two
+balls.  No pose is differenced.
+
+Sources:
+    Featherstone (2008), Rigid Body Dynamics Algorithms, chapters 2 and 8 (spatial
+    accelerations, loop closures).
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.nominal import mobile, motion_screws, size_of
+from assembly.kinematics.posture import POSE, Posture, pose_components
+from assembly.kinematics.se3 import bracket, stumpff, turn_jacobian
+from assembly.model.robot import Robot
+
+# relative size below which a singular value of closures and path counts as zero, as in
+# assembly.kinematics.closure_rates
+_SINGULAR = 1e-6
+_NOISE = 30.0  # the same for each unit of the closures' nominal error
+_PRESCRIBED = 1e-4  # largest relative error of a prescribed velocity
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Motion of a robot of n frames at k points of a path.
+
+    Attributes:
+        postures: k postures in one.
+        rates: (k, n) [rad/s or m/s] of the joint coordinates.
+        second_rates: (k, n) [rad/s^2 or m/s^2] their derivatives.
+        twists: (k, n, 6) [rad/s, m/s] of the bodies, read at the base's origin.
+        accelerations: (k, n, 6) [rad/s^2, m/s^2] derivatives of the twists.
+        free: largest number of joint motions that neither path nor closures prescribe.
+        equations: (k, 6 closures + c, n) closures and prescribed components of the pose
+            for unit rates of the joints.
+    """
+
+    postures: Posture
+    rates: NDArray
+    second_rates: NDArray
+    twists: NDArray
+    accelerations: NDArray
+    free: int
+    equations: NDArray
+
+    def acceleration_of(self, body: int, points: NDArray) -> NDArray:
+        """Return the acceleration of points of a body.
+
+        Args:
+            body: row of its frame.
+            points: (k, 3) [m] base axes.
+
+        Returns:
+            (k, 3) [m/s^2] base axes.
+        """
+        V, A = self.twists[:, body], self.accelerations[:, body]
+        velocity = V[:, 3:] + np.cross(V[:, :3], points)
+        return A[:, 3:] + np.cross(A[:, :3], points) + np.cross(V[:, :3], velocity)
+
+
+class NotFollowed(Exception):
+    """The robot cannot follow the path at some of its points.
+
+    Attributes:
+        row: the first of them.
+    """
+
+    def __init__(self, row: int) -> None:
+        super().__init__(f"point {row} cannot be followed")
+        self.row = row
+
+
+def follow_path(
+    postures: Posture, names: tuple[str, ...], path: tuple[NDArray, NDArray, NDArray]
+) -> Motion:
+    """Return the motion of a robot along a path.
+
+    Args:
+        postures: k postures on the path.
+        names: c prescribed components, ``tx`` .. or ``q.<frame>``, of one kind; drives
+            that are not named among joints stay at rest.
+        path: (k, c) components [m or rad] and their first and second derivatives.
+
+    Returns:
+        The motion.
+
+    Raises:
+        NotFollowed: at a singular posture, where the platform cannot have the
+            prescribed velocity or acceleration.
+    """
+    robot = postures.robot
+    if names[0] not in POSE:
+        names, path = _with_all_drives(robot, names, path)
+    values, first, second = path
+    moves, scale = mobile(robot), _units(robot)
+    S = motion_screws(robot, postures.transforms)
+    E, size = _equations(postures, names, values, S)
+    U, sizes, Vt = np.linalg.svd(E[:, :, moves] * scale[moves], full_matrices=False)
+    inverse = _inverse(sizes, postures.mismatch)
+    solve = np.swapaxes(Vt, 1, 2) * inverse[:, None] @ np.swapaxes(U, 1, 2)
+    ranks = np.count_nonzero(inverse, axis=1)
+    free = int(moves.sum() - ranks.min(initial=moves.sum()))
+
+    def joints(prescribed: NDArray, closures: NDArray) -> NDArray:
+        right = np.concatenate([closures, prescribed], axis=1)
+        q = np.zeros((len(values), len(moves)))
+        q[:, moves] = (solve @ right[..., None])[..., 0] * scale[moves]
+        _check_followed(E, q, right)
+        return q
+
+    closed = np.zeros((len(values), E.shape[1] - values.shape[1]))
+    rates = joints(first, closed)
+    carries = carries_matrix(robot)
+    twists = carries @ (S * rates[..., None])
+    turning = (bracket(twists) @ S[..., None])[..., 0] * rates[..., None]
+    drift = carries @ turning  # accelerations at q'' = 0
+    of_closures = _of_closures(robot, drift) / size
+    own = _second_of_pose(postures, names, values, twists, drift)
+    second_rates = joints(second - own, -of_closures)
+    accelerations = carries @ (S * second_rates[..., None]) + drift
+    return Motion(postures, rates, second_rates, twists, accelerations, free, E)
+
+
+def _with_all_drives(
+    robot: Robot, names: tuple[str, ...], path: tuple[NDArray, NDArray, NDArray]
+) -> tuple[tuple[str, ...], tuple[NDArray, NDArray, NDArray]]:
+    """Return a path of joints with the drives that it does not name, at rest."""
+    drives = [f"q.{f.name}" for f in robot.frames if f.actuated]
+    still = [name for name in drives if name not in names]
+    zero = np.zeros((len(path[0]), len(still)))
+    values, first, second = (np.hstack([part, zero]) for part in path)
+    return (*names, *still), (values, first, second)
+
+
+def _units(robot: Robot) -> NDArray:
+    """Return (n,) the unit of each joint's coordinate: 1 rad, or the robot's size."""
+    slides = np.array([f.joint == "prismatic" for f in robot.frames])
+    return np.where(slides, size_of(robot), 1.0)
+
+
+def carries_matrix(robot: Robot) -> NDArray:
+    """Return (n, n): 1 where the column's joint carries the row's body."""
+    return robot.on_path - np.eye(len(robot.frames))
+
+
+def _closures(robot: Robot) -> NDArray:
+    """Return (closures, 2) rows of the frames that meet."""
+    pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
+    return np.array(pairs, dtype=int).reshape(-1, 2)
+
+
+def _of_closures(robot: Robot, bodies: NDArray) -> NDArray:
+    """Return (k, 6 closures) difference of the (k, n, 6) screws of frames that meet."""
+    pairs = _closures(robot)
+    first, second = bodies[:, pairs[:, 0]], bodies[:, pairs[:, 1]]
+    return (first - second).reshape(len(bodies), 6 * len(pairs))
+
+
+def _equations(
+    postures: Posture, names: tuple[str, ...], values: NDArray, S: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Return closures and prescribed components for unit rates of all joints.
+
+    Returns:
+        (k, 6 closures + c, n), lengths of the closures' rows over the robot's size;
+        and (6 closures,) that size in these rows, 1 in those of rotations.
+    """
+    robot = postures.robot
+    carries = carries_matrix(robot)
+    unit = np.tile(np.repeat([1.0, size_of(robot)], 3), len(robot.closures))
+    pairs = _closures(robot)
+    signs = carries[pairs[:, 0]] - carries[pairs[:, 1]]
+    closures = np.einsum("cn,kns->kcsn", signs, S)
+    closures = closures.reshape(len(S), len(unit), len(carries))
+    if names[0] not in POSE:
+        rows = [robot.index(name.removeprefix("q.")) for name in names]
+        own = np.broadcast_to(
+            np.eye(len(robot.frames))[rows], (len(S), len(rows), len(carries))
+        )
+    else:
+        platform = carries[robot.index(robot.platform)]
+        twists = np.swapaxes(S * platform[:, None], 1, 2)
+        own = _of_pose(postures, names, values) @ twists
+    return np.concatenate([closures / unit[:, None], own], axis=1), unit
+
+
+def _rotations(postures: Posture, names: tuple[str, ...], values: NDArray) -> NDArray:
+    """Return (k, 3) [rad] rotation vectors of the platform, as the path counts them."""
+    turn = pose_components(postures.platform)[:, 3:]
+    for k, name in enumerate(names):
+        if name[0] == "r":
+            turn[:, POSE.index(name) - 3] = values[:, k]
+    return turn
+
+
+def _of_pose(postures: Posture, names: tuple[str, ...], values: NDArray) -> NDArray:
+    """Return (k, c, 6) rates of components of the pose for unit twists."""
+    rates = np.zeros((len(values), 6, 6))
+    p = postures.platform[:, :3, 3]
+    rates[:, :3, 3:] = np.eye(3)
+    for i, axis in enumerate(np.eye(3)):
+        rates[:, :3, i] = np.cross(axis, p)
+    if any(name[0] == "r" for name in names):
+        turn = _rotations(postures, names, values)
+        rates[:, 3:, :3] = np.linalg.inv(turn_jacobian(turn))
+    return rates[:, [POSE.index(name) for name in names]]
+
+
+def _second_of_pose(
+    postures: Posture, names: tuple[str, ...], values: NDArray, twists: NDArray,
+    drift: NDArray,
+) -> NDArray:  # fmt: skip
+    """Return (k, c) second derivatives of the prescribed components at q'' = 0."""
+    if names[0] not in POSE:
+        return np.zeros_like(values)
+    row = postures.robot.index(postures.robot.platform)
+    V, A, p = twists[:, row], drift[:, row], postures.platform[:, :3, 3]
+    omega = V[:, :3]
+    velocity = V[:, 3:] + np.cross(omega, p)
+    shift = A[:, 3:] + np.cross(A[:, :3], p) + np.cross(omega, velocity)
+    second = np.concatenate([shift, np.zeros_like(shift)], axis=1)
+    if any(name[0] == "r" for name in names):
+        turn = _rotations(postures, names, values)
+        to_rates = np.linalg.inv(turn_jacobian(turn))
+        rate = (to_rates @ omega[..., None])[..., 0]
+        moved = A[:, :3] - _turning_of_jacobian(turn, rate)
+        second[:, 3:] = (to_rates @ moved[..., None])[..., 0]
+    return second[:, [POSE.index(name) for name in names]]
+
+
+def _turning_of_jacobian(turn: NDArray, rate: NDArray) -> NDArray:
+    """Return (k, 3) J' r', J of :func:`turn_jacobian` along a rotation vector r(t).
+
+    J r' = r' + c_2 r x r' + c_3 r x (r x r'), and c_k has the derivative
+    (k c_(k+2) - c_(k+1)) r.r' with time.
+    """
+    _, _, _, c3, c4, c5 = (c[..., 0] for c in stumpff(turn))
+    along = np.sum(turn * rate, axis=1, keepdims=True)
+    once = np.cross(turn, rate)
+    twice = np.cross(turn, once)
+    own = c3 * np.cross(rate, once)
+    return own + along * ((2 * c4 - c3) * once + (3 * c5 - c4) * twice)
+
+
+def _inverse(values: NDArray, mismatch: Any) -> NDArray:
+    """Return the (k, m) inverse singular values; 0 for those that count as zero."""
+    least = np.maximum(_SINGULAR, _NOISE * np.broadcast_to(mismatch, len(values)))
+    kept = values > least[:, None] * values[:, :1]
+    return np.where(kept, 1 / np.where(kept, values, 1.0), 0.0)
+
+
+def idle_rates(motion: Motion) -> NDArray:
+    """Return joint motions that neither drives nor closures nor platform hold.
+
+    Args:
+        motion: motion of a robot of n frames at k points.
+
+    Returns:
+        (k, n, d) [rad or m] d independent ones, the least number of all points.
+    """
+    robot = motion.postures.robot
+    passive = np.array([f.passive for f in robot.frames])
+    E = motion.equations[:, :, passive] * _units(robot)[passive]
+    _, values, Vt = np.linalg.svd(E)
+    inverse = _inverse(values, motion.postures.mismatch)
+    rank = int(np.count_nonzero(inverse, axis=1).max(initial=0))
+    idle = np.zeros((len(E), len(passive), Vt.shape[1] - rank))
+    idle[:, passive] = np.swapaxes(Vt[:, rank:], 1, 2)
+    return idle * _units(robot)[:, None]
+
+
+def _check_followed(E: NDArray, q: NDArray, right: NDArray) -> None:
+    """Refuse derivatives that the robot cannot have."""
+    left = np.abs((E @ q[..., None])[..., 0] - right).max(axis=1, initial=0.0)
+    size = np.abs(right).max(axis=1, initial=0.0)
+    size = np.maximum(size, 1e-6 * size.max(initial=0.0))
+    beyond = left > _PRESCRIBED * size
+    if beyond.any():
+        raise NotFollowed(int(np.argmax(beyond)))

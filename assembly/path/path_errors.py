@@ -1,0 +1,289 @@
+"""Errors of a robot along a path: deflection, forces and stress by its acceleration.
+
+At each instant the bodies' inertia and weight act as loads on the posture, and
+problem (22) is solved as at rest (quasi-static).  This leaves out vibration, damping
+and the inertia of the deflection itself: right where the motion takes many periods of
+the first natural frequency and its acceleration does not jump.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.kinematics.nominal import Target
+from assembly.kinematics.posture import together
+from assembly.kinematics.verdict import verdicts
+from assembly.linear.energy import Assembly, solve_assembly
+from assembly.linear.pose_error import bound_pose_error
+from assembly.model.link_stress import stressed_links
+from assembly.model.links import own_screw
+from assembly.model.robot import Robot
+from assembly.model.statuses import OK, SINGULAR
+from assembly.path.beam_inertia import beam_stress
+from assembly.path.idle_motions import with_idle_accelerations
+from assembly.path.inertial_loads import InertialLoads, inertial_loads
+from assembly.path.motion import Motion, NotFollowed, follow_path
+from assembly.path.placing import check_path_robot, first_frequency, placed
+from assembly.path.trajectory import Trajectory
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from assembly.sweeps.targets import goals_of, of_joints
+from forcefit.inputs.table import BadInput, nearest
+from forcefit.results.display import Figures, html_table, largest, short_repr
+
+ASSUMPTIONS = ("none", "frozen", "free")  # of the bounds of problem (27) under load
+_BLOCK = 2000  # points solved together
+# results that exist wherever the path does
+_GEOMETRIC = {
+    "coordinates", "rates", "second_rates", "platform", "platform_velocity",
+    "platform_acceleration", "compliance",
+}  # fmt: skip
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class PathErrors:
+    """Results at k instants of a path, of a robot of n frames.
+
+    Attributes:
+        robot: the robot.
+        trajectory: components of the pose.
+        assumption: of the bounds of problem (27), ``"none"`` without.
+        frequency: [Hz] least first natural frequency along the path; NaN if unknown.
+        free: largest number of joint motions that neither path nor closures prescribe;
+            they are left at rest.
+        arrays: results by name, k rows each; NaN where the status is not ok.
+
+            - ``coordinates``, ``rates``, ``second_rates`` (k, n) of all joints
+            - ``platform`` (k, 4, 4), ``platform_velocity``, ``platform_acceleration``
+              (k, 6) of its origin
+            - ``platform_screw`` (k, 6) pose error by geometric errors and all loads
+            - ``inertial_screw`` (k, 6) its change by the accelerations
+            - ``energy`` (k,), ``wrench`` (k, n, 6) through bodies at their tips,
+              ``drive_force`` (k, drives), ``stress`` (k, links)
+            - ``compliance`` (k, 6, 6) nominal, of the platform
+            - with an assumption ``rotation_error``, ``translation_error`` (k, 2)
+        status: (k,) ``"ok"``, or why a point has no result.
+        reason: (k,) message where the status is not ok.
+    """
+
+    robot: Robot
+    trajectory: Trajectory
+    assumption: str
+    frequency: float
+    free: int
+    arrays: dict[str, NDArray]
+    status: NDArray
+    reason: NDArray = field(repr=False)
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    def _figures(self) -> Figures:
+        """Return the numbers that ``forcefit assembly path`` prints first."""
+        solved = self.status == OK
+        return {
+            "points": f"{len(self.status)}, {np.count_nonzero(solved)} solved",
+            "deflection by acceleration": f"at most {largest(self.inertial[solved])}",
+            "path time": f"{self.trajectory.duration:.4g} s, {self.periods:.3g} "
+            "periods of the first natural frequency",
+        }
+
+    @property
+    def inertial(self) -> NDArray:
+        """(k, 6) [rad, m] change of the platform's error by the accelerations."""
+        return self.arrays["inertial_screw"]
+
+    @property
+    def periods(self) -> float:
+        """[-] the path's time over the first period; NaN if unknown."""
+        return self.trajectory.duration * self.frequency
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Names of the actuated joints, of the columns of ``drive_force``."""
+        return tuple(self.drive_units)
+
+    @property
+    def drive_units(self) -> dict[str, str]:
+        """Unit of each drive's force: N of a prismatic joint, N m of others."""
+        return {
+            f.name: "N" if f.joint == "prismatic" else "N m"
+            for f in self.robot.frames if f.actuated
+        }  # fmt: skip
+
+
+def path_errors(
+    robot: Robot,
+    trajectory: Trajectory,
+    *,
+    load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    assumption: str = "none",
+    progress: Progress = lambda done, most: None,
+) -> PathErrors:
+    """Return the errors of a robot along a path, its inertia included.
+
+    Args:
+        robot: robot with masses.
+        trajectory: of :func:`assembly.path.trajectory.timed` or
+            :func:`~assembly.path.trajectory.profiled`.
+        load: (6,) [N m, N] constant load on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes; none if absent.
+        assumption: of bounds of the pose error, problem (27): ``"frozen"`` or
+            ``"free"``; ``"none"`` for no bounds.
+        progress: called with the points solved, and all.
+
+    Returns:
+        The results.
+
+    Raises:
+        BadInput: nothing has a mass, the robot has effects, a point is out of reach or
+            cannot be followed, or no such assumption.
+    """
+    if assumption not in ASSUMPTIONS:
+        hint = nearest(assumption, ASSUMPTIONS)
+        raise BadInput(f'--assumption: found "{assumption[:60]}"{hint}')
+    check_path_robot(robot)
+    asked = _Asked(robot, trajectory, load, gravity, assumption)
+    count, parts = len(trajectory.times), []
+    progress(0, count)
+    for first in range(0, count, _BLOCK):
+        rows = slice(first, min(first + _BLOCK, count))
+        parts.append(_solve(asked, rows))
+        progress(rows.stop, count)
+    arrays = {name: np.concatenate([p[name] for p in parts]) for name in parts[0]}
+    status, reason = arrays.pop("status"), arrays.pop("reason")
+    free = int(arrays.pop("free").max())
+    frequency = first_frequency(robot, trajectory)
+    return PathErrors(
+        robot, trajectory, assumption, frequency, free, arrays, status, reason
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """Arguments of :func:`path_errors`, the same for all blocks."""
+
+    robot: Robot
+    trajectory: Trajectory
+    load: ArrayLike | None
+    gravity: ArrayLike | None
+    assumption: str
+
+
+def _solve(asked: _Asked, rows: slice) -> dict[str, NDArray]:
+    """Return the results of a block of points."""
+    motion, verdict = _moved(asked, rows)
+    gravity = np.zeros(3) if asked.gravity is None else np.asarray(asked.gravity, float)
+    motion = with_idle_accelerations(motion, gravity)
+    loads = inertial_loads(motion, gravity)
+    still = np.zeros_like(motion.twists)
+    at_rest = replace(motion, twists=still, accelerations=still)
+    assembly = _assembled(asked, motion, loads)
+    static = _assembled(asked, motion, inertial_loads(at_rest, gravity))
+    robot, T = asked.robot, motion.postures.platform
+    platform = robot.index(robot.platform)
+    wrenches = assembly.wrenches - loads.at_tips
+    out = {
+        "coordinates": motion.postures.coordinates,
+        "rates": motion.rates,
+        "second_rates": motion.second_rates,
+        "platform": T,
+        "platform_velocity": _at_origin(motion.twists[:, platform], T),
+        "platform_acceleration": np.hstack([
+            motion.accelerations[:, platform, :3],
+            motion.acceleration_of(platform, T[:, :3, 3]),
+        ]),
+        "platform_screw": assembly.platform_screw,
+        "inertial_screw": assembly.platform_screw - static.platform_screw,
+        "energy": assembly.energy,
+        "wrench": wrenches,
+        "drive_force": _drive_forces(robot, assembly.joint_wrenches),
+        "stress": _stresses(robot, loads, wrenches),
+        "compliance": platform_stiffness(motion.postures).compliance,
+    }
+    if asked.assumption != "none":
+        bounds = bound_pose_error(assembly, asked.assumption)
+        out["rotation_error"] = bounds.rotation_error
+        out["translation_error"] = bounds.translation_error
+    status, reason = _statuses(assembly, verdict)
+    for name in out.keys() - _GEOMETRIC:
+        out[name] = np.array(out[name], dtype=float)
+        out[name][status != OK] = np.nan
+    free = np.full(len(status), motion.free)
+    return out | {"status": status, "reason": reason, "free": free}
+
+
+def _moved(asked: _Asked, rows: slice) -> tuple[Motion, list[tuple[str, str]]]:
+    """Return the motion of a block of points, and the verdict on each posture."""
+    robot, path = asked.robot, asked.trajectory
+    values = path.values[rows]
+    postures, reasons = placed(robot, path.names, values)
+    for i, reason in enumerate(reasons):
+        if reason:
+            raise BadInput(f"path at {path.times[rows][i]:.6g} s: {reason}")
+    there = together([one for one in postures if one is not None])
+    goals = goals_of(path.names, robot, values)
+    target = Target(coordinates=goals) if of_joints(path.names) else Target(goals)
+    verdict = verdicts(robot, target, there.coordinates, there.transforms)
+    try:
+        motion = follow_path(
+            there, path.names, (values, path.first[rows], path.second[rows])
+        )
+    except NotFollowed as error:
+        raise BadInput(
+            f"path at {path.times[rows][error.row]:.6g} s: the platform cannot have "
+            "the velocity and acceleration of the path here; expected a path without "
+            "singular postures"
+        ) from None
+    return motion, verdict
+
+
+def _assembled(asked: _Asked, motion: Motion, loads: InertialLoads) -> Assembly:
+    """Return the least energies under loads on bodies and platform."""
+    return solve_assembly(
+        motion.postures, asked.load, loads.bodies, carried=loads.carried
+    )
+
+
+def _statuses(
+    assembly: Assembly, verdict: list[tuple[str, str]]
+) -> tuple[NDArray, NDArray]:
+    """Return the status of each point, and its reason."""
+    status, reason = assembly.status.astype(object), assembly.reason.astype(object)
+    for i, (geometric, why) in enumerate(verdict):
+        if geometric and (status[i] == OK or geometric == SINGULAR):
+            status[i], reason[i] = geometric, why
+    return status, reason
+
+
+def _at_origin(twists: NDArray, T: NDArray) -> NDArray:
+    """Return (k, 6) twists read at the platform's origin."""
+    moved = twists.copy()
+    moved[:, 3:] += np.cross(twists[:, :3], T[:, :3, 3])
+    return moved
+
+
+def _drive_forces(robot: Robot, joint_wrenches: NDArray) -> NDArray:
+    """Return (k, drives) [N m or N] of each drive on the part that it carries."""
+    driven = [i for i, f in enumerate(robot.frames) if f.actuated]
+    screws = np.array([own_screw(robot.frames[i]) for i in driven]).reshape(-1, 6)
+    forces: NDArray = -np.einsum("kdi,di->kd", joint_wrenches[:, driven], screws)
+    return forces
+
+
+def _stresses(robot: Robot, loads: InertialLoads, tips: NDArray) -> NDArray:
+    """Return (k, links) [Pa] largest stress in every link of known stress."""
+    links = stressed_links(robot)
+    stress = np.full((len(tips), len(links)), np.nan)
+    solved = np.isfinite(tips).all(axis=(1, 2))
+    for column, link in enumerate(links):
+        tip = tips[solved, link.row]
+        load = loads.beams.get(link.row)
+        if load is None:
+            stress[solved, column] = link.peak(tip)
+        else:
+            frame = robot.frames[link.row]
+            stress[solved, column] = beam_stress(frame, load.rows(solved), tip)
+    return stress

@@ -1,0 +1,81 @@
+"""The table of a path: poses or joint coordinates, with or without times."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.model.robot import Robot
+from assembly.sweeps.targets import read_targets
+from forcefit.inputs.table import BadInput, quoted
+
+
+@dataclass(frozen=True, eq=False)
+class PathTable:
+    """Rows through which a path leads.
+
+    Attributes:
+        names: components, ``tx`` .. or ``q.<frame>``, of one kind.
+        values: (rows, components) [m or rad].
+        times: (rows,) [s], increasing; None without times.
+        labels: names of the rows, for messages.
+    """
+
+    names: tuple[str, ...]
+    values: NDArray
+    times: NDArray | None = None
+    labels: tuple[str, ...] = ()
+
+    def row_name(self, row: int) -> str:
+        """Return the name of a row, for messages."""
+        return f"row {quoted(self.labels[row])}" if self.labels else f"row {row + 1}"
+
+
+def read_path(file: Path | str, robot: Robot) -> PathTable:
+    """Return the table of a CSV file.
+
+    Args:
+        file: columns ``pose.tx`` .. [m, rad] or ``q.<frame>``, optionally ``time`` [s]
+            and ``id``; a row for each pose.
+        robot: robot with actuated joints that may be columns.
+
+    Returns:
+        The table.
+
+    Raises:
+        BadInput: the table is invalid, has fewer than two rows, or its times do not
+            increase; the message names line and column.
+    """
+    targets = read_targets(file, robot, extra=("time",))
+    names = tuple(name for name in targets.names if name != "time")
+    columns = dict(zip(targets.names, targets.values, strict=True))
+    table = PathTable(
+        names, np.stack([columns[name] for name in names], axis=1),
+        columns.get("time"), tuple(targets.labels or ()),
+    )  # fmt: skip
+    check_path(table, str(file))
+    return table
+
+
+def check_path(table: PathTable, where: str = "path") -> None:
+    """Reject a path of fewer than two rows, or whose times do not increase.
+
+    Args:
+        table: the path.
+        where: its file, for messages.
+
+    Raises:
+        BadInput: as said.
+    """
+    if len(table.values) < 2:
+        raise BadInput(f"{where}: found one row, expected at least two poses")
+    if table.times is None:
+        return
+    steps = np.diff(table.times)
+    if not (steps > 0).all():
+        row = int(np.argmin(steps > 0)) + 1
+        raise BadInput(
+            f"{where}: {table.row_name(row)}, time: found {table.times[row]:g} s after "
+            f"{table.times[row - 1]:g} s; expected times that increase"
+        )

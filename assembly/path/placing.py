@@ -1,0 +1,90 @@
+"""Postures along a path: rows within reach, and the first natural frequency there."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.posture import Posture, place_many, place_many_joints
+from assembly.model.robot import Robot
+from assembly.path.path_file import PathTable
+from assembly.path.trajectory import Trajectory
+from assembly.platform_stiffness.vibration import check_masses, natural_modes
+from assembly.solvers.conic import SolverFailed
+from assembly.sweeps.targets import goals_of, of_joints
+from forcefit.inputs.table import BadInput
+
+_FREQUENCIES = 5  # postures at which the first natural frequency is computed
+
+
+def placed(
+    robot: Robot, names: tuple[str, ...], values: NDArray
+) -> tuple[list[Posture | None], list[str]]:
+    """Return the postures of rows of a path, and the reason where there is none.
+
+    Args:
+        robot: any robot.
+        names: components, ``tx`` .. or ``q.<frame>``.
+        values: (k, components) [m or rad].
+
+    Returns:
+        A posture or None, and an empty reason or why not, for each row.
+    """
+    place = place_many_joints if of_joints(names) else place_many
+    return place(robot, goals_of(names, robot, values))
+
+
+def check_path_robot(robot: Robot) -> None:
+    """Reject a robot without masses, or with effects, which a path leaves out.
+
+    Args:
+        robot: any robot.
+
+    Raises:
+        BadInput: as said.
+    """
+    if robot.has_effects:
+        raise BadInput(
+            f"{robot.name}: found effects of the machine, which are not computed along "
+            "a path; expected a robot without effects"
+        )
+    check_masses(robot)
+
+
+def check_rows(robot: Robot, table: PathTable, where: str = "path") -> None:
+    """Reject a path with a row that the robot cannot reach.
+
+    Args:
+        robot: any robot.
+        table: rows of the path.
+        where: its file, for messages.
+
+    Raises:
+        BadInput: names the row.
+    """
+    _, reasons = placed(robot, table.names, table.values)
+    for row, reason in enumerate(reasons):
+        if reason:
+            raise BadInput(f"{where}: {table.row_name(row)}: {reason}")
+
+
+def first_frequency(robot: Robot, trajectory: Trajectory) -> float:
+    """Return the least natural frequency at postures along a path, drives held.
+
+    Args:
+        robot: any robot.
+        trajectory: the path.
+
+    Returns:
+        [Hz], of the nominal robot; NaN where nothing vibrates.
+    """
+    count = len(trajectory.times)
+    rows = np.unique(np.linspace(0, count - 1, _FREQUENCIES).astype(int))
+    postures, _ = placed(robot, trajectory.names, trajectory.values[rows])
+    found = []
+    for posture in postures:
+        try:
+            modes = natural_modes(posture, 6) if posture is not None else None
+        except (BadInput, SolverFailed):
+            continue
+        if modes is not None:
+            found += [f for f in modes.frequencies.tolist() if f > 0.0]
+    return min(found, default=float("nan"))

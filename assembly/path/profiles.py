@@ -1,0 +1,49 @@
+"""Time laws of a motion from rest to rest, s from 0 to 1 in the time 1.
+
+==========  ========================  ==========  ============  ====================
+name        s                         peak speed  acceleration  jumps
+==========  ========================  ==========  ============  ====================
+quintic     10 t^3 - 15 t^4 + 6 t^5   1.875       5.774         of the jerk
+seventh     35 t^4 - 84 t^5 + 70 t^6  2.1875      7.513         none of the jerk
+            - 20 t^7
+trapezoid   thirds of the time: speed 1.5         4.5           of the acceleration
+            grows, stays, falls
+==========  ========================  ==========  ============  ====================
+
+Sources:
+    Biagiotti & Melchiorri (2008), Trajectory Planning for Automatic Machines and
+    Robots, chapters 2 and 3.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
+
+Law = Callable[[NDArray], tuple[NDArray, NDArray, NDArray]]
+
+
+def _polynomial(*coefficients: float) -> Law:
+    """Return the law of a polynomial, constant term first."""
+    s = Polynomial(coefficients)
+    return lambda t: (s(t), s.deriv()(t), s.deriv(2)(t))
+
+
+def _trapezoid(t: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Return the law of constant acceleration, speed and deceleration, a third each."""
+    left = np.minimum(t, 1 - t)  # time since rest, or until rest
+    ramp = left < 1 / 3
+    way = np.where(ramp, 2.25 * left**2, 1.5 * left - 0.25)
+    speed = np.where(ramp, 4.5 * left, 1.5)
+    # where the acceleration jumps, the value of the outer third
+    size = np.where(left <= 1 / 3, 4.5, 0.0)
+    return np.where(t <= 0.5, way, 1 - way), speed, np.where(t <= 0.5, size, -size)
+
+
+PROFILES: dict[str, Law] = {
+    "quintic": _polynomial(0, 0, 0, 10, -15, 6),
+    "seventh": _polynomial(0, 0, 0, 0, 35, -84, 70, -20),
+    "trapezoid": _trapezoid,
+}
+JUMPING = frozenset({"trapezoid"})  # laws whose acceleration jumps

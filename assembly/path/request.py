@@ -1,0 +1,151 @@
+"""The errors along a path from the options of ``forcefit assembly path``."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from assembly.exchange.robot_files import load_robot
+from assembly.kinematics.nominal import size_of
+from assembly.model.robot import Robot
+from assembly.path.path_errors import (
+    PathErrors,
+    Progress,
+    path_errors,
+)
+from assembly.path.path_file import PathTable, check_path, read_path
+from assembly.path.placing import check_path_robot, check_rows
+from assembly.path.trajectory import Trajectory, profiled, timed
+from forcefit.inputs.errors import checked
+from forcefit.inputs.table import BadInput, nearest
+
+ENDS = ("rest", "moving")
+POINTS = 201
+
+
+@dataclass(frozen=True)
+class PathTimes:
+    """How a path runs in time.
+
+    Attributes:
+        profile: law from rest to rest, of :data:`assembly.path.profiles.PROFILES`; None
+            where times are given.
+        duration: [s] of the profile.
+        speed: [m/s, or rad/s or m/s of drives] its largest speed.
+        acceleration: [m/s^2, or rad/s^2 or m/s^2 of drives] its largest acceleration.
+        interval: [s] between the rows of a table without times.
+        ends: ``"rest"`` or ``"moving"``, of a path with times.
+        points: number of instants, equally spaced.
+    """
+
+    profile: str | None = None
+    duration: float | None = None
+    speed: float | None = None
+    acceleration: float | None = None
+    interval: float | None = None
+    ends: str = "rest"
+    points: int = POINTS
+
+
+def errors_along_path(
+    robot: Robot | str | Path,
+    path: PathTable | str | Path,
+    *,
+    times: PathTimes | None = None,
+    load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    assumption: str = "none",
+    progress: Progress = lambda done, most: None,
+) -> PathErrors:
+    """Return the errors of a robot along a path, its inertia included.
+
+    Args:
+        robot: a robot with masses, a robot file, or a built-in name.
+        path: rows of poses or joint coordinates, or the CSV file of them, with a column
+            ``time`` or without; see :func:`assembly.path.path_file.read_path`.
+        times: how the path runs in time; as its times if absent.
+        load: (6,) [N m, N] constant load on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes; none if absent.
+        assumption: of bounds of the pose error, problem (27): ``"frozen"`` or
+            ``"free"``; ``"none"`` for no bounds.
+        progress: called with the points solved, and all.
+
+    Returns:
+        The results.
+
+    Raises:
+        BadInput: the path, its times or the robot break a rule; a row is out of reach.
+    """
+    machine = robot if isinstance(robot, Robot) else load_robot(robot)
+    trajectory = trajectory_of(machine, path, times or PathTimes())
+    return path_errors(
+        machine, trajectory, load=load, gravity=gravity, assumption=assumption,
+        progress=progress,
+    )  # fmt: skip
+
+
+def trajectory_of(
+    robot: Robot, path: PathTable | str | Path, times: PathTimes
+) -> Trajectory:
+    """Return a path in time, all its rows within the robot's reach.
+
+    Args:
+        robot: robot with masses.
+        path: of :func:`errors_along_path`.
+        times: how the path runs in time.
+
+    Returns:
+        The trajectory.
+
+    Raises:
+        BadInput: as :func:`errors_along_path`.
+    """
+    check_path_robot(robot)
+    where = "path" if isinstance(path, PathTable) else str(path)
+    table = path if isinstance(path, PathTable) else read_path(path, robot)
+    check_path(table, where)
+    table = _with_times(table, times, where)
+    check_rows(robot, table, where)
+    if times.profile is not None:
+        return profiled(
+            table, times.points, times.profile, size_of(robot), times.duration,
+            times.speed, times.acceleration,
+        )  # fmt: skip
+    return timed(table, times.points, times.ends)
+
+
+def _with_times(table: PathTable, times: PathTimes, where: str) -> PathTable:
+    """Return the rows with their times; refuse options that contradict each other."""
+    limits = {
+        "--duration": (times.duration, "s"), "--speed": (times.speed, "m/s"),
+        "--acceleration": (times.acceleration, "m/s^2"),
+        "--interval": (times.interval, "s"),
+    }  # fmt: skip
+    for option, (value, unit) in limits.items():
+        if value is not None:
+            checked(option, value, unit, above=0)
+    if times.ends not in ENDS:
+        raise BadInput(f'--ends: found "{times.ends[:60]}"{nearest(times.ends, ENDS)}')
+    given = {
+        "column time": table.times is not None,
+        "--interval": times.interval is not None,
+        "--profile": times.profile is not None,
+    }  # fmt: skip
+    found = [name for name, there in given.items() if there]
+    if len(found) != 1:
+        expected = "expected a column time, --interval or --profile, one of them"
+        raise BadInput(
+            f"{where}: found {' and '.join(found) or 'no times'}; {expected}"
+        )
+    if times.profile is None:
+        for option in ("--duration", "--speed", "--acceleration"):
+            if limits[option][0] is not None:
+                raise BadInput(f"{option}: found without --profile, whose limit it is")
+    elif times.ends == "moving":
+        raise BadInput(
+            "--ends moving: found together with --profile, from rest to rest"
+        )
+    if times.interval is None:
+        return table
+    return replace(table, times=times.interval * np.arange(len(table.values)))

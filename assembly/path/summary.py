@@ -1,0 +1,178 @@
+"""Summary of the errors along a path, as plain values and as text."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.linear.closure import virtual_joints
+from assembly.model.link_stress import stressed_links
+from assembly.model.statuses import OK
+from assembly.path.path_errors import PathErrors
+from forcefit.results.display import largest_row, listing
+from forcefit.results.text import in_unit, lines_of, table_lines
+from forcefit.results.units import FACTORS
+
+LEAST_PERIODS = 10.0  # below, vibration adds 15 % and more (quintic, undamped)
+_STARTS = 1e-6  # of the largest acceleration: more at an end is a jump from rest
+LAWS = {"times": "spline through given times"}
+# largest values by key: words, SI unit, shown unit
+LARGEST = {
+    "inertial_translation": ("deflection by acceleration", "m", "um"),
+    "inertial_rotation": ("rotation by acceleration", "rad", "mrad"),
+    "translation": ("platform translation error", "m", "um"),
+    "rotation": ("platform rotation error", "rad", "mrad"),
+    "translation_bound": ("bound of the translation error", "m", "um"),
+    "rotation_bound": ("bound of the rotation error", "rad", "mrad"),
+    "force": ("force through a body", "N", "N"),
+    "stress": ("von Mises stress", "Pa", "MPa"),
+    "speed": ("speed of the platform", "m/s", "m/s"),
+    "acceleration": ("acceleration of the platform", "m/s^2", "m/s^2"),
+}
+
+
+def sizes(errors: PathErrors) -> dict[str, NDArray]:
+    """Return the sizes of the results at each instant.
+
+    Args:
+        errors: errors along a path, k points.
+
+    Returns:
+        By the keys of :data:`LARGEST`, (k,) in SI, or (k, bodies or links) of forces
+        and stresses.
+    """
+    arrays = errors.arrays
+    found: dict[str, NDArray] = {}
+    for name, key in (("inertial_screw", "inertial_{}"), ("platform_screw", "{}")):
+        halves = np.split(arrays[name], 2, axis=1)
+        for part, half in zip(("rotation", "translation"), halves, strict=True):
+            found[key.format(part)] = np.linalg.norm(half, axis=1)
+    for part in ("rotation", "translation"):
+        if f"{part}_error" in arrays:
+            found[f"{part}_bound"] = arrays[f"{part}_error"][:, 1]
+    found["force"] = np.linalg.norm(arrays["wrench"][:, :, 3:], axis=2)
+    if arrays["stress"].shape[1]:
+        found["stress"] = arrays["stress"]
+    for key in ("velocity", "acceleration"):
+        name = "speed" if key == "velocity" else key
+        found[name] = np.linalg.norm(arrays[f"platform_{key}"][:, 3:], axis=1)
+    return found
+
+
+def path_summary(errors: PathErrors) -> dict[str, Any]:
+    """Return the results of ``assembly path`` as plain values.
+
+    Args:
+        errors: errors along a path.
+
+    Returns:
+        Time, frequency, largest values and the instants of them; ``status`` is that of
+        the first point without a result, with its reason, or ``"ok"``.
+    """
+    solved = errors.status == OK
+    first = int(np.argmin(solved))
+    times = errors.trajectory.times
+    summary: dict[str, Any] = {
+        "robot": errors.robot.name, "status": str(errors.status[first]),
+        **({} if solved.all() else
+           {"reason": f"at {times[first]:.6g} s: {errors.reason[first]}"}),
+        "law": errors.trajectory.law, "duration": errors.trajectory.duration,
+        "points": len(solved), "solved": int(solved.sum()),
+        "first_frequency": errors.frequency, "periods": errors.periods,
+        "remarks": remarks(errors),
+    }  # fmt: skip
+    if not solved.any():
+        return summary
+    owners = {
+        "force": [frame.name for frame in errors.robot.frames],
+        "stress": [link.frame for link in stressed_links(errors.robot)],
+    }
+    summary["largest"] = {
+        key: _peak(values, times, owners.get(key))
+        for key, values in sizes(errors).items() if np.isfinite(values).any()
+    }  # fmt: skip
+    forces = errors.arrays["drive_force"]
+    summary["drives"] = {
+        name: _peak(np.abs(forces[:, k]), times) | {"unit": unit}
+        for k, (name, unit) in enumerate(errors.drive_units.items())
+    }  # fmt: skip
+    return summary
+
+
+def _peak(
+    values: NDArray, times: NDArray, owners: list[str] | None = None
+) -> dict[str, Any]:
+    """Return the largest value of (k,) or (k, owners) values, its time and owner."""
+    known = np.where(np.isfinite(values), values, -1.0)  # sizes are never negative
+    over_time = known if known.ndim == 1 else known.max(axis=1)
+    row = largest_row(over_time)
+    peak: dict[str, Any] = {"value": float(over_time[row]), "time": float(times[row])}
+    if owners is not None:
+        peak["frame"] = owners[largest_row(known[row])]
+    return peak
+
+
+def remarks(errors: PathErrors) -> list[str]:
+    """Return remarks on what the quasi-static answer leaves out, a sentence each.
+
+    Args:
+        errors: errors along a path.
+
+    Returns:
+        Sentences.
+    """
+    found, path = [], errors.trajectory
+    if errors.periods < LEAST_PERIODS:
+        found.append(
+            f"the path takes {errors.periods:.3g} periods of the first natural "
+            f"frequency, less than {LEAST_PERIODS:g}: vibration, which these numbers "
+            "leave out, may exceed them"
+        )
+    if not np.isfinite(errors.periods):
+        found.append("no natural frequency was found: vibration is left out unjudged")
+    ends = np.abs(path.second[[0, -1]]).max()
+    if path.jumps or ends > _STARTS * np.abs(path.second).max(initial=0.0):
+        found.append(
+            "the acceleration jumps along the path or at its ends: undamped vibration, "
+            "which these numbers leave out, makes two to three times the deflection"
+        )
+    if virtual_joints(errors.robot).cones.shape[1]:
+        found.append(
+            "impacts where a clearance changes sides are left out; without a load the "
+            "pose within the clearances, and the change from it, is not unique"
+        )
+    if errors.free:
+        found.append(
+            f"{errors.free} joint motions follow neither from the path nor from the "
+            "closures; their rates are taken as zero"
+        )
+    return found
+
+
+def path_text(summary: dict[str, Any]) -> str:
+    """Return a summary as text: times, largest values and drive forces."""
+    lines = lines_of(summary, "status reason")
+    periods = summary["periods"]
+    beside = f", {periods:.3g} periods of {summary['first_frequency']:.4g} Hz"
+    lines |= {
+        "law": LAWS.get(summary["law"], summary["law"]),
+        "path time": in_unit(summary["duration"], "s")
+        + (beside if np.isfinite(periods) else ""),
+        "points": f"{summary['points']}, {summary['solved']} solved",
+    }
+    text = [listing(summary["robot"], lines)]
+    if "largest" in summary:
+        text += _table(summary)
+    return "\n".join(text + [f"note: {one}" for one in summary["remarks"]])
+
+
+def _table(summary: dict[str, Any]) -> list[str]:
+    """Return the lines of the largest values and drive forces."""
+    rows: dict[str, tuple[Any, ...]] = {}
+    for key, peak in summary["largest"].items():
+        words, _, unit = LARGEST[key]
+        value = FACTORS.get(unit, 1.0) * peak["value"]
+        rows[f"{words} [{unit}]"] = (value, peak["time"], peak.get("frame", ""))
+    for name, peak in summary["drives"].items():
+        rows[f"drive {name} [{peak['unit']}]"] = (peak["value"], peak["time"], "")
+    return table_lines(("largest", "value", "at [s]", "body"), rows)

@@ -1,0 +1,184 @@
+"""A path in time: components of the pose with their first and second derivatives.
+
+Given times are interpolated by a quintic spline through the rows, continuous up to the
+fourth derivative.  With ends at rest, speed and acceleration are zero there; two rows
+are then the quintic profile.  A path without times is a natural cubic spline through
+its rows over the length of its chords, a straight line for two rows.  A profile of
+:mod:`assembly.path.profiles` runs along it.  Both interpolate positions, rotation
+vectors or joint coordinates, component by component.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.path.path_file import PathTable
+from assembly.path.profiles import JUMPING, PROFILES
+from forcefit.inputs.table import BadInput, nearest
+
+MOST_POINTS = 20_000  # ten seconds and 600 MB for a hexapod
+_FINE = 4001  # instants at which peaks of speed and acceleration are searched
+_ROWS_MOVING = 6  # least number of rows that a quintic spline needs without end values
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Components of the pose at k instants.
+
+    Attributes:
+        names: components, ``tx`` .. or ``q.<frame>``.
+        times: (k,) [s].
+        values: (k, c) [m or rad].
+        first: (k, c) their derivatives.
+        second: (k, c) their second derivatives.
+        law: ``"times"``, or the name of the profile.
+        jumps: whether the acceleration jumps.
+    """
+
+    names: tuple[str, ...]
+    times: NDArray
+    values: NDArray
+    first: NDArray
+    second: NDArray
+    law: str
+    jumps: bool = False
+
+    @property
+    def duration(self) -> float:
+        """[s] from the first instant to the last."""
+        return float(self.times[-1] - self.times[0])
+
+
+def timed(table: PathTable, points: int, ends: str = "rest") -> Trajectory:
+    """Return the trajectory through rows at given times.
+
+    Args:
+        table: path with times.
+        points: number of instants, equally spaced.
+        ends: ``"rest"``: speed and acceleration are zero at both ends; ``"moving"``:
+            they follow from the rows (the spline's fifth derivative is continuous at
+            the two knots nearest to each end).
+
+    Returns:
+        The trajectory.
+
+    Raises:
+        BadInput: fewer than six rows with moving ends, or another number of points.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    _check_points(points)
+    assert table.times is not None
+    rest = ends == "rest"
+    if not rest and len(table.values) < _ROWS_MOVING:
+        raise BadInput(
+            f"--ends moving: found {len(table.values)} rows, expected at least "
+            f"{_ROWS_MOVING}, or --ends rest"
+        )
+    zero = np.zeros(table.values.shape[1])
+    still = [(1, zero), (2, zero)]
+    spline = make_interp_spline(
+        table.times, table.values, k=5, bc_type=(still, still) if rest else None
+    )
+    t = np.linspace(table.times[0], table.times[-1], points)
+    parts = (spline(t), spline(t, 1), spline(t, 2))
+    return Trajectory(table.names, t, *parts, "times")
+
+
+def profiled(
+    table: PathTable, points: int, profile: str, size: float,
+    duration: float | None = None, speed: float | None = None,
+    acceleration: float | None = None,
+) -> Trajectory:  # fmt: skip
+    """Return the trajectory of a profile from rest to rest along the rows.
+
+    Args:
+        table: path; times are not used.
+        points: number of instants, equally spaced.
+        profile: of :data:`assembly.path.profiles.PROFILES`.
+        size: [m] that counts as 1 rad in the length of a chord.
+        duration: [s] of the motion.
+        speed: [m/s, or rad/s of drives] instead, the largest of the platform's origin
+            or of any joint named.
+        acceleration: [m/s^2, or rad/s^2 of drives] likewise.
+
+    Returns:
+        The trajectory; the shortest within the limits.
+
+    Raises:
+        BadInput: unknown profile; not exactly a duration or limits; a row equals the
+            next; or limits of a path along which nothing that they limit moves.
+    """
+    from scipy.interpolate import CubicSpline
+
+    _check_points(points)
+    if profile not in PROFILES:
+        raise BadInput(f'--profile: found "{profile[:60]}"{nearest(profile, PROFILES)}')
+    if (duration is None) == (speed is None and acceleration is None):
+        raise BadInput(
+            "--profile: expected --duration, or --speed and --acceleration or one of "
+            "them"
+        )
+    curve = CubicSpline(_chords(table, size), table.values, bc_type="natural")
+
+    def at(t: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        s, s1, s2 = (part[:, None] for part in PROFILES[profile](t))
+        along = s[:, 0]
+        slope = curve(along, 1)
+        return curve(along), slope * s1, slope * s2 + curve(along, 2) * s1**2
+
+    if duration is None:
+        _, first, second = at(np.linspace(0, 1, _FINE))
+        duration = _within(table.names, first, second, speed, acceleration)
+    t = np.linspace(0, 1, points)
+    values, first, second = at(t)
+    return Trajectory(
+        table.names, duration * t, values, first / duration, second / duration**2,
+        profile, profile in JUMPING,
+    )  # fmt: skip
+
+
+def _check_points(points: int) -> None:
+    """Reject a number of points that is no path, or too large."""
+    if not 2 <= points <= MOST_POINTS:
+        raise BadInput(f"--points: found {points}, expected 2 to {MOST_POINTS}")
+
+
+def _chords(table: PathTable, size: float) -> NDArray:
+    """Return (rows,) the share of the chords' length before each row."""
+    turns = np.array([name[0] == "r" for name in table.names])
+    steps = np.diff(table.values, axis=0) * np.where(turns, size, 1.0)
+    lengths = np.linalg.norm(steps, axis=1)
+    if not lengths.all():
+        row = int(np.argmin(lengths))
+        raise BadInput(
+            f"path: {table.row_name(row + 1)}: found the pose of "
+            f"{table.row_name(row)}; expected another, or times"
+        )
+    before = np.concatenate([[0.0], np.cumsum(lengths)])
+    return before / before[-1]
+
+
+def _within(
+    names: tuple[str, ...], first: NDArray, second: NDArray, speed: float | None,
+    acceleration: float | None,
+) -> float:  # fmt: skip
+    """Return the shortest duration [s] of a motion given for the duration 1."""
+    # speeds fall with the duration, accelerations with its square
+    moved = [k for k, name in enumerate(names) if name[0] == "t"]
+    if names[0].startswith("q."):
+        fastest = np.abs(first).max(), np.abs(second).max()
+    else:
+        fastest = tuple(
+            np.linalg.norm(part[:, moved], axis=1).max(initial=0.0)
+            for part in (first, second)
+        )
+    if fastest[0] == 0.0:
+        raise BadInput(
+            "--speed, --acceleration: found a path along which the platform's origin "
+            "does not move; expected --duration"
+        )
+    times = [0.0 if speed is None else fastest[0] / speed]
+    times.append(0.0 if acceleration is None else np.sqrt(fastest[1] / acceleration))
+    return float(max(times))

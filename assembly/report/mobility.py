@@ -1,0 +1,206 @@
+"""Mobility of a robot as plain values and in words."""
+
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+
+from assembly.kinematics.mobility import mobility, mobility_near, platform_screws
+from assembly.kinematics.nominal import size_of
+from assembly.kinematics.posture import Posture
+from assembly.kinematics.pure_motions import PureMotion, pure_motions
+from forcefit.results.display import listing
+from forcefit.results.text import lines_of
+
+# ratio of singular values below which a rank is not certain
+CERTAIN = 100.0
+_FREE = ("freedom", "freedoms")
+_OVER = ("over-constraint", "over-constraints")
+_VERBS = {
+    "translation": "translates along",
+    "turn": "turns about",
+    "screw": "screws along",
+}
+
+
+def shown_of(posture: Posture) -> dict[str, Any]:
+    """Return what ``assembly show`` tells besides the picture, as plain values.
+
+    Args:
+        posture: of the robot.
+
+    Returns:
+        Pose, mobility, remarks, and for each frame the point, x and z of its axes [m,
+        base axes], in which its errors, clearance and springs are.
+    """
+    robot = posture.robot
+    axes = {
+        frame.name: {"at": T[:3, 3], "x": T[:3, 0], "z": T[:3, 2]}
+        for frame, T in zip(robot.frames, posture.transforms, strict=True)
+    }
+    return {
+        "robot": robot.name,
+        "pose": posture.pose(),
+        "mobility": mobility_of(posture),
+        "remarks": list(robot.remarks),
+        "axes": axes,
+    }
+
+
+def shown_text(results: Mapping[str, Any]) -> str:
+    """Return the pose, mobility and remarks of :func:`shown_of` as text."""
+    lines = lines_of(results, "pose") | mobility_lines(results["mobility"])
+    return listing(results["robot"], lines, results["remarks"])
+
+
+def mobility_of(posture: Posture) -> dict[str, Any]:
+    """Return the mobility at a posture as plain values.
+
+    Args:
+        posture: of the robot.
+
+    Returns:
+        The counts of :class:`assembly.kinematics.mobility.Mobility`, the platform's
+        motions, and whether there are more freedoms than at postures nearby; then the
+        counts there, where motions lead away from the posture.
+    """
+    here = mobility(posture)
+    near = mobility_near(posture, here)
+    counts = vars(here) | {"motions": _motions(posture)}
+    counts |= {"counts_certain": here.singular_value_gap >= CERTAIN}
+    there = near.there or here
+    singular = near.freedoms < here.freedoms
+    singular |= there.freedoms_drives_locked < here.freedoms_drives_locked
+    if singular and near.there is not None:
+        # without motions: several modes may meet here, with different ones
+        counts["near"] = vars(near.there)
+    counts |= {"singular": singular, "finite_freedoms": near.freedoms}
+    return counts | {"words": mobility_words(counts)}
+
+
+def _motions(posture: Posture) -> list[dict[str, Any]]:
+    """Return the platform's motions as plain values; absent keys have no meaning."""
+    screws, error = platform_screws(posture)
+    motions = pure_motions(
+        screws, posture.platform[:3, 3], size_of(posture.robot), error
+    )
+    return [
+        {k: v for k, v in vars(motion).items() if v is not None} for motion in motions
+    ]
+
+
+def mobility_words(counts: Mapping[str, Any]) -> str:
+    """Return freedoms, the platform's motions and over-constraints in words.
+
+    Args:
+        counts: of :func:`mobility_of`.
+
+    Returns:
+        Such as "3 freedoms: translates along x, y, z; 12 over-constraints".
+    """
+    total, moved = counts["freedoms"], counts["platform_freedoms"]
+    text = _number(total, *_FREE)
+    if total > moved:
+        text += f", {moved or 'none'} of the platform"
+    motions = [PureMotion(**motion) for motion in counts["motions"]]
+    if motions:
+        text += f": {motion_words(motions)}"
+    return f"{text}; {_number(counts['overconstraint'], *_OVER)}"
+
+
+def motion_words(motions: Sequence[PureMotion]) -> str:
+    """Return motions of a body in words.
+
+    Args:
+        motions: of :func:`assembly.kinematics.pure_motions.pure_motions`.
+
+    Returns:
+        Such as "translates along z and turns about x, y through (0, 0, 0.4) m".
+    """
+    slides = [m for m in motions if m.kind == "translation"]
+    others = [m for m in motions if m.kind != "translation"]
+    screws = any(m.kind == "screw" for m in others)
+    texts = [_of_kind("translation", slides)] if slides else []
+    if screws and len(others) > 1:
+        pitches = ", ".join(f"{_plain(1e3 * (m.pitch or 0.0))}" for m in others)
+        order = f"moves in a screw system of order {len(others)}"
+        texts.append(f"{order}, principal pitches {pitches} mm per turn")
+    else:
+        texts += [_of_kind(k, list(group)) for k, group in groupby(others, _kind)]
+    return " and ".join(texts)
+
+
+def _kind(motion: PureMotion) -> str:
+    """Return the kind of a motion."""
+    return motion.kind
+
+
+def _of_kind(kind: str, motions: Sequence[PureMotion]) -> str:
+    """Return motions of one kind in words; turns have one point in common."""
+    along = ", ".join(_direction(motion.direction) for motion in motions)
+    text = f"{_VERBS[kind]} {along}"
+    first = motions[0]
+    if first.point is not None:
+        text += f" through ({', '.join(map(_plain, first.point))}) m"
+    if first.pitch is not None:
+        text += f", pitch {_plain(1e3 * first.pitch)} mm per turn"
+    return text
+
+
+def _direction(d: Any) -> str:
+    """Return a direction: the name of an axis of the base, or its components."""
+    k = int(np.argmax(np.abs(d)))
+    if abs(d[k]) > 1 - 1e-9:
+        return "xyz"[k]
+    return f"({', '.join(map(_plain, d))})"
+
+
+def _plain(value: float) -> str:
+    """Return a number of 4 digits, rounding errors as 0."""
+    return f"{0.0 if abs(value) < 1e-9 else value:.4g}"
+
+
+def _number(count: int, one: str, many: str) -> str:
+    """Return a count and its noun."""
+    return f"{count} {one if count == 1 else many}"
+
+
+def mobility_lines(counts: Mapping[str, Any]) -> dict[str, str]:
+    """Return the mobility as lines of text.
+
+    Args:
+        counts: of :func:`mobility_of`.
+
+    Returns:
+        By words: mobility; what locked drives leave free, redundant drives, another
+        number of freedoms nearby and uncertain counts only where there are any.
+    """
+    lines = {"mobility": counts["words"]}
+    if held := counts["freedoms_drives_locked"]:
+        inner = counts["platform_freedoms_drives_locked"] or "none"
+        text = f"{_number(held, *_FREE)}, {inner} of the platform"
+        lines["drives locked"] = text
+    if spare := counts["actuation_redundancy"]:
+        lines["redundant drives"] = str(spare)
+    if counts["singular"]:
+        lines["singular posture"] = _singular(counts)
+    if not counts["counts_certain"]:
+        gap = counts["singular_value_gap"]
+        lines["counts not certain"] = (
+            f"singular values that count and that do not differ only by {gap:.3g} times"
+        )
+    return lines
+
+
+def _singular(counts: Mapping[str, Any]) -> str:
+    """Return the mobility near a singular posture in words."""
+    if "near" not in counts:
+        finite = _number(counts["finite_freedoms"], *_FREE)
+        return f"motions at first order only, {finite} of finite size"
+    near = counts["near"]
+    return (
+        f"near it {_number(near['freedoms'], *_FREE)}, "
+        f"{near['freedoms_drives_locked']} with drives locked; "
+        f"{_number(near['overconstraint'], *_OVER)}"
+    )

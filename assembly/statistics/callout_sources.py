@@ -1,0 +1,266 @@
+"""Random errors of the callouts and fits of a robot, with independent errors.
+
+A callout is drawn as a whole: shift and tilt of a bore in a position zone depend on
+each other.  The numbers of a draw depend on its number and the seed only, as those of
+:mod:`assembly.model.error_distributions`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.callouts.fits import Fit, parse_fit
+from assembly.callouts.zone import DISTRIBUTIONS
+from assembly.kinematics.callout_maps import PlacedCallout, place_callouts
+from assembly.kinematics.posture import home_posture
+from assembly.model.error_distributions import ErrorSources
+from assembly.model.robot import Clearance, Robot
+from assembly.statistics.ranking import group_of, kind_of
+from forcefit.inputs.table import BadInput
+
+_SAMPLE = 1 << 14  # draws of a fit for its variance
+_WORDS = 4  # random numbers of one step of Philox
+
+
+@dataclass(frozen=True, eq=False)
+class JointFit:
+    """A fit of a joint.
+
+    Attributes:
+        row: of the frame.
+        frame: its name.
+        fit: the fit.
+    """
+
+    row: int
+    frame: str
+    fit: Fit
+
+    @property
+    def name(self) -> str:
+        """Name in tables: ``"fit 12 H7/g6 of elbow"``."""
+        return f"fit {self.fit.text} of {self.frame}"
+
+
+@dataclass(frozen=True, eq=False)
+class CalloutSources:
+    """Errors by callouts, independent errors and fits; m numbers of each draw.
+
+    The numbers are the independent errors [rad or m], then the coordinates of the
+    callouts' zones in radii of their balls [-], then the radial clearances of the fits
+    less their means [m].
+
+    Attributes:
+        robot: of the callouts.
+        placed: its callouts.
+        independent: errors that are added, or None.
+        fixed: (n, 6) [rad, m] errors that every draw has; zero if None.
+        fits: of its joints.
+    """
+
+    robot: Robot
+    placed: tuple[PlacedCallout, ...]
+    independent: ErrorSources | None = None
+    fixed: NDArray | None = None
+    fits: tuple[JointFit, ...] = ()
+
+    @property
+    def _independent_count(self) -> int:
+        """Independent errors of a draw."""
+        return 0 if self.independent is None else len(self.independent)
+
+    @cached_property
+    def columns(self) -> list[NDArray]:
+        """Columns of the numbers of each callout."""
+        widths = [sum(placed.zone.dimensions) for placed in self.placed]
+        ends = self._independent_count + np.cumsum(widths)
+        return [np.arange(e - w, e) for e, w in zip(ends, widths, strict=True)]
+
+    @cached_property
+    def maps(self) -> NDArray:
+        """(n, 6, m) [rad, m] delta l of all frames for a unit of each number."""
+        n = len(self.robot.frames)
+        maps = np.zeros((n, 6, len(self)))
+        if self.independent is not None:
+            columns = np.arange(len(self.independent))
+            maps[self.independent.frame, self.independent.component, columns] = 1.0
+        for columns, placed in zip(self.columns, self.placed, strict=True):
+            maps[:, :, columns] = placed.errors
+        return maps
+
+    def __len__(self) -> int:
+        of_zones = sum(sum(placed.zone.dimensions) for placed in self.placed)
+        return self._independent_count + of_zones + len(self.fits)
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """Name of each number."""
+        own = () if self.independent is None else self.independent.labels
+        return (
+            *own,
+            *(
+                f"{placed.name} ({i + 1})"
+                for placed in self.placed
+                for i in range(sum(placed.zone.dimensions))
+            ),
+            *(fit.name for fit in self.fits),
+        )
+
+    def groups_by(self, by: str) -> list[str]:
+        """Return the name of the group of each number.
+
+        Args:
+            by: ``"source"``, ``"frame"`` or ``"kind"``.
+
+        Returns:
+            (m,) names.  A callout is always whole; by kind the callouts of the same
+            name in every leg are one group.
+        """
+        labels = () if self.independent is None else self.independent.labels
+        own = [group_of(label, by) for label in labels]
+        for placed in self.placed:
+            callout = placed.callout
+            name = kind_of(callout.name) if by == "kind" else callout.name
+            own += [f"{callout.words} of {name}"] * sum(placed.zone.dimensions)
+        for fit in self.fits:
+            short = kind_of(fit.frame) if by == "kind" else fit.frame
+            own.append(f"fit {fit.fit.text} of {short}")
+        return own
+
+    def draw(self, first: int, count: int, seed: int, stream: int = 0) -> NDArray:
+        """Return the (count, m) numbers of draws; see ErrorSources.uniforms."""
+        words = [self._independent_count, *(p.zone.words for p in self.placed)]
+        words += [2] * len(self.fits)
+        ends = np.cumsum(words)
+
+        @cache
+        def uniforms(attempt: int) -> list[NDArray]:
+            rows = _uniforms(first, count, seed, stream, int(ends[-1]), attempt)
+            return np.split(rows, ends[:-1], axis=1)
+
+        parts = []
+        if self.independent is not None:
+            own = self.independent
+            parts.append(own.values(own.standard(uniforms(0)[0])))
+        for i, placed in enumerate(self.placed, 1):
+            of_callout = _nth(uniforms, i)
+            parts.append(
+                placed.zone.draw(
+                    of_callout, placed.callout.distribution, placed.callout.cp
+                )
+            )
+        for i, one in enumerate(self.fits, 1 + len(self.placed)):
+            radial = one.fit.draw(uniforms(0)[i])
+            parts.append(radial[:, None] - one.fit.mean_radial)
+        return np.hstack(parts)
+
+    def with_clearances(self, values: NDArray) -> Robot:
+        """Return the robot with the clearances of one draw's numbers (m,)."""
+        more = values[len(self) - len(self.fits) :]
+        pairs = zip(self.fits, more, strict=True)
+        return self._with_radial([f.fit.mean_radial + float(v) for f, v in pairs])
+
+    def with_largest_clearances(self) -> Robot:
+        """Return the robot with the largest clearance of every fit."""
+        return self._with_radial([one.fit.radial[1] for one in self.fits])
+
+    def _with_radial(self, radial: list[float]) -> Robot:
+        """The robot with radial clearances [m] of the fits."""
+        frames = list(self.robot.frames)
+        for one, bound in zip(self.fits, radial, strict=True):
+            frame = frames[one.row]
+            clearance = replace(frame.clearance or Clearance(), radial=max(0.0, bound))
+            frames[one.row] = replace(frame, clearance=clearance)
+        return replace(self.robot, frames=tuple(frames))
+
+    def errors(self, values: NDArray) -> NDArray:
+        """Return (..., n, 6) [rad, m] delta l of every frame for numbers (..., m)."""
+        full = np.einsum("nim,...m->...ni", self.maps, values)
+        return full if self.fixed is None else full + self.fixed
+
+    def of_numbers(self, slopes: NDArray) -> NDArray:
+        """Return slopes (..., n, 6) with the errors as slopes (..., m)."""
+        return np.einsum("...ni,nim->...m", slopes, self.maps)
+
+    @cached_property
+    def variance(self) -> NDArray:
+        """(m,) variance of each number."""
+        own = [] if self.independent is None else [self.independent.variance]
+        for p in self.placed:
+            C = p.zone.variance_of_u(p.callout.distribution, p.callout.cp)
+            own.append(np.diag(C))
+        fixed = np.random.default_rng(1).random((_SAMPLE, 2))
+        own += [np.array([one.fit.draw(fixed).var()]) for one in self.fits]
+        return np.concatenate(own)
+
+    @property
+    def units(self) -> list[str]:
+        """Unit of each number: those of callouts are shifts and tilts together."""
+        own = [] if self.independent is None else self.independent.units
+        return own + ["rad, m"] * (len(self) - len(own))
+
+    @property
+    def identity(self) -> list[NDArray]:
+        """Arrays that are equal if the draws are."""
+        own = [] if self.independent is None else self.independent.identity
+        for p in self.placed:
+            law = [DISTRIBUTIONS.index(p.callout.distribution), p.callout.cp]
+            own += [*p.zone.bounds, np.array([p.zone.bonus, *law]), p.errors]
+        own += [np.array([*f.fit.hole, *f.fit.shaft, f.row]) for f in self.fits]
+        return own + ([] if self.fixed is None else [self.fixed])
+
+
+Sources = ErrorSources | CalloutSources
+
+
+def _nth(uniforms: Callable[[int], list[NDArray]], i: int) -> Callable[[int], NDArray]:
+    """The uniform numbers of one callout, by attempt."""
+    return lambda attempt: uniforms(attempt)[i]
+
+
+def _uniforms(
+    first: int, count: int, seed: int, stream: int, words: int, attempt: int
+) -> NDArray:
+    """(count, words) uniform numbers of draws; each attempt has numbers of its own."""
+    steps = -(-max(1, words) // _WORDS)
+    philox = np.random.Philox(
+        key=np.array([seed, stream], dtype=np.uint64),
+        counter=np.array([0, 0, attempt, 0], dtype=np.uint64),
+    )
+    philox.advance(first * steps)
+    rows = np.random.Generator(philox).random((count, steps * _WORDS))
+    return rows[:, :words]
+
+
+def sources_of(
+    robot: Robot, independent: ErrorSources | None = None, fixed: NDArray | None = None
+) -> Sources:
+    """Return the random errors of a robot: its callouts', and independent ones.
+
+    Args:
+        robot: any robot.
+        independent: of an errors file, or None.
+        fixed: (n, 6) [rad, m] errors that every draw has.
+
+    Returns:
+        The independent errors alone if the robot has no callouts.
+
+    Raises:
+        BadInput: there are neither.
+    """
+    fits = tuple(
+        JointFit(robot.index(name), name, parse_fit(fit))
+        for name, fit in robot.fits.items()
+    )
+    if robot.callouts or fits:
+        placed = place_callouts(home_posture(robot))
+        return CalloutSources(robot, placed, independent, fixed, fits)
+    if independent is None:
+        raise BadInput(
+            f"{robot.name}: found no [[tolerance]] and no fit in the robot file and no "
+            "--errors, expected one of them"
+        )
+    return independent

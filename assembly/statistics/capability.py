@@ -1,0 +1,172 @@
+"""Capability: Cp, Cpk and parts per million outside, with their intervals.
+
+Normal data within two limits, and draws of any distribution below one limit.
+
+Sources:
+    Rodriguez (1992), Recent developments in process capability analysis, J. Quality
+    Technology 24 (approximate interval of Cpk).
+"""
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import chi2, nct, norm
+
+from assembly.statistics.estimates import quantile
+
+_TAIL = 0.99865  # share below three standard deviations of a normal distribution
+
+
+@dataclass(frozen=True)
+class Capability:
+    """Indices of a sample, each with its interval.
+
+    Attributes:
+        cp: value, lower, upper; NaN without two limits.
+        cpk: value, lower, upper.
+        share_outside: of the normal distribution of the sample's mean and deviation.
+    """
+
+    cp: tuple[float, float, float]
+    cpk: tuple[float, float, float]
+    share_outside: float
+
+
+def capability(
+    values: ArrayLike, lower: float, upper: float, level: float = 0.95
+) -> Capability:
+    """Return Cp and Cpk of normal data.
+
+    Args:
+        values: (n,) n > 1, of a normal distribution.
+        lower: lower limit, -inf for none.
+        upper: upper limit, inf for none.
+        level: confidence of the intervals.
+
+    Returns:
+        The indices, with the sample's standard deviation (n - 1).
+
+    Raises:
+        ValueError: fewer than two values, no limit, or values that do not vary.
+    """
+    x = np.asarray(values, dtype=float)
+    if len(x) < 2 or not lower < upper or not np.isfinite([lower, upper]).any():
+        raise ValueError("capability needs two values and a limit, lower < upper")
+    mean, sigma = float(x.mean()), float(x.std(ddof=1))
+    if sigma == 0:
+        raise ValueError("capability of values that do not vary")
+    sides = (upper - mean) / (3 * sigma), (mean - lower) / (3 * sigma)
+    cp, cpk = (upper - lower) / (6 * sigma), min(sides)
+    one = not np.isfinite([lower, upper]).all()
+    within = cpk_interval_one_sided if one else cpk_interval
+    return Capability(
+        (cp, *cp_interval(cp, len(x), level)) if not one else (np.nan,) * 3,
+        (cpk, *within(cpk, len(x), level)), share_outside(*sides),
+    )  # fmt: skip
+
+
+def share_outside(cpk_upper: float, cpk_lower: float) -> float:
+    """Return the share of a normal distribution outside its limits."""
+    return float(norm.sf(3 * cpk_upper) + norm.sf(3 * cpk_lower))
+
+
+def cp_interval(cp: float, n: int, level: float = 0.95) -> tuple[float, float]:
+    """Return the interval of Cp, exact for n normal values."""
+    tails = chi2.ppf([(1 - level) / 2, (1 + level) / 2], n - 1)
+    low, high = cp * np.sqrt(tails / (n - 1))
+    return float(low), float(high)
+
+
+def cpk_interval(cpk: float, n: int, level: float = 0.95) -> tuple[float, float]:
+    """Return the approximate interval of Cpk, for two limits."""
+    half = norm.ppf((1 + level) / 2) * np.sqrt(1 / (9 * n) + cpk**2 / (2 * (n - 1)))
+    return float(cpk - half), float(cpk + half)
+
+
+def cpk_interval_one_sided(
+    cpk: float, n: int, level: float = 0.95
+) -> tuple[float, float]:
+    """Return the interval of Cpk for one limit, exact by the noncentral t."""
+    from scipy.optimize import brentq
+
+    # 3 sqrt(n) Cpk of the sample is a noncentral t with 3 sqrt(n) times the true one
+    t, root = 3 * np.sqrt(n) * cpk, 3 * np.sqrt(n)
+    low, high = cpk_interval(cpk, n, 1 - (1 - level) / 100)
+
+    def solve(probability: float) -> float:
+        def excess(delta: float) -> float:
+            return float(nct.cdf(t, n - 1, delta)) - probability
+
+        return float(brentq(excess, root * low, root * high))
+
+    return solve((1 + level) / 2) / root, solve((1 - level) / 2) / root
+
+
+def quantile_cpk(
+    values: ArrayLike, limit: float, level: float = 0.95
+) -> tuple[float, float, float]:
+    """Return Cpk of draws of any distribution below an upper limit.
+
+    Cpk is (limit - median) / (99.865 % quantile - median), which is the usual index of
+    a normal distribution.
+
+    Args:
+        values: (k,) draws; inf where there is no answer.
+        limit: upper limit.
+        level: confidence of the interval, which holds for any distribution: order
+            statistics of both quantiles, at half the error each.
+
+    Returns:
+        Value, lower, upper; 0 below a quantile that so few draws do not bound.
+    """
+    each = (1 + level) / 2
+    middle, tail = (quantile(values, share, each) for share in (0.5, _TAIL))
+
+    def index(m: float, q: float) -> float:
+        if not np.isfinite(m) or m == -np.inf:
+            return float("nan")
+        return (limit - m) / (q - m) if q > m else float("inf")
+
+    ends = itertools.product(("lower", "upper"), repeat=2)
+    corners = [index(middle[a], tail[b]) for a, b in ends]
+    return index(middle["value"], tail["value"]), min(corners), max(corners)
+
+
+def draws_capability(
+    values: ArrayLike, exceeds: Mapping[str, Any], level: float = 0.95
+) -> dict[str, Any]:
+    """Return Cpk and parts per million of draws above a limit.
+
+    Args:
+        values: (k,) draws; NaN where there is no answer, which exceeds the limit.
+        exceeds: ``limit``, ``unit``, and the ``probability`` above it with ``lower``
+            and ``upper``.
+        level: level of confidence.
+
+    Returns:
+        ``limit``, ``unit``, and ``cpk`` and ``ppm`` with value, lower, upper.
+    """
+    values = np.where(np.isnan(values), np.inf, values)
+    words, limit = ("value", "lower", "upper"), exceeds["limit"]
+    ppm = [1e6 * exceeds[k] for k in ("probability", "lower", "upper")]
+    cpk = quantile_cpk(values, limit, level)
+    return {
+        "limit": limit, "unit": exceeds["unit"],
+        "cpk": dict(zip(words, cpk, strict=True)),
+        "ppm": dict(zip(words, ppm, strict=True)),
+    }  # fmt: skip
+
+
+def capability_text(results: Mapping[str, Any]) -> str:
+    """Return capabilities of draws by quantity as text, a line each."""
+    return "\n".join(
+        f"{key} up to {one['limit']:.4g} {one['unit']}: Cpk {one['cpk']['value']:.3g} "
+        f"({one['cpk']['lower']:.3g} to {one['cpk']['upper']:.3g}) by quantiles, "
+        f"{one['ppm']['value']:.4g} ppm above ({one['ppm']['lower']:.4g} to "
+        f"{one['ppm']['upper']:.4g})"
+        for key, one in results.items()
+    )

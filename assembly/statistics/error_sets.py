@@ -1,0 +1,130 @@
+"""Zones of all errors and clearances of a posture, and the platform screws of them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.callouts.zone import Zone
+from assembly.kinematics.callout_maps import PlacedCallout
+from assembly.model.error_distributions import KINDS, ErrorSources
+from assembly.statistics.callout_sources import CalloutSources, Sources
+from assembly.statistics.linear_response import LinearResponse
+from forcefit.inputs.table import BadInput
+
+_ROUNDING = 1e-9  # a row relative to the largest: smaller ones are rounding
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorSets:
+    """Zones of all errors and clearances in one vector z, with linear rows.
+
+    Attributes:
+        names: of the zones.
+        zones: one for each, in unit coordinates.
+        columns: of z for each zone.
+        screws: (6, total) [rad, m] platform screw.
+        rigid_rows: (p, total) rows that must be zero: of rigid parts.
+        spring_rows: (r, total) rows that load springs.
+        clearances: number of coordinates of clearances.
+    """
+
+    names: tuple[str, ...]
+    zones: tuple[Zone, ...]
+    columns: tuple[NDArray, ...]
+    screws: NDArray
+    rigid_rows: NDArray
+    spring_rows: NDArray
+    clearances: int
+
+
+def error_sets(prepared: LinearResponse, sources: Sources) -> ErrorSets:
+    """Return the zones of errors and clearances, and their effect on the platform.
+
+    Args:
+        prepared: a posture without loads.
+        sources: of the errors.
+
+    Returns:
+        All zones in one vector.
+
+    Raises:
+        BadInput: an independent error is unbounded or not symmetric about zero.
+    """
+    own = zones_of_errors(sources)
+    names, zones = [name for name, _, _ in own], [zone for _, zone, _ in own]
+    n, nu = len(prepared.posture.robot.frames), int(prepared.starts[-1])
+    maps = np.eye(6 * n)[:, :0]
+    if len(sources):
+        maps = _maps(sources).reshape(6 * n, -1) * np.concatenate([
+            unit for _, _, unit in own
+        ])
+    cones = prepared.joints.cones
+    for first, last in zip(prepared.starts[:-1], prepared.starts[1:], strict=True):
+        names.append(_cone_name(prepared, cones[:, first]))
+        zones.append(Zone((np.eye(6)[: last - first],)))
+    sizes = [sum(zone.dimensions) for zone in zones]
+    both = np.hstack([maps, cones])
+    to_platform = np.hstack([prepared.screws[:, nu:] @ maps, prepared.screws[:, :nu]])
+    return ErrorSets(
+        tuple(names), tuple(zones),
+        tuple(np.split(np.arange(sum(sizes)), np.cumsum(sizes)[:-1])),
+        to_platform, _real_rows(prepared.infeasible, both),
+        _real_rows(prepared.misfit, both), nu,
+    )  # fmt: skip
+
+
+def _real_rows(rows: NDArray, columns: NDArray) -> NDArray:
+    """The product, independent rows only, orthonormal; none where all is rounding."""
+    product = rows @ columns
+    scale = np.abs(rows).max(initial=0.0) * np.linalg.norm(columns)
+    _, sizes, vt = np.linalg.svd(product, full_matrices=False)
+    return np.asarray(vt[: len(sizes)][sizes > _ROUNDING * max(scale, 1e-300)])
+
+
+def _maps(sources: Sources) -> NDArray:
+    """(n, 6, m) errors of a unit of each number."""
+    if isinstance(sources, CalloutSources):
+        return sources.maps
+    return np.moveaxis(sources.errors(np.eye(len(sources))), 0, -1)
+
+
+def zones_of_errors(sources: Sources) -> list[tuple[str, Zone, NDArray]]:
+    """Return name, zone and units [rad, m or 1] of the coordinates of every error."""
+    placed: tuple[PlacedCallout, ...] = ()
+    if isinstance(sources, CalloutSources):
+        independent, placed = sources.independent, sources.placed
+        fixed = sources.fixed
+    else:
+        independent, fixed = sources, sources.fixed
+    if fixed is not None and fixed.any():
+        raise BadInput("worst case: found closures that do not hold, expected none")
+    found = [] if independent is None else _intervals(independent)
+    return found + [(p.name, p.zone, np.ones(sum(p.zone.dimensions))) for p in placed]
+
+
+def _intervals(sources: ErrorSources) -> list[tuple[str, Zone, NDArray]]:
+    """Zones of independent errors: intervals in units of their half widths."""
+    pairs = zip(sources.labels, _half_widths(sources), strict=True)
+    return [(name, Zone((np.eye(6)[:1],)), np.array([width])) for name, width in pairs]
+
+
+def _half_widths(sources: ErrorSources) -> NDArray:
+    """(m,) [rad or m] half widths of independent errors."""
+    uniform = sources.kind == KINDS.index("uniform")
+    bounded = uniform | (sources.kind == KINDS.index("truncated"))
+    centred = (sources.centre == 0) & sources.signed
+    if not (bounded & centred).all():
+        name = sources.labels[int(np.argmin(bounded & centred))]
+        raise BadInput(
+            f"worst case: found {name}, which is unbounded or not symmetric about "
+            "zero; expected a uniform or truncated error of both signs"
+        )
+    return np.asarray(sources.scale * np.where(uniform, 1.0, sources.limit))
+
+
+def _cone_name(prepared: LinearResponse, column: NDArray) -> str:
+    """Name of a clearance: the frame's, and its components."""
+    row = int(np.flatnonzero(column)[0])
+    kind = ("tilt", "tilt", "spin", "radial", "radial", "axial")[row % 6]
+    return f"{kind} clearance of {prepared.posture.robot.frames[row // 6].name}"

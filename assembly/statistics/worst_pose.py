@@ -1,0 +1,218 @@
+"""Worst pose error over all errors within tolerance and all clearances.
+
+Four readings are different numbers where a machine is over-constrained:
+
+=========== ====================================================================
+rigid       errors and clearances that close without any force: a convex set
+elastic     no clearance: the platform's screw is linear in the errors
+equilibrium least energy (22) at given errors, worst position in the clearances
+bound       clearances are added as if they were errors: not below equilibrium
+=========== ====================================================================
+
+The first two, and all where nothing is over-constrained, are convex maximisations: the
+largest size over the sphere of directions of a sum of support functions.  Equilibrium
+with clearances is none: it is bracketed by climbing from corner to corner and by the
+bound.
+
+Sources:
+    Hoffman (1981), see :mod:`assembly.solvers.outer_cuts`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.callouts.largest_product import largest_product
+from assembly.solvers.outer_cuts import farthest
+from assembly.statistics.callout_sources import CalloutSources, Sources
+from assembly.statistics.error_sets import ErrorSets, error_sets, zones_of_errors
+from assembly.statistics.linear_response import LinearResponse, linear_response
+from assembly.statistics.quantities import POSE_ERRORS
+from assembly.statistics.responses import respond
+from assembly.steps.bolted import refuse_bolted
+from forcefit.inputs.table import BadInput
+
+_TOLERANCE = 3e-4  # relative to the sum of the supports along x, y and z
+_STARTS = 24  # random corners from which the equilibrium climbs
+_CLIMBS = 12  # most steps from corner to corner
+
+MEANINGS = {
+    "linear": "nothing is over-constrained: every reading is the same",
+    "rigid": "rigid parts: only errors and clearances that close without force",
+    "elastic": "elastic parts without clearance: the response is linear",
+    "equilibrium": "elastic parts with clearance: between the largest equilibrium "
+    "found by climbing and the bound with clearances counted as errors",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class WorstPose:
+    """The worst pose error over errors and clearances.
+
+    Attributes:
+        quantity: ``"rotation"`` or ``"translation"``.
+        reading: a key of :data:`MEANINGS`.
+        attained: [rad or m] the largest value found.
+        bound: [rad or m] a certified upper bound.
+        direction: (3,) unit vector of the value attained, base axes.
+        shares: [rad or m] by callout, independent error or clearance, along that
+            direction, the largest first; their sum is the bound's support there.
+        rigid: [rad or m] attained by the rigid reading, as a part of equilibrium; NaN
+            for the other readings.
+    """
+
+    quantity: str
+    reading: str
+    attained: float
+    bound: float
+    direction: NDArray
+    shares: tuple[tuple[str, float], ...]
+    rigid: float = float("nan")
+
+
+def worst_pose(
+    prepared: LinearResponse, sources: Sources, quantity: str, seed: int = 1
+) -> WorstPose:
+    """Return the worst pose error over all errors within tolerance and clearances.
+
+    Args:
+        prepared: a posture without loads.
+        sources: callouts, independent errors that are bounded and symmetric, and
+            fits, each at its largest clearance.
+        quantity: ``"rotation"`` or ``"translation"``.
+        seed: of the corners from which the equilibrium climbs.
+
+    Returns:
+        The worst case, with the reading that it answers.
+
+    Raises:
+        BadInput: a joint is bolted at a pose, the posture is loaded, or an independent
+            error is unbounded or not symmetric about zero.
+    """
+    refuse_bolted(prepared.posture.robot, "worst case")
+    if prepared.loads is not None:
+        raise BadInput("worst case: found a load, expected none: it is not linear then")
+    if isinstance(sources, CalloutSources) and sources.fits:
+        robot = sources.with_largest_clearances()
+        prepared = linear_response(replace(prepared.posture, robot=robot))
+        sources = replace(sources, fits=())
+    sets, half = error_sets(prepared, sources), 3 * POSE_ERRORS.index(quantity)
+    held, sprung = len(sets.rigid_rows) > 0, len(sets.spring_rows) > 0
+    if sprung and sets.clearances:
+        reading = "equilibrium"
+    else:
+        reading = "elastic" if sprung else "rigid" if held else "linear"
+    (low, high), screw = _farthest(sets, sets.rigid_rows, half)
+    rigid = float("nan")
+    if reading == "equilibrium":
+        rows = np.vstack([sets.rigid_rows, sets.spring_rows])
+        (rigid, _), inner = _farthest(sets, rows, half)
+        toward = inner[half : half + 3] / max(rigid, 1e-300)
+        errors = _support(sets, rows, half)(toward)[2][: -sets.clearances]
+        low, direction = _climb(prepared, sources, quantity, seed, errors)
+        if rigid > low:
+            low, direction = rigid, inner[half : half + 3]
+    else:
+        direction = screw[half : half + 3]
+    size = float(np.linalg.norm(direction))
+    direction = direction / size if size else np.eye(3)[0]
+    weights = direction @ sets.screws[half : half + 3]
+    shares = [
+        (name, zone.farthest_u(weights[columns])[1])
+        for name, zone, columns in zip(
+            sets.names, sets.zones, sets.columns, strict=True
+        )
+    ]
+    shares.sort(key=lambda share: -share[1])
+    return WorstPose(
+        quantity, reading, low, max(low, high), direction, tuple(shares), rigid
+    )
+
+
+def _farthest(
+    sets: ErrorSets, rows: NDArray, half: int
+) -> tuple[tuple[float, float], NDArray]:
+    """Bracket the largest half screw over the zones where rows @ z = 0."""
+    support = _support(sets, rows, half)
+    sizes = [support(direction)[0] for direction in np.eye(3)]
+    if not max(sizes) > 0:
+        return (0.0, 0.0), np.zeros(6)
+    bounds, screw, _ = farthest(np.zeros(6), half, _TOLERANCE * max(sizes), support)
+    low = bounds[0]
+    # the farthest screw in its own direction is not shorter
+    for _ in range(50):
+        further = support(screw[half : half + 3] / low)[1]
+        size = float(np.linalg.norm(further[half : half + 3]))
+        if size <= low * (1 + 1e-12):
+            break
+        screw, low = further, size
+    return (low, max(low, bounds[1])), screw
+
+
+def _support(
+    sets: ErrorSets, rows: NDArray, half: int
+) -> Callable[[NDArray], tuple[float, NDArray, NDArray]]:
+    """The support function of the platform's screws, with the screw that attains it."""
+    P = sets.screws[half : half + 3]
+    if not len(rows):
+
+        def closed_form(direction: NDArray) -> tuple[float, NDArray, NDArray]:
+            w, z, height = direction @ P, np.zeros(P.shape[1]), 0.0
+            for zone, columns in zip(sets.zones, sets.columns, strict=True):
+                z[columns], value = zone.farthest_u(w[columns])
+                height += value
+            return height, sets.screws @ z, z
+
+        return closed_form
+    N = np.linalg.svd(rows)[2][len(rows) :].T
+    bounds = [
+        bound @ N[columns]
+        for zone, columns in zip(sets.zones, sets.columns, strict=True)
+        for bound in zone.bounds_on_u
+    ]
+
+    def programme(direction: NDArray) -> tuple[float, NDArray, NDArray]:
+        y, height = largest_product(direction @ P @ N, bounds)
+        return height, sets.screws @ (N @ y), N @ y
+
+    return programme
+
+
+def _climb(
+    prepared: LinearResponse, sources: Sources, quantity: str, seed: int, start: NDArray
+) -> tuple[float, NDArray]:
+    """The largest equilibrium found by climbing, and its direction (3,)."""
+    half = 3 * POSE_ERRORS.index(quantity)
+    own = zones_of_errors(sources)
+    sizes = [sum(zone.dimensions) for _, zone, _ in own]
+    parts = np.split(np.arange(sum(sizes)), np.cumsum(sizes)[:-1])
+    scale = np.concatenate([unit for _, _, unit in own])
+
+    def corners(slopes: NDArray) -> NDArray:
+        """Farthest errors for slopes (k, m), in the numbers of the sources."""
+        u = np.zeros_like(slopes)
+        for row, w in zip(u, slopes * scale, strict=True):
+            for (_, zone, _), columns in zip(own, parts, strict=True):
+                row[columns] = zone.farthest_u(w[columns])[0]
+        return u * scale
+
+    rng = np.random.default_rng(seed)
+    along = prepared.screws[half : half + 3, int(prepared.starts[-1]) :]
+    starts = rng.normal(size=(_STARTS, 3)) @ along
+    n = len(prepared.posture.robot.frames)
+    first = sources.of_numbers(starts.reshape(-1, n, 6))
+    values = corners(np.vstack([first, rng.normal(size=first.shape) / scale]))
+    values = np.vstack([values, start * scale])
+    best, best_values = -np.inf, values[0]
+    for _ in range(_CLIMBS):
+        sizes_found, slopes = respond(prepared, sources, values, quantity)
+        sizes_found = np.where(np.isnan(sizes_found), -np.inf, sizes_found)
+        i = int(np.argmax(sizes_found))
+        if sizes_found[i] <= best * (1 + 1e-12):
+            break
+        best, best_values = float(sizes_found[i]), values[i]
+        values = corners(np.nan_to_num(slopes))
+    draws = prepared.solve(sources.errors(best_values[None]))
+    return best, draws.platform_screw[0, half : half + 3]

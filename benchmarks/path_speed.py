@@ -1,0 +1,107 @@
+"""Seconds of a path of 1000 points with inertial loads, and the same point by point.
+
+Three built-in robots whose beams and platform have a mass, over 0.1 m by the quintic
+profile at 20 G.  Both columns compute motion, loads, problem (22) with and without
+acceleration, and K_C; ``point by point`` calls the same public functions for each
+instant in a loop.  Stress, verdicts on the postures, and the first natural frequency at
+five of them are in the whole path alone.  The least of several runs, by the clock and
+by processor time; the ratio is of processor time.
+``python -m benchmarks.path_speed``.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from assembly.kinematics.posture import POSE, home_posture, place_many, together
+from assembly.linear.energy import solve_assembly
+from assembly.model.robot import BeamLink, Robot
+from assembly.path.idle_motions import with_idle_accelerations
+from assembly.path.inertial_loads import inertial_loads
+from assembly.path.motion import follow_path
+from assembly.path.path_errors import path_errors
+from assembly.path.path_file import PathTable
+from assembly.path.trajectory import Trajectory, profiled
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from assembly.robots import load_robot
+from assembly.sweeps.targets import goals_of
+
+POINTS, RUNS, ONE_BY_ONE = 1000, 5, 50
+MOVES = {"irsbot2": ("tx", "tz"), "hexapod": POSE, "delta": ("tx", "ty", "tz")}
+
+
+def heavy(name: str) -> Robot:
+    """A built-in robot with beams of aluminium and a platform of 1 kg."""
+    robot = load_robot(name)
+    frames = []
+    for frame in robot.frames:
+        if isinstance(frame.link, BeamLink):
+            frame = replace(frame, link=replace(frame.link, density=2700.0))
+        if frame.name == robot.platform:
+            frame = replace(frame, mass=1.0)
+        frames.append(frame)
+    return replace(robot, frames=tuple(frames))
+
+
+def path_of(robot: Robot, names: tuple[str, ...]) -> Trajectory:
+    """0.1 m along x about home, at 20 G."""
+    pose = home_posture(robot).pose()
+    rows = np.array([[pose[name] for name in names]] * 2)
+    rows[:, 0] += [-0.05, 0.05]
+    table = PathTable(names, rows)
+    return profiled(table, POINTS, "quintic", 1.0, acceleration=20 * 9.80665)
+
+
+def solve_instant(robot: Robot, path: Trajectory, row: int) -> None:
+    """Solve one instant of a path by the functions of one posture."""
+    parts = (part[row : row + 1] for part in (path.values, path.first, path.second))
+    values, first, second = parts
+    placed, _ = place_many(robot, goals_of(path.names, robot, values))
+    posture = placed[0]
+    assert posture is not None
+    motion = follow_path(together([posture]), path.names, (values, first, second))
+    motion = with_idle_accelerations(motion, np.zeros(3))
+    loads = inertial_loads(motion)
+    moving = solve_assembly(posture, bodies=loads.bodies[0], carried=loads.carried[0])
+    static = solve_assembly(posture)
+    np.subtract(moving.platform_screw, static.platform_screw)
+    np.array(platform_stiffness(posture).compliance)
+
+
+def solve_some(robot: Robot, path: Trajectory) -> None:
+    """Solve some instants along a path one by one."""
+    for row in np.linspace(0, POINTS - 1, ONE_BY_ONE).astype(int).tolist():
+        solve_instant(robot, path, row)
+
+
+def least(run: Callable[[], object], runs: int) -> tuple[float, float]:
+    """Least seconds of the clock and of the processor."""
+    spent = []
+    for _ in range(runs):
+        start = time.perf_counter(), time.process_time()
+        run()
+        spent.append((time.perf_counter() - start[0], time.process_time() - start[1]))
+    clock, processor = zip(*spent, strict=True)
+    return min(clock), min(processor)
+
+
+def main() -> None:
+    """Print a line for each robot."""
+    head = f"{'robot':10}{'path [s]':>10}{'(clock)':>10}{'point by point [s]':>20}"
+    print(f"{head}{'ratio':>8}")
+    for name, names in MOVES.items():
+        robot = heavy(name)
+        path = path_of(robot, names)
+        clock, processor = least(lambda r=robot, p=path: path_errors(r, p), RUNS)
+        each = least(lambda r=robot, p=path: solve_some(r, p), 3)[1]
+        each *= POINTS / ONE_BY_ONE
+        numbers = f"{processor:10.2f}{clock:10.2f}{each:20.1f}"
+        print(f"{name:10}{numbers}{each / processor:8.0f}")
+
+
+if __name__ == "__main__":
+    with threadpool_limits(1):
+        main()

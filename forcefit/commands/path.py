@@ -1,0 +1,150 @@
+"""The command ``forcefit assembly path``."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from forcefit.commands.answer import answer
+from forcefit.commands.options import (
+    FigureOption,
+    GravityOption,
+    JsonOption,
+    LoadOption,
+    MismatchOption,
+    RestOption,
+    RobotArgument,
+    note_closing,
+    parse_gravity,
+    parse_load,
+)
+from forcefit.commands.progress import one_thread, progress_lines
+from forcefit.commands.report import ReportOption, provenance
+from forcefit.inputs.writing import (
+    PICTURE,
+    check_writable,
+    save_figure,
+    write_text,
+)
+
+
+def path(
+    robot: RobotArgument,
+    path: Annotated[
+        Path,
+        typer.Option(
+            help="CSV table of the path: pose.tx .. or q.<frame>, optionally time [s] "
+            "and id."
+        ),
+    ],
+    profile: Annotated[
+        str | None,
+        typer.Option(
+            help="Law of the motion from rest to rest: quintic | seventh | trapezoid."
+        ),
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="[s] Time of the profile.")
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            help="[m/s] Largest speed of the platform with a profile; of drives "
+            "[rad/s or m/s]."
+        ),
+    ] = None,
+    acceleration: Annotated[
+        float | None,
+        typer.Option(
+            help="[m/s^2] Largest acceleration of the platform with a profile; of "
+            "drives [rad/s^2 or m/s^2]."
+        ),
+    ] = None,
+    interval: Annotated[
+        float | None,
+        typer.Option(help="[s] Time between the rows of a table without times."),
+    ] = None,
+    ends: Annotated[
+        str,
+        typer.Option(
+            help="Ends of a path with times: rest (no speed, no acceleration) | moving."
+        ),
+    ] = "rest",
+    points: Annotated[
+        int, typer.Option(help="Number of instants computed, equally spaced.")
+    ] = 201,
+    load: LoadOption = None,
+    gravity: GravityOption = None,
+    assumption: Annotated[
+        str,
+        typer.Option(
+            help="Also bound the pose error, problem (27): frozen | free | none."
+        ),
+    ] = "none",
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Also write all numbers (NetCDF)."),
+    ] = None,
+    figure: FigureOption = None,
+    report: ReportOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Compute the errors by inertia along a path.
+
+    Masses must be declared.  Vibration is left out.
+    """
+    from assembly.path.path_errors import path_errors
+    from assembly.path.request import PathTimes, trajectory_of
+    from assembly.path.summary import path_summary, path_text
+    from assembly.sweeps.dataset import check_dataset
+
+    if output is not None:
+        check_dataset(output, "a path")
+    if figure is not None:
+        check_writable(figure, PICTURE)
+    wrench, g = parse_load(load), parse_gravity(gravity)
+    times = PathTimes(
+        profile, duration, speed, acceleration, interval, ends, points
+    )  # fmt: skip
+    machine = _closed(robot, rest, mismatch)
+    with one_thread(), progress_lines() as update:
+        trajectory = trajectory_of(machine, path, times)
+        errors = path_errors(
+            machine, trajectory, load=wrench, gravity=g, assumption=assumption,
+            progress=lambda done, total: update("points", done, total),
+        )  # fmt: skip
+    summary = path_summary(errors)
+    if output is not None:
+        summary["output"] = str(output)
+    _write(summary, errors, provenance(robot, path), output, figure, report)
+    answer(summary, path_text(summary), summary["status"], json)
+
+
+def _closed(robot: str, rest: str | None, mismatch: str | None) -> Any:
+    """Return the robot; its closures closed as the options specify."""
+    from assembly.exchange.robot_files import load_robot
+    from assembly.kinematics.closing import closing_of
+
+    machine = load_robot(robot, closing_of(rest, mismatch))
+    note_closing(machine, rest, mismatch)
+    return machine
+
+
+def _write(
+    summary: dict[str, Any], errors: Any, source: Any, output: Path | None,
+    figure: Path | None, report: Path | None,
+) -> None:  # fmt: skip
+    """Write data, picture and page."""
+    from assembly.path.report import path_page, plot_path
+
+    if output is not None:
+        from assembly.path.dataset import path_dataset
+        from assembly.sweeps.dataset import save_dataset
+
+        save_dataset(path_dataset(errors, source.command), output)
+    if figure is not None:
+        save_figure(plot_path(errors), figure)
+    if report is not None:
+        write_text(path_page(summary, errors, source), report)

@@ -1,0 +1,125 @@
+"""The command ``forcefit assembly show``."""
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from forcefit.commands.options import (
+    DriveForceOption,
+    JointOption,
+    JsonOption,
+    LoadOption,
+    MismatchOption,
+    PoseOption,
+    RestOption,
+    RobotArgument,
+    parse_load,
+    posture_of,
+)
+from forcefit.inputs.errors import BadInput, checked, nearest
+from forcefit.inputs.packages import need
+from forcefit.inputs.writing import PIXELS, check_writable, save_pixels, write_json
+
+
+def show(
+    robot: RobotArgument,
+    figure: Annotated[
+        Path | None,
+        typer.Option(
+            "--figure",
+            help="Picture to write: PNG, JPEG, BMP or TIFF; without it and --json a "
+            "window opens.",
+        ),
+    ] = None,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
+    load: LoadOption = None,
+    drive_force: DriveForceOption = None,
+    exaggeration: Annotated[
+        float | None, typer.Option(help="Factor on displacements.")
+    ] = None,
+    error_body: Annotated[
+        str | None,
+        typer.Option(
+            help="Also show the set of possible platform errors: translation | "
+            "rotation."
+        ),
+    ] = None,
+    assumption: Annotated[
+        str | None,
+        typer.Option(
+            help="Assumption of that set: frozen | free | budget. Default: budget; "
+            "under a load frozen."
+        ),
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Plot the robot and its errors; print its mobility.
+
+    The nominal and the forced robot are drawn; with --json and without --figure, none.
+    """
+    from assembly.linear.energy import CannotAssemble, failure_status, solve_assembly
+    from assembly.linear.reference.pose_error import ASSUMPTIONS
+    from assembly.linear.reference.reduction import FreeMotion
+    from assembly.report.error_body import PARTS
+    from assembly.report.mobility import shown_of, shown_text
+    from assembly.solvers.conic import SolverFailed
+
+    drawn = figure is not None or json is None
+    if figure is not None:
+        check_writable(figure, PIXELS)
+    for option, value, valid in (
+        ("--error-body", error_body, PARTS), ("--assumption", assumption, ASSUMPTIONS)
+    ):  # fmt: skip
+        if value is not None and value not in valid:
+            raise BadInput(f'{option}: found "{value[:60]}"{nearest(value, valid)}')
+    if exaggeration is not None:
+        checked("--exaggeration", exaggeration, "1", above=0)
+    wrench = parse_load(load)
+    loaded = bool(drive_force) or (wrench is not None and any(wrench))
+    if loaded and error_body is not None and assumption == "budget":
+        raise BadInput(
+            "--assumption: found budget together with a load, but the budget bound "
+            "is defined for a robot without load; expected frozen or free"
+        )
+    assumption = assumption or ("frozen" if loaded else "budget")
+    posture = posture_of(robot, pose, joint, rest, mismatch, drive_force=drive_force)
+    results = shown_of(posture)
+    if drawn:
+        need("pyvista")
+    write_json(results, json)
+    if json != "-":
+        print(shown_text(results))
+    if not drawn:
+        return
+    display = os.environ.get("DISPLAY") or sys.platform in {"win32", "darwin"}
+    if figure is None and not display:
+        raise BadInput("no display to open a window on; name a file with --figure")
+    try:
+        assembly = solve_assembly(posture, wrench)
+        _draw(assembly, figure, exaggeration, error_body, assumption)
+    except (CannotAssemble, FreeMotion, SolverFailed) as error:
+        print(f"{failure_status(error)}: {error}")
+        raise typer.Exit(1) from None
+
+
+def _draw(
+    assembly: Any, figure: Path | None, exaggeration: float | None,
+    error_body: str | None, assumption: str,
+) -> None:  # fmt: skip
+    """Write the picture, or open a window."""
+    from assembly.report.plot import plot_assembly
+
+    plotter = plot_assembly(
+        assembly, exaggeration, error_body, assumption, figure is not None
+    )
+    if figure is None:
+        plotter.show()
+    else:
+        save_pixels(plotter.screenshot(return_img=True), figure)
+    plotter.close()

@@ -1,0 +1,102 @@
+"""ISO 286 fits against worked limits, and the distribution of the clearance."""
+
+import numpy as np
+import pytest
+
+from assembly.callouts.fits import clearance_fit, limits_of, parse_fit, parse_size
+from forcefit.inputs.table import BadInput
+
+
+@pytest.mark.parametrize(
+    ("text", "hole", "shaft", "clearance", "kind"),
+    [
+        ("12 H7/g6", (0, 18), (-17, -6), (6, 35), "clearance"),
+        ("12 H7/h6", (0, 18), (-11, 0), (0, 29), "clearance"),
+        ("30 H7/f7", (0, 21), (-41, -20), (20, 62), "clearance"),
+        ("8 H8/h7", (0, 22), (-15, 0), (0, 37), "clearance"),
+        ("20 H7/k6", (0, 21), (2, 15), (-15, 19), "transition"),
+        ("25 H7/p6", (0, 21), (22, 35), (-35, -1), "interference"),
+    ],
+)
+def test_fit_has_the_limits_of_the_worked_table(text, hole, shaft, clearance, kind):
+    fit = parse_fit(text)
+    um = 1e6
+    assert np.multiply(fit.hole, um) == pytest.approx(hole)
+    assert np.multiply(fit.shaft, um) == pytest.approx(shaft)
+    assert np.multiply(fit.diametral, um) == pytest.approx(clearance)
+    assert fit.kind == kind
+
+
+@pytest.mark.parametrize(
+    ("size", "name", "lower", "upper"),
+    [
+        # shaft basis and transition holes as in tables of machine elements
+        (20, ("G", 7), 7, 28), (20, ("F", 8), 20, 53), (50, ("K", 7), -18, 7),
+        (25, ("N", 7), -28, -7), (10, ("M", 7), -15, 0), (40, ("P", 7), -42, -17),
+        (10, ("JS", 7), -7.5, 7.5), (12, ("K", 8), -19, 8), (300, ("M", 6), -41, -9),
+        (2, ("N", 7), -14, -4), (18, ("k", 8), 0, 27), (31, ("h", 11), -160, 0),
+    ],
+)  # fmt: skip
+def test_holes_and_shafts_have_their_tabulated_limits(size, name, lower, upper):
+    limits = limits_of(size, *name)
+    assert np.multiply(limits, 1e6) == pytest.approx((lower, upper))
+
+
+def test_sizes_at_the_end_of_a_step_belong_to_it():
+    assert limits_of(30, "H", 7).upper == pytest.approx(21e-6)
+    assert limits_of(30.01, "H", 7).upper == pytest.approx(25e-6)
+
+
+def test_width_of_a_grade_is_within_rounding_of_its_tolerance_unit():
+    """IT7 = 16 i, i = 0.45 D^(1/3) + 0.001 D at the geometric mean of the step; the
+    standard rounds, so the plain formula may miss by one tenth."""
+    for low, high in [(6, 10), (18, 30), (50, 80), (120, 180), (250, 315)]:
+        D = (low * high) ** 0.5
+        unit = 0.45 * D ** (1 / 3) + 0.001 * D
+        width = np.ptp(limits_of(high, "H", 7)) * 1e6
+        assert width == pytest.approx(16 * unit, rel=0.05)
+
+
+def test_clearance_of_12_h7_g6_has_the_worked_spread():
+    """Uniform sizes: sqrt(18^2/12 + 11^2/12) = 6.09 um diametral; normal at Cp = 1: a
+    sixth of the widths, 3.52 um.  Quantiles 0.135, 50, 99.865 % of the radius."""
+    fit = parse_fit("12 H7/g6")
+    numbers = np.random.default_rng(1).random((400_000, 2))
+    tails = (0.00135, 0.5, 0.99865)
+    cases = [("uniform", 6.09, (3.4, 10.2, 17.1)), ("normal", 3.52, (5.0, 10.2, 15.5))]
+    for distribution, sigma, quantiles in cases:
+        radial = fit.draw(numbers, distribution) * 1e6
+        assert 2 * radial.mean() == pytest.approx(20.5, abs=0.04)
+        assert 2 * radial.std() == pytest.approx(sigma, abs=0.02)
+        assert np.quantile(radial, tails) == pytest.approx(quantiles, abs=0.07)
+
+
+def test_transition_fit_interferes_in_31_percent_of_normal_pairs():
+    fit = clearance_fit("20 H7/k6")
+    numbers = np.random.default_rng(1).random((400_000, 2))
+    assert np.mean(fit.draw(numbers, "normal") == 0.0) == pytest.approx(0.31, abs=0.005)
+
+
+def test_size_at_maximum_material_grows_by_its_width():
+    assert np.ptp(parse_size("12 H7")) == pytest.approx(18e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("12 H7/z6", '"z6", expected one of the letters'),
+        ("12 H7-g6", 'found "12 H7-g6", expected a fit such as "12 H7/g6"'),
+        ("12 h7/G6", "capital letters are holes"),
+        ("12 H4/g6", '"H4", expected a grade from 5 to 11'),
+        ("600 H7/g6", "a nominal size of 600 mm, expected over 0 and up to 500"),
+        ("0 H7/g6", "a nominal size of 0 mm"),
+        ("12 K10/h6", '"K10", expected K of a grade from 6 to 8'),
+        ("25 H7/p6", "an interference fit (-35 to -1 um)"),
+        ("1 HJ7/g6", '"HJ7"'),
+    ],
+)
+def test_fit_that_cannot_be_used_is_refused_in_one_line(text, message):
+    with pytest.raises(BadInput) as error:
+        clearance_fit(text)
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)

@@ -1,0 +1,73 @@
+"""ISO 2768 tables and texts of tolerances."""
+
+import numpy as np
+import pytest
+
+from assembly.callouts.general_tolerances import (
+    linear_tolerance,
+    parse_general,
+    perpendicularity_tolerance,
+)
+from assembly.callouts.written_tolerances import parse_length, parse_width
+from forcefit.inputs.table import BadInput
+
+
+@pytest.mark.parametrize(
+    ("mm", "kind", "tolerance"),
+    [(3, "m", 0.1), (6, "f", 0.05), (6.1, "f", 0.1), (30, "m", 0.2), (120, "m", 0.3),
+     (452, "m", 0.8), (2000, "c", 3.0), (4000, "v", 8.0), (400, "f", 0.2)],
+)  # fmt: skip
+def test_length_has_the_tolerance_of_its_class(mm, kind, tolerance):
+    assert linear_tolerance(mm * 1e-3, kind) == pytest.approx(tolerance * 1e-3)
+
+
+def test_coarser_class_and_longer_length_are_never_tighter():
+    lengths = np.array([2.9, 5, 20, 100, 300, 900, 1500]) * 1e-3
+    table = [[linear_tolerance(x, k) for x in lengths] for k in "fmc"]
+    assert (np.diff(table, axis=0) > 0).all()
+    assert (np.diff(table, axis=1) >= 0).all()
+
+
+def test_perpendicularity_has_the_width_of_its_class():
+    assert perpendicularity_tolerance(0.1, "H") == pytest.approx(0.2e-3)
+    assert perpendicularity_tolerance(0.2, "K") == pytest.approx(0.6e-3)
+
+
+@pytest.mark.parametrize(
+    ("mm", "kind"), [(0.3, "m"), (5000, "m"), (2.0, "v"), (3000, "f")]
+)
+def test_length_without_a_value_is_refused(mm, kind):
+    with pytest.raises(BadInput, match="expected"):
+        linear_tolerance(mm * 1e-3, kind)
+
+
+def test_texts_of_tolerances_are_read():
+    assert parse_general("ISO 2768-mK") == ("m", "K")
+    assert parse_general("ISO 2768 - f") == ("f", "")
+    assert parse_length("452 +- 0.1 mm") == pytest.approx((0.452, 1e-4))
+    assert parse_length("452 mm ± 50 um") == pytest.approx((0.452, 5e-5))
+    assert parse_width("0.05 mm") == (pytest.approx(5e-5), False)
+    assert parse_width("0.05 mm (M)") == (pytest.approx(5e-5), True)
+    assert parse_width(5e-5) == (5e-5, False)
+
+
+@pytest.mark.parametrize("value", ["0.05", "-1 mm", 0, True, [1], "0 mm", "1e9 m"])
+def test_width_that_is_none_is_refused(value):
+    with pytest.raises(BadInput, match=r"expected a width > 0 such as \"0.05 mm\""):
+        parse_width(value)
+
+
+@pytest.mark.parametrize("value", ["452", "452 +- 0.1", "1 +- 2 mm", 452.0, "5 +- 0 m"])
+def test_length_without_a_tolerance_is_refused(value):
+    with pytest.raises(BadInput, match=r"expected a length such as"):
+        parse_length(value)
+
+
+def test_general_tolerance_of_another_standard_is_refused():
+    with pytest.raises(BadInput, match="ISO 2768-mK"):
+        parse_general("DIN 7168-m")
+
+
+def test_huge_whole_number_is_no_width():
+    with pytest.raises(BadInput, match="expected a width > 0"):
+        parse_width(10**400)

@@ -1,0 +1,234 @@
+"""Zones of callouts against worked numbers, closed forms and brute force."""
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from assembly.callouts.zone import Zone, intersection
+from assembly.callouts.zones_of_features import (
+    axis_orientation,
+    axis_position,
+    axis_position_along,
+    offset_rows,
+    plane_orientation,
+    plane_position,
+    point_position,
+    shift_along,
+)
+
+LENGTH, WIDTH = 0.020, 50e-6  # bore of 20 mm, position 0.05 mm
+POSITION = axis_position(WIDTH, LENGTH)
+BOTH = intersection([POSITION, axis_orientation(20e-6, LENGTH)])
+
+
+def numbers_of(zone, count=200_000, seed=1):
+    return lambda attempt: np.random.default_rng([seed, attempt]).random((
+        count,
+        zone.words,
+    ))
+
+
+def drawn(zone, distribution="uniform", cp=1.0, count=100_000):
+    return zone.draw(numbers_of(zone, count), distribution, cp) @ zone.columns.T
+
+
+def reach(zone, height):
+    """Largest offset of the axis at a height, over directions."""
+    angles = np.linspace(0, np.pi, 13)
+    rows = [np.array([np.cos(a), np.sin(a)]) @ offset_rows(height) for a in angles]
+    return max(zone.support(row) for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("height", "um"), [(0, 25), (0.010, 25), (0.050, 125), (0.200, 500)]
+)
+def test_bore_position_reaches_max_of_radius_and_2hr_over_length(height, um):
+    assert reach(POSITION, height) == pytest.approx(um * 1e-6, rel=1e-12)
+
+
+def test_bore_position_tilts_at_most_its_width_over_its_length():
+    assert POSITION.support(np.eye(6)[0]) == pytest.approx(2.5e-3, rel=1e-12)
+    assert POSITION.support(np.eye(6)[2]) == 0.0
+    assert POSITION.support(np.eye(6)[5]) == 0.0
+
+
+def test_perpendicularity_cuts_the_reach_of_a_bore():
+    """Tilt t/L = 1 mrad; reach R + (h - L/2) t/L = 25 + 190 = 215 um at 200 mm."""
+    assert BOTH.support(np.eye(6)[1]) == pytest.approx(1e-3, rel=1e-7)
+    assert reach(BOTH, 0.200) == pytest.approx(215e-6, rel=1e-7)
+
+
+def test_farthest_screw_attains_the_support():
+    rng = np.random.default_rng(3)
+    for zone in (POSITION, BOTH, plane_position(4e-5, 0.04, 0.03)):
+        for _ in range(5):
+            w = rng.normal(size=6) * [1e-2, 1e-2, 1, 1, 1, 1]
+            screw = zone.farthest(w)
+            assert w @ screw == pytest.approx(zone.support(w), rel=1e-7)
+            sizes = [np.linalg.norm(b @ screw) for b in zone.bounds]
+            assert max(sizes) <= 1 + 1e-9
+
+
+def test_uniform_bore_ends_have_the_worked_shift_and_tilt():
+    """Ends uniform in their discs: shift R/(2 sqrt 2) = 8.84 um, tilt R/(sqrt 2 L) =
+    0.884 mrad, at 50 mm R sqrt(1/8 + (h/L)^2/2) = 45.1 um; closed form and draws."""
+    C = POSITION.covariance()
+    assert np.sqrt(C[3, 3]) * 1e6 == pytest.approx(8.839, abs=1e-3)
+    assert np.sqrt(C[0, 0]) * 1e3 == pytest.approx(0.8839, abs=1e-4)
+    row = offset_rows(0.050)[0]
+    assert np.sqrt(row @ C @ row) * 1e6 == pytest.approx(45.07, abs=0.01)
+    assert np.allclose(np.cov(drawn(POSITION).T)[0, 0], C[0, 0], rtol=0.01)
+    assert C[1, 3] == pytest.approx(0, abs=1e-20)
+
+
+def test_sizes_of_shift_and_tilt_of_a_bore_are_correlated():
+    screws = drawn(POSITION)
+    tilt = np.linalg.norm(screws[:, :2], axis=1)
+    shift = np.linalg.norm(screws[:, 3:5], axis=1)
+    assert np.corrcoef(tilt, shift)[0, 1] == pytest.approx(-0.52, abs=0.01)
+
+
+def test_perpendicularity_keeps_43_percent_and_raises_the_shift():
+    all_screws = drawn(POSITION)
+    kept = np.linalg.norm(all_screws[:, :2], axis=1) <= 1e-3
+    assert kept.mean() == pytest.approx(0.43, abs=0.005)
+    screws = drawn(BOTH)
+    assert screws[:, 0].std() * 1e3 == pytest.approx(0.474, abs=0.003)
+    assert screws[:, 3].std() * 1e6 == pytest.approx(10.5, abs=0.06)
+    # the same as the draws of the larger zone that are kept
+    assert screws[:, 3].std() == pytest.approx(all_screws[kept, 3].std(), rel=0.01)
+
+
+def test_draw_of_one_part_does_not_depend_on_the_others():
+    few = BOTH.draw(lambda a: numbers_of(BOTH, 200)(a)[:50])
+    many = BOTH.draw(numbers_of(BOTH, 200))
+    assert np.array_equal(few, many[:50])
+
+
+def test_uniform_disc_has_half_the_radius_as_deviation():
+    disc = Zone((np.array([[0, 0, 0, 1.0, 0, 0], [0, 0, 0, 0, 1.0, 0]]) / 25e-6,))
+    assert np.sqrt(disc.covariance()[3, 3]) * 1e6 == pytest.approx(12.5, rel=1e-12)
+    # share of a square of the same half width that is outside: 1 - pi/4 = 21.5 %
+    square = np.random.default_rng(1).uniform(-1, 1, (200_000, 2))
+    assert 1 - disc.inside(square).mean() == pytest.approx(0.215, abs=0.003)
+
+
+def test_normal_position_has_0_27_percent_outside():
+    """Rayleigh: exp(-R^2/2 s^2) = 0.0027 for s = 0.2908 R = 7.27 um; s = R/3 leaves
+    exp(-4.5) = 1.11 % outside."""
+    disc = Zone((np.array([[0, 0, 0, 1.0, 0, 0], [0, 0, 0, 0, 1.0, 0]]) / 25e-6,))
+    assert disc.deviation() == pytest.approx(0.2908, abs=1e-4)
+    sigma = np.sqrt(disc.covariance("normal")[3, 3])
+    assert sigma * 1e6 == pytest.approx(7.27, abs=0.005)
+    radii = np.linalg.norm(drawn(disc, "normal")[:, 3:5], axis=1)
+    assert np.mean(radii > 25e-6) == pytest.approx(0.0027, abs=4e-4)
+    assert np.mean(radii * (1 / 3) / 0.2908 > 25e-6) == pytest.approx(0.0111, abs=8e-4)
+
+
+@pytest.mark.parametrize("cp", [1.0, 1.33])
+def test_normal_interval_has_three_cp_deviations_to_its_limit(cp):
+    assert shift_along(1e-4, [1, 0, 0]).deviation(cp) == pytest.approx(1 / (3 * cp))
+
+
+@pytest.mark.parametrize("zone", [POSITION, BOTH, plane_position(4e-5, 0.04, 0.03)])
+def test_truncated_draws_stay_in_the_zone_and_have_its_covariance(zone):
+    screws = drawn(zone, "truncated", 0.6)
+    sizes = [np.linalg.norm(screws @ b.T, axis=1).max() for b in zone.bounds]
+    assert max(sizes) <= 1 + 1e-9
+    C = zone.covariance("truncated", 0.6)
+    for i in np.flatnonzero(np.diag(C)):
+        assert screws[:, i].var() == pytest.approx(C[i, i], rel=0.02)
+
+
+@pytest.mark.parametrize("zone", [POSITION, BOTH])
+def test_normal_draws_leave_the_zone_as_often_as_one_dimension(zone):
+    u = zone.draw(numbers_of(zone), "normal", 0.7)
+    # 2 Phi(-2.1) = 3.57 %
+    assert 1 - zone.inside(u).mean() == pytest.approx(0.0357, abs=0.0015)
+
+
+def test_plane_zone_is_an_octahedron():
+    """Support g max(|w_TZ|, |w_RX|/B, |w_RY|/A); variance of a cross-polytope in three
+    dimensions g^2/10 along each of its axes."""
+    g, A, B = 20e-6, 0.020, 0.015
+    zone = plane_position(2 * g, 2 * A, 2 * B)
+    rng = np.random.default_rng(1)
+    for _ in range(10):
+        w = rng.normal(size=6) * [B, A, 0, 1, 1, 1]
+        expected = g * max(abs(w[5]), abs(w[0]) / B, abs(w[1]) / A)
+        assert zone.support(w) == pytest.approx(expected, rel=1e-7)
+    C = zone.covariance()
+    assert C[5, 5] == pytest.approx(g**2 / 10, rel=0.01)
+    assert C[0, 0] == pytest.approx((g / B) ** 2 / 10, rel=0.01)
+
+
+def test_support_of_a_polyhedron_agrees_with_a_linear_programme():
+    zone = intersection([
+        plane_position(5e-5, 0.04, 0.03),
+        plane_orientation(2e-5, 0.04, 0.03),
+    ])
+    rows = np.vstack(zone.bounds)[:, [0, 1, 5]] * [1e-3, 1e-3, 1e-5]
+    rng = np.random.default_rng(2)
+    for _ in range(10):
+        w = rng.normal(size=3)
+        found = linprog(
+            -w, np.vstack([rows, -rows]), np.ones(2 * len(rows)), bounds=(None, None)
+        )
+        full = np.zeros(6)
+        full[[0, 1, 5]] = w / [1e-3, 1e-3, 1e-5]
+        assert zone.support(full) == pytest.approx(-found.fun, rel=1e-7)
+
+
+def test_position_in_one_direction_leaves_the_other_exact():
+    zone = axis_position_along(WIDTH, LENGTH, np.array([1.0, 0.0]))
+    assert zone.support(np.eye(6)[3]) == pytest.approx(25e-6)
+    assert zone.support(np.eye(6)[1]) == pytest.approx(2.5e-3)
+    assert zone.support(np.eye(6)[4]) == pytest.approx(0, abs=1e-15)
+    assert zone.support(np.eye(6)[0]) == pytest.approx(0, abs=1e-15)
+
+
+def test_orientation_in_one_direction_is_an_interval():
+    zone = axis_orientation(20e-6, LENGTH, np.array([1.0, 0.0]))
+    assert zone.support(np.eye(6)[1]) == pytest.approx(1e-3)
+    assert zone.support(np.eye(6)[0]) == pytest.approx(0, abs=1e-15)
+
+
+def test_point_zone_is_a_ball():
+    zone = point_position(40e-6)
+    w = np.array([1, 2, 3, 0.3, -0.4, 1.2])
+    assert zone.support(w) == pytest.approx(20e-6 * 1.3)
+    assert zone.covariance()[3, 3] == pytest.approx(20e-6**2 / 5)
+    screws = drawn(zone)
+    assert screws[:, 3:].var(axis=0) == pytest.approx([20e-6**2 / 5] * 3, rel=0.01)
+
+
+def test_zone_at_maximum_material_grows_with_the_hole():
+    """12 H7 with 0.05 (M): 0.050 mm at the least hole to 0.068 mm at the largest."""
+    zone = axis_position(WIDTH, LENGTH, bonus=18e-6)
+    assert zone.support(np.eye(6)[3]) == pytest.approx(34e-6)
+    screws = drawn(zone, count=400_000)
+    ends = np.linalg.norm(screws @ offset_rows(LENGTH / 2).T, axis=1)
+    assert 33.9e-6 < ends.max() <= 34e-6
+    # size uniform, then the position: E[r^2] = E[R^2]/2, R uniform in 25..34 um
+    mean_square = (34e-6**3 - 25e-6**3) / (3 * 9e-6) / 2
+    assert np.mean(ends**2) == pytest.approx(mean_square, rel=0.01)
+    assert zone.covariance()[3, 3] == pytest.approx(screws[:, 3].var(), rel=0.01)
+
+
+def test_shift_along_a_direction_has_no_part_across_it():
+    along = np.array([0.5, np.sqrt(0.75), 0.0])
+    zone = shift_along(1e-4, along)
+    across = np.concatenate([np.zeros(3), [-along[1], along[0], 0]])
+    assert zone.support(np.concatenate([np.zeros(3), along])) == pytest.approx(1e-4)
+    assert zone.support(across) == pytest.approx(0, abs=1e-18)
+    both = axis_position_along(WIDTH, LENGTH, along[:2])
+    assert both.support(across) == pytest.approx(0, abs=1e-18)
+
+
+def test_draws_of_a_wide_zone_within_a_narrow_one_are_those_of_the_narrow_one():
+    """Position 20 mm within position 0.05 mm on the same bore: the tighter holds."""
+    narrow = axis_position(WIDTH, LENGTH)
+    zone = intersection([axis_position(20e-3, LENGTH), narrow])
+    screws = drawn(zone, count=20_000)
+    C = narrow.covariance()
+    assert screws.var(axis=0)[[0, 3]] == pytest.approx(np.diag(C)[[0, 3]], rel=0.03)

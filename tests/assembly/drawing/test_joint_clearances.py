@@ -1,0 +1,459 @@
+"""Clearances by the sizes of contacts: closed forms, sampling, and other engines.
+
+Expected numbers are worked by hand from the offset of the axis at the height z,
+``e(z) = (TX + z RY, TY - z RX)``.
+"""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from assembly.exact.exact import solve_exact
+from assembly.files.robot_file import read_robot, write_robot
+from assembly.kinematics.mobility import mobility
+from assembly.kinematics.posture import home_posture
+from assembly.linear.closure import linearise
+from assembly.linear.energy import solve_assembly
+from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.reference.pose_error import reachable_screws
+from assembly.statistics.clearance_positions import position_clearances
+from assembly.statistics.linear_response import linear_response
+from validation.assumptions.bushes import solve_bushes
+from validation.crosscheck.crosscheck import crosscheck
+from validation.crosscheck.pair import scaled
+
+C, L = 10e-6, 40e-3  # [m]
+BORE = 'radial = "10 um", length = "40 mm"'
+GUIDE = "guide = { gap = 1e-5, length = 0.08, width = 0.04, height = 0.03 }"
+PAD = "pad = { gap = 1e-5, length = 0.06, width = 0.04 }"
+
+
+@pytest.fixture
+def one_joint(tmp_path):
+    """Return a function that reads a robot of one joint between base and table."""
+
+    def read(kind, clearance, at=(0, 0, 0), keys="axis = [0, 0, 1]", reverse=False):
+        ends = ("table", "base") if reverse else ("base", "table")
+        if clearance and not clearance.startswith("["):
+            clearance = f"{{ {clearance} }}"
+        given = f"clearance = {clearance}" if clearance else ""
+        file = tmp_path / "one.toml"
+        file.write_text(f"""
+            format = 2
+            platform = "table"
+            platform_at = {[float(x) for x in at]}
+            [[body]]
+            name = "table"
+            [[joint]]
+            name = "j"
+            type = "{kind}"
+            between = ["{ends[0]}", "{ends[1]}"]
+            at = [0, 0, 0]
+            {keys}
+            {given}
+        """)
+        return home_posture(read_robot(file))
+
+    return read
+
+
+def reach(posture):
+    """Largest translation error [m], lower and upper bound."""
+    found = bound_pose_error(solve_assembly(posture), tolerance_translation=1e-9)
+    return found.translation_error
+
+
+def heights(posture, directions):
+    """Support function of the set of platform screws along wrenches (k, 6)."""
+    reachable = reachable_screws(solve_assembly(posture), "frozen")
+    return np.array([reachable.support(w).height for w in np.array(directions)])
+
+
+@pytest.mark.parametrize("kind", ["revolute", "cylindrical"])
+@pytest.mark.parametrize(("height", "expected"), [
+    (0.0, 10e-6), (0.02, 10e-6), (0.1, 50e-6), (-0.1, 50e-6)
+])  # fmt: skip
+def test_a_shaft_in_a_bore_reaches_as_its_ends_allow(kind, height, expected, one_joint):
+    """c max(1, 2 |h| / L), on the axis; a cylindrical joint slides beside it."""
+    posture = one_joint(kind, BORE, [0, 0, height])
+    if kind == "revolute":
+        assert reach(posture) == pytest.approx(expected, abs=1e-9)
+    for angle in (0.0, 0.7, 2.0):
+        across = [0, 0, 0, np.cos(angle), np.sin(angle), 0]
+        assert heights(posture, [across])[0] == pytest.approx(expected, rel=1e-7)
+
+
+def bore_support(w, c=C, length=L):
+    """Most work of a wrench at O on the ends' offsets, |e(L/2)| and |e(-L/2)| <= c."""
+    force, moment = w[3:5], np.array([w[1], -w[0]])
+    ends = force / 2 + moment / length, force / 2 - moment / length
+    return c * sum(np.linalg.norm(end) for end in ends)
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+def test_the_set_of_a_bore_is_exactly_that_of_its_two_ends(reverse, one_joint, rng):
+    """By its support function, its volume, and members drawn without the program."""
+    wrenches = rng.normal(size=(40, 6)) * [1 / L, 1 / L, 0, 1, 1, 0]
+    posture = one_joint("revolute", BORE, reverse=reverse)
+    found = heights(posture, wrenches)
+    np.testing.assert_allclose(found, [bore_support(w) for w in wrenches], rtol=1e-7)
+    # (pi c^2)^2 / L^2, a quarter of radial = c and tilt = 2 c / L apart
+    answer = solve_assembly(posture)
+    to_screw = linearise(posture).platform @ answer.joints.cones
+    volume = np.pi**2 * abs(np.linalg.det(to_screw[[0, 1, 3, 4]]))
+    assert volume == pytest.approx((np.pi * C**2) ** 2 / L**2, rel=1e-12)
+    drawn = rng.uniform(-1, 1, size=(200_000, 4)) * [2 * C / L, 2 * C / L, C, C]
+    tilt, shift = drawn[:, :2], drawn[:, 2:]
+    apart = np.hypot(*tilt.T) <= 2 * C / L
+    apart &= np.hypot(*shift.T) <= C
+    turned = np.stack([tilt[:, 1], -tilt[:, 0]], axis=1) * L / 2
+    inside = np.maximum(*(np.hypot(*(shift + s * turned).T) for s in (1, -1))) <= C
+    assert inside.sum() / apart.sum() == pytest.approx(0.25, abs=0.005)
+    screws = np.zeros((inside.sum(), 6))
+    screws[:, [0, 1, 3, 4]] = drawn[inside]
+    assert ((screws @ wrenches.T) <= found * (1 + 1e-7)).all()
+
+
+def test_the_reach_of_a_bore_is_that_of_finite_shafts(one_joint):
+    """Straight lines through points of the two rims; offset of their point at h."""
+    angles = np.linspace(0, 2 * np.pi, 61)
+    rim = C * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    low, high = (np.insert(rim, 2, z, axis=1) for z in (-L / 2, L / 2))
+    along = high[None] - low[:, None]
+    middle, unit = (
+        (high[None] + low[:, None]) / 2,
+        along / np.linalg.norm(along, axis=2, keepdims=True),
+    )
+    for height in (0.0, 0.03, 0.1):
+        off = middle + height * unit - [0, 0, height]
+        found = reach(one_joint("revolute", BORE, [0, 0, height]))
+        assert np.linalg.norm(off, axis=2).max() == pytest.approx(found[1], rel=2e-4)
+
+
+BEARINGS = (
+    'bearings = [{ z = "-20 mm", radial = "10 um" }, { z = "60 mm", radial = "5 um" }]'
+)
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+def test_two_bearings_bound_the_axis_at_their_places(reverse, one_joint):
+    """e(h) is linear between e(-20 mm) <= 10 um and e(60 mm) <= 5 um."""
+    for h, expected in ((-0.02, 10e-6), (0.06, 5e-6), (0.14, 20e-6), (-0.1, 25e-6)):
+        posture = one_joint("cylindrical", BEARINGS, [0, 0, h], reverse=reverse)
+        for direction in ([1, 0], [0.6, 0.8]):
+            found = heights(posture, [[0, 0, 0, *direction, 0]])[0]
+            assert found == pytest.approx(expected, rel=1e-7)
+
+
+def test_axial_and_spin_of_a_bore_stay_bounds_of_their_own(one_joint):
+    posture = one_joint("revolute", BORE + ', axial = "5 um", spin = "1 mrad"')
+    along, turn = heights(posture, [[0, 0, 0, 0, 0, 1], [0, 0, 1, 0, 0, 0]])
+    assert along == pytest.approx(5e-6, rel=1e-7)
+    assert turn == pytest.approx(1e-3, rel=1e-7)
+
+
+def test_a_round_guide_slides_and_its_key_bounds_its_roll(one_joint):
+    """Key with a gap of 20 um at a radius of 20 mm: 1 mrad."""
+    posture = one_joint("prismatic", BORE + ", spin = 1e-3")
+    turn, aside = heights(posture, [[0, 0, 1, 0, 0, 0], [0, 0, 0, 0.6, 0.8, 0]])
+    assert turn == pytest.approx(1e-3, rel=1e-7)
+    assert aside == pytest.approx(C, rel=1e-7)
+    assert mobility(posture).freedoms == 1
+
+
+@pytest.mark.parametrize("driven", [False, True])
+def test_a_nut_has_the_bore_of_its_length_and_a_backlash_along_its_thread(
+    driven, one_joint
+):
+    """Tr 16 x 4, 50 um from flank to flank: |TZ - h RZ| <= 25 um, h = 4 mm / 2 pi."""
+    keys = 'axis = [0, 0, 1]\npitch = "4 mm"'
+    keys += "\nactuated = true" if driven else ""
+    text = BORE + ', axial = "25 um"'
+    posture = one_joint("helical", text, [0, 0, 0.1], keys)
+    along_thread = [0, 0, -4e-3 / (2 * np.pi), 0, 0, 1]
+    found = heights(posture, [along_thread, [0, 0, 0, 0.6, 0.8, 0]])
+    np.testing.assert_allclose(found, [25e-6, 50e-6], rtol=1e-7)
+    assert mobility(posture).drives == driven
+
+
+def test_only_the_own_frame_of_a_driven_joint_is_its_drive(one_joint):
+    keys = "axis = [0, 0, 1]\nactuated = true\nposition = 0.1\nlimits = [0, 1]"
+    for text in (BORE, GUIDE):
+        posture = one_joint("prismatic", text, keys=keys)
+        assert mobility(posture).drives == 1
+        assert [f.name for f in posture.robot.frames if f.actuated] == ["j"]
+        assert [f.name for f in posture.robot.frames if f.limits] == ["j"]
+        assert mobility(posture).freedoms == 1
+
+
+@pytest.mark.parametrize("axis2", [[0, 1, 0], [1, 1, 0]])
+def test_a_cross_adds_the_clearances_of_its_two_bearings(axis2, one_joint):
+    """c = a = 10 um, L = 30 mm: 20 um along each axis, 4 c / L = 1.33 mrad about n."""
+    clearance = 'radial = "10 um", axial = "10 um", length = "30 mm"'
+    keys = f"axis = [1, 0, 0]\naxis2 = {axis2}"
+    posture = one_joint("universal", clearance, keys=keys)
+    a1, a2 = np.array([1.0, 0, 0]), np.array(axis2) / np.linalg.norm(axis2)
+    n = np.cross(a1, a2) / np.linalg.norm(np.cross(a1, a2))
+    normal, about = heights(posture, [[0, 0, 0, *n], [*n, 0, 0, 0]])
+    assert normal == pytest.approx(20e-6, rel=1e-7)
+    assert about == pytest.approx(4 * 10e-6 / 30e-3, rel=1e-7)
+    for along, other in ((a1, a2), (a2, a1)):
+        # the other pair adds its axial gap and its disc, by their angle
+        c = abs(along @ other)
+        expected = 10e-6 * (1 + c + np.sqrt(1 - c**2))
+        found = heights(posture, [[0, 0, 0, *along]])[0]
+        assert found == pytest.approx(expected, rel=1e-7)
+
+
+def test_bearings_of_a_cross_may_have_different_bores(one_joint):
+    """The sum of both support functions."""
+    pair = '[{ radial = 1e-5, length = 0.03 }, { radial = 2e-5, length = "50 mm" }]'
+    keys = "axis = [1, 0, 0]\naxis2 = [0, 1, 0]"
+    posture = one_joint("universal", pair, keys=keys)
+    normal, about = heights(posture, [[0, 0, 0, 0, 0, 1], [0, 0, 1, 0, 0, 0]])
+    assert normal == pytest.approx(3e-5, rel=1e-7)
+    assert about == pytest.approx(2 * (1e-5 / 0.03 + 2e-5 / 0.05), rel=1e-7)
+
+
+def test_a_ball_joint_reaches_its_gap_and_turns_freely(one_joint, rng):
+    posture = one_joint("spherical", 'ball = "10 um"', keys="")
+    assert reach(posture) == pytest.approx(C, abs=1e-9)
+    directions = rng.normal(size=(10, 3))
+    found = heights(posture, [[0, 0, 0, *d] for d in directions])
+    np.testing.assert_allclose(found, C * np.linalg.norm(directions, axis=1), rtol=1e-7)
+    assert mobility(posture).freedoms == 3
+
+
+def test_a_guide_reaches_its_largest_motions_one_by_one(one_joint):
+    """10 um, 80 by 40 by 30 mm: yaw and pitch 2 c / L, roll 2 c / w."""
+    posture = one_joint("prismatic", GUIDE)
+    expected = [0.25e-3, 0.25e-3, 0.5e-3, 1e-5, 1e-5]
+    found = heights(posture, np.eye(6)[:5])
+    np.testing.assert_allclose(found, expected, rtol=1e-7)
+    assert mobility(posture).freedoms == 1
+
+
+def test_a_guide_may_have_different_gaps_and_axes(one_joint):
+    """Gaps 10 um along x, the direction of axis2, and 4 um along y."""
+    text = GUIDE.replace("1e-5", '["10 um", "4 um"]')
+    keys = "axis = [0, 0, 1]\naxis2 = [0, 1, 0]"
+    posture = one_joint("prismatic", text, keys=keys)
+    expected = [0.25e-3, 0.1e-3, 0.2e-3, 4e-6, 10e-6]
+    found = heights(posture, np.eye(6)[:5])
+    np.testing.assert_allclose(found, expected, rtol=1e-7)
+
+
+def test_a_guide_is_exact_without_roll_and_contains_all_positions(one_joint, rng):
+    """Diamonds |TX| + L/2 |RY| <= c_x and |TY| + L/2 |RX| <= c_y; slabs with roll."""
+    wrenches = rng.normal(size=(40, 6)) * [25, 25, 0, 1, 1, 0]
+    posture = one_joint("prismatic", GUIDE)
+    tilts, shifts = np.abs(wrenches[:, [1, 0]]) / 0.04, np.abs(wrenches[:, 3:5])
+    expected = 1e-5 * np.maximum(tilts, shifts).sum(axis=1)
+    np.testing.assert_allclose(heights(posture, wrenches), expected, rtol=1e-7)
+    wrenches[:, 2] = 20 * rng.normal(size=40)
+    found = heights(posture, wrenches)
+    box = np.array([2.5e-4, 2.5e-4, 5e-4, 1e-5, 1e-5])
+    screws = rng.uniform(-1, 1, size=(200_000, 5)) * box
+    RX, RY, RZ, TX, TY = np.abs(screws.T)
+    inside = (TX + 0.04 * RY + 0.015 * RZ <= 1e-5) & (
+        TY + 0.04 * RX + 0.02 * RZ <= 1e-5
+    )
+    work = screws[inside] @ wrenches[:, :5].T
+    assert (work <= found * (1 + 1e-7)).all()
+    # volume of the sum over that of the guide: 1 / int (1 - s)^2 (1 - 3 s / 4)^2
+    diamonds = (TX + 0.04 * RY <= 1e-5) & (TY + 0.04 * RX <= 1e-5)
+    assert diamonds.sum() / inside.sum() == pytest.approx(1 / 0.227083, rel=0.05)
+
+
+def test_a_pad_contains_its_octahedron_and_1_5_times_its_volume(one_joint, rng):
+    """|TZ| + B |RX| + A |RY| <= g, 60 by 40 mm: vertices g, g / B, g / A."""
+    posture = one_joint("planar", PAD)
+    scale = 1e-5 / np.array([0.02, 0.03, 1.0])  # of RX, RY, TZ
+    vertices = heights(posture, np.eye(6)[[0, 1, 5]])
+    np.testing.assert_allclose(vertices, scale, rtol=1e-7)
+    wrenches = np.zeros((40, 6))
+    wrenches[:, [0, 1, 5]] = rng.normal(size=(40, 3)) / scale
+    # the support function of a sum of four segments (1, +-1, +-1) / 4
+    signs = [[1, s, t] for s in (1, -1) for t in (1, -1)]
+    segments = wrenches[:, [5, 0, 1]] * scale[[2, 0, 1]] @ np.array(signs).T / 4
+    found = heights(posture, wrenches)
+    np.testing.assert_allclose(found, np.abs(segments).sum(axis=1), rtol=1e-7)
+    octahedron = np.abs(wrenches[:, [0, 1, 5]] * scale).max(axis=1)
+    assert (found >= octahedron * (1 - 1e-7)).all()
+    # volumes in units of the scale: 4 / 3 of the octahedron, 8 sum |det| of the sum
+    answer = solve_assembly(posture)
+    columns = (linearise(posture).platform @ answer.joints.cones)[[0, 1, 5]]
+    segments = columns / scale[:, None]
+    volume = 8 * sum(
+        abs(np.linalg.det(segments[:, list(three)]))
+        for three in itertools.combinations(range(4), 3)
+    )
+    assert volume / (4 / 3) == pytest.approx(1.5, rel=1e-12)
+    assert mobility(posture).freedoms == 3
+
+
+@pytest.mark.parametrize(("kind", "clearance"), [
+    ("revolute", BORE), ("cylindrical", BORE), ("universal", BORE),
+    ("spherical", 'ball = "10 um"'), ("prismatic", GUIDE), ("planar", PAD),
+    ("revolute", BEARINGS),
+])  # fmt: skip
+def test_contacts_change_no_count_of_mobility(kind, clearance, one_joint, tmp_path):
+    """And they are the same in the frames that are written."""
+    keys = "axis = [0, 0, 1]\naxis2 = [0, 1, 0]"
+    bare, own = (mobility(one_joint(kind, text, keys=keys)) for text in ("", clearance))
+    assert vars(bare) == vars(own)
+    posture = one_joint(kind, clearance, [0, 0, 0.1], keys)
+    write_robot(posture.robot, tmp_path / "frames.toml")
+    again = read_robot(tmp_path / "frames.toml")
+    frames = zip(again.frames, posture.robot.frames, strict=True)
+    assert all(a.clearance == b.clearance for a, b in frames)
+    change = home_posture(again).transforms - posture.transforms
+    assert np.abs(change).max() == 0.0
+
+
+@pytest.fixture
+def held_shaft(tmp_path):
+    """Return a function that reads a shaft in a bore, sprung, and off by an error."""
+
+    def read(error, clearance):
+        file = tmp_path / "held.toml"
+        file.write_text(f"""
+            format = 2
+            platform = "shaft"
+            platform_at = [0, 0, 0]
+            [[body]]
+            name = "bush"
+            [[body]]
+            name = "shaft"
+            [[joint]]
+            name = "spring"
+            type = "fixed"
+            between = ["base", "bush"]
+            at = [0, 0, 0]
+            joint_stiffness = {STIFFNESS}
+            [[joint]]
+            name = "bore"
+            type = "revolute"
+            between = ["bush", "shaft"]
+            at = [0, 0, 0]
+            axis = [0, 0, 1]
+            clearance = {{ {clearance} }}
+            [[joint]]
+            name = "mount"
+            type = "fixed"
+            between = ["shaft", "base"]
+            at = [0, 0, 0]
+            geometric_error = {[float(x) for x in error]}
+        """)
+        return home_posture(read_robot(file))
+
+    return read
+
+
+STIFFNESS = [2e3, 3e3, 1e3, 2e6, 1e6, 4e6]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_energy_of_a_forced_bore_equals_that_of_its_ends_in_cvxpy(seed, held_shaft):
+    """Least v K v / 2 of a spring's screw v; v + clearance + error close the loop."""
+    import cvxpy as cp
+
+    rng = np.random.default_rng(seed)
+    error = rng.normal(size=6) * [1e-3, 1e-3, 1e-3, 2e-5, 2e-5, 2e-5]
+    v, c = cp.Variable(6), cp.Variable(6)  # [mrad, um]
+    unit = np.array([1e-3] * 3 + [1e-6] * 3)
+    offsets = [
+        cp.hstack([c[3] + z * c[1], c[4] - z * c[0]]) for z in (20.0, -20.0)  # [mm]
+    ]  # fmt: skip
+    within = [cp.norm(e) <= 10 for e in offsets]
+    within += [cp.abs(c[5]) <= 5, v + c + error / unit == 0]
+    root = np.sqrt(np.array(STIFFNESS)) * unit * 1e3
+    problem = cp.Problem(cp.Minimize(cp.sum_squares(cp.multiply(root, v)) / 2), within)
+    problem.solve(solver=cp.CLARABEL, tol_gap_rel=1e-11, tol_feas=1e-11)
+    found = solve_assembly(held_shaft(error, BORE + ', axial = "5 um"'))
+    assert found.energy == pytest.approx(problem.value * 1e-6, rel=1e-6)
+
+
+def test_a_bore_has_the_energy_of_a_pin_in_two_bushes(held_shaft, rng):
+    """Bushes at +-20 mm: radial 10 um, tilt 10 um / 20 mm, as one pair of discs."""
+    for _ in range(4):
+        error = rng.normal(size=6) * [1e-3, 1e-3, 1e-3, 2e-5, 2e-5, 2e-5]
+        bushes = solve_bushes(held_shaft(error, 'radial = "10 um", tilt = "0.5 mrad"'))
+        found = solve_assembly(held_shaft(error, BORE))
+        assert found.energy == pytest.approx(bushes.energy, rel=1e-7)
+
+
+@pytest.mark.exudyn
+def test_crosscheck_of_a_bore_passes(held_shaft):
+    """The simulation moves the two frames of the bore by finite rotations."""
+    error = [4e-3, -7e-3, 2e-3, 9e-5, -6e-5, 7e-5]
+    check = crosscheck(held_shaft(error, BORE), (1.0, 0.5, 0.25), clearances=True)
+    assert check.passed, check.checks
+
+
+@pytest.mark.parametrize("clearance", [BORE, 'ball = "10 um"'])
+def test_both_exact_methods_agree_with_contacts(clearance, held_shaft):
+    posture = held_shaft([4e-3, -7e-3, 2e-3, 90e-6, -60e-6, 70e-6], clearance)
+    one, other = (solve_exact(posture, method=m) for m in ("compiled", "reference"))
+    assert one.energy == pytest.approx(other.energy, rel=1e-9)
+    np.testing.assert_allclose(
+        one.clearance_screws, other.clearance_screws, rtol=1e-6, atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("clearance", [BORE, 'ball = "10 um"'])
+def test_the_exact_model_differs_from_the_linear_one_by_the_square(
+    clearance, held_shaft
+):
+    """Errors and clearances times 1, 1/2, 1/4: platform screws differ by 1/4, 1/16."""
+    error = np.array([4e-3, -7e-3, 2e-3, 90e-6, -60e-6, 70e-6])
+    posture, sizes = held_shaft(error, clearance), []
+    for scale in (1.0, 0.5, 0.25):
+        found = solve_exact(scaled(posture, scale))
+        assert found.clearance_excess() < 1e-9
+        assert found.closure_residual() < 1e-12
+        screw = found.platform_screw - found.linear.platform_screw
+        sizes.append(np.linalg.norm(screw * ([1e-3] * 3 + [1.0] * 3)))
+    slopes = np.diff(np.log(sizes)) / np.log(0.5)
+    np.testing.assert_allclose(slopes, 2.0, atol=0.1)
+
+
+def drawn_positions(posture, model, count=3000):
+    """(k, 6) platform screws of a clearance model."""
+    prepared = linear_response(posture)
+    draws = prepared.solve(np.zeros((count, len(posture.robot.frames), 6)))
+    rngs = [np.random.default_rng([5, k]) for k in range(count)]
+    screws, mixed = position_clearances(prepared, draws, model, rngs)
+    assert mixed.all()
+    return screws
+
+
+def test_uniform_positions_in_a_ball_have_a_uniform_cubed_radius(one_joint):
+    from scipy import stats
+
+    at = drawn_positions(one_joint("fixed", 'ball = "10 um"'), "uniform")[:, 3:] / C
+    radius = np.linalg.norm(at, axis=1)
+    assert stats.kstest(radius**3, "uniform").pvalue > 1e-3
+    assert stats.kstest(at[:, 2] / radius / 2 + 0.5, "uniform").pvalue > 1e-3
+
+
+def test_contact_positions_in_a_ball_are_uniform_on_its_surface(one_joint):
+    from scipy import stats
+
+    at = drawn_positions(one_joint("fixed", 'ball = "10 um"'), "contact")[:, 3:] / C
+    assert np.linalg.norm(at, axis=1) == pytest.approx(1.0, rel=1e-9)
+    for x in at.T:
+        assert stats.kstest(x / 2 + 0.5, "uniform").pvalue > 1e-3
+
+
+def test_uniform_positions_in_a_bore_have_uniform_ends(one_joint):
+    """Standard deviations c / 2 sqrt 2 and c / (sqrt 2 L) of each axis; their sizes
+    have a correlation of -0.52.
+    """
+    at = drawn_positions(one_joint("fixed", BORE), "uniform")
+    tilt, shift = at[:, :2], at[:, 3:5]
+    np.testing.assert_allclose(shift.std(axis=0), C / np.sqrt(8), rtol=0.04)
+    np.testing.assert_allclose(tilt.std(axis=0), C / (np.sqrt(2) * L), rtol=0.04)
+    sizes = np.hypot(*tilt.T), np.hypot(*shift.T)
+    assert np.corrcoef(*sizes)[0, 1] == pytest.approx(-0.52, abs=0.05)

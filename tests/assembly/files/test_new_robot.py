@@ -1,0 +1,111 @@
+"""Files of ``forcefit new``: read, solved, and of the mobility of the literature."""
+
+import json
+import sys
+import tomllib
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from assembly.files.new_robot import KINDS
+from assembly.files.robot_schema import ROBOT_FILE
+from assembly.kinematics.mobility import mobility
+from assembly.kinematics.posture import home_posture
+from assembly.robots import load_robot
+from forcefit.results.schema import schema_of
+
+# all freedoms, of the platform, over-constraints: Merlet, Parallel Robots (2006), by
+# Kutzbach's count where the closures are independent; three of each loop in a plane
+MOBILITY = {
+    "UPS": (6, 6, 0), "RUS": (6, 6, 0), "UPU": (3, 3, 0), "PRS": (3, 3, 0),
+    "RRR": (3, 3, 6), "delta": (9, 3, 0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_new_robot_has_the_mobility_of_the_literature_and_solves(
+    run, tmp_path, monkeypatch, kind
+):
+    monkeypatch.chdir(tmp_path)
+    status, out, err = run("new", "mine", "--kind", kind)
+    assert (status, err) == (0, "")
+    assert "written: mine.toml" in out
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
+    found = mobility(home_posture(load_robot("mine.toml")))
+    assert (
+        found.freedoms, found.platform_freedoms, found.overconstraint
+    ) == MOBILITY[kind]  # fmt: skip
+    assert found.platform_freedoms_drives_locked == 0
+    status, out, _ = run("assembly", "solve", "mine.toml", "--load", "fz=-50",
+                         "--json", "-")  # fmt: skip
+    results = json.loads(out)
+    assert (status, results["status"]) == (0, "ok")
+    assert not results["mobility"]["singular"]
+    assert results["platform_screw"][5] < 0  # the platform gives way downwards
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_new_robot_fits_the_schema_that_its_first_line_names(
+    run, tmp_path, monkeypatch, kind
+):
+    monkeypatch.chdir(tmp_path)
+    run("new", "mine", "--kind", kind)
+    text = (tmp_path / "mine.toml").read_text()
+    assert text.startswith("#:schema robot.schema.json\n")
+    assert len(text.splitlines()) <= 110
+    validator = Draft202012Validator(schema_of(ROBOT_FILE, "robot", file=True))
+    assert not list(validator.iter_errors(tomllib.loads(text)))
+
+
+@pytest.mark.parametrize(("kind", "legs", "expected"), [
+    # more legs than freedoms: each further drive is redundant
+    ("UPS", 8, (6, 2, 0)), ("RRR", 4, (3, 1, 9)),
+    # each leg of a 3-UPU holds one turn: two of four hold the third too
+    ("UPU", 4, (3, 1, 1)),
+])  # fmt: skip
+def test_further_legs_are_redundant(run, tmp_path, kind, legs, expected):
+    path = tmp_path / "mine.toml"
+    assert run("new", path, "--kind", kind, "--legs", legs)[0] == 0
+    found = mobility(home_posture(load_robot(path)))
+    assert (
+        found.freedoms, found.actuation_redundancy, found.overconstraint
+    ) == expected  # fmt: skip
+
+
+@pytest.mark.parametrize(("words", "message"), [
+    (["mine"], "--kind: missing, expected UPS | RUS | UPU | PRS | RRR | delta"),
+    (["mine", "--kind", "UPX"], '--kind: found "UPX"; did you mean "UPU"?'),
+    (["mine", "--kind", "UPS", "--legs", "7"],
+     "--legs: found 7, expected a multiple of 2 from 6 to 12 for --kind UPS"),
+    (["mine", "--kind", "RRR", "--legs", "2"],
+     "--legs: found 2, expected from 3 to 12 for --kind RRR"),
+    (["a b", "--kind", "RRR"], 'NAME: found "a b", expected letters'),
+    (["absent/mine", "--kind", "RRR"], "found no folder"),
+])  # fmt: skip
+def test_unusable_request_for_a_new_robot_is_refused_in_one_line(
+    run, tmp_path, monkeypatch, words, message
+):
+    monkeypatch.chdir(tmp_path)
+    status, out, err = run("new", *words)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_new_robot_overwrites_no_file(run, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text("# Written by forcefit.\n")
+    status, _, err = run("new", path, "--kind", "RRR")
+    assert status == 2
+    assert "not overwritten" in err
+    assert path.read_text() == "# Written by forcefit.\n"
+
+
+def test_new_robot_asks_for_its_kind_on_a_terminal(run, tmp_path, monkeypatch):
+    answers = iter(["UPU", 4])
+    monkeypatch.setattr(sys.stdin, "isatty", lambda: True)
+    monkeypatch.setattr("typer.prompt", lambda *_, **__: next(answers))
+    status, out, _ = run("new", tmp_path / "mine")
+    assert status == 0
+    assert "UPS     Gough platform, UPS, 6 legs" in out
+    assert "UPU after Tsai, 4 legs" in (tmp_path / "mine.toml").read_text()

@@ -1,0 +1,174 @@
+"""Datum frames and the errors of frames, against hand calculation and finite motion."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.callouts.callout import Callout, Datum
+from assembly.kinematics.callout_maps import place_callouts
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.model.robot import Frame, Robot
+from forcefit.inputs.table import BadInput
+from stiffness.screws import rotation_matrix, rotation_vector
+
+TURN = np.pi / 2
+# body "plate": face A (normal z, at the origin), face B (normal x, at the origin, its
+# long side 60 mm along z), hole 80 mm along x from B
+PLATE = Robot(
+    "plate",
+    "tip",
+    (
+        Frame("plate"),
+        Frame("A", "plate"),
+        Frame("B", "plate", rotation=np.array([0, TURN, 0]), joint="revolute"),
+        Frame("hole", "plate", np.array([0.08, 0, 0]), joint="revolute"),
+        Frame("tip", "hole", np.array([0.1, 0, 0])),
+    ),
+)
+A, B = Datum("A", "plane"), Datum("B", "plane")
+SIDE_FACE = Callout(
+    "side face", "B", (A,), shape="plane", extent=(0.06, 0.04),
+    widths={"perpendicularity": 0.05e-3},
+)  # fmt: skip
+
+
+def placed(robot, *callouts):
+    return place_callouts(home_posture(replace(robot, callouts=callouts)))
+
+
+def hole(*datums):
+    return Callout(
+        "hole", "hole", datums, extent=(0.02,), widths={"position": 1e-9}
+    )  # fmt: skip
+
+
+def test_order_of_datums_moves_a_hole_by_the_worked_amount():
+    """B out of square to A by 0.05 over 60 mm (0.833 mrad): the hole 80 mm from B
+    moves by 66.7 um normal to A in B|A, not at all in A|B."""
+    row = PLATE.index("hole")
+    largest = []
+    for datums in ((A, B), (B, A)):
+        face, _ = placed(PLATE, SIDE_FACE, hole(*datums))
+        normal = face.errors[row, 5]
+        largest.append(face.zone.support(_on_screw(face, normal)))
+    assert largest[0] == pytest.approx(0.0, abs=1e-15)
+    assert largest[1] == pytest.approx(66.67e-6, rel=1e-3)
+
+
+def _on_screw(placed_callout, row):
+    """(6,) direction whose product with the screw of u is row @ u."""
+    return row @ np.linalg.pinv(placed_callout.zone.columns)
+
+
+def test_side_face_tilts_at_most_its_width_over_its_side():
+    (face,) = placed(PLATE, SIDE_FACE)
+    tilt = face.errors[PLATE.index("B"), 1]
+    assert face.zone.support(_on_screw(face, tilt)) == pytest.approx(
+        0.8333e-3, rel=1e-4
+    )
+
+
+def test_datum_that_an_earlier_one_holds_takes_only_what_is_left():
+    """A (plane) holds RX, RY, TZ.  A bore B along z then holds TX and TY, not RZ."""
+    robot = replace(
+        PLATE,
+        frames=(*PLATE.frames, Frame("bore", "plate", np.array([0.0, 0.05, 0]))),
+    )
+    bore = Callout(
+        "bore", "bore", (A,), extent=(0.02,), widths={"position": 0.1e-3}
+    )  # fmt: skip
+    first, _ = placed(robot, bore, hole(A, Datum("bore")))
+    moved = first.errors[robot.index("hole")]
+    own = first.errors[robot.index("bore")]
+    # the shift of the bore carries the hole, its tilt does not
+    assert moved[[3, 4]] == pytest.approx(own[[3, 4]], abs=1e-12)
+    assert np.abs(moved[[0, 1, 2, 5]]).max() < 1e-12
+
+
+# crank 0.4 m, rod 0.3 m, the elbow's bore on the rod's side 20 mm long
+SERIAL = Robot(
+    "serial",
+    "tip",
+    (
+        Frame("shoulder", joint="revolute", actuated=True, position=0.5),
+        Frame("elbow", "shoulder", np.array([0.4, 0, 0]), joint="revolute",
+              actuated=True, position=0.7),
+        Frame("tip", "elbow", np.array([0.3, 0, 0])),
+    ),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("after", "frame"), [(False, "elbow"), (True, "tip")])
+def test_shift_of_a_bore_moves_the_tip_as_in_finite_geometry(after, frame):
+    """Before the joint the bore is shifted on the crank: the tip follows.  After it the
+    bore is shifted on the rod: the tip moves by the opposite, in the rod's axes.  The
+    second order is 1e-14 m for these widths."""
+    datum = Datum("shoulder") if not after else Datum("tip")
+    callout = Callout(
+        "bore", "elbow", (datum,), after, extent=(0.02,), widths={"position": 2e-8}
+    )
+    home = home_posture(replace(SERIAL, callouts=(callout,)))
+    (one,) = place_callouts(home)
+    u = np.array([0.3, -0.4, 0.5, 0.2])
+    errors = one.errors @ u
+    assert np.flatnonzero(errors.any(axis=1)).tolist() == [SERIAL.index(frame)]
+    # the screw at the bore, in the elbow's axes before or after the joint
+    screw = one.zone.columns @ u
+    angle = 0.5 + 0.7 * after
+    R = np.array([[np.cos(angle), -np.sin(angle), 0],
+                  [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])  # fmt: skip
+    lever = R.T @ (np.array([np.cos(1.2), np.sin(1.2), 0]) * 0.3)
+    sign = -1 if after else 1
+    expected = sign * (R @ (screw[3:] + np.cross(screw[:3], lever)))
+    moved = _platform(home, errors)[:3, 3] - _platform(home, 0 * errors)[:3, 3]
+    assert moved == pytest.approx(expected, abs=1e-13)
+
+
+def _platform(home, errors):
+    """Platform pose with the errors as finite displacements of the frames."""
+    frames = []
+    for frame, e in zip(home.robot.frames, errors, strict=True):
+        R = rotation_matrix(frame.rotation)
+        frames.append(
+            replace(
+                frame,
+                translation=frame.translation + R @ e[3:],
+                rotation=rotation_vector(R @ rotation_matrix(e[:3])),
+            )
+        )
+    robot = replace(home.robot, frames=tuple(frames), callouts=())
+    q = {f.name: f.position for f in robot.frames if f.actuated}
+    return place_robot(robot, joints=q).platform
+
+
+@pytest.mark.parametrize(
+    ("callouts", "message"),
+    [
+        ([hole(B), replace(hole(Datum("hole")), name="B", feature="B")],
+         "circular datums"),
+        ([replace(hole(A), datums=(Datum("tip"),))], "another body"),
+        ([replace(hole(A), datums=(Datum("hole"),))], "the feature itself"),
+        ([hole(A), hole(B)], "found the feature twice"),
+        ([replace(hole(A), widths={"parallelism": 1e-5}, datums=(Datum("B"),))],
+         "90 deg at home, expected 0 deg"),
+        ([replace(hole(B), widths={}, length=(0.09, 1e-4))],
+         "found a length of 90 mm, expected that at home, 80 mm"),
+        ([replace(hole(Datum("hole")), feature="tip", after=True)],
+         "no frame that its joint"),
+    ],
+)  # fmt: skip
+def test_callout_that_does_not_fit_is_refused_in_one_line(callouts, message):
+    with pytest.raises(BadInput, match=message) as error:
+        placed(PLATE, *callouts)
+    assert "\n" not in str(error.value)
+
+
+def test_length_and_general_tolerance_are_intervals_along_the_distance():
+    callout = replace(hole(B), widths={}, length=(0.08, 1e-4))
+    (one,) = placed(PLATE, callout)
+    assert one.zone.support(np.eye(6)[3]) == pytest.approx(1e-4)
+    general = replace(hole(B), widths={}, general="ISO 2768-m")
+    (one,) = placed(PLATE, general)
+    assert one.zone.support(np.eye(6)[3]) == pytest.approx(0.3e-3)
+    assert one.zone.dimensions == (1,)

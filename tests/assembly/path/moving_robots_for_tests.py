@@ -1,0 +1,67 @@
+"""Small robots that move along a path, and their motion at given instants."""
+
+import numpy as np
+
+from assembly.kinematics.posture import place_many_joints, together
+from assembly.model.robot import BeamLink, Frame, Robot
+from assembly.path.motion import follow_path
+from assembly.path.trajectory import Trajectory
+from assembly.sweeps.targets import goals_of
+from stiffness.screws import rotation_matrix
+
+GRAVITY = np.array([0.0, -9.81, 0.0])
+
+
+def hinge(name, parent="base", at=(0, 0, 0), **other):
+    """An actuated hinge about z."""
+    return Frame(name, parent, at, joint="revolute", actuated=True, **other)
+
+
+def instants(names, values, first, second):
+    """A trajectory of separate instants, which need not follow each other."""
+    rows = [np.atleast_2d(np.array(x, dtype=float)) for x in (values, first, second)]
+    return Trajectory(tuple(names), np.arange(len(rows[0])) * 1.0, *rows, "times")
+
+
+def rod(mass, length):
+    """Mass, centre and moments of inertia of a thin rod along x, at its far end."""
+    turning = mass * length**2 / 12
+    return {
+        "mass": mass, "centre_of_mass": [-length / 2, 0, 0],
+        "inertia": np.diag([0, turning, turning]),
+    }  # fmt: skip
+
+
+def spinning_beam(
+    rate, acceleration, pieces=1, theory="euler", radius=0.01, axis=(0, 0, 1)
+):
+    """A beam of 0.5 m along x clamped to a hub that turns about an axis."""
+    link = BeamLink({"radius": radius}, 70e9, 0.3, 2700.0, theory)
+    turn = _turn_of_z(axis)
+    step = np.array([0.5 / pieces, 0, 0])
+    first = rotation_matrix(turn).T @ step
+    frames = [
+        hinge("hub", rotation=turn),
+        Frame("piece0", "hub", first, -turn, link=link),
+    ]
+    for k in range(1, pieces):
+        frames.append(Frame(f"piece{k}", f"piece{k - 1}", step, link=link))
+    robot = Robot("beam", frames[-1].name, tuple(frames))
+    return robot, instants(["q.hub"], [[0.0]], [[rate]], [[acceleration]])
+
+
+def _turn_of_z(axis):
+    """The rotation vector that lays z along an axis."""
+    axis = np.array(axis) / np.linalg.norm(axis)
+    across = np.cross([0, 0, 1], axis)
+    sine = np.linalg.norm(across)
+    if sine < 1e-12:
+        return np.zeros(3)
+    return across / sine * np.arctan2(sine, axis[2])
+
+
+def moving_drives(robot, names, path):
+    """Motion of a robot whose drives follow (k, c) coordinates and derivatives."""
+    postures, reasons = place_many_joints(robot, goals_of(names, robot, path[0]))
+    assert not any(reasons)
+    return follow_path(together(postures), names, path)

@@ -1,0 +1,148 @@
+"""Deflection of a closed robot against the dynamic solution of Exudyn, stiff limit."""
+
+import exudyn as exu
+import exudyn.itemInterface as item
+import numpy as np
+import pytest
+
+from assembly.model.robot import Frame, Robot
+from assembly.path.path_errors import path_errors
+from assembly.path.path_file import PathTable
+from assembly.path.profiles import PROFILES
+from assembly.path.trajectory import profiled
+from tests.assembly.exact.test_exact import only
+from tests.assembly.path.moving_robots_for_tests import hinge, rod
+
+NEAR, FAR, FEET = 0.09, 0.11, ((-0.06, 0.0), (0.06, 0.0))
+MASSES, TOOL = {"near": 0.2, "far": 0.15}, 0.5
+START, END, DURATION = np.array([-0.02, 0.13]), np.array([0.025, 0.15]), 0.08
+
+
+def arm_angles(tip, foot, side):
+    """Angles of both arms of a leg to the x axis, elbow outward, by the cosine rule."""
+    along = np.subtract(tip, foot)
+    d, to_tip = np.hypot(*along), np.arctan2(along[1], along[0])
+    inner = np.arccos((NEAR**2 + d**2 - FAR**2) / (2 * NEAR * d))
+    near = to_tip + side * inner
+    elbow = foot + NEAR * np.array([np.cos(near), np.sin(near)])
+    far = np.arctan2(*(tip - elbow)[::-1])
+    return near, far
+
+
+def robot_of(stiffness):
+    """The five-bar robot: rigid arms, elastic drives, a mass at the tip."""
+    frames = []
+    for name, foot, side in (("left", FEET[0], 1), ("right", FEET[1], -1)):
+        near, far = arm_angles(START, foot, side)
+        frames.append(hinge(
+            f"{name}.drive", at=[*foot, 0], position=near,
+            joint_stiffness=only(2, stiffness),
+        ))  # fmt: skip
+        frames.append(Frame(
+            f"{name}.elbow", f"{name}.drive", [NEAR, 0, 0], joint="revolute",
+            position=far - near, **rod(MASSES["near"], NEAR),
+        ))  # fmt: skip
+    turned = np.subtract(
+        arm_angles(START, FEET[1], -1)[1], arm_angles(START, FEET[0], 1)[1]
+    )
+    frames += [
+        Frame("left.pin", "left.elbow", [FAR, 0, 0], joint="revolute",
+              position=float(turned), **rod(MASSES["far"], FAR)),
+        Frame("left.tip", "left.pin", mass=TOOL),
+        Frame("right.tip", "right.elbow", [FAR, 0, 0], **rod(MASSES["far"], FAR)),
+    ]  # fmt: skip
+    return Robot("five_bar", "left.tip", tuple(frames), (("left.tip", "right.tip"),))
+
+
+def simulated(stiffness, steps):
+    """Times and positions of the tip by Exudyn: planar bodies, springs as drives."""
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    ground = mbs.AddObject(item.ObjectGround())
+
+    def body(mass, length, start, angle):
+        centre = start + length / 2 * np.array([np.cos(angle), np.sin(angle)])
+        node = mbs.AddNode(item.NodeRigidBody2D(referenceCoordinates=[*centre, angle]))
+        inertia = mass * length**2 / 12
+        number = mbs.AddObject(
+            item.ObjectRigidBody2D(mass=mass, inertia=inertia, nodeNumber=node)
+        )
+        return node, number
+
+    def marker(number, place):
+        return mbs.AddMarker(
+            item.MarkerBodyPosition(bodyNumber=number, localPosition=place)
+        )
+
+    def pin(first, second):
+        mbs.AddObject(item.ObjectJointRevolute2D(markerNumbers=[first, second]))
+
+    def nominal(t):
+        s = PROFILES["seventh"](np.array([min(t / DURATION, 1.0)]))[0][0]
+        return START + s * (END - START)
+
+    tips = []
+    for foot, side in ((FEET[0], 1), (FEET[1], -1)):
+        near, far = arm_angles(START, foot, side)
+        arm, arm_body = body(MASSES["near"], NEAR, np.array(foot), near)
+        elbow = foot + NEAR * np.array([np.cos(near), np.sin(near)])
+        _, far_body = body(MASSES["far"], FAR, elbow, far)
+        pin(marker(ground, [*foot, 0]), marker(arm_body, [-NEAR / 2, 0, 0]))
+        pin(marker(arm_body, [NEAR / 2, 0, 0]), marker(far_body, [-FAR / 2, 0, 0]))
+        tips.append(marker(far_body, [FAR / 2, 0, 0]))
+
+        def torque(mbs, t, i, u, v, k, d, offset, foot=foot, side=side, near=near):
+            return k * (u - (arm_angles(nominal(t), foot, side)[0] - near))
+
+        still = mbs.AddNode(item.NodePointGround())
+        ends = [mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=n, coordinate=c))
+                for n, c in ((still, 0), (arm, 2))]  # fmt: skip
+        mbs.AddObject(item.ObjectConnectorCoordinateSpringDamper(
+            markerNumbers=ends, stiffness=stiffness, springForceUserFunction=torque
+        ))  # fmt: skip
+    point = mbs.AddNode(item.NodePoint2D(referenceCoordinates=list(START)))
+    tool = mbs.AddObject(item.ObjectMassPoint2D(mass=TOOL, nodeNumber=point))
+    at_tool = marker(tool, [0, 0, 0])
+    for tip in tips:
+        pin(tip, at_tool)
+    sensor = mbs.AddSensor(
+        item.SensorNode(nodeNumber=point, storeInternal=True, writeToFile=False,
+                        outputVariableType=exu.OutputVariableType.Position)
+    )  # fmt: skip
+    mbs.Assemble()
+    settings = exu.SimulationSettings()
+    settings.timeIntegration.numberOfSteps = steps
+    settings.timeIntegration.endTime = DURATION
+    settings.timeIntegration.generalizedAlpha.spectralRadius = 0.9
+    settings.timeIntegration.newton.absoluteTolerance = 1e-9
+    settings.timeIntegration.newton.relativeTolerance = 1e-8
+    settings.timeIntegration.verboseMode = 0
+    settings.solution.file.write = False
+    settings.solution.sensors.writePeriod = DURATION / steps
+    mbs.SolveDynamic(settings)
+    data = mbs.GetSensorStoredData(sensor)
+    container.Reset()
+    return data[:, 0], data[:, 1:3]
+
+
+@pytest.mark.slow
+@pytest.mark.exudyn
+def test_deflection_approaches_the_dynamic_solution_with_the_square_of_the_period():
+    """What the quasi-static answer leaves out falls as 1 / (T f1)^2."""
+    table = PathTable(("tx", "ty"), np.array([START, END]))
+    path = profiled(table, 101, "seventh", 1.0, duration=DURATION)
+    left_out, periods = [], []
+    for stiffness, steps in ((2e4, 2000), (8e4, 4000)):
+        found = path_errors(robot_of(stiffness), path)
+        times, positions = simulated(stiffness, steps)
+        dynamic = np.stack(
+            [np.interp(path.times, times, p) for p in positions.T], axis=1
+        )
+        error = dynamic - path.values - found.inertial[:, 3:5]
+        left_out.append(np.abs(error).max() / np.abs(found.inertial[:, 3:5]).max())
+        periods.append(found.periods)
+    assert periods[0] > 15
+    assert left_out[1] < 0.005
+    assert left_out[1] / left_out[0] == pytest.approx(
+        (periods[0] / periods[1]) ** 2, rel=0.2
+    )

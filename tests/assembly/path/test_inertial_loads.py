@@ -1,0 +1,173 @@
+"""Loads of accelerated bodies and beams against closed forms."""
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.linear.energy import solve_assembly
+from assembly.model.robot import Frame, Robot
+from assembly.path.inertial_loads import inertial_loads
+from assembly.path.path_errors import path_errors
+from tests.assembly.path.moving_robots_for_tests import (
+    GRAVITY,
+    hinge,
+    instants,
+    moving_drives,
+    rod,
+    spinning_beam,
+)
+
+MASS, LENGTH, G = 2.0, 0.5, 9.81
+
+
+def pendulum():
+    """A rod on a hinge at the origin, along x at home."""
+    body = Frame("rod", "hinge", [LENGTH, 0, 0], **rod(MASS, LENGTH))
+    return Robot("pendulum", "rod", (hinge("hinge"), body))
+
+
+@pytest.mark.parametrize(
+    ("from_vertical", "axial", "transverse"),
+    [(90.0, 0.0, 4.905), (30.0, 42.4786, 2.4525), (0.0, 49.05, 0.0)],
+)
+def test_hinge_of_a_falling_rod_carries_the_forces_of_the_textbook(
+    from_vertical, axial, transverse
+):
+    """Released level: alpha = 3 g sin / 2 L, omega^2 = 3 g cos / L; no moment.
+
+    Axially m g cos + m omega^2 L / 2 = 5/2 m g cos, across m g sin / 4.
+    """
+    angle = np.radians(from_vertical)
+    q = angle - np.pi / 2
+    rate = -np.sqrt(3 * G * np.cos(angle) / LENGTH)
+    second = -1.5 * G * np.sin(angle) / LENGTH
+    if from_vertical == 90.0:
+        assert second == pytest.approx(-29.43)
+    path = instants(["q.hinge"], [q], [rate], [second])
+    found = path_errors(pendulum(), path, gravity=GRAVITY)
+    force = found.arrays["wrench"][0, 0, 3:]
+    along = np.array([np.cos(q), np.sin(q), 0.0])
+    assert abs(found.arrays["drive_force"][0, 0]) < 1e-12 * MASS * G * LENGTH
+    assert force @ along == pytest.approx(axial, abs=1e-4)
+    assert np.linalg.norm(np.cross(along, force)) == pytest.approx(transverse, abs=1e-4)
+
+
+def test_drive_torques_of_two_links_equal_those_of_lagrange():
+    """Rods of 3 and 2 kg, 0.4 and 0.3 m, in a horizontal and in a vertical plane."""
+    frames = (
+        hinge("shoulder"),
+        hinge("elbow", "shoulder", [0.4, 0, 0], **rod(3.0, 0.4)),
+        Frame("tip", "elbow", [0.3, 0, 0], **rod(2.0, 0.3)),
+    )
+    path = instants(["q.shoulder", "q.elbow"], [0.5, 0.8], [3, -2], [20, 15])
+    robot = Robot("arm", "tip", frames)
+    level, upright = (
+        path_errors(robot, path, gravity=gravity).arrays["drive_force"][0]
+        for gravity in (None, GRAVITY)
+    )
+    assert level == pytest.approx([16.9869, 4.5468], abs=1e-4)
+    np.testing.assert_allclose(level, lagrange(weight=False), rtol=1e-12)
+    np.testing.assert_allclose(upright, lagrange(weight=True), rtol=1e-12)
+
+
+def lagrange(weight):
+    """Torques by the equations of motion of a planar arm of two links."""
+    (m1, m2), (l1, l2), (q1, q2) = (3.0, 2.0), (0.4, 0.3), (0.5, 0.8)
+    c1, c2, g = l1 / 2, l2 / 2, G * weight
+    I1, I2 = m1 * l1**2 / 12, m2 * l2**2 / 12
+    h = m2 * l1 * c2
+    M11 = I1 + I2 + m1 * c1**2 + m2 * (l1**2 + c2**2) + 2 * h * np.cos(q2)
+    M12 = I2 + m2 * c2**2 + h * np.cos(q2)
+    M22 = I2 + m2 * c2**2
+    a, b, s = 3.0, -2.0, h * np.sin(q2)
+    return [
+        M11 * 20 + M12 * 15 - s * (2 * a * b + b * b)
+        + g * ((m1 * c1 + m2 * l1) * np.cos(q1) + m2 * c2 * np.cos(q1 + q2)),
+        M12 * 20 + M22 * 15 + s * a * a + g * m2 * c2 * np.cos(q1 + q2),
+    ]  # fmt: skip
+
+
+def test_rotating_beam_stretches_by_rho_omega_squared_length_cubed_over_3_E():
+    """16.07 um, and rho omega^2 L^2 / 2 = 3.375 MPa at its start."""
+    robot, path = spinning_beam(100.0, 0.0)
+    found = path_errors(robot, path)
+    assert found.arrays["platform_screw"][0, 3] == pytest.approx(
+        2700 * 100**2 * 0.5**3 / (3 * 70e9), rel=1e-9
+    )
+    assert found.arrays["inertial_screw"][0, 3] == pytest.approx(16.07e-6, rel=1e-3)
+    assert found.arrays["stress"][0, 0] == pytest.approx(3.375e6, rel=1e-9)
+
+
+def test_beam_on_an_accelerated_hub_bends_by_11_q_L4_over_120_E_I():
+    """q = rho A alpha L at the tip; the sections' own turning adds rho I alpha L^3/3EI.
+
+    At the start the moment is q L^2 / 3 and the stress 4 M / pi r^3.
+    """
+    r, L, alpha, rho, E = 0.01, 0.5, 500.0, 2700.0, 70e9
+    area, second = np.pi * r**2, np.pi * r**4 / 4
+    q = rho * area * alpha * L
+    bending = 11 * q * L**4 / (120 * E * second)
+    turning = rho * second * alpha * L**3 / (3 * E * second)
+    assert bending == pytest.approx(2.210e-3, rel=1e-3)
+    robot, path = spinning_beam(0.0, alpha)
+    found = path_errors(robot, path)
+    assert -found.arrays["platform_screw"][0, 4] == pytest.approx(
+        bending + turning, rel=1e-9
+    )
+    moment = q * L**2 / 3 + rho * second * alpha * L
+    assert found.arrays["stress"][0, 0] == pytest.approx(
+        4 * moment / (np.pi * r**3), rel=2e-3
+    )
+
+
+@pytest.mark.parametrize("theory", ["euler", "timoshenko"])
+def test_beam_in_pieces_deflects_as_the_whole_beam(theory):
+    """The ends' loads are exact, short thick beams with shear included."""
+    screws = []
+    for pieces in (1, 2, 7):
+        robot, path = spinning_beam(
+            80.0, 3000.0, pieces, theory, radius=0.06, axis=(0.3, -0.5, 1)
+        )
+        found = path_errors(robot, path, gravity=[3.0, -9.0, 2.0])
+        screws.append(found.arrays["platform_screw"][0])
+    size = np.abs(screws[0]).max()
+    for screw in screws[1:]:
+        np.testing.assert_allclose(screw, screws[0], atol=1e-9 * size)
+
+
+def test_section_at_a_beams_start_carries_what_the_hub_bears():
+    """Equilibrium of the whole beam: its load and a tool beside its tip."""
+    robot, path = spinning_beam(80.0, 3000.0, radius=0.03, axis=(0.3, -0.5, 1))
+    tool = Frame(
+        "tool",
+        "piece0",
+        [0.1, 0.05, -0.07],
+        mass=1.2,
+        inertia=np.diag([1e-3, 2e-3, 2e-3]),
+    )
+    robot = Robot("beam", "tool", (*robot.frames, tool))
+    motion = moving_drives(robot, path.names, (path.values, path.first, path.second))
+    load = inertial_loads(motion, GRAVITY).beams[1]
+    hub, tip = path_errors(robot, path, gravity=GRAVITY).arrays["wrench"][0, :2]
+    T = motion.postures.transforms[0]
+    to_section = T[1, :3, :3] @ load.data.axes
+    R = load.data.axes
+    sections = load.on_sections(np.r_[tip[:3] @ R, tip[3:] @ R][None], count=3)[0]
+    in_base = T[0, :3, :3]
+    at_start = np.r_[to_section.T @ in_base @ hub[:3], to_section.T @ in_base @ hub[3:]]
+    np.testing.assert_allclose(sections[0], at_start, atol=1e-10 * np.abs(hub).max())
+    np.testing.assert_allclose(sections[2, :3], tip[:3] @ R, atol=1e-12)
+
+
+def test_load_at_rest_is_the_weight_of_the_static_solution():
+    """The uniform weight is the case of equal accelerations."""
+    robot, path = spinning_beam(0.0, 0.0, pieces=2, theory="timoshenko")
+    found = path_errors(robot, path, gravity=[1.0, -9.0, 2.0])
+    static = solve_assembly(home_posture(robot), gravity=[1.0, -9.0, 2.0])
+    np.testing.assert_allclose(
+        found.arrays["platform_screw"][0], static.platform_screw, rtol=1e-10, atol=1e-16
+    )
+    np.testing.assert_allclose(
+        found.arrays["wrench"][0], static.tip_wrenches, rtol=1e-10, atol=1e-12
+    )
+    assert np.abs(found.arrays["inertial_screw"]).max() < 1e-18

@@ -1,0 +1,189 @@
+"""Conservation laws and static limits of the errors along a path."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture, place_many, together
+from assembly.model.robot import BeamLink, Clearance, Frame, Robot, beam_axis
+from assembly.path.motion import follow_path
+from assembly.path.path_errors import path_errors
+from assembly.path.path_file import PathTable
+from assembly.path.trajectory import Trajectory, profiled
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from assembly.robots import load_robot
+from assembly.sweeps.targets import goals_of
+from stiffness.beam.sections import declared_section
+from tests.assembly.path.moving_robots_for_tests import GRAVITY, hinge, instants, rod
+from tests.assembly.path.test_motion import CASES, path_of
+
+DENSITY = 2700.0
+
+
+def heavy(name, density=DENSITY, mass=1.5):
+    """A built-in robot whose beams and platform have a mass."""
+    robot = load_robot(name)
+    frames = []
+    for frame in robot.frames:
+        if isinstance(frame.link, BeamLink):
+            frame = replace(frame, link=replace(frame.link, density=density or None))
+        if frame.name == robot.platform:
+            frame = replace(
+                frame, mass=mass, centre_of_mass=[0.01, -0.02, 0.03],
+                inertia=np.diag([1e-3, 2e-3, 2.5e-3]),
+            )  # fmt: skip
+        frames.append(frame)
+    return replace(robot, frames=tuple(frames))
+
+
+def without_clearance(robot):
+    frames = tuple(replace(frame, clearance=None) for frame in robot.frames)
+    return replace(robot, frames=frames)
+
+
+def energy(motion, gravity):
+    """Kinetic and potential energy (k,) of all bodies, by textbook formulas."""
+    robot, T = motion.postures.robot, motion.postures.transforms
+    total = np.zeros(len(T))
+    for i, frame in enumerate(robot.frames):
+        R, p, V = T[:, i, :3, :3], T[:, i, :3, 3], motion.twists[:, i]
+        bodies = [(frame.mass, p + R @ frame.centre_of_mass, frame.inertia)]
+        if isinstance(frame.link, BeamLink) and frame.link.density:
+            length, axis = beam_axis(frame)
+            section = declared_section(frame.link.section, frame.link.poisson)
+            mass = frame.link.density * section.area * length
+            assert section.I_y == pytest.approx(section.I_z)
+            turning = frame.link.density * section.I_y * length
+            across = np.eye(3) - np.outer(axis, axis)
+            inertia = (mass * length**2 / 12 + turning) * across
+            inertia += 2 * turning * np.outer(axis, axis)
+            bodies.append((mass, p - length / 2 * R @ axis, inertia))
+        for mass, centre, inertia in bodies:
+            velocity = V[:, 3:] + np.cross(V[:, :3], centre)
+            spin = np.einsum("kji,kj->ki", R, V[:, :3])
+            total += mass / 2 * np.sum(velocity**2, axis=1) - mass * centre @ gravity
+            total += np.einsum("ki,ij,kj->k", spin, inertia, spin) / 2
+    return total
+
+
+@pytest.mark.parametrize("name", ["irsbot2", "hexapod", "delta", "arm6"])
+def test_power_of_the_drives_is_the_rate_of_the_energy(name):
+    """Kinetic and potential energy, differenced along the path to fourth order."""
+    robot, names = heavy(name), CASES[name]
+    pose = home_posture(robot).pose()
+    home, h = np.array([pose[one] for one in names]), 2e-3
+    times = 0.4 + h * np.arange(-2, 3)
+    path = path_of(names, home, times)
+    postures, _ = place_many(robot, goals_of(names, robot, path[0]))
+    motion = follow_path(together(postures), names, path)
+    E = energy(motion, GRAVITY)
+    rate = (8 * (E[3] - E[1]) - (E[4] - E[0])) / (12 * h)
+    found = path_errors(
+        robot, Trajectory(names, times, *path, "times"), gravity=GRAVITY
+    )
+    driven = [f.actuated for f in robot.frames]
+    power = found.arrays["drive_force"][2] @ motion.rates[2, driven]
+    assert (found.status == "ok").all()
+    assert abs(rate) > 1e-3
+    assert power == pytest.approx(rate, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["hexapod", "five_bar"])
+def test_mass_of_the_platform_alone_deflects_by_the_platform_compliance(name):
+    """Deflection = C times the d'Alembert wrench of the platform."""
+    robot, names = heavy(name, density=0.0), CASES[name]
+    tight = without_clearance(robot)
+    pose = home_posture(tight).pose()
+    path = path_of(names, np.array([pose[one] for one in names]), np.array([0.3]))
+    found = path_errors(tight, Trajectory(names, np.zeros(1), *path, "times"))
+    arrays, frame = found.arrays, tight.frame(tight.platform)
+    R = arrays["platform"][0, :3, :3]
+    omega = arrays["platform_velocity"][0, :3]
+    alpha, of_origin = np.split(arrays["platform_acceleration"][0], 2)
+    c, J = R @ frame.centre_of_mass, R @ frame.inertia @ R.T
+    a = of_origin + np.cross(alpha, c)
+    force = -frame.mass * (a + np.cross(omega, np.cross(omega, c)))
+    moment = np.cross(c, force) - J @ alpha - np.cross(omega, J @ omega)
+    place, _ = place_many(tight, goals_of(names, tight, path[0]))
+    C = platform_stiffness(place[0]).compliance
+    expected = C @ np.r_[moment, force]
+    np.testing.assert_allclose(
+        arrays["inertial_screw"][0], expected, atol=1e-8 * np.abs(expected).max()
+    )
+    size = np.sqrt(np.outer(np.diag(C), np.diag(C)))
+    np.testing.assert_allclose(arrays["compliance"][0] / size, C / size, atol=1e-9)
+
+
+def test_deflection_grows_with_the_square_of_the_speed():
+    """Half the duration of a path from rest to rest: four times the deflection."""
+    robot = heavy("five_bar")
+    tight = without_clearance(robot)
+    table = PathTable(("tx", "ty"), np.array([[0.0, 0.14], [0.02, 0.13]]))
+    slow, fast = (
+        path_errors(tight, profiled(table, 21, "quintic", 1.0, duration=T))
+        for T in (0.2, 0.1)
+    )
+    np.testing.assert_allclose(fast.inertial, 4 * slow.inertial, rtol=1e-8, atol=1e-15)
+    assert fast.periods == pytest.approx(slow.periods / 2)
+
+
+def test_clearance_adds_to_the_deflection_of_an_accelerated_arm():
+    """A mass on a radial clearance of 10 um rests on its outer side: + 10 um."""
+    link = BeamLink({"radius": 0.01}, 70e9, 0.3)
+    joint = Clearance(radial=1e-5)
+    frames = (
+        hinge("hub"), Frame("arm", "hub", [0.3, 0, 0], link=link, clearance=joint),
+        Frame("tool", "arm", [0.0, 0, 0], mass=0.5),
+    )  # fmt: skip
+    path = instants(["q.hub"], [[0.0]], [[50.0]], [[0.0]])
+    found = path_errors(Robot("arm", "tool", frames), path)
+    force = 0.5 * 50.0**2 * 0.3
+    stretch = force * 0.3 / (70e9 * np.pi * 0.01**2)
+    assert found.arrays["platform_screw"][0, 3] == pytest.approx(
+        stretch + 1e-5, rel=1e-6
+    )
+    frozen = path_errors(Robot("arm", "tool", frames), path, assumption="frozen")
+    lower, upper = frozen.arrays["translation_error"][0]
+    assert lower <= stretch + 1e-5 + 1e-9
+    assert upper >= stretch + 1e-5
+
+
+def test_rod_between_balls_spins_by_no_load():
+    """Turned about an axis across it, a rod free to spin carries no moment along it."""
+    robot = heavy("delta")
+    names = CASES["delta"]
+    pose = home_posture(robot).pose()
+    path = path_of(names, np.array([pose[one] for one in names]), np.array([0.3]))
+    found = path_errors(robot, Trajectory(names, np.zeros(1), *path, "times"))
+    assert found.free == 6
+    assert found.status[0] == "ok"
+
+
+def test_weightless_robot_and_robot_with_effects_are_refused():
+    path = instants(["q.hub"], [[0.0]], [[1.0]], [[0.0]])
+    frames = (hinge("hub"), Frame("arm", "hub", [0.3, 0, 0]))
+    with pytest.raises(ValueError, match="found no moving mass"):
+        path_errors(Robot("arm", "arm", frames), path)
+    heavy_arm = (frames[0], Frame("arm", "hub", [0.3, 0, 0], **rod(1.0, 0.3)))
+    effects = {"registration": {"rx": 1e-3}}
+    with pytest.raises(ValueError, match="found effects of the machine"):
+        path_errors(Robot("arm", "arm", heavy_arm, effects=effects), path)
+    with pytest.raises(ValueError, match='--assumption: found "frosen"'):
+        path_errors(Robot("arm", "arm", heavy_arm), path, assumption="frosen")
+
+
+def test_paper_robot_at_20_g_needs_54_ms_for_100_mm():
+    """The quintic's peak is 10/sqrt 3 D/T^2: T = 54.2 ms, 3.46 m/s at the middle."""
+    robot = heavy("irsbot2")
+    table = PathTable(("tx", "tz"), np.array([[-0.05, -0.5], [0.05, -0.5]]))
+    path = profiled(table, 101, "quintic", 1.0, acceleration=20 * 9.80665)
+    assert path.duration == pytest.approx(np.sqrt(10 / 3**0.5 * 0.1 / (20 * 9.80665)))
+    assert path.duration == pytest.approx(54.2e-3, abs=0.1e-3)
+    found = path_errors(robot, path)
+    speed = np.linalg.norm(found.arrays["platform_velocity"][:, 3:], axis=1)
+    assert speed.max() == pytest.approx(3.46, abs=0.01)
+    # robot and path are symmetric about x = 0, the motion about its middle
+    mirrored = found.inertial[::-1] * [1, -1, -1, -1, 1, 1]
+    size = np.abs(found.inertial).max()
+    np.testing.assert_allclose(mirrored, found.inertial, atol=1e-6 * size)

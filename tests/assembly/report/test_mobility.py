@@ -1,0 +1,239 @@
+"""Mobility in words and as JSON, of mechanisms whose motions are known."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from assembly.drawing.drawing import DrawnJoint, perpendicular, unit
+from assembly.kinematics.mobility import mobility
+from assembly.kinematics.posture import Posture, home_posture, place_robot
+from assembly.kinematics.pure_motions import pure_motions
+from assembly.report.mobility import mobility_lines, mobility_of
+from assembly.robots import load_robot
+from tests.assembly.drawing import test_mobility_of_mechanisms as mechanisms
+from tests.assembly.drawing.test_mobility_of_mechanisms import (
+    MECHANISMS,
+    X,
+    Y,
+    Z,
+    gough,
+    joint,
+    mechanism,
+    three_upu,
+)
+
+DRAWN = Path(__file__).parents[3] / "examples" / "drawn"
+ALL = "translates along x, y, z and turns about x, y, z"
+WORDS = {
+    "sarrus": "1 freedom: translates along z; 1 over-constraint",
+    "agile_eye": (
+        "3 freedoms: turns about x, y, z through (0, 0, 0) m; 6 over-constraints"
+    ),
+    "tsai": "3 freedoms: translates along x, y, z; 0 over-constraints",
+    "snu": (
+        "5 freedoms: translates along x, y, z and turns about x, y; 2 over-constraints"
+    ),
+    "delta of parallelograms": (
+        "3 freedoms: translates along x, y, z; 12 over-constraints"
+    ),
+    "delta of rods": (
+        "9 freedoms, 3 of the platform: translates along x, y, z; 0 over-constraints"
+    ),
+    "6-UPS": f"6 freedoms: {ALL}; 0 over-constraints",
+    "6-SPS": f"12 freedoms, 6 of the platform: {ALL}; 0 over-constraints",
+}
+
+
+@pytest.mark.parametrize("name", WORDS)
+def test_mobility_in_words_equals_the_literature(name):
+    found = mobility_of(home_posture(MECHANISMS[name][0]()))
+    assert found["words"] == WORDS[name]
+    assert found["counts_certain"]
+
+
+def test_coupler_of_a_four_bar_turns_about_the_crossing_of_its_arms():
+    """Crank (0, 0) to (0.1, 0.3), rocker (0.8, 0) to (0.7, 0.5): 3x = -5 (x - 0.8)."""
+    (turn,) = mobility_of(home_posture(MECHANISMS["four_bar"][0]()))["motions"]
+    assert turn["kind"] == "turn"
+    np.testing.assert_allclose(turn["point"], [0.5, 1.5, 0.0], atol=1e-9)
+    np.testing.assert_allclose(turn["direction"], Z, atol=1e-12)
+
+
+def test_tricept_turns_about_the_joint_of_its_central_leg():
+    found = mobility_of(home_posture(load_robot(DRAWN / "tricept.toml")))
+    assert found["words"].startswith(
+        "3 freedoms: translates along z and turns about x, y through (0, 0, "
+    )
+
+
+def test_redundant_drive_is_reported():
+    robot = mechanism(
+        "coupler", [0.5, 0.3, 0],
+        joint("revolute", "base", "crank", [0, 0, 0], driven=True),
+        joint("revolute", "crank", "coupler", [0, 0.3, 0]),
+        joint("revolute", "coupler", "rocker", [0.5, 0.3, 0]),
+        joint("revolute", "base", "rocker", [0.5, 0, 0], driven=True),
+    )  # fmt: skip
+    found = mobility_of(home_posture(robot))
+    assert (found["actuation_redundancy"], found["local_freedoms"]) == (1, 0)
+    assert mobility_lines(found)["redundant drives"] == "1"
+
+
+def test_seoul_robot_has_fewer_freedoms_near_its_singular_home():
+    """5 at home and 3 near it (Zlatanov, Bonev, Gosselin 2002)."""
+    found = mobility_of(home_posture(three_upu(X, 0.24)))
+    assert (found["freedoms"], found["singular"]) == (5, True)
+    assert (found["finite_freedoms"], found["near"]["freedoms"]) == (3, 3)
+    assert "near it 3 freedoms" in mobility_lines(found)["singular posture"]
+
+
+def test_crosses_along_their_legs_turn_at_home_only():
+    """9 freedoms, 3 over-constraints, 6 with drives locked; near home 6, 0, 0."""
+    found = mobility_of(home_posture(gough("universal", axis_along=True)))
+    names = ("freedoms", "overconstraint", "freedoms_drives_locked")
+    assert [found[name] for name in names] == [9, 3, 6]
+    assert [found["near"][name] for name in names] == [6, 0, 0]
+
+
+def test_three_parallel_axes_in_a_plane_move_at_first_order_only():
+    """Two bars of 0.3 and 0.2 m stretched between hinges 0.5 m apart are rigid."""
+    robot = mechanism(
+        "one", [0.1, 0, 0],
+        joint("revolute", "base", "one", [0, 0, 0], driven=True),
+        joint("revolute", "one", "two", [0.3, 0, 0]),
+        joint("revolute", "base", "two", [0.5, 0, 0]),
+    )  # fmt: skip
+    found = mobility_of(home_posture(robot))
+    assert (found["freedoms"], found["finite_freedoms"]) == (1, 0)
+    assert found["singular"]
+    assert "near" not in found
+
+
+@pytest.mark.parametrize("name", ["agile_eye", "tsai", "sarrus", "6-SPS", "bennett"])
+def test_regular_home_is_not_singular(name):
+    found = mobility_of(home_posture(MECHANISMS[name][0]()))
+    assert not found["singular"]
+    assert found["finite_freedoms"] == found["freedoms"]
+    assert "near" not in found
+
+
+def test_ball_joint_turned_by_a_right_angle_keeps_three_freedoms():
+    """Whatever three axes it is made of: it turns about every axis."""
+    robot = mechanism("ball", [0, 0, 0.2], joint("spherical", "base", "ball", [0] * 3))
+    home = home_posture(robot)
+    for axis in (X, Y, Z):
+        turned = place_robot(robot, dict(zip(("rx", "ry", "rz"), np.pi / 2 * axis,
+                                             strict=True)))  # fmt: skip
+        found = mobility_of(turned)
+        assert (found["freedoms"], found["platform_freedoms"]) == (3, 3)
+        assert "turns about x, y, z through (0, 0, 0) m" in found["words"]
+    assert mobility(home).freedoms == 3
+
+
+def test_hexapod_whose_balls_are_at_a_right_angle_has_six_freedoms():
+    """Three axes of each ball are replaced, at the home of the same 6-UPS."""
+    robot = MECHANISMS["6-UPS"][0]()
+    home = home_posture(robot)
+    q = home.coordinates.copy()
+    second = [i for i, f in enumerate(robot.frames) if f.name.endswith(".second")]
+    balls = [i for i in second if robot.frames[i + 1].name.endswith(".third")]
+    assert len(balls) == 6
+    # the first axis turned into the third: what is counted depends on frames' poses
+    T = home.transforms.copy()
+    for i in balls:
+        T[i + 1, :3, :3] = T[i - 1, :3, :3]
+    found = mobility(Posture(robot, q, T, home.mismatch))
+    assert (found.freedoms, found.freedoms_drives_locked) == (6, 0)
+
+
+SCREWS = {
+    # a turn about z through (1, 2, 0): at the origin v = p x w
+    "turn": ([[0, 0, 1, 2, -1, 0]], [("turn", [1, 2, 0], None)]),
+    "screw": ([[0, 0, 1, 2, -1, 0.3]], [("screw", [1, 2, 0], 0.3 * 2 * np.pi)]),
+    # cylindrical: the screw is a turn but for the translation along it
+    "cylindrical": (
+        [[0, 0, 1, 2, -1, 0.3], [0, 0, 0, 0, 0, 1]],
+        [("translation", None, None), ("turn", [1, 2, 0], None)],
+    ),
+    "planar": (
+        [[0, 0, 1, 2, -1, 0], [0, 0, 0, 1, 0, 0], [0, 0, 0, 1, 1, 0]],
+        [("translation", None, None)] * 2 + [("turn", None, None)],
+    ),
+    # turns about two lines along x and y, at z = 0 and z = 0.4: the principal screws
+    # of this cylindroid are along the bisectors, half way, of pitches -+ 0.4/2
+    "two skew turns": (
+        [[1, 0, 0, 0, 0, 0], [0, 1, 0, -0.4, 0, 0]],
+        [("screw", [0, 0, 0.2], -0.4 * np.pi), ("screw", [0, 0, 0.2], 0.4 * np.pi)],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SCREWS)
+@pytest.mark.parametrize("size", [1.0, 1e-3])
+def test_pure_motions_of_screw_systems_equal_hand_results(name, size):
+    screws, expected = SCREWS[name]
+    found = pure_motions(np.array(screws, float), np.zeros(3), size)
+    assert [m.kind for m in found] == [kind for kind, _, _ in expected]
+    for motion, (_, point, pitch) in zip(found, expected, strict=True):
+        assert (motion.point is None) == (point is None)
+        if point is not None:
+            np.testing.assert_allclose(motion.point, point, atol=1e-9)
+        assert motion.pitch == (None if pitch is None else pytest.approx(pitch))
+
+
+def rounded(digits):
+    """A maker of joints whose points and axes have so many digits."""
+
+    def make(name, kind, first, second, at, axis, across, axis2, driven):
+        axis, axis2 = (unit(np.round(v, digits)) for v in (axis, axis2))
+        across = perpendicular(axis, axis2)
+        at = np.round(at, digits)
+        return DrawnJoint(name, kind, first, second, at, axis, across, axis2, driven)
+
+    return make
+
+
+@pytest.mark.parametrize("name", [*WORDS, "bennett"])
+def test_counts_of_files_rounded_at_6_digits_are_those_of_exact_ones(name, monkeypatch):
+    """Of Bennett's linkage they would be 0 if all its singular values counted."""
+    make, expected = MECHANISMS[name]
+    monkeypatch.setattr(mechanisms, "DrawnJoint", rounded(6))
+    found = mobility_of(home_posture(make()))
+    names = ("freedoms", "platform_freedoms", "freedoms_drives_locked",
+             "platform_freedoms_drives_locked", "redundant_constraints")  # fmt: skip
+    assert tuple(found[key] for key in names) == expected
+    assert found["counts_certain"]
+    assert found["words"] == WORDS.get(name, found["words"])
+    assert found["finite_freedoms"] == found["freedoms"] - 2 * (name == "snu")
+
+
+def test_counts_without_a_gap_are_reported_as_not_certain():
+    """Axes tilted by 1e-4 and 2e-5 rad: the equations they add are of those sizes."""
+    robot = mechanism(
+        "one", [0.1, 0.2, 0],
+        joint("revolute", "base", "one", [0, 0, 0], driven=True),
+        joint("revolute", "one", "two", [0.1, 0.3, 0]),
+        joint("revolute", "two", "three", [0.4, 0.6, 0], [1e-4, 0, 1]),
+        joint("revolute", "three", "four", [0.7, 0.5, 0], [0, 2e-5, 1]),
+        joint("revolute", "base", "four", [0.8, 0, 0]),
+    )  # fmt: skip
+    found = mobility_of(home_posture(robot))
+    assert 1 < found["singular_value_gap"] < 100
+    assert not found["counts_certain"]
+    assert "differ only by" in mobility_lines(found)["counts not certain"]
+
+
+def test_show_writes_mobility_and_axes_without_a_picture(run):
+    status, out, err = run(
+        "assembly", "show", DRAWN / "three_upu.toml", "--json", "-"
+    )  # fmt: skip
+    assert (status, err) == (0, "")
+    found = json.loads(out)
+    assert found["mobility"]["words"] == WORDS["tsai"]
+    slide = found["axes"]["leg1.slide"]
+    np.testing.assert_allclose(
+        slide["z"], np.array([-16, 0, 45]) / np.hypot(16, 45), atol=1e-12
+    )
+    np.testing.assert_allclose(slide["x"] @ np.array(slide["z"]), 0.0, atol=1e-12)

@@ -1,0 +1,156 @@
+"""Statistics of callouts: a serial arm and a four-bar by hand."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from assembly.files.robot_file import read_robot
+from assembly.kinematics.posture import home_posture
+from assembly.model.error_distributions import tolerance_sources
+from assembly.statistics.callout_sources import sources_of
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.importance import linear_importance, source_groups
+from assembly.statistics.linear_response import linear_response
+from assembly.statistics.monte_carlo import run_draws
+from assembly.statistics.worst_pose import worst_pose
+from forcefit.inputs.table import BadInput
+from tests.drawn_four_bar_for_tests import COEFFICIENTS, LEVER, four_bar_file
+
+
+@pytest.fixture(scope="module")
+def four_bar(tmp_path_factory):
+    path = tmp_path_factory.mktemp("four_bar") / "four_bar.toml"
+    path.write_text(four_bar_file())
+    return read_robot(path)
+
+
+@pytest.fixture(scope="module")
+def experiment(four_bar):
+    return Experiment(
+        home_posture(four_bar), sources_of(four_bar), clearance="least", margins=False
+    )
+
+
+def test_coupler_turns_as_much_as_by_hand(experiment):
+    """Deviation of the angle: 20 um / sqrt 3 times the root of the sum of squares."""
+    data = run_draws(experiment, 20_000)
+    root = np.sqrt(sum(c**2 for c in COEFFICIENTS.values()))
+    expected = root * 20e-6 / np.sqrt(3) / LEVER
+    turned = data["platform_screw"].values[:, 2]
+    assert turned.std() == pytest.approx(expected, rel=0.01)
+
+
+def test_importance_by_callout_is_the_share_by_hand(experiment):
+    sources = experiment.sources
+    slopes = experiment.energies.screws[2, -6 * len(sources.robot.frames) :]
+    shares = linear_importance(
+        sources.of_numbers(slopes.reshape(1, -1, 6)), sources,
+        groups := source_groups(sources, "source"),
+    )[0]  # fmt: skip
+    total = sum(c**2 for c in COEFFICIENTS.values())
+    for (name, _), share in zip(groups, shares, strict=True):
+        body = name.rpartition(" ")[2]
+        assert name.startswith("length of ")
+        assert share == pytest.approx(COEFFICIENTS[body] ** 2 / total, abs=1e-3)
+
+
+def test_draw_is_the_same_in_any_division(four_bar):
+    sources = sources_of(four_bar)
+    whole = sources.draw(0, 100, 5)
+    assert np.array_equal(sources.draw(37, 20, 5), whole[37:57])
+    assert not np.array_equal(sources.draw(0, 100, 6), whole)
+
+
+def test_independent_errors_are_added_to_callouts(four_bar):
+    independent = tolerance_sources(four_bar, np.eye(6)[3] * 1e-5, ("C",))
+    sources = sources_of(four_bar, independent)
+    assert len(sources) == len(sources_of(four_bar)) + 1
+    values = sources.draw(0, 50_000, 1)
+    errors = sources.errors(values)[:, four_bar.index("C")]
+    alone = sources_of(four_bar)
+    of_callouts = alone.errors(alone.draw(0, 50_000, 1))[:, four_bar.index("C")]
+    added = errors[:, 3].var() - of_callouts[:, 3].var()
+    assert added == pytest.approx(1e-10 / 3, rel=0.05)
+    assert [n for n, _ in source_groups(sources, "source")][0] == "C.TX"
+
+
+def test_robot_without_tolerances_needs_a_file_of_errors(four_bar):
+    from dataclasses import replace
+
+    with pytest.raises(BadInput, match=r"found no \[\[tolerance\]\]"):
+        sources_of(replace(four_bar, callouts=()))
+
+
+ARM = """
+name = "arm"
+platform = "tip"
+[[frame]]
+name = "shoulder"
+parent = "base"
+joint = "revolute"
+actuated = true
+clearance = { fit = "12 H7/g6" }
+[[frame]]
+name = "tip"
+parent = "shoulder"
+translation = [0.4, 0, 0]
+"""
+
+
+def test_fit_gives_every_draw_a_clearance_of_its_own(tmp_path):
+    """The tip of an exact arm on one pin moves as far as its radial clearance: 6 to 35
+    um of diameter, on average 20.5 um, with a deviation of 6.09 um."""
+    path = tmp_path / "arm.toml"
+    path.write_text(ARM)
+    robot = read_robot(path)
+    assert robot.frame("shoulder").clearance.radial == pytest.approx(10.25e-6)
+    assert "10.25 um of 3 to 17.5" in " ".join(robot.remarks)
+    sources = sources_of(robot)
+    experiment = Experiment(home_posture(robot), sources, margins=False, stress=False)
+    radial = 10.25e-6 + sources.draw(0, 40, 1)[:, 0]
+    assert experiment.solve(0, 40)["translation"] == pytest.approx(radial, abs=1e-9)
+    many = 2e6 * (10.25e-6 + sources.draw(0, 100_000, 1)[:, 0])
+    assert many.mean() == pytest.approx(20.5, abs=0.06)
+    assert many.std() == pytest.approx(6.09, abs=0.03)
+    assert 6 <= many.min() <= many.max() <= 35
+    perfect = experiment.evaluate(np.zeros((1, 1)), [0])
+    assert perfect["translation"] == pytest.approx(10.25e-6, abs=1e-9)
+    assert source_groups(sources, "source")[0][0] == "fit 12 H7/g6 of shoulder"
+
+
+def test_worst_case_has_the_largest_clearance_of_a_fit(tmp_path):
+    path = tmp_path / "arm.toml"
+    path.write_text(ARM)
+    robot = read_robot(path)
+    prepared = linear_response(home_posture(robot))
+    found = worst_pose(prepared, sources_of(robot), "translation")
+    assert found.attained == pytest.approx(17.5e-6, rel=1e-6)
+
+
+def test_command_reports_the_importance_by_callout(tmp_path):
+    from forcefit.commands.app import app
+
+    path, answer = tmp_path / "four_bar.toml", tmp_path / "answer.json"
+    path.write_text(four_bar_file())
+    words = ["assembly", "statistics", str(path), "--draws", "200", "--importance",
+             "128", "--clearance", "least", "--json", str(answer), "-o",
+             str(tmp_path / "draws.nc"), "--limit", "translation=2e-5", "--capability",
+             "--worst-case", "--report", str(tmp_path / "page.html")]  # fmt: skip
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, result.output
+    assert "length of C on rocker" in result.output
+    results = json.loads(answer.read_text())
+    groups = results["importance"]["platform"]
+    assert set(groups) == {
+        "length of B on crank", "length of C on coupler", "length of C on rocker",
+        "length of D on base",
+    }  # fmt: skip
+    turned = results["worst_case"]["rotation"]
+    assert turned["attained"] == pytest.approx(0.1903e-3, abs=5e-8)
+    assert turned["reading"] == "linear"
+    assert sum(turned["shares"].values()) == pytest.approx(0.1903e-3, abs=5e-8)
+    above = results["exceeds"]["translation"]["probability"]
+    assert results["capability"]["translation"]["ppm"]["value"] == above * 1e6
+    assert "certified bound" in (tmp_path / "page.html").read_text()

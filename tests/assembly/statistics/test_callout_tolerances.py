@@ -1,0 +1,130 @@
+"""Tolerances allotted to callouts: as independent errors, and by finite geometry."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.callouts.callout import Callout, Datum
+from assembly.files.robot_file import write_robot
+from assembly.kinematics.posture import home_posture
+from assembly.model.robot import Frame, Robot
+from assembly.statistics.allocated_tolerances import allocation_of, allocation_text
+from assembly.statistics.allocation import allocate
+from assembly.statistics.tolerance_file import read_plan
+from forcefit.inputs.table import BadInput
+
+ARM = Robot(
+    "arm",
+    "tip",
+    (
+        Frame("shoulder", joint="revolute", actuated=True, position=0.5),
+        Frame("elbow", "shoulder", np.array([0.4, 0, 0]), joint="revolute",
+              actuated=True, position=0.8),
+        Frame("tip", "elbow", np.array([0.3, 0, 0])),
+    ),
+    callouts=(
+        Callout("arm", "elbow", (Datum("shoulder"),), length=(0.4, 50e-6)),
+        Callout("hand", "tip", (Datum("elbow"),), length=(0.3, 20e-6)),
+    ),
+)  # fmt: skip
+PLAN = """
+yield = 0.9
+draws = 400
+[limits]
+translation = 1e-4
+[[tolerance]]
+name = "arm"
+{arm}
+cost = 1.0
+[[tolerance]]
+name = "hand"
+{hand}
+cost = 4.0
+"""
+OF_FRAMES = {
+    "arm": 'frames = ["elbow"]\ncomponents = ["TX"]',
+    "hand": 'frames = ["tip"]\ncomponents = ["TX"]',
+}
+OF_CALLOUTS = {"arm": 'callouts = ["arm"]', "hand": 'callouts = ["hand"]'}
+
+
+def allotted(tmp_path, robot, text):
+    path = tmp_path / "plan.toml"
+    path.write_text(text)
+    plan = replace(read_plan(path, robot), clearance="least")
+    return allocate([home_posture(robot)], plan, 0)
+
+
+def test_lengths_are_allotted_as_independent_errors_along_them(tmp_path):
+    """The draws of an interval are those of an independent uniform error, so both
+    plans must have the same tolerances, whatever the robot file states."""
+    callouts = allotted(tmp_path, ARM, PLAN.format(**OF_CALLOUTS))
+    frames = allotted(tmp_path, ARM, PLAN.format(**OF_FRAMES))
+    assert callouts.tolerances == pytest.approx(frames.tolerances, rel=1e-6)
+    assert "arm: +-" in allocation_text(allocation_of(callouts))
+
+
+def test_width_of_a_position_meets_its_yield_in_finite_geometry(tmp_path):
+    """The tip 150 mm above a bore of 20 mm: its offset in units of the width is that
+    of both ends in discs; the allotted width is the limit over the quantile."""
+    robot = Robot(
+        "post",
+        "tip",
+        (
+            Frame("foot", joint="revolute", actuated=True),
+            Frame("bore", "foot", np.array([0.4, 0, 0]), joint="revolute",
+                  actuated=True),
+            Frame("tip", "bore", np.array([0, 0, 0.15])),
+        ),
+        callouts=(
+            Callout("bore", "bore", (Datum("foot"),), extent=(0.02,),
+                    widths={"position": 0.3e-3}),
+        ),
+    )  # fmt: skip
+    text = PLAN.partition("[[tolerance]]")[0].replace("400", "4000")
+    found = allotted(tmp_path, robot, text + '[[tolerance]]\ncallouts = ["bore"]\n')
+    points = np.random.default_rng(5).uniform(-1, 1, (4_000_000, 2))
+    points = points[np.hypot(*points.T) <= 1] / 2
+    half = len(points) // 2
+    up, down = points[:half], points[half : 2 * half]
+    offset = (up + down) / 2 + (up - down) / 0.02 * 0.15
+    quantile = np.quantile(np.hypot(*offset.T), 0.9)
+    # enough draws to show a yield of 0.9 with 95 %: slightly tighter, by 1 %
+    assert 0.97 * 1e-4 / quantile < found.tolerances[0] < 1e-4 / quantile
+    text = allocation_text(allocation_of(found))
+    assert "position of bore: " in text
+    assert "+-" not in text.splitlines()[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (PLAN.format(**OF_CALLOUTS).replace("0.9", "1.0"), "found 1 with callouts"),
+        (PLAN.format(**OF_CALLOUTS).replace('["hand"]', '["hnd"]'), 'found "hnd"; did'),
+        (PLAN.format(**OF_CALLOUTS).replace('["hand"]', '["arm"]'), '"arm" again'),
+        (PLAN.format(**OF_CALLOUTS).replace('["hand"]', "[]"), "at least one"),
+        (PLAN.format(**OF_CALLOUTS).replace('["hand"]', "[1]"), "a list of names"),
+    ],
+)
+def test_mistake_in_a_plan_of_callouts_is_reported_in_one_line(tmp_path, text, message):
+    with pytest.raises(BadInput, match=message) as error:
+        allotted(tmp_path, ARM, text)
+    assert "\n" not in str(error.value)
+
+
+def test_command_allots_widths_of_callouts(tmp_path):
+    from typer.testing import CliRunner
+
+    from forcefit.commands.app import app
+
+    write_robot(ARM, tmp_path / "arm.toml")
+    (tmp_path / "plan.toml").write_text(PLAN.format(**OF_CALLOUTS))
+    words = ["assembly", "tolerances", str(tmp_path / "arm.toml"), "--plan",
+             str(tmp_path / "plan.toml"), "--grid", "tx=0.43", "--fresh", "200",
+             "--clearance", "least", "--json", str(tmp_path / "answer.json"),
+             "-o", str(tmp_path / "out.nc"),
+             "--report", str(tmp_path / "page.html")]  # fmt: skip
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, result.output
+    assert "arm: +-" in result.output

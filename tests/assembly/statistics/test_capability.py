@@ -1,0 +1,71 @@
+"""Capability indices against worked numbers and exact coverage."""
+
+import numpy as np
+import pytest
+
+from assembly.statistics.capability import (
+    capability,
+    cp_interval,
+    cpk_interval,
+    cpk_interval_one_sided,
+    quantile_cpk,
+    share_outside,
+)
+from assembly.statistics.estimates import proportion
+
+
+@pytest.mark.parametrize(
+    ("cpk", "ppm", "tol"),
+    [(1.0, 2700, 0.5), (4 / 3, 63.3, 0.05), (1.33, 66.1, 0.05), (2.0, 0.00197, 5e-6)],
+)
+def test_share_outside_of_a_centred_process_is_the_known_ppm(cpk, ppm, tol):
+    assert share_outside(cpk, cpk) * 1e6 == pytest.approx(ppm, abs=tol)
+
+
+def test_intervals_of_fifty_values_at_1_33_are_the_worked_ones():
+    assert cpk_interval(1.33, 50) == pytest.approx((1.051, 1.609), abs=5e-4)
+    assert cpk_interval_one_sided(1.33, 50) == pytest.approx((1.051, 1.607), abs=5e-4)
+    assert cp_interval(1.33, 50) == pytest.approx((1.067, 1.592), abs=5e-4)
+
+
+def test_intervals_cover_the_true_index_as_often_as_stated():
+    """2000 samples of 30: a share of 0.95 has a standard error of 0.5 %."""
+    rng = np.random.default_rng(1)
+    found = [capability(x, -4.0, 4.0) for x in rng.normal(size=(2000, 30))]
+    assert np.mean([c.cp[1] <= 4 / 3 <= c.cp[2] for c in found]) > 0.93
+    one = [capability(x, -np.inf, 4.0) for x in rng.normal(size=(300, 30))]
+    assert np.mean([c.cpk[1] <= 4 / 3 <= c.cpk[2] for c in one]) > 0.91
+
+
+def test_capability_without_spread_is_refused():
+    with pytest.raises(ValueError, match="do not vary"):
+        capability([1.0, 1.0], 0.0, 2.0)
+
+
+def test_parts_per_million_have_the_worked_intervals():
+    """270 of 1e5: 2388 to 3041 ppm; none of 1e6: at most 3.7 ppm, one-sided 3.0."""
+    share = proportion(270, 100_000)
+    assert share["lower"] * 1e6 == pytest.approx(2388, abs=1)
+    assert share["upper"] * 1e6 == pytest.approx(3041, abs=1)
+    assert proportion(0, 10**6)["upper"] * 1e6 == pytest.approx(3.7, abs=0.05)
+    assert proportion(0, 10**6, 0.9)["upper"] * 1e6 == pytest.approx(3.0, abs=0.01)
+
+
+def test_cpk_by_quantiles_is_the_index_of_a_normal_distribution():
+    values = np.random.default_rng(1).normal(size=200_000)
+    value, lower, upper = quantile_cpk(values, 4.0)
+    assert value == pytest.approx(4 / 3, rel=0.02)
+    assert lower < 4 / 3 < upper
+
+
+def test_cpk_by_quantiles_of_a_disc_is_that_of_its_radius():
+    """Rayleigh: median s sqrt(2 ln 2), 99.865 % quantile s sqrt(-2 ln 0.00135)."""
+    x = np.random.default_rng(2).normal(size=(400_000, 2))
+    middle, tail = np.sqrt(2 * np.log(2)), np.sqrt(-2 * np.log(0.00135))
+    value, lower, upper = quantile_cpk(np.linalg.norm(x, axis=1), 4.0)
+    assert value == pytest.approx((4 - middle) / (tail - middle), rel=0.01)
+    assert lower < value < upper
+
+
+def test_cpk_of_few_draws_has_no_lower_bound_above_zero():
+    assert quantile_cpk(np.arange(100.0), 200.0)[1] == 0.0

@@ -1,0 +1,218 @@
+"""Worst pose error against hand calculation, corners in finite geometry, and draws."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.callouts.callout import Callout, Datum
+from assembly.files.robot_file import read_robot
+from assembly.kinematics.posture import home_posture
+from assembly.model.error_distributions import tolerance_sources
+from assembly.model.robot import Clearance, Frame, Robot
+from assembly.statistics.callout_sources import sources_of
+from assembly.statistics.linear_response import linear_response
+from assembly.statistics.responses import respond
+from assembly.statistics.worst_pose import worst_pose
+from forcefit.inputs.table import BadInput
+from tests.drawn_four_bar_for_tests import four_bar_file
+
+FIRST, SECOND = np.radians(30.0), np.radians(45.0)
+PIN = Clearance(radial=10e-6)
+# 0.4 m at 30 deg and 0.3 m at 75 deg
+SERIAL = Robot(
+    "serial",
+    "tip",
+    (
+        Frame("shoulder", joint="revolute", actuated=True, position=FIRST,
+              clearance=PIN),
+        Frame("elbow", "shoulder", np.array([0.4, 0, 0]), joint="revolute",
+              actuated=True, position=SECOND, clearance=PIN),
+        Frame("tip", "elbow", np.array([0.3, 0, 0])),
+    ),
+    callouts=(
+        Callout("arm", "elbow", (Datum("shoulder"),), length=(0.4, 50e-6)),
+        Callout("hand", "tip", (Datum("elbow"),), length=(0.3, 50e-6)),
+    ),
+)  # fmt: skip
+
+
+def of_serial(robot=SERIAL):
+    angles = tolerance_sources(robot, np.eye(6)[2] * 1e-4, ("shoulder", "elbow"))
+    return linear_response(home_posture(robot)), sources_of(robot, angles)
+
+
+def test_serial_arm_has_the_worst_case_of_all_corners_in_finite_geometry():
+    """156.18 um in direction 9.8 deg, lengths + and angles -; discs add 10 um each."""
+    found = worst_pose(*of_serial(), "translation")
+    assert found.reading == "linear"
+    corners = []
+    for s in itertools.product((-1, 1), repeat=4):
+        a, b = 0.4 + s[0] * 50e-6, 0.3 + s[1] * 50e-6
+        first = FIRST + s[2] * 1e-4
+        second = first + SECOND + s[3] * 1e-4
+        corners.append([a * np.cos(first) + b * np.cos(second),
+                        a * np.sin(first) + b * np.sin(second)])  # fmt: skip
+    home = [0.4 * np.cos(FIRST) + 0.3 * np.cos(FIRST + SECOND),
+            0.4 * np.sin(FIRST) + 0.3 * np.sin(FIRST + SECOND)]  # fmt: skip
+    finite = np.linalg.norm(np.array(corners) - home, axis=1).max() + 20e-6
+    assert found.attained == pytest.approx(finite, abs=0.03e-6)
+    assert found.attained == pytest.approx(156.18e-6, abs=0.005e-6)
+    assert found.bound == pytest.approx(found.attained, rel=1e-3)
+    angle = np.degrees(np.arctan(found.direction[1] / found.direction[0]))
+    assert angle == pytest.approx(9.8, abs=0.05)
+    assert sum(share for _, share in found.shares) == pytest.approx(156.18e-6, rel=1e-4)
+
+
+def test_uniform_draws_of_the_serial_arm_have_the_worked_radius():
+    """rms 58.9 um of uniform errors and uniform discs: the sum of the variances."""
+    prepared, sources = of_serial()
+    draws = prepared.solve(sources.errors(sources.draw(0, 50_000, 1)))
+    square = (draws.platform_screw[:, 3:] ** 2).sum(axis=1).mean()
+    # each disc of 10 um adds R^2/2
+    assert np.sqrt(square + 2 * 10e-6**2 / 2) == pytest.approx(58.9e-6, rel=0.01)
+
+
+def four_bar(tmp_path, clearance):
+    path = tmp_path / "four_bar.toml"
+    path.write_text(four_bar_file(clearance))
+    robot = read_robot(path)
+    return linear_response(home_posture(robot)), sources_of(robot)
+
+
+@pytest.mark.parametrize(
+    ("clearance", "mrad"), [("", 0.1903), ("radial = 10e-6", 0.3595)]
+)
+def test_four_bar_coupler_turns_at_most_as_by_hand(tmp_path, clearance, mrad):
+    """0.1903 mrad by errors and 0.1692 by clearances."""
+    found = worst_pose(*four_bar(tmp_path, clearance), "rotation")
+    assert found.attained * 1e3 == pytest.approx(mrad, abs=5e-5)
+    assert found.attained <= found.bound <= found.attained * 1.001
+
+
+@pytest.mark.parametrize(("clearance", "um"), [("", 38.4), ("radial = 10e-6", 67.35)])
+def test_four_bar_point_moves_at_most_as_by_hand(tmp_path, clearance, um):
+    """The point is half way between the coupler's bores, so half of the coupler's
+    length error moves it."""
+    prepared, sources = four_bar(tmp_path, clearance)
+    robot, placed = sources.robot, []
+    for one in sources.placed:
+        errors = one.errors.copy()
+        if "coupler" in one.name:
+            errors[robot.index("C")] /= 2
+            errors[robot.index("coupler")] = errors[robot.index("C")]
+        placed.append(replace(one, errors=errors))
+    found = worst_pose(prepared, replace(sources, placed=tuple(placed)), "translation")
+    assert found.attained * 1e6 == pytest.approx(um, abs=0.03)
+    # clearances alone: 29.2 um
+    none = [replace(one, errors=0 * one.errors) for one in placed]
+    alone = worst_pose(prepared, replace(sources, placed=tuple(none)), "translation")
+    assert alone.attained * 1e6 == pytest.approx(29.24 if clearance else 0, abs=0.005)
+
+
+def test_worst_case_is_not_below_any_draw(tmp_path):
+    prepared, sources = four_bar(tmp_path, "")
+    found = worst_pose(prepared, sources, "translation")
+    draws = prepared.solve(sources.errors(sources.draw(0, 20_000, 1)))
+    largest = np.linalg.norm(draws.platform_screw[:, 3:], axis=1).max()
+    assert 0.8 * found.attained < largest < found.attained
+
+
+STIFF = np.full(6, np.inf)
+STIFF[5] = 1e6
+
+
+def on_springs(positions, clearance, stiffness=STIFF):
+    """A platform that lifts along z and turns about y, on legs along z."""
+    frames = [
+        Frame("lift", joint="prismatic"),
+        Frame("turn", "lift", rotation=np.array([-np.pi / 2, 0, 0]), joint="revolute"),
+        Frame("plate", "turn", rotation=np.array([np.pi / 2, 0, 0])),
+    ]
+    closures = []
+    for k, s in enumerate(positions):
+        leg = f"leg{k}"
+        K = None if stiffness is None else np.diag(stiffness)
+        frames += [
+            # the error and the spring along z, then free along x and about y
+            Frame(f"{leg}.foot", translation=np.array([s, 0, 0]), joint_stiffness=K,
+                  clearance=Clearance(axial=clearance) if clearance else None),
+            Frame(f"{leg}.slide", f"{leg}.foot", rotation=np.array([0, np.pi / 2, 0]),
+                  joint="prismatic"),
+            Frame(f"{leg}.hinge", f"{leg}.slide",
+                  rotation=np.array([np.pi / 2, 0, 0]), joint="revolute"),
+            Frame(f"{leg}.head", f"{leg}.hinge"),
+            Frame(f"{leg}.seat", "plate", np.array([s, 0, 0])),
+        ]  # fmt: skip
+        T = _pose(frames[-4:-1])
+        frames[-1] = replace(frames[-1], rotation=T)
+        closures.append((f"{leg}.head", f"{leg}.seat"))
+    robot = Robot("springs", "plate", tuple(frames), tuple(closures))
+    feet = tuple(f"leg{k}.foot" for k in range(len(positions)))
+    return robot, tolerance_sources(robot, np.eye(6)[5] * 50e-6, feet)
+
+
+def _pose(frames):
+    """Rotation vector of the last of three frames."""
+    from stiffness.screws import rotation_matrix, rotation_vector
+
+    R = np.eye(3)
+    for frame in frames:
+        R = R @ rotation_matrix(frame.rotation)
+    return rotation_vector(R)
+
+
+def test_four_springs_have_three_different_readings():
+    """At s = -0.3, -0.1, 0.1, 0.3 m, errors +-50 um, clearances +-20 um: rigid 233,
+    equilibrium 240 (errors -,-,+,+), clearances as errors 280 urad."""
+    robot, sources = on_springs((-0.3, -0.1, 0.1, 0.3), 20e-6)
+    found = worst_pose(linear_response(home_posture(robot)), sources, "rotation")
+    assert found.reading == "equilibrium"
+    assert found.rigid * 1e6 == pytest.approx(233.3, abs=0.5)
+    assert found.attained * 1e6 == pytest.approx(240, abs=0.5)
+    assert found.bound * 1e6 == pytest.approx(280, abs=0.5)
+
+
+def test_equilibrium_is_not_below_its_corners_and_inner_points():
+    """All 16 corners and 500 inner points; each pose error is known to 1e-9 rad."""
+    robot, sources = on_springs((-0.3, -0.1, 0.1, 0.3), 20e-6)
+    prepared = linear_response(home_posture(robot))
+    found = worst_pose(prepared, sources, "rotation")
+    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=4)))
+    inner = np.random.default_rng(1).uniform(-1, 1, (500, 4))
+    sizes, _ = respond(
+        prepared, sources, 50e-6 * np.vstack([corners, inner]), "rotation"
+    )
+    assert sizes.max() <= found.attained + 1e-9
+
+
+def test_springs_without_clearance_are_a_linear_response():
+    """Rotation sum s d / sum s^2: 50 um * 0.8 / 0.2 m = 200 urad."""
+    robot, sources = on_springs((-0.3, -0.1, 0.1, 0.3), 0.0)
+    found = worst_pose(linear_response(home_posture(robot)), sources, "rotation")
+    assert found.reading == "elastic"
+    assert found.attained == pytest.approx(200e-6, rel=1e-6)
+    assert found.bound == pytest.approx(200e-6, rel=1e-3)
+
+
+def test_rigid_legs_take_only_errors_that_close():
+    """Two rigid legs are not over-constrained: 2 * 70 um / 0.6 m = 233.3 urad.  A third
+    one in the middle, 20 um of clearance, does not limit it; nor does the reading."""
+    for positions, reading in [((-0.3, 0.3), "linear"), ((-0.3, 0.0, 0.3), "rigid")]:
+        robot, sources = on_springs(positions, 20e-6, None)
+        found = worst_pose(linear_response(home_posture(robot)), sources, "rotation")
+        assert found.reading == reading
+        assert found.attained == pytest.approx(140e-6 / 0.6, rel=1e-4)
+        assert found.bound == pytest.approx(140e-6 / 0.6, rel=1e-3)
+
+
+def test_unbounded_errors_and_loads_are_refused():
+    robot, sources = on_springs((-0.3, 0.3), 20e-6)
+    posture = home_posture(robot)
+    unbounded = replace(sources, kind=np.full(len(sources), 1))
+    with pytest.raises(BadInput, match="leg0.foot.TZ, which is unbounded"):
+        worst_pose(linear_response(posture), unbounded, "rotation")
+    loaded = linear_response(posture, load=(0, 0, 0, 0, 0, -10))
+    with pytest.raises(BadInput, match="found a load, expected none"):
+        worst_pose(loaded, sources, "rotation")

@@ -1,0 +1,127 @@
+"""The best order, against all orders carried out one by one."""
+
+from dataclasses import replace
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from assembly.steps.plan import Fix, Join, Plan, Release
+from assembly.steps.run import assemble_in_steps
+from assembly.steps.search import OBJECTIVES, best_order, why_order_matters
+from forcefit.inputs.table import BadInput
+from tests.assembly.steps.robots_for_steps import planar_platform, three_legs
+
+LEG = {i: ("platform", f"leg{i}") for i in (1, 2, 3)}
+
+
+def join(i, **more):
+    return Join(f"{i}", (f"seat{i}", f"end{i}"), **more)
+
+
+def outcome(plan, posture, objective):
+    results = assemble_in_steps(plan, posture)
+    if objective == "force":
+        return max(r.closing_force[0] for r in results if isinstance(r.step, Join))
+    if objective == "energy":
+        return results[-1].energy[0]
+    return np.linalg.norm(results[-1].platform_screw[0, 3:])
+
+
+def test_least_peak_force_of_three_legs_is_that_of_the_springs():
+    """Closing forces by hand: the last leg needs 6.7, 86.7 or 80 N; before it two legs
+    close with k_i k_j / (k_i + k_j) |d_i - d_j|."""
+    steps = tuple(Join(f"{i}", LEG[i]) for i in (1, 2, 3))
+    found = best_order(Plan(steps), three_legs(), "force")
+    k, d = np.array([1e6, 2e6, 3e6]), np.array([30e-6, -20e-6, 50e-6])
+    peaks = []
+    for a, b, c in permutations(range(3)):
+        pair = k[a] * k[b] / (k[a] + k[b])
+        x = (k[a] * d[a] + k[b] * d[b]) / (k[a] + k[b])
+        all_of = (k[a] + k[b]) * k[c] / k.sum()
+        peaks.append(max(pair * abs(d[a] - d[b]), all_of * abs(d[c] - x)))
+    assert found.value == pytest.approx(min(peaks))
+    assert found.bound == found.value
+    assert found.method == "sets"
+    assert outcome(found.plan, three_legs(), "force") == pytest.approx(min(peaks))
+
+
+@pytest.mark.parametrize("objective", OBJECTIVES)
+@pytest.mark.parametrize("slots", [(), (4,), (2, 5)])
+def test_best_order_is_the_best_of_all_orders(objective, slots, rng):
+    errors = rng.normal(size=5) * 40e-6
+    posture = planar_platform([0.0, 0.4, 0.1, 0.3, 0.25], errors)
+    locked = {i: ("TZ",) if i in slots else () for i in range(1, 6)}
+    steps = tuple(join(i, locked=locked[i]) for i in range(1, 6))
+    found = best_order(Plan(steps), posture, objective)
+    every = [outcome(Plan(order), posture, objective) for order in permutations(steps)]
+    assert found.value == pytest.approx(min(every), rel=1e-9, abs=1e-15)
+    assert found.bound == pytest.approx(found.value)
+    assert found.given == pytest.approx(every[0])
+    assert outcome(found.plan, posture, objective) == pytest.approx(
+        found.value, rel=1e-9, abs=1e-15
+    )
+
+
+def test_only_joining_steps_between_other_steps_change_places():
+    steps = (
+        Join("1", LEG[1]), Fix("clamp", "platform", None), Join("3", LEG[3]),
+        Join("2", LEG[2]), Release("free", ("clamp",)),
+    )  # fmt: skip
+    found = best_order(Plan(steps), three_legs(), "force")
+    names = [step.name for step in found.plan.steps]
+    assert (names[0], names[1], names[4]) == ("1", "clamp", "free")
+    assert sorted(names[2:4]) == ["2", "3"]
+
+
+def test_order_matters_where_a_step_holds_what_it_finds():
+    pinned = Plan(tuple(Join(f"{i}", LEG[i]) for i in (1, 2, 3)))
+    assert why_order_matters(pinned) == ""
+    slot = replace(pinned.steps[1], locked=("TZ",))
+    assert why_order_matters(Plan((*pinned.steps[:1], slot))) == "2"
+    lying = Plan((Fix("clamp", "platform", None), *pinned.steps))
+    assert why_order_matters(lying) == "clamp"
+    placed = Plan((Fix("clamp", "platform", {"TZ": 0.0}), *pinned.steps))
+    assert why_order_matters(placed) == ""
+
+
+def test_least_error_of_too_many_joins_is_refused():
+    posture = planar_platform(np.linspace(0, 0.4, 9), np.zeros(9))
+    steps = tuple(join(i, locked=("TZ",)) for i in range(1, 10))
+    with pytest.raises(BadInput, match="at most 8"):
+        best_order(Plan(steps), posture, "error")
+
+
+@pytest.mark.parametrize("objective", ["force", "energy"])
+@pytest.mark.parametrize("most", [20, 60])
+def test_search_that_ends_early_brackets_the_best_order(objective, most, rng):
+    errors = rng.normal(size=5) * 40e-6
+    posture = planar_platform([0.0, 0.4, 0.1, 0.3, 0.25], errors)
+    steps = tuple(join(i, locked=("TZ",) if i in (2, 5) else ()) for i in range(1, 6))
+    every = best_order(Plan(steps), posture, objective)
+    early = best_order(Plan(steps), posture, objective, most=most)
+    assert early.bound <= every.value * (1 + 1e-9)
+    assert every.value <= early.value * (1 + 1e-9)
+    assert early.searched < every.searched
+
+
+def test_interrupted_search_returns_the_best_order_so_far():
+    posture = planar_platform([0.0, 0.4, 0.1, 0.3], [0, 3e-5, 4e-5, -2e-5])
+    steps = tuple(join(i, locked=("TZ",) if i == 4 else ()) for i in range(1, 5))
+
+    def stop(done):
+        if done == 12:
+            raise KeyboardInterrupt
+
+    found = best_order(Plan(steps), posture, "force", progress=stop)
+    assert found.bound <= found.value <= found.given
+
+
+def test_slot_last_or_first_decides_the_error_of_nine_legs():
+    """Beyond 8 joins the least energy is searched with bounds: zero, slots first."""
+    errors = np.array([0, 0, 10, 20, -10, 5, 15, -5, 25]) * 1e-6
+    posture = planar_platform(np.linspace(0, 0.4, 9), errors)
+    steps = tuple(join(i, locked=("TZ",) if i > 2 else ()) for i in range(1, 10))
+    found = best_order(Plan(steps[::-1]), posture, "energy")
+    assert found.value == pytest.approx(0.0, abs=1e-15)
+    assert found.bound == pytest.approx(0.0, abs=1e-15)
