@@ -72,7 +72,7 @@ def mjcf_of_model(model: Any) -> str:
     for i in range(model.nkey):
         key = model.key(i)
         group = SubElement(root, "keyframe")
-        SubElement(group, "key", name=key.name, qpos=_words(key.qpos))
+        SubElement(group, "key", name=key.name, qpos=words(key.qpos))
     return tostring(root, encoding="unicode")
 
 
@@ -89,13 +89,13 @@ def _bodies(mujoco: Any, model: Any, root: Element) -> list[Element]:
         body = model.body(i)
         element = SubElement(
             elements[int(model.body_parentid[i])], "body", name=_body(model, i),
-            pos=_words(body.pos), quat=_words(body.quat),
+            pos=words(body.pos), quat=words(body.quat),
         )  # fmt: skip
         elements.append(element)
         if body.mass[0]:
             SubElement(
-                element, "inertial", pos=_words(body.ipos), quat=_words(body.iquat),
-                mass=_words(body.mass), diaginertia=_words(body.inertia),
+                element, "inertial", pos=words(body.ipos), quat=words(body.iquat),
+                mass=words(body.mass), diaginertia=words(body.inertia),
             )  # fmt: skip
         for number, j in enumerate(_joints_of(model, i), 1):
             _add_joint(mujoco, model, element, j, _joint(model, j, number))
@@ -114,18 +114,18 @@ def _add_joint(mujoco: Any, model: Any, element: Element, j: int, name: str) -> 
     if kind == "free":
         SubElement(element, "freejoint", name=name)
         return
-    given = {"name": name, "type": kind, "pos": _words(model.jnt_pos[j])}
+    given = {"name": name, "type": kind, "pos": words(model.jnt_pos[j])}
     stiffness = float(model.jnt_stiffness[j])
     if kind != "ball":
         at = int(model.jnt_qposadr[j])
-        given |= {"axis": _words(model.jnt_axis[j]), "ref": _words(model.qpos0[at])}
+        given |= {"axis": words(model.jnt_axis[j]), "ref": words(model.qpos0[at])}
         if model.jnt_limited[j]:
-            given |= {"limited": "true", "range": _words(model.jnt_range[j])}
-        given["springref"] = _words(model.qpos_spring[at])
+            given |= {"limited": "true", "range": words(model.jnt_range[j])}
+        given["springref"] = words(model.qpos_spring[at])
     powers = getattr(model, "jnt_stiffnesspoly", None)
     more = [] if powers is None else np.ravel(powers[j]).tolist()
     if stiffness or any(more):
-        given["stiffness"] = _words([stiffness, *(more if any(more) else [])])
+        given["stiffness"] = words([stiffness, *(more if any(more) else [])])
     SubElement(element, "joint", given)
 
 
@@ -147,7 +147,7 @@ def _ties(mujoco: Any, model: Any, root: Element, bodies: list[Element]) -> None
             for key, end in zip(("1", "2"), ends, strict=True):
                 if end >= 0:
                     tie.set(f"{kind}{key}", name(model, end))
-            tie.set("polycoef", _words(data[:5]))
+            tie.set("polycoef", words(data[:5]))
             continue
         for key, end, pose in zip("12", ends, _places(kind, data), strict=True):
             body = end
@@ -155,11 +155,11 @@ def _ties(mujoco: Any, model: Any, root: Element, bodies: list[Element]) -> None
                 body = int(model.site_bodyid[end])
                 pose = model.site_pos[end], model.site_quat[end]
             site = f"{tie.get('name')}.site{key}"
-            SubElement(bodies[body], "site", name=site, pos=_words(pose[0]),
-                       quat=_words(pose[1]))  # fmt: skip
+            SubElement(bodies[body], "site", name=site, pos=words(pose[0]),
+                       quat=words(pose[1]))  # fmt: skip
             tie.set(f"site{key}", site)
         if kind == "weld":
-            tie.set("torquescale", _words(data[10]))
+            tie.set("torquescale", words(data[10]))
 
 
 def _places(kind: str, data: Any) -> list[tuple[Any, Any]]:
@@ -205,6 +205,6 @@ def _any_joint(model: Any, j: int) -> str:
     return _joint(model, j, j - first + 1)
 
 
-def _words(values: ArrayLike) -> str:
+def words(values: ArrayLike) -> str:
     """Return numbers in full."""
     return " ".join(repr(float(v)) for v in np.ravel(values))

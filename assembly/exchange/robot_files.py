@@ -19,6 +19,7 @@ from forcefit.inputs.table import read_bytes
 
 if TYPE_CHECKING:
     import mujoco
+    import pinocchio
 
 _LOG = logging.getLogger("forcefit.load")
 OTHERS = (".urdf", ".xml", ".sdf")
@@ -28,18 +29,19 @@ _WEIGHTY = ("mimic:", "no platform", "no drive", "may carry load", "masses")
 
 
 def load_robot(
-    name: Union[str, Path, "mujoco.MjModel", "mujoco.MjSpec"],
+    name: Union[str, Path, "mujoco.MjModel", "mujoco.MjSpec", "pinocchio.Model"],
     close: Closing | None = None,
     *,
     links: bool = True,
 ) -> Robot:
-    """Return a built-in robot by its name, the robot of a file, or of a MuJoCo model.
+    """Return a built-in robot by its name, the robot of a file, or of a model.
 
     Args:
         name: name such as ``"irsbot2"``; or the path of a robot file, a URDF (with its
             loops next to it), MJCF or SDF file; or a ``mujoco.MjModel`` or
             ``mujoco.MjSpec``, of which bodies, joints, equalities between them,
-            actuators and the key ``home`` are read.
+            actuators and the key ``home`` are read; or a ``pinocchio.Model``, a tree
+            whose joints of one freedom are all drives.
         close: function that makes the closures of a declared robot hold, as
             :mod:`assembly.kinematics.closing` does; none if absent.
         links: whether links given by a mesh or a library are solved or read now, which
@@ -112,18 +114,28 @@ def _robot_of_foreign(path: Path, title: str, close: Closing | None) -> Robot:
 def _robot_of_model(model: object, close: Closing | None) -> Robot:
     """Return the robot of a model in memory."""
     from assembly.exchange.mujoco_model import is_mujoco, mjcf_of_model
+    from assembly.exchange.pinocchio_model import (
+        ASSUMED,
+        is_pinocchio,
+        mjcf_of_pinocchio,
+    )
 
-    kind = type(model).__name__
-    if not is_mujoco(model):
-        expected = "expected a name, a path, an MjModel or an MjSpec"
+    kind, assumed = type(model).__name__, tuple[str, ...]()
+    if is_mujoco(model):
+        text = mjcf_of_model(model)
+    elif is_pinocchio(model):
+        text, assumed = mjcf_of_pinocchio(model), (f"{kind}: taken: {ASSUMED}",)
+    else:
+        expected = "expected a name, a path, an MjModel, MjSpec or pinocchio.Model"
         raise BadInput(f"load_robot: found {describe(model)} ({kind}), {expected}")
     with TemporaryDirectory() as folder:
         path = Path(folder, f"{kind}.xml")
-        path.write_text(mjcf_of_model(model), encoding="utf-8")
+        path.write_text(text, encoding="utf-8")
         try:
-            return _robot_of_foreign(path, kind, close)
+            robot = _robot_of_foreign(path, kind, close)
         except BadInput as error:
             raise BadInput(str(error).replace(str(path), kind)) from None
+    return replace(robot, remarks=(*assumed, *robot.remarks)) if assumed else robot
 
 
 def write_robot(robot: Robot, path: str | Path) -> None:
