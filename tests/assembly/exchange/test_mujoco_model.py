@@ -85,7 +85,7 @@ def test_model_with_a_tendon_says_that_it_is_left_out():
 
 def test_other_objects_are_refused():
     with pytest.raises(
-        BadInput, match=r"load_robot: found 3\.0 .* an MjModel or an Mj"
+        BadInput, match=r"load_robot: found 3\.0 .* an MjModel, MjSpec or pinocchio"
     ):
         ff.load_robot(3.0)
 
