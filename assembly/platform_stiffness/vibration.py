@@ -28,6 +28,7 @@ from assembly.exact.equilibrium import tangent_space
 from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.exact.finite_robot import LINK
 from assembly.kinematics.posture import Posture
+from assembly.model.given_load import Load
 from assembly.model.mesh_link import mesh_link_mass
 from assembly.model.robot import BeamLink, Frame, MeshLink, Robot, beam_axis
 from assembly.platform_stiffness.exact_tangent import part_owners, platform_moves
@@ -72,7 +73,7 @@ class NaturalModes:
 def natural_modes(
     posture: Posture,
     count: int = 6,
-    load: ArrayLike | None = None,
+    load: Load | None = None,
     gravity: ArrayLike | None = None,
     state: Literal["nominal", "exact"] = "nominal",
     method: Method = "compiled",
@@ -82,8 +83,8 @@ def natural_modes(
     Args:
         posture: the robot's configuration.
         count: largest number of modes.
-        load: (6,) [N m, N] on the platform, only in the state ``"exact"``; it has no
-            mass.
+        load: (6,) [N m, N] on the platform, or by component, ``{"fz": -50}``, only in
+            the state ``"exact"``; it has no mass.
         gravity: (3,) [m/s^2], only in the state ``"exact"``.
         state: ``"nominal"``, of the nominal robot with clearances held at zero;
             ``"exact"``, around the equilibrium with errors, clearances and loads.

@@ -51,7 +51,7 @@ def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
     errors = experiment.sources.errors(drawn)[0]
     robot = bolt_joints(experiment.posture.robot.with_errors(errors))
     return _forced_robot(
-        replace(experiment.posture, robot=robot), experiment.load, experiment.gravity,
+        replace(experiment.posture, robot=robot), experiment.wrench, experiment.gravity,
         why=f"Draw {draw}, whose {NAMES[key]} is nearest to 95 % of them.",
     )  # fmt: skip
 

@@ -258,7 +258,7 @@ def test_finite_elements_of_equal_links_run_once_and_are_logged(
         link if line.startswith("link = {") else line for line in FILE.splitlines()
     )
     (folder / "both.toml").write_text(both)
-    with caplog.at_level(logging.INFO, "assembly.files.solved_links"):
+    with caplog.at_level(logging.INFO, "forcefit.links"):
         robot = load_robot(folder / "both.toml")
     surface = folder / "bar.stl"
     assert caplog.messages == [f'finite elements of frame "elbow", {surface}']
