@@ -17,7 +17,7 @@ from assembly.drawing.parts import joint_axes, parts_of
 from assembly.drawing.tree import ROOT, Edge, Node, Step, steps_of
 from assembly.model.placed_frames import PlacedFrame, place_frames
 from assembly.model.robot import BASE, Frame, Robot
-from forcefit.inputs.table import quoted
+from forcefit.inputs.table import BadInput, quoted
 from stiffness.screws import transform
 
 
@@ -86,7 +86,7 @@ def _plan(drawing: Drawing, steps: list[Step]) -> _Plan:
     """Names of the frames, the users' where no joint has them."""
     joints = {joint.name: joint for joint in drawing.joints}
     bodies = {body.name: body for body in drawing.bodies}
-    taken = {part.name for joint in drawing.joints for part in parts_of(joint)}
+    taken = _part_names(drawing)
     met = {step.end for step in steps if step.closes} - {ROOT}
     massive = {(body.name, True) for body in drawing.bodies if _has_mass(body)}
     linked = {s.end for s in steps if _is_body(drawing, s)}
@@ -111,6 +111,21 @@ def _plan(drawing: Drawing, steps: list[Step]) -> _Plan:
         if not step.closes:
             carriers[step.end] = own.get(step.end) or _last_name(step, links)
     return _Plan(drawing, joints, bodies, own, carriers, links, ends, seats)
+
+
+def _part_names(drawing: Drawing) -> set[str]:
+    """Names of the frames of all joints, which must be different."""
+    owners: dict[str, str] = {}
+    for joint in drawing.joints:
+        for part in parts_of(joint):
+            if part.name in owners:
+                raise BadInput(
+                    f"joint {quoted(joint.name)}: found {quoted(part.name)} as the "
+                    f"name of a frame, which joint {quoted(owners[part.name])} has "
+                    "too; expected another name"
+                )
+            owners[part.name] = joint.name
+    return set(owners)
 
 
 def _free_name(name: str, taken: set[str]) -> str:
