@@ -10,10 +10,13 @@ from assembly.model.robot import BeamLink, Clearance, Frame, Robot, beam_axis
 from assembly.path.motion import follow_path
 from assembly.path.path_errors import path_errors
 from assembly.path.path_file import PathTable
+from assembly.path.report import path_page
+from assembly.path.summary import path_summary
 from assembly.path.trajectory import Trajectory, profiled
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
 from assembly.sweeps.targets import goals_of
+from forcefit.page.page import Provenance
 from stiffness.beam.sections import declared_section
 from tests.assembly.path.moving_robots_for_tests import GRAVITY, hinge, instants, rod
 from tests.assembly.path.test_motion import CASES, path_of
@@ -187,3 +190,21 @@ def test_paper_robot_at_20_g_needs_54_ms_for_100_mm():
     mirrored = found.inertial[::-1] * [1, -1, -1, -1, 1, 1]
     size = np.abs(found.inertial).max()
     np.testing.assert_allclose(mirrored, found.inertial, atol=1e-6 * size)
+
+
+def test_falling_pendulum_has_no_deflection_at_rest_to_compare_with():
+    """A level rod of 2 kg falls with 3 g / 4 at its centre: its hinge holds m g / 4."""
+    rail = Frame("rail", rotation=[0.0, np.pi / 2, 0.0], joint="prismatic",
+                 actuated=True)  # fmt: skip
+    cart = Frame("cart", "rail", rotation=[0.0, -np.pi / 2, 0.0], mass=1.0)
+    pin = Frame("pin", "cart", joint="revolute")
+    bob = Frame("bob", "pin", [0.5, 0.0, 0.0], **rod(2.0, 0.5))
+    robot = Robot("crane", "cart", (rail, cart, pin, bob))
+    errors = path_errors(robot, instants(["q.rail"], [[0.0]], [[0.0]], [[0.0]]),
+                         gravity=GRAVITY)  # fmt: skip
+    summary = path_summary(errors)
+    assert summary["status"] == "ok"
+    assert summary["largest"]["force"]["value"] == pytest.approx(4.905 + 9.81)
+    assert "inertial_translation" not in summary["largest"]
+    assert any("no equilibrium at rest" in one for one in summary["remarks"])
+    assert "unknown" in path_page(summary, errors, Provenance())
