@@ -113,10 +113,12 @@ def natural_modes(
     equilibrium = solve_exact(posture, load, gravity=gravity, method=method)
     D, H = tangent_space(equilibrium.expansion)
     mass = mass_matrix(equilibrium)
-    M, rounding = D.T @ mass @ D, _ROUNDING * np.abs(mass).max() * (D.T @ D)
+    M, rounding = D.T @ mass @ D, _ROUNDING * np.abs(mass).max(initial=0.0) * (D.T @ D)
     if not np.trace(M) > 0.0:
         raise BadInput(_no_mass(posture.robot))
     squares, modes = _modes(H, M, rounding)
+    if not squares.size:  # the mass of what moves is rounding
+        raise BadInput(_no_mass(posture.robot))
     squares, modes, idle = _without_idle(
         squares, modes, platform_moves(equilibrium.expansion) @ D
     )
@@ -182,6 +184,8 @@ def _modes(K: NDArray, M: NDArray, rounding: NDArray) -> tuple[NDArray, NDArray]
     least = shift * np.sum(vectors * (rounding @ vectors), axis=0)
     # no mode without mass and spring
     kept = values > np.maximum(_NULL * values.max(), least)
+    if not kept.any():
+        return np.zeros(0), np.zeros((len(K), 0))
     basis = vectors[:, kept] / np.sqrt(values[kept])
     inertia, turned = np.linalg.eigh(basis.T @ M @ basis)
     heavy = inertia > _NULL * inertia.max()
