@@ -10,11 +10,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.nominal import motion_screws
+from assembly.kinematics.nominal import motion_screws, size_of
 from assembly.path.inertial_loads import InertialLoads, inertial_loads
 from assembly.path.motion import Motion, carries_matrix, idle_rates
 
 _MASSLESS = 1e-12  # of the largest inertia: below it an idle motion has none
+_STILL = 1e-10  # of the largest twist: a body with less is at rest but for rounding
 
 
 def with_idle_accelerations(motion: Motion, gravity: NDArray) -> Motion:
@@ -35,7 +36,7 @@ def with_idle_accelerations(motion: Motion, gravity: NDArray) -> Motion:
     robot, T = motion.postures.robot, motion.postures.transforms
     S, carries = motion_screws(robot, T), carries_matrix(robot)
     joints = [S * Z[:, :, d, None] for d in range(Z.shape[2])]
-    bodies = [carries @ own for own in joints]
+    bodies = [_without_rounding(carries @ own, size_of(robot)) for own in joints]
     parts = [body + own for body, own in zip(bodies, joints, strict=True)]
 
     def work(loads: InertialLoads) -> NDArray:
@@ -57,6 +58,17 @@ def with_idle_accelerations(motion: Motion, gravity: NDArray) -> Motion:
     return replace(
         motion, second_rates=rates, accelerations=motion.accelerations + added
     )
+
+
+def _without_rounding(twists: NDArray, size: float) -> NDArray:
+    """Return (k, n, 6) twists at the base, 0 for bodies that an idle motion leaves.
+
+    Else the inertia of a rod without mass that spins would be that of the platform in
+    its rounding, and the spin would accelerate until the platform falls.
+    """
+    angles = twists * np.repeat([1.0, 1.0 / size], 3)
+    sizes = np.linalg.norm(angles, axis=2, keepdims=True)
+    return np.where(sizes > _STILL * sizes.max(axis=1, keepdims=True), twists, 0.0)
 
 
 def _power(wrenches: NDArray, twists: NDArray, points: NDArray) -> NDArray:

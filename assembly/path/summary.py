@@ -144,8 +144,8 @@ def remarks(errors: PathErrors) -> list[str]:
     fall = (errors.status == OK) & np.isnan(errors.arrays["inertial_screw"][:, 0])
     if fall.any():
         found.append(
-            f"at {fall.sum()} instants the robot has no equilibrium at rest under these "
-            "loads, so that the deflection by acceleration is unknown"
+            f"at {fall.sum()} instants the robot has no equilibrium at rest under "
+            "these loads, so that the deflection by acceleration is unknown"
         )
     if errors.free:
         found.append(

@@ -119,7 +119,7 @@ def test_large_loads_deflect_by_the_compliance(size):
 
 @pytest.mark.parametrize(("shift", "hangs"), [(0.0, True), (1e-9, False)])
 def test_pendulum_is_in_equilibrium_only_where_it_hangs(shift, hangs):
-    """Its hinge, turned and off the origin, carries 2 kg; a moment of 0 but for rounding.
+    """Its hinge, turned and off the origin, carries 2 kg; its moment is rounding.
 
     A mass centre that is 1 nm off turns it.
     """

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from assembly.files.robot_file import read_robot
 from assembly.kinematics.posture import home_posture, place_many, together
 from assembly.model.robot import BeamLink, Clearance, Frame, Robot, beam_axis
 from assembly.path.motion import follow_path
@@ -208,3 +209,44 @@ def test_falling_pendulum_has_no_deflection_at_rest_to_compare_with():
     assert "inertial_translation" not in summary["largest"]
     assert any("no equilibrium at rest" in one for one in summary["remarks"])
     assert "unknown" in path_page(summary, errors, Provenance())
+
+
+SPHERICAL_ENDS = """
+format = 2
+platform = "plate"
+platform_at = [0, 0, 0.5]
+[[body]]
+name = "plate"
+mass = 3.0
+centre = [0, 0, 0.5]
+"""
+LEG = """
+[[leg]]
+name = "leg{0}"
+repeat = {{ count = 3, about = [0, 0, 1] }}
+body = [{{ name = "nut" }}, {{ name = "screw" }}]
+joint = [
+    {{ name = "low", type = "spherical", between = ["base", "nut"], at = {1} }},
+    {{ name = "drive", type = "prismatic", between = ["nut", "screw"], at = {1}, axis = {3}, actuated = true, drive_stiffness = 5e7 }},
+    {{ name = "top", type = "spherical", between = ["screw", "plate"], at = {2} }},
+]
+"""  # noqa: E501
+
+
+def test_drives_carry_the_platform_where_massless_legs_spin_freely(tmp_path):
+    """Six equal legs between balls: each drive has m (g + a) / (6 cos(angle to z))."""
+    text = SPHERICAL_ENDS
+    for name, below, above in (("a", 10, 50), ("b", 110, 70)):
+        low, top = (
+            np.array([r * np.cos(np.radians(at)), r * np.sin(np.radians(at)), z])
+            for r, at, z in ((0.5, below, 0.0), (0.25, above, 0.5))
+        )
+        text += LEG.format(name, *(x.tolist() for x in (low, top, top - low)))
+    (tmp_path / "six_sps.toml").write_text(text)
+    names = ["tx", "ty", "tz", "rx", "ry", "rz"]
+    pose = [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]
+    path = instants(names, [pose], [np.zeros(6)], [[0, 0, 5.0, 0, 0, 0]])
+    errors = path_errors(read_robot(tmp_path / "six_sps.toml"), path,
+                         gravity=[0.0, 0.0, -9.81])  # fmt: skip
+    expected = 3.0 * (9.81 + 5.0) / (6 * 0.5 / np.linalg.norm(top - low))
+    np.testing.assert_allclose(errors.arrays["drive_force"][0], expected, rtol=1e-9)
