@@ -15,7 +15,7 @@ from assembly.path.inertial_loads import InertialLoads, inertial_loads
 from assembly.path.motion import Motion, carries_matrix, idle_rates
 
 _MASSLESS = 1e-12  # of the largest inertia: below it an idle motion has none
-_STILL = 1e-10  # of the largest twist: a body with less is at rest but for rounding
+_ROUNDING = 1e-20  # of the whole mass on the longest arm: 1e-10 of an arm, squared
 
 
 def with_idle_accelerations(motion: Motion, gravity: NDArray) -> Motion:
@@ -36,7 +36,7 @@ def with_idle_accelerations(motion: Motion, gravity: NDArray) -> Motion:
     robot, T = motion.postures.robot, motion.postures.transforms
     S, carries = motion_screws(robot, T), carries_matrix(robot)
     joints = [S * Z[:, :, d, None] for d in range(Z.shape[2])]
-    bodies = [_without_rounding(carries @ own, size_of(robot)) for own in joints]
+    bodies = [carries @ own for own in joints]
     parts = [body + own for body, own in zip(bodies, joints, strict=True)]
 
     def work(loads: InertialLoads) -> NDArray:
@@ -51,7 +51,7 @@ def with_idle_accelerations(motion: Motion, gravity: NDArray) -> Motion:
         work(inertial_loads(replace(still, accelerations=body))) for body in bodies
     ], axis=2)  # fmt: skip
     driving = work(inertial_loads(motion, gravity))
-    solve = np.linalg.pinv(inertia, rcond=_MASSLESS, hermitian=True)
+    solve = _inverse(inertia, _ROUNDING * _largest_inertia(motion, bodies))
     second = (solve @ driving[..., None])[..., 0]
     added = sum(second[:, d, None, None] * body for d, body in enumerate(bodies))
     rates = motion.second_rates + (Z @ second[..., None])[..., 0]
@@ -60,15 +60,34 @@ def with_idle_accelerations(motion: Motion, gravity: NDArray) -> Motion:
     )
 
 
-def _without_rounding(twists: NDArray, size: float) -> NDArray:
-    """Return (k, n, 6) twists at the base, 0 for bodies that an idle motion leaves.
+def _inverse(inertia: NDArray, least: NDArray) -> NDArray:
+    """Return the (k, d, d) pseudoinverse of symmetric matrices.
 
-    Else the inertia of a rod without mass that spins would be that of the platform in
-    its rounding, and the spin would accelerate until the platform falls.
+    Args:
+        inertia: (k, d, d) of idle motions.
+        least: (k,) eigenvalues up to it count as 0.  The inertia of a spin without
+            mass, or of masses on its axis, is rounding: the spin would accelerate
+            until the platform falls.
+
+    Returns:
+        The pseudoinverses.
     """
-    angles = twists * np.repeat([1.0, 1.0 / size], 3)
-    sizes = np.linalg.norm(angles, axis=2, keepdims=True)
-    return np.where(sizes > _STILL * sizes.max(axis=1, keepdims=True), twists, 0.0)
+    values, vectors = np.linalg.eigh(inertia)
+    least = np.maximum(least, _MASSLESS * values[:, -1])[:, None]
+    inverse = np.where(values > least, 1.0 / np.where(values > least, values, 1.0), 0.0)
+    return np.asarray((vectors * inverse[:, None, :]) @ vectors.swapaxes(1, 2))
+
+
+def _largest_inertia(motion: Motion, bodies: list[NDArray]) -> NDArray:
+    """Return (k,) the inertia if the whole mass moved as the fastest body does."""
+    along = np.zeros_like(motion.twists)
+    along[..., 3] = 1.0
+    still = replace(motion, twists=np.zeros_like(along), accelerations=along)
+    loads = inertial_loads(still)
+    mass = -(loads.bodies + loads.carried)[..., 3].sum(axis=1)
+    lengths = np.repeat([size_of(motion.postures.robot), 1.0], 3)
+    speed = max(np.abs(body * lengths).max(initial=0.0) for body in bodies)
+    return np.asarray(mass * speed**2)
 
 
 def _power(wrenches: NDArray, twists: NDArray, points: NDArray) -> NDArray:

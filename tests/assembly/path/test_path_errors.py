@@ -222,31 +222,56 @@ centre = [0, 0, 0.5]
 """
 LEG = """
 [[leg]]
-name = "leg{0}"
+name = "leg{name}"
 repeat = {{ count = 3, about = [0, 0, 1] }}
-body = [{{ name = "nut" }}, {{ name = "screw" }}]
+body = [{{ name = "nut" }}, {{ name = "screw", mass = {mass}, centre = {middle} }}]
 joint = [
-    {{ name = "low", type = "spherical", between = ["base", "nut"], at = {1} }},
-    {{ name = "drive", type = "prismatic", between = ["nut", "screw"], at = {1}, axis = {3}, actuated = true, drive_stiffness = 5e7 }},
-    {{ name = "top", type = "spherical", between = ["screw", "plate"], at = {2} }},
+    {{ name = "low", type = "{kind}", between = ["base", "nut"], at = {low}, {axes} }},
+    {{ name = "drive", type = "prismatic", between = ["nut", "screw"], at = {low}, axis = {along}, actuated = true }},
+    {{ name = "top", type = "spherical", between = ["screw", "plate"], at = {top} }},
 ]
 """  # noqa: E501
 
 
-def test_drives_carry_the_platform_where_massless_legs_spin_freely(tmp_path):
-    """Six equal legs between balls: each drive has m (g + a) / (6 cos(angle to z))."""
+def six_legs(file, kind, mass=0.0):
+    """A Gough platform whose six legs have masses on their axes; and a leg's vector."""
     text = SPHERICAL_ENDS
     for name, below, above in (("a", 10, 50), ("b", 110, 70)):
         low, top = (
             np.array([r * np.cos(np.radians(at)), r * np.sin(np.radians(at)), z])
             for r, at, z in ((0.5, below, 0.0), (0.25, above, 0.5))
         )
-        text += LEG.format(name, *(x.tolist() for x in (low, top, top - low)))
-    (tmp_path / "six_sps.toml").write_text(text)
+        along = top - low
+        first = np.cross(along, [0.0, 0.0, 1.0])
+        second = np.cross(along, first)
+        axes = f"axis = {first.tolist()}, axis2 = {second.tolist()}"
+        text += LEG.format(
+            name=name, kind=kind, mass=mass, axes=axes, low=low.tolist(),
+            top=top.tolist(), along=along.tolist(), middle=(low + 0.7 * along).tolist(),
+        )  # fmt: skip
+    file.write_text(text)
+    return read_robot(file), along
+
+
+def test_drives_carry_the_platform_where_massless_legs_spin_freely(tmp_path):
+    """Six equal legs between balls: each drive has m (g + a) / (6 cos(angle to z))."""
+    robot, along = six_legs(tmp_path / "six_sps.toml", "spherical")
     names = ["tx", "ty", "tz", "rx", "ry", "rz"]
     pose = [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]
     path = instants(names, [pose], [np.zeros(6)], [[0, 0, 5.0, 0, 0, 0]])
-    errors = path_errors(read_robot(tmp_path / "six_sps.toml"), path,
-                         gravity=[0.0, 0.0, -9.81])  # fmt: skip
-    expected = 3.0 * (9.81 + 5.0) / (6 * 0.5 / np.linalg.norm(top - low))
+    errors = path_errors(robot, path, gravity=[0.0, 0.0, -9.81])
+    expected = 3.0 * (9.81 + 5.0) / (6 * along[2] / np.linalg.norm(along))
     np.testing.assert_allclose(errors.arrays["drive_force"][0], expected, rtol=1e-9)
+
+
+def test_legs_with_masses_on_their_axes_may_spin_without_a_change(tmp_path):
+    """Balls at the base let them spin, universal joints do not: the same forces."""
+    names = ["tx", "ty", "tz", "rx", "ry", "rz"]
+    pose, rate, second = [0.05, -0.02, 0.55, 0.1, -0.1, 0.2], [0.5] * 6, [-3.0] * 6
+    forces = []
+    for kind in ("spherical", "universal"):
+        robot, _ = six_legs(tmp_path / f"{kind}.toml", kind, mass=0.8)
+        path = instants(names, [pose], [rate], [second])
+        errors = path_errors(robot, path, gravity=[0.0, 0.0, -9.81])
+        forces.append(errors.arrays["drive_force"][0])
+    np.testing.assert_allclose(forces[0], forces[1], rtol=1e-9)
