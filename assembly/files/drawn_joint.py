@@ -117,8 +117,9 @@ def _refuse_count(table: Table, key: str) -> None:
     """Reject a list of values for another number of bearings than two."""
     value = table.content.get(key)
     parts = dict if key == "clearance" else list
-    listed = isinstance(value, list) and all(isinstance(v, parts) for v in value)
-    if listed and len(value) != 2:
+    if not isinstance(value, list) or not all(isinstance(v, parts) for v in value):
+        return
+    if len(value) != 2:
         fault = f"found a list of {len(value)}, expected one value for both bearings"
         raise table.bad(key, f"{fault}, or two, [first, second]")
 
