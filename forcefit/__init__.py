@@ -85,6 +85,7 @@ _OWNERS = {
     "assembly.model.robot": (
         "BeamLink", "Clearance", "Frame", "LockedAt", "MatrixLink", "Robot",
     ),
+    "assembly.report.show": ("show",),
     "assembly.files.step_file": ("read_steps",),
     "assembly.steps.bolted": ("bolt_joints",),
     "assembly.steps.run": ("assemble_in_steps",),

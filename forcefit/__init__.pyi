@@ -15,6 +15,7 @@ from assembly.path.request import PathTimes, errors_along_path
 from assembly.platform_stiffness.deflection import deflection_curve
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.platform_stiffness.vibration import natural_modes
+from assembly.report.show import show
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.summary import summarise
@@ -85,6 +86,7 @@ __all__ = [
     "round_section",
     "run_draws",
     "run_study",
+    "show",
     "solve_assembly",
     "solve_exact",
     "summarise",

@@ -223,7 +223,7 @@ def _add_mass(sheet: _Sheet, i: int) -> None:
 
 def _new_body(sheet: _Sheet, name: str) -> int:
     """Add a body, and return its number."""
-    k = 1 + max(sheet.bodies, default=0)
+    k = 1 + max((*sheet.bodies, *sheet.same), default=0)
     sheet.bodies[k] = DrawnBody(sheet.new_name(name, joint=False))
     return k
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.drawing.drawing import DrawnBody, DrawnJoint, JointNumbers, perpendicular
+from assembly.drawing.parts import parts_of
 from assembly.drawing.rigid_bodies import RigidBodies, connects
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
@@ -69,7 +70,8 @@ def found_joints(
             rows.append(following[rows[-1]])
         options = (_several(posture, rows[:n]) for n in (3, 2) if len(rows) >= n)
         joint, rows = next(filter(None, options), None) or (_single(posture, i), [i])
-        if joint.name in names:
+        others = {f.name for k, f in enumerate(robot.frames) if k not in rows}
+        if joint.name in names or others & {part.name for part in parts_of(joint)}:
             joint = replace(joint, name=frame.name)
         names.add(joint.name)
         found.append(FoundJoint(joint, tuple(rows), _ends(bodies, rows)))

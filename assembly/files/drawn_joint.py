@@ -104,12 +104,25 @@ def _numbers(table: Table, kind: str, actuated: bool) -> tuple[JointNumbers, ...
     """Error, clearance and stiffness; of a universal joint for each bearing."""
     if kind != "universal":
         return (_one(table, kind, actuated),)
+    for key in ("clearance", "geometric_error", "tolerance"):
+        _refuse_count(table, key)
     bearings = []
     for which in (0, 1):
         content = {k: _bearing(table, k, which) for k in _KEYS if table.has(k)}
         place = f"{table.place}, {('first', 'second')[which]} bearing"
         bearings.append(_one(Table(content, table.file, place), "revolute", False))
     return tuple(bearings)
+
+
+def _refuse_count(table: Table, key: str) -> None:
+    """Reject a list of values for another number of bearings than two."""
+    value = table.content.get(key)
+    parts = dict if key == "clearance" else list
+    if not isinstance(value, list) or not all(isinstance(v, parts) for v in value):
+        return
+    if len(value) != 2:
+        fault = f"found a list of {len(value)}, expected one value for both bearings"
+        raise table.bad(key, f"{fault}, or two, [first, second]")
 
 
 def _bearing(table: Table, key: str, which: int) -> Any:

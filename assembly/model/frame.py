@@ -9,10 +9,12 @@ carries the children.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.model.equal_data import EqualData
 from assembly.model.inertia import inertia_fault, six_moments
 from assembly.model.link_kinds import BeamLink, Link
 from forcefit.inputs.table import BadInput, quoted
@@ -96,7 +98,7 @@ class LockedAt:
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class Frame(EqualData):
     """One body and the joint at its far end; see the head of this module.
 
     Attributes:
@@ -190,6 +192,12 @@ class Frame:
             # files have the upper triangle
             J = locked((self.inertia + self.inertia.T) / 2, (3, 3), "inertia")
             object.__setattr__(self, "inertia", J)
+
+    @cached_property
+    def _hash(self) -> int:
+        # what differs in random errors and identified geometries
+        numbers = self.translation.tobytes() + self.geometric_error.tobytes()
+        return hash((self.name, numbers))
 
     def _figures(self) -> Figures:
         """Return the fields in short; the rarest only where they are not zero."""

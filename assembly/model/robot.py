@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.callouts.callout import Callout
+from assembly.model.equal_data import EqualData
 from assembly.model.frame import (
     BASE,
     JOINTS,
@@ -33,7 +34,7 @@ from assembly.model.link_kinds import (
     MeshLink,
 )
 from forcefit.inputs.table import BadInput, nearest, quoted
-from forcefit.results.display import Figures, html_table, largest, short_repr
+from forcefit.results.display import Figures, html_table, largest, short_repr, show
 from stiffness.screws import rotation_matrix, transform
 
 __all__ = [
@@ -44,11 +45,11 @@ __all__ = [
 
 
 @dataclass(frozen=True, eq=False)
-class Robot:
+class Robot(EqualData):
     """A manipulator.
 
     Frames are stored parents first.  Rows of every array below are frames in that
-    order.
+    order.  Robots of equal data are equal, bit by bit.
 
     Attributes:
         name: name of the robot.
@@ -90,6 +91,7 @@ class Robot:
     fits: Mapping[str, str] = field(default_factory=dict)
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
+    show = show
 
     def _figures(self) -> Figures:
         """Return the summary that is printed."""
@@ -133,6 +135,10 @@ class Robot:
     def frame(self, name: str) -> Frame:
         """Return the frame of a name; see :meth:`index` for the error."""
         return self.frames[self.index(name)]
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((self.name, self.platform, self.frames))
 
     @cached_property
     def _rows(self) -> dict[str, int]:

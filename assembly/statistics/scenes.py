@@ -53,7 +53,7 @@ def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
     rngs = bolt_generators(robot, experiment.seed, [draw])
     robot = bolt_joints(robot, None if rngs is None else rngs[0])
     return _forced_robot(
-        replace(experiment.posture, robot=robot), experiment.load, experiment.gravity,
+        replace(experiment.posture, robot=robot), experiment.wrench, experiment.gravity,
         why=f"Draw {draw}, whose {NAMES[key]} is nearest to 95 % of them.",
     )  # fmt: skip
 

@@ -158,12 +158,12 @@ def load_design(name: str | Path) -> Design:
     Raises:
         BadInput: the name is neither a built-in name nor a file.
     """
-    from assembly.exchange.robot_files import OTHERS, load_robot
+    from assembly.exchange.robot_files import is_robot_file, load_robot
     from assembly.robots import BUILT_IN
 
     # an invalid file is refused before numbers are changed
     robot = load_robot(name, links=False)
-    if str(name) in BUILT_IN or Path(name).suffix.lower() in OTHERS:
+    if str(name) in BUILT_IN or not is_robot_file(Path(name)):
         return design_of(robot)
     table = read_toml(Path(name))
     if is_drawing(
