@@ -3,11 +3,15 @@
 from typing import Any
 
 from assembly.kinematics.posture import POSE
+from assembly.model.frame import LEFT
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Clearance, LockedAt
 from forcefit.inputs.table import Table, describe
 
-_EXPECTED = '"home", { pose = { tx = .. } } or { joints = { NAME = .. } }'
+_EXPECTED = (
+    '"home", { pose = { tx = .. } } or { joints = { NAME = .. } }, with left = '
+    '"uniform" for a random position'
+)
 
 
 def read_locked_at(
@@ -37,14 +41,15 @@ def read_locked_at(
     value = table.content[key]
     if value == "home":
         return None, LockedAt(clearance)
-    if not isinstance(value, dict) or len(value) != 1:
+    if not isinstance(value, dict) or {"pose", "joints"} <= set(value):
         raise table.bad(key, f"found {describe(value)}, expected {_EXPECTED}")
     inner = table.table(key)
     pose, joints = _numbers(inner, "pose", POSE), _numbers(inner, "joints", None)
+    left = inner.choice("left", LEFT, "least")
     inner.finish()
-    if not pose and not joints:
+    if not pose and not joints and set(value) != {"left"}:
         raise table.bad(key, f"found no coordinate, expected {_EXPECTED}")
-    return None, LockedAt(clearance, pose, joints)
+    return None, LockedAt(clearance, pose, joints, left)
 
 
 def _numbers(table: Table, key: str, names: tuple[str, ...] | None) -> dict[str, float]:
@@ -71,4 +76,7 @@ def bolt_table(bolt: LockedAt) -> Any:
         Plain values of the file format.
     """
     given = {"pose": bolt.pose, "joints": bolt.joints}
-    return {k: dict(v) for k, v in given.items() if v} or "home"
+    table: dict[str, Any] = {k: dict(v) for k, v in given.items() if v}
+    if bolt.left != "least":
+        table["left"] = bolt.left
+    return table or "home"

@@ -7,6 +7,7 @@ from assembly.effects import LIBRARY
 from assembly.effects.forms import FORMS
 from assembly.effects.functions import FORMULA
 from assembly.files.function_file import FUNCTION
+from assembly.model.frame import LEFT
 from assembly.model.function import KINDS
 from assembly.model.robot import JOINTS
 from forcefit.results.quantities import count, flag, number, text
@@ -64,7 +65,8 @@ _LINK = record(
 _LOCKED_AT = Either((
     Words(("home",)),
     record(pose_=Each(number("pose of the platform", "m, rad")),
-           joints_=Each(number("coordinate of a drive", "rad or m"))),
+           joints_=Each(number("coordinate of a drive", "rad or m")),
+           left_=Words(LEFT)),
 ))  # fmt: skip
 _CLEARANCE = record(
     radial_=number("radial clearance", "m"), axial_=number("axial clearance", "m"),

@@ -204,6 +204,9 @@ def _adjust(table: Table, name: str, robot: Robot) -> Adjust:
     dimension = "length" if components[0][0] == "T" else "angle"
     without_units(table, "increment", dimension)
     increment = table.number("increment", "rad or m", 0.0, least=0.0, largest=1e3)
+    if increment and len({c[0] for c in components}) > 1:
+        fault = "found for rotations and translations together, expected one kind"
+        raise table.bad("increment", fault)
     frame = _frame(table, "adjust", robot)
     return Adjust(name, frame, components, Measure(name, reading, of), increment)
 

@@ -65,6 +65,9 @@ class Clearance:
             raise BadInput(f"clearance.{key}: {ONE_OF_BALL}")
 
 
+LEFT = ("least", "uniform")  # rules for the position in which a joint is bolted
+
+
 @dataclass(frozen=True, eq=False)
 class LockedAt:
     """A fixed joint with clearance that is bolted at one pose and rigid afterwards.
@@ -73,6 +76,8 @@ class LockedAt:
         clearance: before it is bolted.
         pose: components ``tx .. rz`` [m, rad] of the platform at that pose.
         joints: or coordinates [rad or m] of drives; home if both are empty.
+        left: where the fitter leaves drawn machines: ``"least"``, the least sum of
+            squares among the positions of least energy, or ``"uniform"``, any of them.
         screw: (6,) [rad, m] clearance that is locked in; it is part of the geometric
             error.  Computed by :func:`assembly.steps.bolted.bolt_joints`.
     """
@@ -80,9 +85,15 @@ class LockedAt:
     clearance: Clearance
     pose: Mapping[str, float] = field(default_factory=dict)
     joints: Mapping[str, float] = field(default_factory=dict)
+    left: str = "least"
     screw: NDArray = field(default_factory=lambda: np.zeros(6))
 
     def __post_init__(self) -> None:
+        if self.left not in LEFT:
+            raise BadInput(
+                f"locked_at.left: found {quoted(self.left)}, expected one of "
+                f"{', '.join(LEFT)}"
+            )
         object.__setattr__(self, "screw", locked(self.screw, (6,), "locked_at: screw"))
 
 

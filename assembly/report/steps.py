@@ -11,11 +11,18 @@ from assembly.linear.energy import failure_status
 from assembly.linear.reference.energy import CannotAssemble
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.statuses import OK
+from assembly.report.influences import (
+    about_influences,
+    about_order,
+    influence_values,
+    influences_among_joins,
+)
 from assembly.solvers.conic import SolverFailed
+from assembly.steps.influence import Influence
 from assembly.steps.machine import Machine, machine_at
 from assembly.steps.plan import Adjust, Fix, Join, Plan, Preload, Release, Step
 from assembly.steps.run import StepResult, carry_out
-from assembly.steps.search import BestOrder, why_order_matters
+from assembly.steps.search import BestOrder
 from assembly.steps.state import State, first_state
 from forcefit.inputs.errors import quoted
 from forcefit.results.display import listing, numbers
@@ -53,7 +60,7 @@ def steps_of(
     machine = machine_at(posture)
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": OK, "pose": posture.pose(),
-        "remarks": [_about_order(plan)], "steps": [],
+        "remarks": [about_order(plan)], "steps": [],
     }  # fmt: skip
     if machine.cones.shape[1]:
         results["remarks"].append(_IN_CLEARANCES)
@@ -66,7 +73,9 @@ def steps_of(
     try:
         state = first_state(machine, plan, None, gravity)
         results["first_energy"] = float(state.found.energy[0])
-        for step in plan.steps:
+        found: list[Influence] = []
+        for number, step in enumerate(plan.steps):
+            found += influences_among_joins(machine, state, plan, number)
             state, result = carry_out(machine, state, step)
             results["steps"].append(_values(result))
             if states is not None:
@@ -75,18 +84,10 @@ def steps_of(
         failed = plan.steps[len(results["steps"])].name
         reason = f"step {quoted(failed)}: {error}"
         return results | {"status": failure_status(error), "reason": reason}
+    if found:
+        results["remarks"][:1] = about_influences(plan, found)
+        results["influences"] = [influence_values(pair) for pair in found]
     return results | _totals(results)
-
-
-def _about_order(plan: Plan) -> str:
-    """Return whether the order matters, in a sentence."""
-    why = why_order_matters(plan)
-    if why:
-        return f"the order matters: these steps hold what they find: {why}"
-    return (
-        "the order does not change the assembled machine, because every part is joined "
-        "at a fixed position; it changes the closing forces"
-    )
 
 
 def kind_of(step: Step) -> str:

@@ -26,7 +26,7 @@ from assembly.statistics.posture_margins import PostureMargins, prepare_margins
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.stiffness_spread import draw_stiffnesses
 from assembly.statistics.worst_clearance import PRECISION, bound_worst_errors
-from assembly.steps.bolted import bolted_errors
+from assembly.steps.bolted import bolt_generators, bolted_errors
 from forcefit.inputs.renamed import renamed_fields, warn_renamed
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
@@ -203,7 +203,9 @@ class Experiment:
         self, values: NDArray, draws: Sequence[int] | NDArray
     ) -> tuple[NDArray, NDArray, NDArray]:
         """Return records with the posture's clearances, wrenches, and their weights."""
-        errors = bolted_errors(self.posture.robot, self.sources.errors(values))
+        robot = self.posture.robot
+        bolts = bolt_generators(robot, self.seed, draws)
+        errors = bolted_errors(robot, self.sources.errors(values), bolts)
         solved = self.energies.solve(errors)
         rows = np.zeros(len(values), dtype=self.record_type)
         rows["energy"] = solved.energy

@@ -7,6 +7,7 @@ it were a geometric error.  Joints are bolted in the order of the frames; those 
 same pose together.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import groupby
@@ -16,23 +17,29 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.posture import Posture, place_robot
 from assembly.linear.reference.energy import CannotAssemble
+from assembly.model.error_distributions import draw_generator
 from assembly.model.robot import Frame, LockedAt, Robot
 from assembly.solvers.conic import SolverFailed
+from assembly.steps.left_anywhere import (
+    positions_left_anywhere,
+)
 from assembly.steps.machine import Machine, machine_at
 from assembly.steps.plan import Plan
 from assembly.steps.state import first_state
 from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import numbers
 
+BOLT_STREAM = 4  # stream of random numbers of bolted joints, see draw_generator
 _ROUNDED = 1e-12  # share of its bound below which a clearance is rounding
 _BOLTED = "is bolted at"  # words of a remark
 
 
-def bolt_joints(robot: Robot) -> Robot:
+def bolt_joints(robot: Robot, rng: np.random.Generator | None = None) -> Robot:
     """Return a robot with the clearances of its bolted joints locked in.
 
     Args:
         robot: robot whose links are solved.
+        rng: of a drawn machine, see :func:`bolted_errors`.
 
     Returns:
         The robot; the screws locked in are part of its geometric errors.  The same
@@ -45,7 +52,8 @@ def bolt_joints(robot: Robot) -> Robot:
     if not any(frame.locked_at for frame in robot.frames):
         return robot
     declared = robot.declared_errors
-    total = bolted_errors(robot, declared[None])[0]
+    rngs = None if rng is None else [rng]
+    total = bolted_errors(robot, declared[None], rngs)[0]
     frames = []
     for frame, error, own in zip(robot.frames, total, declared, strict=True):
         bolt = frame.locked_at
@@ -61,15 +69,40 @@ def _remark(frame: Frame) -> str:
     """Return the position in which a joint is bolted."""
     assert frame.locked_at is not None
     screw = numbers(frame.locked_at.screw)
-    return f"joint {quoted(frame.name)} {_BOLTED} {screw} rad, m in its clearance"
+    drawn = ", drawn machines anywhere at least energy"
+    rule = drawn if frame.locked_at.left == "uniform" else ""
+    return f"joint {quoted(frame.name)} {_BOLTED} {screw} rad, m in its clearance{rule}"
 
 
-def bolted_errors(robot: Robot, errors: NDArray) -> NDArray:
+def bolt_generators(
+    robot: Robot, seed: int, draws: Sequence[int] | NDArray
+) -> list[np.random.Generator] | None:
+    """Return the generators of the positions in which drawn machines are bolted.
+
+    Args:
+        robot: any robot.
+        seed: seed of all draws.
+        draws: numbers of the draws.
+
+    Returns:
+        One for each draw; None if no position is random.
+    """
+    if all(f.locked_at is None or f.locked_at.left == "least" for f in robot.frames):
+        return None
+    numbers = np.asarray(draws).tolist()
+    return [draw_generator(seed, number, BOLT_STREAM) for number in numbers]
+
+
+def bolted_errors(
+    robot: Robot, errors: NDArray, rngs: Sequence[np.random.Generator] | None = None
+) -> NDArray:
     """Return the errors of machines with the clearances of bolted joints locked in.
 
     Args:
         robot: robot of n frames whose links are solved; its own errors do not matter.
         errors: (k, n, 6) [rad, m] of k machines, nothing locked in.
+        rngs: k generators of drawn machines, for joints left ``"uniform"``; where
+            absent, they are left at the least sum of squares.
 
     Returns:
         (k, n, 6) [rad, m] with the screws locked in; the same object if no joint is
@@ -86,6 +119,9 @@ def bolted_errors(robot: Robot, errors: NDArray) -> NDArray:
             place = f"{robot.name}: frame {quoted(robot.frames[frames[0]].name)}"
             raise BadInput(f"{place}.locked_at: {error}") from None
         u = state.found.clearances
+        bolt = robot.frames[frames[0]].locked_at
+        if rngs is not None and bolt is not None and bolt.left == "uniform":
+            u = positions_left_anywhere(machine, state, rngs)
         moved = np.where(np.abs(u) > _ROUNDED, u, 0.0) @ machine.cones.T
         total = total.copy()
         total[:, frames] += moved.reshape(total.shape)[:, frames]
@@ -122,7 +158,7 @@ def _pose(frame: Frame) -> tuple:
     """Return what two frames that are bolted together have in common."""
     bolt = frame.locked_at
     assert bolt is not None
-    return sorted(bolt.pose.items()), sorted(bolt.joints.items())
+    return sorted(bolt.pose.items()), sorted(bolt.joints.items()), bolt.left
 
 
 def _posture(robot: Robot, row: int, open_: set[int]) -> Posture:

@@ -17,6 +17,7 @@ from forcefit.inputs.table import BadInput, nearest, quoted
 from stiffness.screws import SCREW
 
 Closure = tuple[str, str]
+GRAVITY = "gravity"  # name of the weights among the loads of steps
 
 
 @dataclass(frozen=True)
@@ -165,12 +166,16 @@ def check_plan(plan: Plan, robot: Robot) -> None:
             f"{robot.name}: frame {quoted(driven[0])}.drive_force: found a drive that "
             "applies a force, which steps of assembly do not compute; expected none"
         )
+    taken = {closure_name(closure): "a closure" for closure in robot.closures}
+    taken |= {GRAVITY: "the weights"}
     names: set[str] = set()
     held: dict[str, Closure | str | None] = {}
     for number, step in enumerate(plan.steps, 1):
         where = f"step[{number}] {quoted(step.name)}"
         if step.name in names:
             raise BadInput(f"{where}: the name of an earlier step, expected another")
+        if step.name in taken:
+            raise BadInput(f"{where}: the name of {taken[step.name]}, expected another")
         names.add(step.name)
         for part in _parts_of(step):
             _check_part(where, part, robot)
@@ -223,6 +228,11 @@ def _held(held: Mapping) -> str:
     """Return the names that may be released, in words."""
     names = ", ".join(map(quoted, held))
     return f"one of {names}" if names else "an earlier step that holds something"
+
+
+def closure_name(closure: Closure) -> str:
+    """Return the name under which a closure holds that no step joins."""
+    return f"{closure[0]} - {closure[1]}"
 
 
 def rows_of(components: tuple[str, ...]) -> NDArray:

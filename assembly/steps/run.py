@@ -24,6 +24,7 @@ from assembly.linear.load import loads_on_frames
 from assembly.steps.adjusting import adjustment_of, with_adjustment
 from assembly.steps.machine import Machine, machine_at
 from assembly.steps.plan import (
+    GRAVITY,
     Fix,
     Join,
     Measure,
@@ -260,7 +261,7 @@ def _told(
     gained = np.where(np.abs(gained) <= _ROUNDED * size, 0.0, gained)
     wrenches = _wrenches(machine, after)
     releasing = isinstance(step, Release)
-    linear = before.is_linear(machine) and "gravity" not in after.loads
+    linear = before.is_linear(machine) and GRAVITY not in after.loads
     half = _half_work(machine, before, after, step)
     return after, replace(
         result, energy=after.found.energy, load_work=load_work,

@@ -3,13 +3,15 @@
 Only steps that join are permuted, among themselves and between the other steps.  If
 all of them are closed at fixed positions, the state after each depends only on the set
 joined so far; the least peak force is a shortest path over the 2^n sets, with the
-largest force in place of the sum.  If joints are bolted as they lie, the orders are
-searched by branch and bound: the peak force never falls, and without loads joining a
-part never lowers the energy, so both bound the orders not yet searched.
+largest force in place of the sum.  The path is searched from its end, because the state
+of a set has the closing forces of all its parts.  If joints are bolted as they lie, the
+orders are searched by branch and bound: the peak force never falls, and without loads
+joining a part never lowers the energy, so both bound the orders not yet searched.
 """
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from heapq import heappop, heappush
 from itertools import groupby
 from math import inf
 from typing import Literal
@@ -19,16 +21,16 @@ from numpy.typing import ArrayLike
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.reference.energy import CannotAssemble
+from assembly.steps.influence import depends_on_state
 from assembly.steps.machine import Machine, machine_at
-from assembly.steps.plan import Adjust, Fix, Join, Plan, Step, check_plan
+from assembly.steps.plan import Join, Plan, Step, check_plan
 from assembly.steps.run import StepResult, carry_out
-from assembly.steps.state import State, first_state
+from assembly.steps.state import State, closed_rows, first_state, settle
 from forcefit.inputs.table import BadInput, quoted
 
 Objective = Literal["force", "energy", "error"]
 OBJECTIVES: tuple[Objective, ...] = ("force", "energy", "error")
 ALL_ORDERS = 8  # joins in a run of which all orders are searched, without a bound
-MOST_SETS = 14  # joins in a run whose sets are searched
 _EQUAL = 1e-9  # share by which an order must be better than the given one
 MOST_STATES = 200_000  # states that are computed: some minutes
 
@@ -58,26 +60,6 @@ class BestOrder:
     method: str
 
 
-def why_order_matters(plan: Plan) -> str:
-    """Return why the final state depends on the order; empty if it cannot.
-
-    Args:
-        plan: any plan.
-
-    Returns:
-        The steps that depend on the state that they find, in words.
-    """
-    steps = [step.name for step in plan.steps if _depends_on_state(step)]
-    return ", ".join(steps)
-
-
-def _depends_on_state(step: Step) -> bool:
-    """Return whether a step holds something at a position that it finds."""
-    if isinstance(step, Join):
-        return isinstance(step.part, str) or bool(step.locked) or step.leave_open
-    return isinstance(step, Adjust) or (isinstance(step, Fix) and not step.position)
-
-
 def best_order(
     plan: Plan,
     posture: Posture,
@@ -96,7 +78,7 @@ def best_order(
             the end.
         gravity: (3,) [m/s^2] base axes.
         progress: called with the number of states computed.
-        most: number of states after which a search over orders ends with a bound.
+        most: number of states after which a search ends with a bound.
 
     Returns:
         The order, with a bound.
@@ -112,17 +94,12 @@ def best_order(
     longest = max((len(run) for run in runs if isinstance(run[0], Join)), default=0)
     search = _Search(machine, objective, progress, most)
     given = search.value_of(start, plan.steps)
-    pinned = not any(isinstance(s, Join) and _depends_on_state(s) for s in plan.steps)
+    pinned = not any(isinstance(s, Join) and depends_on_state(s) for s in plan.steps)
     if pinned and objective == "force":
-        if longest > MOST_SETS:
-            raise BadInput(
-                f"order: found {longest} joining steps in a row, expected at most "
-                f"{MOST_SETS}"
-            )
         found = _over_sets(search, start, runs, given)
         if found.value < given * (1 - _EQUAL):
             return found
-        return replace(found, plan=plan, value=given, bound=given)
+        return replace(found, plan=plan, value=given, bound=min(given, found.bound))
     if objective == "error" and longest > ALL_ORDERS:
         raise BadInput(
             f"order: found {longest} joining steps in a row, expected at most "
@@ -149,6 +126,29 @@ class _Search:
             return carry_out(self.machine, state, step)
         except CannotAssemble:
             return None
+
+    def closing_forces(
+        self, start: State, run: list[Step], chosen: int
+    ) -> list[tuple[int, float]]:
+        """Return the [N] closing force of each part of a set, were it joined last."""
+        self.done += 1
+        self.progress(self.done)
+        joined = [k for k in range(len(run)) if chosen >> k & 1]
+        holds = dict(start.holds)
+        for k in joined:
+            step = run[k]
+            assert isinstance(step, Join)
+            assert not isinstance(step.part, str)
+            holds[step.name] = closed_rows(self.machine, start, step.part)
+        try:
+            found = settle(self.machine, replace(start, holds=holds)).multipliers()
+        except CannotAssemble:
+            raise BadInput(
+                "order: the robot cannot be assembled in any order"
+            ) from None
+        wrenches = [found[run[k].name][0] * self.machine.scale for k in joined]
+        forces = [float(np.linalg.norm(wrench[3:])) for wrench in wrenches]
+        return list(zip(joined, forces, strict=True))
 
     def value(self, peak: float, state: State) -> float:
         """Return the objective of a state that was reached with a peak force."""
@@ -189,11 +189,11 @@ def _over_sets(
 ) -> BestOrder:
     """Return the best order where the state depends only on the set joined."""
     steps: list[Step] = []
-    peak = 0.0
+    peak = bound = 0.0
     for run in runs:
         if isinstance(run[0], Join):
-            run, least = _bottleneck(search, state, run)
-            peak = max(peak, least)
+            run, worst, least = _bottleneck(search, state, run)
+            peak, bound = max(peak, worst), max(bound, least)
         for step in run:
             found = search.carry_out(state, step)
             if found is None:
@@ -202,43 +202,51 @@ def _over_sets(
                 )
             state = found[0]
         steps += run
-    return BestOrder(Plan(tuple(steps)), peak, peak, given, search.done, "sets")
+    return BestOrder(Plan(tuple(steps)), peak, bound, given, search.done, "sets")
 
 
 def _bottleneck(
     search: _Search, start: State, run: list[Step]
-) -> tuple[list[Step], float]:
-    """Return the order of one run with the least peak force, and that force."""
-    count = len(run)
-    states: dict[int, State] = {0: start}
-    best: dict[int, tuple[float, int]] = {0: (0.0, -1)}
-    for chosen in sorted(range(1, 1 << count), key=lambda s: s.bit_count()):
-        peaks = []
-        for k in range(count):
-            before = chosen & ~(1 << k)
-            if before != chosen and before in states:
-                peaks.append((best[before][0], k))
-        if not peaks:
-            continue
-        k = peaks[0][1]
-        found = search.carry_out(states[chosen & ~(1 << k)], run[k])
-        if found is None:
-            continue
-        # the closing force of a part is its force in the set that includes it
-        states[chosen], wrenches = found[0], found[1].wrenches
-        best[chosen] = min(
-            (max(peak, float(np.linalg.norm(wrenches[run[k].name][0, 3:]))), k)
-            for peak, k in peaks
-        )
-    chosen, order = (1 << count) - 1, []
-    if chosen not in best:
-        raise BadInput("order: the robot cannot be assembled in any order")
-    least = best[chosen][0]
+) -> tuple[list[Step], float, float]:
+    """Return the order of one run with the least peak force, that force and its bound.
+
+    The search goes backwards, from the set of all parts, by increasing peak force: one
+    equilibrium has the closing forces of all parts that may have been joined last.
+    After the largest number of states, or Ctrl-C, the part that needs the least force
+    comes last each time.
+    """
+    chosen = (1 << len(run)) - 1
+    best, later = {chosen: 0.0}, {chosen: -1}
+    heap, bound = [(0.0, len(run), chosen)], 0.0
+    try:
+        while heap[0][2] and search.done < search.most:
+            peak, _, chosen = heappop(heap)
+            if peak > best[chosen]:
+                continue
+            bound = peak
+            for k, force in search.closing_forces(start, run, chosen):
+                left, worst = chosen & ~(1 << k), max(peak, force)
+                if worst < best.get(left, inf):
+                    best[left], later[left] = worst, k
+                    heappush(heap, (worst, left.bit_count(), left))
+        bound, _, chosen = heap[0]
+    except KeyboardInterrupt:
+        pass
+    peak, order = best[chosen], _joined_after(chosen, later)
     while chosen:
-        k = best[chosen][1]
-        order.append(run[k])
-        chosen &= ~(1 << k)
-    return order[::-1], least
+        forces = search.closing_forces(start, run, chosen)
+        k, force = min(forces, key=lambda pair: pair[1])
+        chosen, peak, order = chosen & ~(1 << k), max(peak, force), [k, *order]
+    return [run[k] for k in order], peak, bound
+
+
+def _joined_after(chosen: int, later: dict[int, int]) -> list[int]:
+    """Return the parts joined after a set, in order."""
+    order = []
+    while (k := later[chosen]) >= 0:
+        order.append(k)
+        chosen |= 1 << k
+    return order
 
 
 def _over_orders(search: _Search, start: State, plan: Plan, given: float) -> BestOrder:

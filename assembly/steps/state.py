@@ -13,7 +13,14 @@ from assembly.steps.equilibrium import (
     without_idle_weight,
 )
 from assembly.steps.machine import Machine, Part
-from assembly.steps.plan import Fix, Measure, Plan, rows_of
+from assembly.steps.plan import (
+    GRAVITY,
+    Fix,
+    Measure,
+    Plan,
+    closure_name,
+    rows_of,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,12 +100,12 @@ def first_state(
     joined = plan.joined()
     for closure in robot.closures:
         if closure not in joined:
-            name = f"{closure[0]} - {closure[1]}"
-            state.holds[name] = closed_rows(machine, state, closure)
+            hold = closed_rows(machine, state, closure)
+            state.holds[closure_name(closure)] = hold
     if gravity is not None:
         bodies, carried = weights(machine.posture, gravity)
         loads = loads_on_frames(machine.posture, None, bodies, carried)
-        state.loads["gravity"] = loads
+        state.loads[GRAVITY] = loads
     return settle(machine, state)
 
 
@@ -118,8 +125,8 @@ def settle(machine: Machine, state: State) -> State:
     roots = _blocks([hold.roots for hold in held], len(rows))
     last, bolted = state.found, tuple(state.bolted.values())
     movable, cones, motions = machine.movable(tuple(state.loads.values()), bolted, k)
-    if "gravity" in state.loads:
-        weight = state.loads["gravity"].joint @ movable.free
+    if GRAVITY in state.loads:
+        weight = state.loads[GRAVITY].joint @ movable.free
         movable = without_idle_weight(movable, weight, rows)
     fixed = state.errors.copy()
     fixed += last.clearances[:, ~cones] @ machine.cones[:, ~cones].T

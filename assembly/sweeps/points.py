@@ -33,7 +33,7 @@ from assembly.model.statuses import (
 from assembly.platform_stiffness.vibration import natural_modes
 from assembly.report.first_order import MOST_ENERGY, off_by
 from assembly.solvers.conic import SolverFailed
-from assembly.steps.bolted import bolted_errors
+from assembly.steps.bolted import bolt_generators, bolted_errors
 from assembly.sweeps.point_conditions import (
     assemble_rows,
     is_loaded,
@@ -214,7 +214,9 @@ def _errors(question: Question, robot: Robot, draws: NDArray) -> NDArray:
     pages = {page: _page(question, page) for page in np.unique(draws // _PAGE).tolist()}
     own, which = np.unique(draws, return_inverse=True)
     errors = np.array([pages[d // _PAGE][d % _PAGE] for d in own.tolist()])
-    return bolted_errors(robot, errors)[which]
+    return bolted_errors(robot, errors, bolt_generators(robot, question.seed, own))[
+        which
+    ]
 
 
 @lru_cache(maxsize=8)

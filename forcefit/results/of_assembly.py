@@ -296,6 +296,16 @@ _STEPS = record(
         given=number("value in the order given", ""), searched=count("states computed"),
         steps=text("names of the steps", "step"),
     ),
+    influences_=Listed(record(
+        locked=text("step that holds the opening that it finds", "step"),
+        joined=text("step that may move this opening", "step"),
+        zero=flag("closing the part does not move the opening, for any errors"),
+        free=flag("a free motion moves both openings"),
+        coefficients=Listed(number(
+            "motion of a locked component by the closing wrench",
+            "rad or m per N m or N",
+        )),
+    )),
     first_energy_=number("energy before the first step", "J"),
     energy_=number("energy of the assembled machine", "J"),
     work_=number("work of all steps", "J"), lost_=number("energy lost", "J"),

@@ -518,11 +518,67 @@ def test_legs_cut_to_increments_leave_the_rounding_of_their_lengths(rng):
     assert (np.abs(last.platform_screw) <= most).all()
 
 
-def test_adjustment_of_loose_clearances_is_refused_in_one_line():
+@pytest.mark.parametrize(("increment", "change"), [(0.0, -50e-6), (40e-6, -40e-6)])
+def test_shim_closes_without_force_where_the_clearance_lies(increment, change):
+    """Pin 1 lies in the middle of +- 20 um: leg 2, 50 um long, is cut to it; rounded
+    to 40 um, the clearance takes up the 10 um left."""
+    posture = legs_with_pins((0.0, 50e-6), (20e-6, None), k=(1e6, 1e6))
+    shim = Adjust("shim", "leg2", ("TZ",), Measure("gap", LEG[2]), increment)
+    steps = (join_leg(1), shim, join_leg(2))
+    results = assemble_in_steps(Plan(steps), posture)
+    assert results[1].adjustment[0, 0] == pytest.approx(change, rel=1e-6)
+    assert results[2].closing_force == pytest.approx(0.0, abs=1e-5)
+    alone = assemble_in_steps(Plan((join_leg(1), join_leg(2))), posture)
+    assert alone[-1].closing_force == pytest.approx(15.0)  # 30 um on 5e5 N/m
+
+
+@pytest.mark.parametrize(
+    ("name", "component"), [("four_bar", "TZ"), ("3rrr", "RX"), ("four_bar", "TX")]
+)
+def test_shim_of_a_robot_with_clearances_needs_the_least_energy_of_all(
+    name, component, rng
+):
+    """Against a scan of the shim, each length closed with loose clearances."""
+    robot = load_robot(name)
+    errors = rng.normal(size=robot.errors.shape) * np.repeat([3e-3, 3e-4], 3)
+    posture = home_posture(robot.with_errors(errors))
+    *others, last = robot.closures
+    frame = robot.frame(last[1])
+    joins = tuple(Join(f"{i}", part) for i, part in enumerate(others))
+    shim = Adjust("shim", frame.name, (component,), Measure("gap", last))
+    results = assemble_in_steps(Plan((*joins, shim, Join("last", last))), posture)
+    change, found = results[-2].adjustment[0, 0], results[-1].energy[0]
+    energies = []
+    for other in change + np.array([-1e-4, -1e-5, 1e-5, 1e-4]):
+        moved = errors.copy()
+        moved[robot.index(frame.name), SCREW.index(component)] += other
+        other_posture = home_posture(robot.with_errors(moved))
+        closed = assemble_in_steps(Plan((*joins, Join("last", last))), other_posture)
+        energies.append(closed[-1].energy[0])
+    assert found <= min(energies) * (1 + 1e-6) + 1e-10
+    if component == "TX":  # in the plane, where the joints close without a shim
+        assert change == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("before", "reading", "text"),
+    [
+        ((), Measure("z", "platform", Z), "a frame as the reading"),
+        (
+            (Preload("weight", "platform", np.array([0, 0, 0, 0, 0, -1.0])),),
+            Measure("gap", LEG[2]), 'the loads "weight"',
+        ),
+    ],
+)  # fmt: skip
+def test_adjustment_that_is_no_least_energy_is_refused_in_one_line(
+    before, reading, text
+):
     posture = legs_with_pins((0.0, 30e-6), (20e-6, None))
-    shim = Adjust("shim", "leg2", ("TZ",), Measure("z", "platform", Z))
-    with pytest.raises(BadInput, match='step "shim": found clearances'):
-        assemble_in_steps(Plan((join_leg(1), shim, join_leg(2))), posture)
+    shim = Adjust("shim", "leg2", ("TZ",), reading)
+    steps = (join_leg(1), *before, shim, join_leg(2))
+    with pytest.raises(BadInput, match='step "shim": found clearances') as caught:
+        assemble_in_steps(Plan(steps), posture)
+    assert text in str(caught.value)
 
 
 def test_adjustment_is_possible_once_every_clearance_is_bolted():

@@ -6,11 +6,14 @@ from itertools import permutations
 import numpy as np
 import pytest
 
+from assembly.kinematics.posture import home_posture
+from assembly.model.robot import Frame, Robot
+from assembly.steps.influence import why_order_matters
 from assembly.steps.plan import Fix, Join, Plan, Release
 from assembly.steps.run import assemble_in_steps
-from assembly.steps.search import OBJECTIVES, best_order, why_order_matters
+from assembly.steps.search import OBJECTIVES, best_order
 from forcefit.inputs.table import BadInput
-from tests.assembly.steps.robots_for_steps import planar_platform, three_legs
+from tests.assembly.steps.robots_for_steps import leg, planar_platform, three_legs
 
 LEG = {i: ("platform", f"leg{i}") for i in (1, 2, 3)}
 
@@ -103,6 +106,66 @@ def test_search_that_ends_early_brackets_the_best_order(objective, most, rng):
     assert early.bound <= every.value * (1 + 1e-9)
     assert every.value <= early.value * (1 + 1e-9)
     assert early.searched < every.searched
+
+
+def legs_along_z(rng, count):
+    """Legs of a platform that a guide leaves free along z: stiffnesses and errors."""
+    k, d = rng.uniform(1e6, 3e6, count), rng.normal(size=count) * 3e-5
+    frames = [
+        Frame("guide", "base", joint="prismatic"),
+        Frame("platform", "guide"),
+        *(leg(f"leg{i}", *kd) for i, kd in enumerate(zip(k, d, strict=True))),
+    ]
+    closures = tuple(("platform", f"leg{i}") for i in range(count))
+    robot = Robot("legs", "platform", tuple(frames), closures)
+    return home_posture(robot), Plan(tuple(Join(b, (a, b)) for a, b in closures)), k, d
+
+
+def least_peak(k, d):
+    """Return the least peak force over all 2^n sets: leg i needs k_i (d_i - x)."""
+    sets = np.arange(1 << len(k))
+    chosen = sets[:, None] >> np.arange(len(k)) & 1
+    x = chosen @ (k * d) / np.maximum(chosen @ k, 1.0)
+    best = np.full(len(sets), np.inf)
+    best[0] = 0.0
+    for size in range(1, len(k) + 1):
+        layer = sets[chosen.sum(axis=1) == size]
+        for i in range(len(k)):
+            with_i = layer[layer >> i & 1 == 1]
+            force = k[i] * np.abs(d[i] - x[with_i])
+            peak = np.maximum(best[with_i & ~(1 << i)], force)
+            best[with_i] = np.minimum(best[with_i], peak)
+    return best[-1]
+
+
+def test_least_peak_force_of_twelve_pinned_legs_is_that_of_all_their_sets(rng):
+    posture, plan, k, d = legs_along_z(rng, 12)
+    found = best_order(plan, posture, "force")
+    assert found.value == pytest.approx(least_peak(k, d), rel=1e-9)
+    assert found.bound == pytest.approx(found.value)
+    assert outcome(found.plan, posture, "force") == pytest.approx(found.value)
+
+
+@pytest.mark.parametrize("most", [12, 20, 40])
+def test_search_over_sets_that_ends_early_brackets_the_least_peak_force(most, rng):
+    posture, plan, k, d = legs_along_z(rng, 9)
+    found = best_order(plan, posture, "force", most=most)
+    least = least_peak(k, d)
+    assert found.bound <= least * (1 + 1e-9)
+    assert least <= found.value * (1 + 1e-9)
+    assert outcome(found.plan, posture, "force") == pytest.approx(found.value)
+
+
+def test_interrupted_search_over_sets_brackets_the_least_peak_force(rng):
+    posture, plan, k, d = legs_along_z(rng, 9)
+
+    def stop(done):
+        if done == 14:
+            raise KeyboardInterrupt
+
+    found = best_order(plan, posture, "force", progress=stop)
+    least = least_peak(k, d) * (1 + 1e-9)
+    assert found.bound <= least <= found.value * (1 + 2e-9)
 
 
 def test_interrupted_search_returns_the_best_order_so_far():

@@ -128,6 +128,19 @@ def test_draws_have_the_quantiles_of_the_springs(run, files, tmp_path):
             'of = ["rx", "tz"]\n',
             "found rotations and translations together",
         ),
+        (
+            '[[step]]\nadjust = "leg1"\ncomponents = ["tz", "rx"]\nincrement = 1e-5\n'
+            'reading = "platform"\nof = ["tz"]\n',
+            "step[1].increment: found for rotations and translations together",
+        ),
+        (
+            '[[step]]\nname = "platform - leg2"\njoin = ["platform", "leg1"]\n',
+            "the name of a closure",
+        ),
+        (
+            '[[step]]\nname = "gravity"\npreload = "leg1"\nload = { fz = 1 }\n',
+            "the name of the weights",
+        ),
         ("steps = 3\n", "steps"),
         ("", "step: missing"),
     ],
