@@ -64,10 +64,11 @@ def robot_of_drawing(drawing: Drawing) -> Robot:
             placed += _ends(plan, step)
             closures.append((placed[-1][0].name, _seat(plan, step)))
     remarks = (*_cuts(steps), *drawing.remarks)
+    fits, ends = frame_fits(steps)
     return Robot(
         drawing.name, drawing.platform, place_frames(placed), tuple(closures),
         drawing.description, remarks=remarks,
-        callouts=frame_callouts(drawing, steps, placed), fits=frame_fits(steps),
+        callouts=frame_callouts(drawing, steps, placed), fits=fits, fitted_ends=ends,
     )  # fmt: skip
 
 
