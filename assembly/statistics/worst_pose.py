@@ -131,6 +131,19 @@ def worst_pose(
     )
 
 
+def farthest_screw(sets: ErrorSets, half: int) -> tuple[tuple[float, float], NDArray]:
+    """Bracket the largest half screw over the zones without any condition.
+
+    Args:
+        sets: zones of errors and clearances.
+        half: 0 for the rotation, 3 for the translation.
+
+    Returns:
+        [rad or m] value attained and certified bound, and (6,) the screw attained.
+    """
+    return _farthest(sets, sets.rigid_rows[:0], half)
+
+
 def _farthest(
     sets: ErrorSets, rows: NDArray, half: int
 ) -> tuple[tuple[float, float], NDArray]:
