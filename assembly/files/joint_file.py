@@ -103,7 +103,8 @@ def read_bounds(table: Table, joint: str) -> Clearance:
             raise table.bad("ball", SLIDING_BALL)
         for key in ("radial", "axial"):
             if key in bounds:
-                raise table.bad(key, ONE_OF_BALL)
+                given = "fit" if fit and key == "radial" else key
+                raise table.bad(given, ONE_OF_BALL)
     return Clearance(**bounds)
 
 

@@ -161,12 +161,13 @@ def _framed(root: Table, name: str, description: str) -> Robot:
     closures = tuple(_closure(table, names) for table in tables[1])
     callouts = read_frame_callouts(root, names)
     _check_known(root, "platform", platform, names)
+    ends = _fitted_ends(tables[0])
     try:
         robot = Robot(
             name, platform, frames, closures, description,
             remarks=_remarks(tables[0]), callouts=callouts,
             fits={t.content["name"]: fit for t in tables[0] if (fit := read_fit(t))},
-            fitted_ends=_fitted_ends(tables[0]),
+            fitted_ends=ends,
         )  # fmt: skip
         _check_meeting_frames(robot)
     except BadInput as error:
@@ -246,13 +247,14 @@ def _fitted_ends(tables: list[Table]) -> dict[str, FittedEnd]:
     fits: dict[str, str] = {}
     for table in tables:
         end, fit = read_fitted_end(table), read_fit(table)
-        if end is None:
-            continue
-        if fits.setdefault(end.parts, fit) != fit:
-            found = f"found {quoted(fit)} of the parts {quoted(end.parts)}"
-            expected = f"expected {quoted(fits[end.parts])}, as before"
+        name = table.content["name"]
+        parts = name if end is None else end.parts
+        if fit and fits.setdefault(parts, fit) != fit:
+            found = f"found {quoted(fit)} of the parts {quoted(parts)}"
+            expected = f"expected {quoted(fits[parts])}, as before"
             raise table.table("clearance").bad("fit", f"{found}, {expected}")
-        ends[table.content["name"]] = end
+        if end is not None:
+            ends[name] = end
     return ends
 
 
