@@ -161,7 +161,18 @@ def _farthest(
         if size <= low * (1 + 1e-12):
             break
         screw, low = further, size
-    return (low, max(low, bounds[1])), screw
+    return (low, max(low, min(bounds[1], _sum_of_sizes(sets, half)))), screw
+
+
+def _sum_of_sizes(sets: ErrorSets, half: int) -> float:
+    """[rad or m] the largest sizes of the parts of all balls, added: an upper bound."""
+    # cuts need many planes where the screws are a ball; there this bound is exact
+    total = 0.0
+    for zone, columns in zip(sets.zones, sets.columns, strict=True):
+        ends = np.cumsum(zone.dimensions)[:-1]
+        for part in np.split(sets.screws[half : half + 3, columns], ends, axis=1):
+            total += (1.0 + zone.bonus) * float(np.linalg.norm(part, 2))
+    return total
 
 
 def _support(
