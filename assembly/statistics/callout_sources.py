@@ -17,7 +17,7 @@ from assembly.callouts.zone import DISTRIBUTIONS
 from assembly.kinematics.callout_maps import PlacedCallout, place_callouts
 from assembly.kinematics.posture import home_posture
 from assembly.model.error_distributions import ErrorSources
-from assembly.model.robot import Clearance, Robot
+from assembly.model.robot import Clearance, Frame, Robot
 from assembly.statistics.ranking import group_of, kind_of
 from forcefit.inputs.table import BadInput
 
@@ -174,8 +174,7 @@ class CalloutSources:
             gap = max(0.0, bound)
             for row, end in one.bounds:
                 new = {"radial": gap} if end is None else {"tilt": end.tilt(gap)}
-                clearance = replace(frames[row].clearance or Clearance(), **new)
-                frames[row] = replace(frames[row], clearance=clearance)
+                frames[row] = _with_clearance(frames[row], new)
         return replace(self.robot, frames=tuple(frames))
 
     def errors(self, values: NDArray) -> NDArray:
@@ -218,6 +217,15 @@ class CalloutSources:
 
 
 Sources = ErrorSources | CalloutSources
+
+
+def _with_clearance(frame: Frame, new: dict[str, float]) -> Frame:
+    """The frame with other bounds; those of a bolted joint hold before it is bolted."""
+    bolt = frame.locked_at
+    if bolt is not None:
+        clearance = replace(bolt.clearance, **new)
+        return replace(frame, locked_at=replace(bolt, clearance=clearance))
+    return replace(frame, clearance=replace(frame.clearance or Clearance(), **new))
 
 
 def _length(end: FittedEnd | None) -> list[float]:

@@ -15,6 +15,7 @@ from assembly.statistics.experiment import Experiment
 from assembly.statistics.linear_response import linear_response
 from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.worst_pose import worst_pose
+from assembly.steps.bolted import bolted_errors
 from forcefit.inputs.table import BadInput
 
 FIRST = np.sqrt((18.0**2 + 11.0**2) / 12) / 2 * 1e-6  # [m] deviation of 12 H7/g6
@@ -176,6 +177,56 @@ def test_mistake_in_a_fitted_contact_is_reported_in_one_line(
         spindle(tmp_path, f"clearance = {clearance}")
     assert message in str(error.value)
     assert "\n" not in str(error.value)
+
+
+BOLTED = """
+format = 2
+name = "slot"
+platform = "plate"
+platform_at = [0, 0, 0]
+[[body]]
+name = "plate"
+[[joint]]
+name = "pin"
+type = "fixed"
+between = ["base", "plate"]
+at = [0, 0, 0]
+[[joint]]
+name = "slot"
+type = "fixed"
+between = ["base", "plate"]
+at = [0.1, 0, 0]
+locked_at = "home"
+clearance = { fit = "12 H7/g6" }
+[[tolerance]]
+feature = "slot"
+datums = ["pin"]
+length = "100 +- 0.03 mm"
+"""
+
+
+def test_bolted_slot_with_a_fit_assembles_where_its_clearance_reaches(tmp_path):
+    """A rigid plate closes only if the clearance c exceeds the error e of the length:
+    e is uniform to 30 um, so the share is the mean of c over 30 um, 0.342.
+
+    Three standard errors of 500 draws are 0.064.
+    """
+    path = tmp_path / "slot.toml"
+    path.write_text(BOLTED)
+    robot = read_robot(path)
+    sources = sources_of(robot)
+    bolt = sources.with_largest_clearances().frame("slot").locked_at
+    assert bolt.clearance.radial == pytest.approx(17.5e-6)
+    values = sources.draw(0, 500, 1)
+    closed = 0
+    for one in values:
+        machine = sources.with_clearances(one)
+        try:
+            bolted_errors(machine, sources.errors(one[None]))
+        except BadInput:
+            continue
+        closed += 1
+    assert closed / 500 == pytest.approx(10.25 / 30, abs=0.064)
 
 
 FRAMES = """
