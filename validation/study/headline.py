@@ -140,21 +140,21 @@ def _drawn_text(results: StudyResults) -> str:
     if not (results.robot.callouts or results.robot.fits):
         return ""
     text = "The certified bounds leave out the tolerances of the drawing"
-    text += ", with fits at their mean" if results.robot.fits else ""
+    text += ", with fits at their mean." if results.robot.fits else "."
     found = results.statistics
     if found is None:
-        return f"{text}."
+        return text
     if "worst_case" in found:
-        most = {key: one["bound"] for key, one in found["worst_case"].items()}
-        text += f": over all parts within these its pose error is {_bound_text(most)}"
-    high = {
-        key: found["quantities"][key]["quantiles"]["0.95"]["value"]
-        for key in ("rotation", "translation")
-        if "quantiles" in found["quantities"][key]
-    }
-    if len(high) == 2:
-        text += "; of 95 % of the drawn machines that assemble "
-        text += f"it is {_bound_text(high)}"
+        worst = found["worst_case"]
+        most = {key: one["bound"] for key, one in worst.items()}
+        means = "; ".join(dict.fromkeys(one["means"] for one in worst.values()))
+        text += f" Over all parts within them its pose error is {_bound_text(most)}"
+        text += f" ({means})."
+    text += f" Of {found['draws']} drawn machines {found['assembled']} assemble"
+    sizes = {key: found["quantities"][key] for key in ("rotation", "translation")}
+    if all("quantiles" in one for one in sizes.values()):
+        high = {key: one["quantiles"]["0.95"]["value"] for key, one in sizes.items()}
+        text += f"; the pose error of 95 % of these is {_bound_text(high)}"
     return f"{text}."
 
 
