@@ -149,6 +149,7 @@ def zone_of(callout: Callout, offset: NDArray, datum_axis: NDArray | None) -> Zo
     Raises:
         BadInput: a callout does not fit the nominal geometry.
     """
+    _check_coaxial(callout, offset, datum_axis)
     zones = [_zone(callout, kind, width) for kind, width in callout.widths.items()]
     away = _away(callout.shape, offset, datum_axis)
     distance = float(np.linalg.norm(away))
@@ -157,10 +158,29 @@ def zone_of(callout: Callout, offset: NDArray, datum_axis: NDArray | None) -> Zo
         if abs(distance - nominal) > _SAME_LENGTH:
             found = f"found a length of {nominal * 1e3:g} mm"
             raise BadInput(f"{found}, expected that at home, {distance * 1e3:g} mm")
+        if distance < _SAME_LENGTH:
+            fault = "found a length to a datum at the same place"
+            raise BadInput(f"{fault}, expected a distance from datum A")
         zones.append(shift_along(tolerance, away / distance))
     if callout.general:
         zones += _general(callout, away, datum_axis)
     return intersection(zones)
+
+
+def _check_coaxial(
+    callout: Callout, offset: NDArray, datum_axis: NDArray | None
+) -> None:
+    """Refuse coaxiality of axes that are not the same at home."""
+    if "coaxiality" not in callout.widths:
+        return
+    expected = "expected the same axis at home; position is for others"
+    if datum_axis is not None and np.linalg.norm(datum_axis[:2]) > _ALONG:
+        raise BadInput(f"found coaxiality to an axis in another direction, {expected}")
+    apart = float(np.linalg.norm(offset[:2]))
+    if apart > _SAME_LENGTH:
+        raise BadInput(
+            f"found coaxiality to an axis {apart * 1e3:g} mm away, {expected}"
+        )
 
 
 def _zone(callout: Callout, kind: str, width: float) -> Zone:
@@ -200,7 +220,10 @@ def _general(callout: Callout, away: NDArray, datum_axis: NDArray | None) -> lis
     distance = float(np.linalg.norm(away))
     zones = [shift_along(linear_tolerance(distance, linear), away / distance)]
     square = datum_axis is not None and abs(datum_axis[2]) < _ALONG
-    if geometry and square and callout.shape == "axis" and callout.extent:
+    if geometry and square and callout.shape == "axis":
+        if not callout.extent:
+            fault = f"found class {geometry} of a bore without its length"
+            raise BadInput(f'{fault}, expected "extent" too, or no class {geometry}')
         width = perpendicularity_tolerance(callout.extent[0], geometry)
         zones.append(axis_orientation(width, callout.extent[0]))
     return zones

@@ -128,6 +128,25 @@ class Fit:
         return np.asarray(np.maximum(0.0, (sizes[0] - sizes[1]) / 2))
 
 
+@dataclass(frozen=True)
+class FittedEnd:
+    """An end of a bore, or a bearing, that a fit lets tilt about another place.
+
+    Attributes:
+        length: [m] between the two places, > 0: the tilt is at most the radial
+            clearance divided by it.
+        parts: name of the hole and the shaft; ends of the same parts have the same
+            clearance.
+    """
+
+    length: float
+    parts: str
+
+    def tilt(self, radial: float) -> float:
+        """[rad] largest tilt for a radial clearance [m]."""
+        return radial / self.length
+
+
 def parse_fit(text: str) -> Fit:
     """Return the fit that a text states.
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.callouts.callout import Callout, Datum
+from assembly.callouts.fits import FittedEnd
 from assembly.drawing.drawing import Drawing, DrawnCallout, DrawnJoint
 from assembly.drawing.parts import parts_of
 from assembly.drawing.tree import Step
@@ -41,13 +42,17 @@ def frame_callouts(
     return tuple(_of_frames(drawn, passed, poses) for drawn in drawing.callouts)
 
 
-def frame_fits(steps: Sequence[Step]) -> dict[str, str]:
-    """Return the fits of the joints of a tree, by frame."""
-    return {
-        part.name: part.numbers.fit
+def frame_fits(
+    steps: Sequence[Step],
+) -> tuple[dict[str, str], dict[str, FittedEnd]]:
+    """Return the fits of the joints of a tree, and their fitted ends, by frame."""
+    found = {
+        part.name: part.numbers
         for step in steps if isinstance(step.edge.item, DrawnJoint)
         for part in parts_of(step.edge.item, step.reverse) if part.numbers.fit
     }  # fmt: skip
+    ends = {name: own.fitted_end for name, own in found.items() if own.fitted_end}
+    return {name: own.fit for name, own in found.items()}, ends
 
 
 def _of_frames(

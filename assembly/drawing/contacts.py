@@ -22,11 +22,12 @@ frames    contacts            small screws that the contacts allow, in the joint
   along TZ, RX and RY alone; the volume is 1.5 times that of the pad.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.callouts.fits import FittedEnd
 from assembly.model.robot import Clearance
 from stiffness.screws import transform
 
@@ -39,11 +40,16 @@ class Contact:
         suffix: of its name.
         pose: (4, 4) in the joint's axes.
         clearance: its bounds.
+        fit: ISO 286 fit from whose mean the bounds follow, or empty.
+        end: how they follow from it; its parts are those of a bearing, empty where
+            the joint has one hole and one shaft.
     """
 
     suffix: str
     pose: NDArray
     clearance: Clearance
+    fit: str = ""
+    end: FittedEnd | None = None
 
 
 def bearings(
@@ -65,6 +71,25 @@ def bearings(
     return tuple(
         Contact(suffix, _along_z(z), Clearance(tilt=gap / (z2 - z1)))
         for suffix, z, gap in turns
+    )
+
+
+def fitted(
+    contacts: tuple[Contact, ...], fits: tuple[str, str], parts: tuple[str, str],
+    length: float,
+) -> tuple[Contact, ...]:  # fmt: skip
+    """Return the contacts of :func:`bearings` with the fits of the two places.
+
+    Args:
+        contacts: two, for the mean radial clearances of the fits.
+        fits: of the first and the second place; empty where its gap is stated.
+        parts: names of the parts at the two places.
+        length: [m] between the two places.
+    """
+    # a turn about one place moves the shaft at the other place only
+    return tuple(
+        replace(contact, fit=fit, end=FittedEnd(length, part)) if fit else contact
+        for contact, fit, part in zip(contacts, fits[::-1], parts[::-1], strict=True)
     )
 
 

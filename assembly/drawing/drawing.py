@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.callouts.callout import Callout
+from assembly.callouts.fits import FittedEnd
 from assembly.drawing.contacts import Contact
 from assembly.model.robot import BeamLink, Clearance, Link, LockedAt, MeshLink
 
@@ -40,6 +41,7 @@ class JointNumbers:
         error: (6,) [rad, m] delta l.
         tolerance: (6,) [rad, m] standard deviations of it, or None.
         fit: ISO 286 fit whose mean radial clearance is in ``clearance``, or empty.
+        fitted_end: how the tilt follows from the fit; None if ``radial`` does.
         contacts: further clearance, by the sizes of the contacts.
         locked_at: where a fixed joint is bolted, with its clearance before; or None.
     """
@@ -49,6 +51,7 @@ class JointNumbers:
     error: NDArray = field(default_factory=lambda: np.zeros(6))
     tolerance: NDArray | None = None
     fit: str = ""
+    fitted_end: FittedEnd | None = None
     contacts: tuple[Contact, ...] = ()
     locked_at: LockedAt | None = None
 

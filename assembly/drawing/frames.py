@@ -70,10 +70,11 @@ def robot_of_drawing(drawing: Drawing) -> Robot:
             placed += _ends(plan, step)
             closures.append((plan.ends[step.edge], plan.seats[step.edge]))
     remarks = (*_cuts(steps), *drawing.remarks)
+    fits, ends = frame_fits(steps)
     return Robot(
         drawing.name, drawing.platform, place_frames(placed), tuple(closures),
         drawing.description, remarks=remarks,
-        callouts=frame_callouts(drawing, steps, placed), fits=frame_fits(steps),
+        callouts=frame_callouts(drawing, steps, placed), fits=fits, fitted_ends=ends,
     )  # fmt: skip
 
 

@@ -59,7 +59,11 @@ def _contact_part(
 ) -> Part:
     """One fixed frame, beside the frame of this suffix and pose."""
     name = ".".join(filter(None, (joint.name, suffix, contact.suffix)))
-    numbers = JointNumbers(clearance=contact.clearance)
+    end = contact.end
+    if end is not None:
+        parts = ".".join(filter(None, (joint.name, suffix, end.parts)))
+        end = replace(end, parts=parts)
+    numbers = JointNumbers(clearance=contact.clearance, fit=contact.fit, fitted_end=end)
     return Part(name, "fixed", pose @ contact.pose, 0.0, numbers)
 
 
@@ -171,6 +175,7 @@ def _reversed(part: Part) -> Part:
         tolerance=own.tolerance,
         locked_at=own.locked_at,
         fit=own.fit,
+        fitted_end=own.fitted_end,
     )
     pose = part.pose @ transform(np.zeros(3), _FLIP)
     return replace(part, pose=pose, numbers=numbers)

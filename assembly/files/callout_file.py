@@ -33,6 +33,8 @@ Vector = tuple[float, float, float]
 _Z = (0.0, 0.0, 1.0)
 _ORIGIN = (0.0, 0.0, 0.0)
 _LARGEST_CP = 5.0
+_ACROSS = 1e-3  # largest cosine of two directions at right angles
+_NOT_ACROSS = "found one that is not at right angles to the axis, expected 90 deg"
 _SIZES = {"axis": 1, "plane": 2, "point": 0}  # numbers of "extent"
 _EXTENTS = {
     "axis": 'the length of the bore, such as "20 mm"',
@@ -131,7 +133,21 @@ def _drawn(
     direction = callout.direction
     if direction is not None:
         direction = tuple((copied.T[:3, :3] @ direction).tolist())
+        _check_direction(table, direction, feature, body)
     return DrawnCallout(body, callout, direction)
+
+
+def _check_direction(
+    table: Table, direction: Vector, feature: DrawnJoint, body: str
+) -> None:
+    """Refuse a direction, base axes, that is not across the axis of a bore."""
+    if feature.kind == "planar":
+        fault = "found one of a face, whose sizes are along the joint's x and y"
+        raise table.bad("direction", f"{fault}; expected none")
+    second = feature.kind == "universal" and body == feature.second
+    axis = feature.axis2 if second else feature.axis
+    if abs(float(np.dot(direction, axis))) > _ACROSS:
+        raise table.bad("direction", _NOT_ACROSS)
 
 
 def _datum_list(table: Table) -> list:
@@ -172,8 +188,19 @@ def _callout(
     after: bool, axis: Vector | None,
 ) -> Callout:  # fmt: skip
     """The keys that both formats have."""
+    if len(set(datums)) < len(datums):
+        names = [datum.frame for datum in datums]
+        raise table.bad("datums", f"found {names}, expected each datum once")
     widths, hole = _widths(table, shape)
     extent = _extent(table, shape, widths)
+    across = _across(table, axis)
+    if across is not None and (shape == "point" or not widths):
+        fault = "a point" if shape == "point" else "a feature without a zone"
+        raise table.bad("direction", f"found one of {fault}, expected none")
+    distribution = table.choice("distribution", DISTRIBUTIONS, "uniform")
+    if table.has("cp") and distribution == "uniform":
+        expected = 'expected distribution = "normal" or "truncated" with it'
+        raise table.bad("cp", f"found one of a uniform distribution, {expected}")
     length = general = None
     if table.has("length"):
         length = _parsed(table, "length", parse_length)
@@ -185,8 +212,7 @@ def _callout(
         raise table.bad("", f"found no tolerance, expected one of {words}")
     return Callout(
         name, feature, datums, after, shape, axis or _Z, extent, widths, hole,
-        _across(table, axis), length, general or "",
-        table.choice("distribution", DISTRIBUTIONS, "uniform"),
+        across, length, general or "", distribution,
         table.number("cp", "", 1.0, above=0.0, largest=_LARGEST_CP),
     )  # fmt: skip
 
@@ -194,6 +220,7 @@ def _callout(
 def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
     """The widths of the zones, and the hole whose position is at maximum material."""
     widths: dict[str, float] = {}
+    used = False
     hole = table.text("hole", "") if table.has("hole") else ""
     if hole:
         _parsed(table, "hole", parse_size)
@@ -201,14 +228,19 @@ def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
         if not table.has(word):
             continue
         if word in _EXCLUDED[shape]:
-            raise table.bad(word, f"found one of a feature that is a {shape}")
+            article = "an" if shape == "axis" else "a"
+            fault = f"found one of a feature that is {article} {shape}"
+            raise table.bad(word, f"{fault}, expected none")
         widths[word], at_most = _parsed(table, word, parse_width)
         if at_most and (word != "position" or shape != "axis" or not hole):
             fault = 'found (M), expected it with the position of a bore and "hole"'
             raise table.bad(word, f'{fault}, such as hole = "12 H7"')
-        hole = hole if at_most or word != "position" else ""
+        used = used or at_most
+    if hole and not used:
+        expected = 'expected one with it, such as position = "0.05 mm (M)"'
+        raise table.bad("hole", f"found one without (M), {expected}")
     _check_widths(table, widths)
-    return widths, hole if "position" in widths else ""
+    return widths, hole
 
 
 def _check_widths(table: Table, widths: dict[str, float]) -> None:
@@ -244,9 +276,8 @@ def _across(table: Table, axis: Vector | None) -> Vector | None:
     """Unit vector in which the zones are, at right angles to a known axis."""
     direction = _direction(table, "direction")
     if direction is not None and axis is not None:
-        if abs(float(np.dot(direction, axis))) > 1e-3:
-            fault = "found one that is not at right angles to the axis"
-            raise table.bad("direction", f"{fault}, expected 90 deg")
+        if abs(float(np.dot(direction, axis))) > _ACROSS:
+            raise table.bad("direction", _NOT_ACROSS)
     return direction
 
 

@@ -1,8 +1,15 @@
 """Clearance of a joint of a robot file of ``format = 2``: bounds, or contacts."""
 
-from assembly.drawing.contacts import Contact, bearings, guide, largest_roll, pad
+from assembly.drawing.contacts import (
+    Contact,
+    bearings,
+    fitted,
+    guide,
+    largest_roll,
+    pad,
+)
 from assembly.drawing.drawing import FREE_ROWS
-from assembly.files.joint_file import read_bounds
+from assembly.files.joint_file import fit_of, read_bounds
 from assembly.files.written_units import without_units
 from assembly.model.clearance import BOUNDS, CONES
 from assembly.model.largest import LARGEST_LENGTH
@@ -38,8 +45,10 @@ def read_drawn_clearance(table: Table, kind: str) -> _Clearance:
     if len(contacts) > 1:
         fault = f"found together with {quoted(contacts[0])}"
         raise inner.bad(contacts[1], f"{fault}, expected one of them")
-    if contacts and inner.has("fit"):
-        fault = f"found together with {quoted(contacts[0])}, expected a radial gap"
+    if contacts not in ([], ["length"]) and inner.has("fit"):
+        in_bearings = contacts == ["bearings"]
+        expected = "it in each bearing" if in_bearings else "only a gap in m"
+        fault = f"found together with {quoted(contacts[0])}, expected {expected}"
         raise inner.bad("fit", fault)
     found: _Clearance = bounds, ()
     for key in contacts:
@@ -54,8 +63,9 @@ def _in_bore(table: Table, kind: str, bounds: Clearance) -> _Clearance:
     _refuse_with(table, "length", ("tilt", "ball"))
     _refuse_without_shaft(table, "length", kind)
     half = _length(table, "length") / 2
-    gap = table.number("radial", "m", least=0.0, largest=LARGEST_LENGTH)
-    return _of_shaft(bounds), bearings((-half, gap), (half, gap), "bore")
+    gap, fit = _gap(table)
+    contacts = bearings((-half, gap), (half, gap), "bore")
+    return _of_shaft(bounds), fitted(contacts, (fit, fit), ("", ""), 2 * half)
 
 
 def _in_bearings(table: Table, kind: str, bounds: Clearance) -> _Clearance:
@@ -68,21 +78,31 @@ def _in_bearings(table: Table, kind: str, bounds: Clearance) -> _Clearance:
         fault = f"found {describe(value)}, expected two tables"
         raise table.bad("bearings", f"{fault} {{ z, radial }}")
     first, second = sorted(_bearing(table, k, one) for k, one in enumerate(value, 1))
-    if second[0] - first[0] <= _LEAST_LENGTH:
-        fault = f"found both at z = {first[0]:g} m"
+    (z1, gap1, fit1, part1), (z2, gap2, fit2, part2) = first, second
+    if z2 - z1 <= _LEAST_LENGTH:
+        fault = f"found both at z = {z1:g} m"
         raise table.bad("bearings", f"{fault}, expected a distance between them")
-    return _of_shaft(bounds), bearings(first, second)
+    contacts = bearings((z1, gap1), (z2, gap2))
+    return _of_shaft(bounds), fitted(contacts, (fit1, fit2), (part1, part2), z2 - z1)
 
 
-def _bearing(table: Table, number: int, content: dict) -> tuple[float, float]:
-    """Height and radial gap [m] of one bearing."""
+def _bearing(table: Table, number: int, content: dict) -> tuple[float, float, str, str]:
+    """Height and radial gap [m] of one bearing, its fit and the name of its parts."""
     inner = Table(dict(content), table.file, f"{table.place}.bearings[{number}]")
     for key in ("z", "radial"):
         without_units(inner, key, "length")
     z = inner.number("z", "m", largest=LARGEST_LENGTH)
-    gap = inner.number("radial", "m", least=0.0, largest=LARGEST_LENGTH)
+    gap, fit = _gap(inner)
     inner.finish()
-    return z, gap
+    return z, gap, fit, f"bearing_{number}"
+
+
+def _gap(table: Table) -> tuple[float, str]:
+    """Radial gap [m], of a fit its mean, and the fit; empty if the gap is stated."""
+    fit = fit_of(table)
+    if fit is not None:
+        return fit.mean_radial, fit.text
+    return table.number("radial", "m", least=0.0, largest=LARGEST_LENGTH), ""
 
 
 def _of_shaft(bounds: Clearance) -> Clearance | None:

@@ -147,7 +147,7 @@ def _one(table: Table, kind: str, actuated: bool) -> JointNumbers:
         error=error,
         tolerance=_tolerance(table),
         locked_at=bolt,
-        fit=read_fit(table),
+        fit="" if contacts else read_fit(table),
     )
 
 

@@ -1,9 +1,11 @@
 """Clearance and stiffness of a joint, read from a robot file."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.callouts.fits import Fit, clearance_fit
+from assembly.callouts.fits import Fit, FittedEnd, clearance_fit
 from assembly.model.frame import ONE_OF_BALL, SLIDING_BALL
 from assembly.model.largest import LARGEST, LARGEST_LENGTH
 from assembly.model.robot import LOCKED, NO_SPIN, Clearance
@@ -12,6 +14,7 @@ from forcefit.inputs.table import BadInput, Table
 
 # [rad, m] smaller values are refused, because their square is 0
 _LEAST_CLEARANCE = 1e-30
+_LEAST_LENGTH = 1e-9  # [m] a shorter one would allow tilts of many turns
 _LEAST_PITCH = 1e-9  # [m] smaller pitches are refused
 _LARGEST_PITCH = 1.0  # [m] larger pitches are refused
 _CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad", "ball": "m"}
@@ -58,7 +61,12 @@ def read_clearance(table: Table, joint: str) -> Clearance | None:
     if not table.has("clearance"):
         return None
     inner = table.table("clearance")
+    end = _fitted_end(inner)
     bounds = read_bounds(inner, joint)
+    if end is not None:
+        # the tilt follows from the fit, in place of the radial clearance
+        tilt = end.tilt(bounds.radial or 0.0)
+        bounds = replace(bounds, radial=None, tilt=tilt)
     inner.finish()
     return bounds
 
@@ -88,14 +96,15 @@ def read_bounds(table: Table, joint: str) -> Clearance:
         if 0.0 < bound < _LEAST_CLEARANCE:
             expected = f"expected 0 or at least {_LEAST_CLEARANCE:g}"
             raise table.bad(key, f"found {bound:g}, {expected}")
-    if fit := _fit(table):
+    if fit := fit_of(table):
         bounds["radial"] = fit.mean_radial
     if "ball" in bounds:
         if joint in {"prismatic", "helical"}:
             raise table.bad("ball", SLIDING_BALL)
         for key in ("radial", "axial"):
             if key in bounds:
-                raise table.bad(key, ONE_OF_BALL)
+                given = "fit" if fit and key == "radial" else key
+                raise table.bad(given, ONE_OF_BALL)
     return Clearance(**bounds)
 
 
@@ -106,8 +115,34 @@ def read_fit(table: Table) -> str:
     return fit.strip() if isinstance(fit, str) else ""
 
 
-def _fit(inner: Table) -> Fit | None:
-    """Return the fit of a clearance, None if it has none."""
+def read_fitted_end(table: Table) -> FittedEnd | None:
+    """Return how a frame's tilt follows from its fit, None if ``radial`` does."""
+    content = table.content.get("clearance")
+    if not isinstance(content, dict) or "length" not in content:
+        return None
+    return _fitted_end(table.table("clearance"))
+
+
+def _fitted_end(inner: Table) -> FittedEnd | None:
+    """Return the ``length`` and the ``parts`` of a clearance with a fit."""
+    if not inner.has("length"):
+        return None
+    for key, fault in (("fit", "missing"), ("parts", "missing")):
+        if not inner.has(key):
+            raise inner.bad(key, f'{fault}; expected one with "length"')
+    if inner.has("tilt"):
+        fault = 'found it together with "length", from which it follows'
+        raise inner.bad("tilt", f"{fault}; expected one of them")
+    length = inner.number("length", "m", above=_LEAST_LENGTH, largest=LARGEST_LENGTH)
+    return FittedEnd(length, inner.text("parts"))
+
+
+def fit_of(inner: Table) -> Fit | None:
+    """Return the fit of a clearance or of a bearing, None if it has none.
+
+    Raises:
+        BadInput: it is none, one of interference, or given with ``radial``.
+    """
     if not inner.has("fit"):
         return None
     if inner.has("radial"):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.callouts.fits import parse_fit
+from assembly.callouts.fits import FittedEnd, parse_fit
 from assembly.drawing.frames import robot_of_drawing
 from assembly.files.bolt_file import bolt_table, read_locked_at
 from assembly.files.callout_file import callout_table, read_frame_callouts
@@ -19,6 +19,7 @@ from assembly.files.inertia_file import read_inertia
 from assembly.files.joint_file import (
     read_clearance,
     read_fit,
+    read_fitted_end,
     read_joint_stiffness,
     read_pitch,
 )
@@ -160,11 +161,13 @@ def _framed(root: Table, name: str, description: str) -> Robot:
     closures = tuple(_closure(table, names) for table in tables[1])
     callouts = read_frame_callouts(root, names)
     _check_known(root, "platform", platform, names)
+    ends = _fitted_ends(tables[0])
     try:
         robot = Robot(
             name, platform, frames, closures, description,
             remarks=_remarks(tables[0]), callouts=callouts,
             fits={t.content["name"]: fit for t in tables[0] if (fit := read_fit(t))},
+            fitted_ends=ends,
         )  # fmt: skip
         _check_meeting_frames(robot)
     except BadInput as error:
@@ -238,10 +241,32 @@ def _remarks(tables: list[Table]) -> tuple[str, ...]:
     return (f"dh without alpha, taken as 0: {', '.join(without_alpha)}",)
 
 
+def _fitted_ends(tables: list[Table]) -> dict[str, FittedEnd]:
+    """Return the fitted ends by frame; the same parts must have the same fit."""
+    ends: dict[str, FittedEnd] = {}
+    fits: dict[str, str] = {}
+    for table in tables:
+        end, fit = read_fitted_end(table), read_fit(table)
+        name = table.content["name"]
+        parts = name if end is None else end.parts
+        if fit and fits.setdefault(parts, fit) != fit:
+            found = f"found {quoted(fit)} of the parts {quoted(parts)}"
+            expected = f"expected {quoted(fits[parts])}, as before"
+            raise table.table("clearance").bad("fit", f"{found}, {expected}")
+        if end is not None:
+            ends[name] = end
+    return ends
+
+
 def _fit_remarks(robot: Robot) -> tuple[str, ...]:
     """Return a remark on the fits, of which one clearance is used."""
     texts = []
-    for name, text in robot.fits.items():
+    ends = robot.fitted_ends
+    by_parts = {
+        ends[frame].parts if frame in ends else frame: text
+        for frame, text in robot.fits.items()
+    }
+    for name, text in by_parts.items():
         fit = parse_fit(text)
         mean, (least, most) = 1e6 * fit.mean_radial, (1e6 * r for r in fit.radial)
         texts.append(
@@ -439,8 +464,7 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
     table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
     for frame in table["frame"]:
         if frame["name"] in robot.fits:
-            del frame["clearance"]["radial"]
-            frame["clearance"]["fit"] = robot.fits[frame["name"]]
+            _write_fit(frame["clearance"], robot, frame["name"])
     if robot.closures:
         table["closure"] = [{"frames": list(pair)} for pair in robot.closures]
     if robot.callouts:
@@ -448,6 +472,15 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
     if robot.has_effects:
         table["effect"] = effect_tables(robot)
     return table
+
+
+def _write_fit(clearance: dict[str, Any], robot: Robot, name: str) -> None:
+    """Replace the mean of a frame's fit by the fit."""
+    end = robot.fitted_ends.get(name)
+    del clearance["radial" if end is None else "tilt"]
+    clearance["fit"] = robot.fits[name]
+    if end is not None:
+        clearance |= {"length": end.length, "parts": end.parts}
 
 
 def root_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:

@@ -68,11 +68,14 @@ _LOCKED_AT = Either((
            joints_=Each(number("coordinate of a drive", "rad or m")),
            left_=Words(LEFT)),
 ))  # fmt: skip
+_FIT = text('fit of ISO 286 in place of radial, such as "12 H7/g6"')
 _CLEARANCE = record(
     radial_=number("radial clearance", "m"), axial_=number("axial clearance", "m"),
     tilt_=number("tilt clearance", "rad"), spin_=number("clearance about z", "rad"),
     ball_=number("clearance of a ball in its socket", "m"),
-    fit_=text('fit of ISO 286 in place of radial, such as "12 H7/g6"'),
+    fit_=_FIT,
+    length_=number("length of the bore, or distance of two bearings", "m"),
+    parts_=text("name of the hole and the shaft of a fit with length"),
 )  # fmt: skip
 _FRAME = record(
     name=text("name"), parent=text('name of a frame, or "base"'),
@@ -141,8 +144,8 @@ _OF_FRAMES = record(
 )  # fmt: skip
 _GAP = number("gap from the middle to one side", "m")
 _CONTACTS = record(
-    "", _CLEARANCE, length_=number("length of the bore", "m"),
-    bearings_=Listed(record(z=number("height", "m"), radial=_GAP)),
+    "", _CLEARANCE,
+    bearings_=Listed(record(z=number("height", "m"), radial_=_GAP, fit_=_FIT)),
     guide_=record(
         gap=Either((_GAP, number("gaps along x and y", "m", "axis"))),
         length=number("length along the axis", "m"),

@@ -114,9 +114,19 @@ def place_callouts(home: Posture) -> tuple[PlacedCallout, ...]:
     for k, callout in enumerate(callouts):
         _add_errors(errors, bodies, callout, screws[k])
     parts = np.split(errors, widths[1:-1], axis=2)
-    return tuple(
+    found = tuple(
         PlacedCallout(*row) for row in zip(callouts, zones, parts, strict=True)
     )
+    _check_names([placed.name for placed in found], callouts)
+    return found
+
+
+def _check_names(names: list[str], callouts: tuple[Callout, ...]) -> None:
+    """Refuse two features that tables could not tell apart."""
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            fault = f"found {quoted(name)} twice, expected another name of the feature"
+            raise BadInput(_fault(callouts[k], fault))
 
 
 def _fault(callout: Callout, found: str) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.callouts.callout import Callout
+from assembly.callouts.fits import FittedEnd
 from assembly.model.equal_data import EqualData
 from assembly.model.frame import (
     BASE,
@@ -71,6 +72,7 @@ class Robot(EqualData):
         callouts: tolerances of features, as the drawing states them.
         fits: ISO 286 fits such as ``"12 H7/g6"`` by frame; ``radial`` of its clearance
             is the mean.
+        fitted_ends: frames with a fit whose ``tilt`` follows from it, not ``radial``.
     """
 
     name: str
@@ -89,6 +91,7 @@ class Robot(EqualData):
     remarks: tuple[str, ...] = ()
     callouts: tuple[Callout, ...] = ()
     fits: Mapping[str, str] = field(default_factory=dict)
+    fitted_ends: Mapping[str, FittedEnd] = field(default_factory=dict)
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
     show = show

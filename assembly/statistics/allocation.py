@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.posture import Posture
 from assembly.statistics.allocated_tolerances import Allocation
+from assembly.statistics.callout_sources import CalloutSources
 from assembly.statistics.cutting_planes import cut_planes
 from assembly.statistics.least_cost import least_cost
 from assembly.statistics.replay import Replay
@@ -28,6 +29,7 @@ from assembly.statistics.scaling import (
     with_worst_corners,
 )
 from assembly.statistics.verification import prove_worst, verify
+from assembly.statistics.worst_case_widths import allot_worst_case
 
 # multiple of the number of training draws; many are possible for a single factor
 _SCALING_DRAWS = 4
@@ -57,6 +59,8 @@ def allocate(
             with the tightest tolerances.
     """
     replay = replay or Replay()
+    if isinstance(plan.sources, CalloutSources) and plan.asked_yield == 1.0:
+        return allot_worst_case(postures, plan, fresh, progress, replay)
     requirement = Requirement(postures, plan, replay)
     perfect_parts = requirement.perfect_parts()
     convex_requirement = requirement

@@ -12,12 +12,12 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.callouts.fits import Fit, parse_fit
+from assembly.callouts.fits import Fit, FittedEnd, parse_fit
 from assembly.callouts.zone import DISTRIBUTIONS
 from assembly.kinematics.callout_maps import PlacedCallout, place_callouts
 from assembly.kinematics.posture import home_posture
 from assembly.model.error_distributions import ErrorSources
-from assembly.model.robot import Clearance, Robot
+from assembly.model.robot import Clearance, Frame, Robot
 from assembly.statistics.ranking import group_of, kind_of
 from forcefit.inputs.table import BadInput
 
@@ -27,17 +27,17 @@ _WORDS = 4  # random numbers of one step of Philox
 
 @dataclass(frozen=True, eq=False)
 class JointFit:
-    """A fit of a joint.
+    """A fit of a hole and a shaft.
 
     Attributes:
-        row: of the frame.
-        frame: its name.
+        frame: name of the joint's frame, or of the parts.
         fit: the fit.
+        bounds: rows of the frames that it bounds, and how: None for ``radial``.
     """
 
-    row: int
     frame: str
     fit: Fit
+    bounds: tuple[tuple[int, FittedEnd | None], ...]
 
     @property
     def name(self) -> str:
@@ -171,9 +171,10 @@ class CalloutSources:
         """The robot with radial clearances [m] of the fits."""
         frames = list(self.robot.frames)
         for one, bound in zip(self.fits, radial, strict=True):
-            frame = frames[one.row]
-            clearance = replace(frame.clearance or Clearance(), radial=max(0.0, bound))
-            frames[one.row] = replace(frame, clearance=clearance)
+            gap = max(0.0, bound)
+            for row, end in one.bounds:
+                new = {"radial": gap} if end is None else {"tilt": end.tilt(gap)}
+                frames[row] = _with_clearance(frames[row], new)
         return replace(self.robot, frames=tuple(frames))
 
     def errors(self, values: NDArray) -> NDArray:
@@ -209,11 +210,39 @@ class CalloutSources:
         for p in self.placed:
             law = [DISTRIBUTIONS.index(p.callout.distribution), p.callout.cp]
             own += [*p.zone.bounds, np.array([p.zone.bonus, *law]), p.errors]
-        own += [np.array([*f.fit.hole, *f.fit.shaft, f.row]) for f in self.fits]
+        for f in self.fits:
+            rows = [x for row, end in f.bounds for x in (row, *_length(end))]
+            own.append(np.array([*f.fit.hole, *f.fit.shaft, *rows]))
         return own + ([] if self.fixed is None else [self.fixed])
 
 
 Sources = ErrorSources | CalloutSources
+
+
+def _with_clearance(frame: Frame, new: dict[str, float]) -> Frame:
+    """The frame with other bounds; those of a bolted joint hold before it is bolted."""
+    bolt = frame.locked_at
+    if bolt is not None:
+        clearance = replace(bolt.clearance, **new)
+        return replace(frame, locked_at=replace(bolt, clearance=clearance))
+    return replace(frame, clearance=replace(frame.clearance or Clearance(), **new))
+
+
+def _length(end: FittedEnd | None) -> list[float]:
+    """The length of a fitted end, nothing of a radial clearance."""
+    return [] if end is None else [end.length]
+
+
+def _fits_of(robot: Robot) -> tuple[JointFit, ...]:
+    """The fits of a robot, each hole and shaft once."""
+    found: dict[str, JointFit] = {}
+    for frame, text in robot.fits.items():
+        end = robot.fitted_ends.get(frame)
+        name = frame if end is None else end.parts
+        one = found.get(name, JointFit(name, parse_fit(text), ()))
+        bound = robot.index(frame), end
+        found[name] = replace(one, bounds=(*one.bounds, bound))
+    return tuple(found.values())
 
 
 def _nth(uniforms: Callable[[int], list[NDArray]], i: int) -> Callable[[int], NDArray]:
@@ -251,10 +280,7 @@ def sources_of(
     Raises:
         BadInput: there are neither.
     """
-    fits = tuple(
-        JointFit(robot.index(name), name, parse_fit(fit))
-        for name, fit in robot.fits.items()
-    )
+    fits = _fits_of(robot)
     if robot.callouts or fits:
         placed = place_callouts(home_posture(robot))
         return CalloutSources(robot, placed, independent, fixed, fits)

@@ -26,7 +26,7 @@ from assembly.statistics.posture_margins import PostureMargins, prepare_margins
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.stiffness_spread import draw_stiffnesses
 from assembly.statistics.worst_clearance import PRECISION, bound_worst_errors
-from assembly.steps.bolted import bolt_generators, bolted_errors
+from assembly.steps.bolted import CannotBolt, bolt_generators, bolted_errors
 from forcefit.inputs.renamed import renamed_fields, warn_renamed
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
@@ -184,20 +184,39 @@ class Experiment:
             solution of (22).
         """
         if not isinstance(self.sources, CalloutSources) or not self.sources.fits:
-            parts = [self._without_stress(values, draws)]
+            parts = self._bolted(values, np.asarray(draws))
         else:
             parts = []
             for own, draw in zip(values, np.asarray(draws).tolist(), strict=True):
                 # every draw has clearances of its own
                 robot = self.sources.with_clearances(own)
                 one = replace(self, posture=replace(self.posture, robot=robot))
-                parts.append(one._without_stress(own[None], [draw]))
+                parts += one._bolted(own[None], np.array([draw]))
         rows, wrenches, at_tips = (
             np.concatenate(arrays) for arrays in zip(*parts, strict=True)
         )
         if self.links:
             rows["stress"] = peak_stresses(self.posture.robot, wrenches, at_tips)
         return rows
+
+    def _bolted(
+        self, values: NDArray, draws: NDArray
+    ) -> list[tuple[NDArray, NDArray, NDArray]]:
+        """Return parts of :meth:`_without_stress`, NaN of machines without a bolt."""
+        try:
+            return [self._without_stress(values, draws)]
+        except CannotBolt:
+            if len(values) > 1:
+                halves = zip(
+                    *(np.array_split(a, 2) for a in (values, draws)), strict=True
+                )
+                return [part for half in halves for part in self._bolted(*half)]
+        rows = np.zeros(1, dtype=self.record_type)
+        for name in set(self.record_type.names or ()) - {"clearance_mixed", "status"}:
+            rows[name] = np.nan
+        rows["status"] = 1
+        wrenches = np.full((1, len(self.posture.robot.frames), 6), np.nan)
+        return [(rows, wrenches, wrenches)]
 
     def _without_stress(
         self, values: NDArray, draws: Sequence[int] | NDArray

@@ -57,22 +57,27 @@ def draws_page(
             tiles=_draws_tiles(summary),
             about=f"{summary['draws']} draws, seed {summary['seed']}; pose errors: "
             f"clearance {summary['clearance']}: {summary['clearance_means']}.",
-            body=[
-                section("Probabilities", _yields(summary)),
-                _perfect_parts(summary),
-                section("A draw of large error", robot) if robot else "",
-                section(
-                    "Distributions", _quantities(summary), _histograms(summary, data)
-                ),
-                _capability(summary),
-                _importance(summary),
-                worst_section(summary["worst_case"]) if "worst_case" in summary else "",
-            ],
+            body=draws_sections(summary, data, robot),
             assumed=_ASSUMED,
             provenance=provenance,
             results=summary,
         )
     )
+
+
+def draws_sections(
+    summary: Mapping[str, Any], data: "xarray.Dataset", robot: str = ""
+) -> list[str]:
+    """Return the sections of :func:`draws_page`, for this page and for others."""
+    return [
+        section("Probabilities", _yields(summary)),
+        _perfect_parts(summary),
+        section("A draw of large error", robot) if robot else "",
+        section("Distributions", _quantities(summary), _histograms(summary, data)),
+        _capability(summary),
+        _importance(summary),
+        worst_section(summary["worst_case"]) if "worst_case" in summary else "",
+    ]
 
 
 def _share(summary: Mapping[str, Any]) -> Mapping[str, float]:

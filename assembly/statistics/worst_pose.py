@@ -131,6 +131,19 @@ def worst_pose(
     )
 
 
+def farthest_screw(sets: ErrorSets, half: int) -> tuple[tuple[float, float], NDArray]:
+    """Bracket the largest half screw over the zones without any condition.
+
+    Args:
+        sets: zones of errors and clearances.
+        half: 0 for the rotation, 3 for the translation.
+
+    Returns:
+        [rad or m] value attained and certified bound, and (6,) the screw attained.
+    """
+    return _farthest(sets, sets.rigid_rows[:0], half)
+
+
 def _farthest(
     sets: ErrorSets, rows: NDArray, half: int
 ) -> tuple[tuple[float, float], NDArray]:
@@ -148,7 +161,18 @@ def _farthest(
         if size <= low * (1 + 1e-12):
             break
         screw, low = further, size
-    return (low, max(low, bounds[1])), screw
+    return (low, max(low, min(bounds[1], _sum_of_sizes(sets, half)))), screw
+
+
+def _sum_of_sizes(sets: ErrorSets, half: int) -> float:
+    """[rad or m] the largest sizes of the parts of all balls, added: an upper bound."""
+    # cuts need many planes where the screws are a ball; there this bound is exact
+    total = 0.0
+    for zone, columns in zip(sets.zones, sets.columns, strict=True):
+        ends = np.cumsum(zone.dimensions)[:-1]
+        for part in np.split(sets.screws[half : half + 3, columns], ends, axis=1):
+            total += (1.0 + zone.bonus) * float(np.linalg.norm(part, 2))
+    return total
 
 
 def _support(

@@ -34,6 +34,10 @@ _ROUNDED = 1e-12  # share of its bound below which a clearance is rounding
 _BOLTED = "is bolted at"  # words of a remark
 
 
+class CannotBolt(BadInput):
+    """A machine that cannot be assembled at the pose where its joint is bolted."""
+
+
 def bolt_joints(robot: Robot, rng: np.random.Generator | None = None) -> Robot:
     """Return a robot with the clearances of its bolted joints locked in.
 
@@ -109,7 +113,8 @@ def bolted_errors(
         bolted.
 
     Raises:
-        BadInput: see :func:`bolt_joints`.
+        CannotBolt: one of the machines cannot be assembled where it is bolted.
+        BadInput: the pose of a bolt is out of reach.
     """
     total = errors
     for frames, machine in _bolts(_AsMade(robot)):
@@ -117,7 +122,7 @@ def bolted_errors(
             state = first_state(machine, Plan(()), total, None)
         except (CannotAssemble, SolverFailed) as error:
             place = f"{robot.name}: frame {quoted(robot.frames[frames[0]].name)}"
-            raise BadInput(f"{place}.locked_at: {error}") from None
+            raise CannotBolt(f"{place}.locked_at: {error}") from None
         u = state.found.clearances
         bolt = robot.frames[frames[0]].locked_at
         if rngs is not None and bolt is not None and bolt.left == "uniform":

@@ -177,7 +177,7 @@ _IMPORTANCE = record(
         )
     ),
 )  # fmt: skip
-_STATISTICS = record(
+STATISTICS = record(
     "robot seed load gravity draws assembled confidence contact_length duality_gap",
     pose=POSE, clearance=_CLEARANCE_MODEL, clearance_means=text("its meaning"),
     assembles=Each(INTERVAL),
@@ -335,7 +335,7 @@ ASSEMBLY: Mapping[str, Content] = {
     "assembly stiffness": PLATFORM_STIFFNESS,
     "assembly deflection": _DEFLECTION,
     "assembly frequencies": _FREQUENCIES,
-    "assembly statistics": _STATISTICS,
+    "assembly statistics": STATISTICS,
     "assembly tolerances": _TOLERANCES,
     "assembly sweep": _SWEEP,
     "assembly steps": _STEPS,

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from forcefit.results.of_assembly import POSE, SOLUTION
+from forcefit.results.of_assembly import POSE, SOLUTION, STATISTICS
 from forcefit.results.quantities import count, flag, number, text
 from forcefit.results.records import Content, Each, Either, Listed, Record, record
 
@@ -103,7 +103,9 @@ VALIDATION: Mapping[str, Content] = {
         record("passed", program=text("program"), title=text("title"),
                errors=text("errors"), links=text("stiffness of the links"),
                verdicts=Each(text("verdict")), unchecked=Each(text("reason")),
-               solution=SOLUTION).content,
+               solution=SOLUTION,
+               statistics_=record("", STATISTICS, worst_case_left_out_=text("reason"))
+               ).content,
         closed=False,
     ),
 }  # fmt: skip

@@ -70,8 +70,11 @@ def verdict(results: StudyResults) -> str:
         return f"{reason[0].upper()}{reason[1:]}. {_checks_text(results)}"
     if solution["status"] != "ok":
         return f"No answer at this pose: {solution['status']}, {solution['reason']}."
-    parts = (_assembly_text(results) + ".", _pose_error_text(results))
-    return " ".join((*parts, _checks_text(results)))
+    parts = (
+        _assembly_text(results) + ".", _pose_error_text(results), _drawn_text(results),
+        _checks_text(results),
+    )  # fmt: skip
+    return " ".join(filter(None, parts))
 
 
 def by_force(results: StudyResults) -> bool:
@@ -130,6 +133,29 @@ def _pose_error_text(results: StudyResults) -> str:
     return "".join(sentence) + (
         f" (certified bounds of (27), assumption {WORST}{others}); {at_rest}"
     )
+
+
+def _drawn_text(results: StudyResults) -> str:
+    """Return sentences on the parts within the tolerances of the drawing."""
+    if not (results.robot.callouts or results.robot.fits):
+        return ""
+    text = "The certified bounds leave out the tolerances of the drawing"
+    text += ", with fits at their mean." if results.robot.fits else "."
+    found = results.statistics
+    if found is None:
+        return text
+    if "worst_case" in found:
+        worst = found["worst_case"]
+        most = {key: one["bound"] for key, one in worst.items()}
+        means = "; ".join(dict.fromkeys(one["means"] for one in worst.values()))
+        text += f" Over all parts within them its pose error is {_bound_text(most)}"
+        text += f" ({means})."
+    text += f" Of {found['draws']} drawn machines {found['assembled']} assemble"
+    sizes = {key: found["quantities"][key] for key in ("rotation", "translation")}
+    if all("quantiles" in one for one in sizes.values()):
+        high = {key: one["quantiles"]["0.95"]["value"] for key, one in sizes.items()}
+        text += f"; the pose error of 95 % of these is {_bound_text(high)}"
+    return f"{text}."
 
 
 def _other_assumptions(results: StudyResults) -> str:

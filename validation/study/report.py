@@ -13,6 +13,7 @@ from forcefit.inputs.writing import write_json, write_text
 from forcefit.page.page import Page, Provenance, Tile, command_line, page
 from forcefit.page.tables import Value
 from forcefit.results.display import largest_row
+from validation.study.drawn_section import drawn_section, drawn_tiles
 from validation.study.headline import by_force, covered, verdict, worst_clearance
 from validation.study.map_section import finite, mapped, maps_section
 from validation.study.platform_section import platform_section
@@ -83,6 +84,8 @@ def results_table(results: StudyResults) -> dict[str, Any]:
         "governing": results.governing,
         "service": results.service,
     }
+    if results.statistics is not None:
+        table["statistics"] = results.statistics
     if results.crosscheck is not None:
         table["crosscheck"] = results.crosscheck.table()
     elif results.crosscheck_failure:
@@ -112,6 +115,7 @@ def report_page(results: StudyResults) -> str:
         unchecked_section(results),
         robot_section(results),
         governing_section(results),
+        drawn_section(results),
         maps_section(results.maps, map_summary(results.maps))
         if results.maps is not None
         else "",
@@ -154,14 +158,17 @@ def _tiles(results: StudyResults) -> list[Tile]:
     """Return tiles: worst case, governing part, tolerance to tighten, force, checks."""
     if results.assembly is None:
         return [Tile("Assembly", [results.solution["status"]])]
-    worst = worst_clearance(results)
+    worst, study_robot = worst_clearance(results), results.robot
     tiles = []
     if worst["pose"] is not None:
         over = worst["map"]
+        drawn = study_robot.callouts or study_robot.fits
         tiles.append(Tile("Certified worst case", _bound(worst["pose"]), [
             "Over all positions within the clearances, at this pose",
             *(["; over the map ", *_bound(over)] if over is not None else []), ".",
+            " Without the tolerances of the drawing." if drawn else "",
         ]))  # fmt: skip
+        tiles += drawn_tiles(results.statistics)
         tiles += _governing_tiles(results, worst["pose"])
     tiles.append(_force_tile(results.assembly))
     tiles += service_tile(results.service)

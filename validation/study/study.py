@@ -41,6 +41,7 @@ from validation.multibody.simulation import (
     closing_sequence,
     without_clearance,
 )
+from validation.study.drawn_tolerances import drawn_at_pose
 from validation.study.governing import governing
 from validation.study.printed_problems import compare_printed
 from validation.study.service import at_pose, over_grid
@@ -75,6 +76,9 @@ class StudyResults:
         governing: bounds (27) with one part made perfect, from
             :func:`validation.study.governing.governing`.
         service: the robot under load, from :func:`validation.study.service.at_pose`.
+        statistics: drawn parts at the pose, with the keys of ``assembly statistics``;
+            None of a robot without tolerances of a drawing.
+        draws: the data set of the draws, or None.
         closing: (k, n, 4, 4) frames while the simulation closes the closures; None if
             it failed.
     """
@@ -93,6 +97,8 @@ class StudyResults:
     platform_stiffness: dict[str, Any]
     governing: list[dict[str, Any]]
     service: dict[str, Any] | None = None
+    statistics: dict[str, Any] | None = None
+    draws: Any = None
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -195,6 +201,11 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
     service = None
     if study.service is not None:
         service = at_pose(posture, study.service, solution)
+    statistics, draws = None, None
+    if study.statistics is not None and solved:
+        statistics, draws = drawn_at_pose(
+            posture, study.statistics, lambda d, n: progress("drawn parts", d, n)
+        )
     check, failure, closing = None, {"reason": ""}, None
     if "crosscheck" in wanted and solved:
         progress("cross-check", 0, 1)
@@ -216,6 +227,8 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
         platform_stiffness=stiffness_of(posture),
         governing=governing(posture) if solved else [],
         service=service,
+        statistics=statistics,
+        draws=draws,
     )
 
 

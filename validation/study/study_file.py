@@ -26,6 +26,11 @@ from forcefit.results.display import html_table, short_repr
 from stiffness.surface.surface import UNITS
 from stiffness.surface.surface_files import named_solid
 from validation.crosscheck.verdict import SCALES, check_scales
+from validation.study.drawn_tolerances import (
+    NOT_IN_BOUNDS,
+    DrawnTolerances,
+    read_statistics,
+)
 from validation.study.service import Service, read_service
 
 _CHECKS = ("reference", "stiffness", "maps", "picture", "crosscheck")
@@ -50,6 +55,8 @@ class Study:
         folder: folder of the report.
         files: files that were read: the study file, a robot file, surfaces.
         service: results requested on the robot under load; None without a table.
+        statistics: results requested on the tolerances of the robot's drawing; None
+            without tolerances.
     """
 
     title: str
@@ -66,6 +73,7 @@ class Study:
     folder: Path
     files: tuple[Path, ...] = ()
     service: Service | None = None
+    statistics: DrawnTolerances | None = None
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -101,6 +109,9 @@ def read_study(
     asked_by_key = {check for check, key in by_key.items() if root.has(key)}
     scales = _scales(root)
     service = read_service(root, robot, links)
+    statistics = read_statistics(root, robot)
+    if robot.callouts or robot.fits:
+        errors = f"{errors}; {NOT_IN_BOUNDS}"
     checks, named = _checks(root, bool(meshes), bool(grid), bool(scales))
     threads = [quoted(frame.name) for frame in robot.frames if frame.pitch]
     if threads and "crosscheck" in checks:
@@ -133,6 +144,7 @@ def read_study(
         folder=folder,
         files=_files(path, root, meshes),
         service=service,
+        statistics=statistics,
     )
 
 

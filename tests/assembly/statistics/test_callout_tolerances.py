@@ -100,7 +100,13 @@ def test_width_of_a_position_meets_its_yield_in_finite_geometry(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (PLAN.format(**OF_CALLOUTS).replace("0.9", "1.0"), "found 1 with callouts"),
+        (
+            PLAN
+            .format(**OF_CALLOUTS)
+            .replace("0.9", "1.0")
+            .replace("translation", "energy"),
+            "found 1 with callouts",
+        ),
         (PLAN.format(**OF_CALLOUTS).replace('["hand"]', '["hnd"]'), 'found "hnd"; did'),
         (PLAN.format(**OF_CALLOUTS).replace('["hand"]', '["arm"]'), '"arm" again'),
         (PLAN.format(**OF_CALLOUTS).replace('["hand"]', "[]"), "at least one"),

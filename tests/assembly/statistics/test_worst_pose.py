@@ -65,6 +65,24 @@ def test_serial_arm_has_the_worst_case_of_all_corners_in_finite_geometry():
     assert sum(share for _, share in found.shares) == pytest.approx(156.18e-6, rel=1e-4)
 
 
+def test_balls_at_two_joints_have_the_sum_of_their_radii():
+    """Every direction is a worst one: 20 and 15 um, both values and bounds."""
+    balls = tuple(
+        Callout(name, feature, (Datum(datum, "point"),), shape="point",
+                widths={"position": width})
+        for name, feature, datum, width in (
+            ("arm", "elbow", "shoulder", 40e-6), ("hand", "tip", "elbow", 30e-6),
+        )
+    )  # fmt: skip
+    tight = tuple(replace(frame, clearance=None) for frame in SERIAL.frames)
+    robot = replace(SERIAL, frames=tight, callouts=balls)
+    found = worst_pose(
+        linear_response(home_posture(robot)), sources_of(robot), "translation"
+    )
+    assert found.attained == pytest.approx(35e-6, rel=1e-9)
+    assert found.bound == pytest.approx(35e-6, rel=1e-9)
+
+
 def test_uniform_draws_of_the_serial_arm_have_the_worked_radius():
     """rms 58.9 um of uniform errors and uniform discs: the sum of the variances."""
     prepared, sources = of_serial()

@@ -1,0 +1,183 @@
+"""Widths of callouts of least cost such that no machine within them exceeds a limit.
+
+The worst pose error is the largest sum of support functions over directions n,
+``sum_g t_g s_g(n) + c(n)``, where it is a convex maximisation without conditions: where
+nothing is over-constrained, or parts are elastic and without clearance.  It is convex
+in the tolerances t.  For each direction ``sum_g t_g s_g(n) <= limit - c(n)`` holds for
+all tolerances that meet the limit, so the programme of such planes proves the least
+cost, see :mod:`assembly.statistics.cutting_planes`.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.posture import Posture
+from assembly.statistics.allocated_tolerances import Allocation
+from assembly.statistics.callout_sources import CalloutSources, sources_of
+from assembly.statistics.cutting_planes import cheapest_within
+from assembly.statistics.error_sets import ErrorSets, error_sets, zones_of_errors
+from assembly.statistics.linear_response import linear_response
+from assembly.statistics.quantities import POSE_ERRORS, UNITS
+from assembly.statistics.replay import Replay
+from assembly.statistics.requirement import Plan, Requirement
+from assembly.statistics.verification import verify
+from assembly.statistics.worst_pose import farthest_screw
+from forcefit.inputs.table import BadInput
+
+_TOLERANCE = 1e-3  # relative to a limit: largest violation before the last scaling
+_MOST_STEPS = 200
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class _Case:
+    """A limit at a posture: the zones at their largest widths, and their classes."""
+
+    key: str
+    sets: ErrorSets
+    classes: tuple[int, ...]  # of each zone; -1 of a clearance
+    where: str
+
+    def scaled(self, shares: NDArray) -> ErrorSets:
+        """The sets for shares (G,) of the largest widths."""
+        factors = np.ones(self.sets.screws.shape[1])
+        for columns, g in zip(self.sets.columns, self.classes, strict=True):
+            factors[columns] = shares[g] if g >= 0 else 1.0
+        return replace(self.sets, screws=self.sets.screws * factors)
+
+    def worst(self, shares: NDArray) -> tuple[float, float, NDArray]:
+        """Value attained, certified bound, and direction (3,) of the worst error."""
+        half = 3 * POSE_ERRORS.index(self.key)
+        (low, high), screw = farthest_screw(self.scaled(shares), half)
+        direction = screw[half : half + 3]
+        size = float(np.linalg.norm(direction))
+        return low, high, direction / size if size else np.eye(3)[0]
+
+    def supports(self, direction: NDArray, count: int) -> tuple[NDArray, float]:
+        """Support of each class (G,) at its largest width, and of the clearances."""
+        half = 3 * POSE_ERRORS.index(self.key)
+        weights = direction @ self.sets.screws[half : half + 3]
+        found = np.zeros(count + 1)
+        for zone, columns, g in zip(
+            self.sets.zones, self.sets.columns, self.classes, strict=True
+        ):
+            found[g] += zone.farthest_u(weights[columns])[1]
+        return found[:-1], float(found[-1])
+
+
+def allot_worst_case(
+    postures: Sequence[Posture], plan: Plan, fresh: int, progress: Progress,
+    replay: Replay | None = None,
+) -> Allocation:  # fmt: skip
+    """Return the tolerances of least cost within which every machine meets the limits.
+
+    Args:
+        postures: of one robot.
+        plan: of callouts, with limits on rotation and translation and a yield of 1;
+            fits have their largest clearance.
+        fresh: number of new draws that verify the tolerances; 0 for none.
+        progress: called with the name of a step, its progress and its total.
+        replay: stored results of the draws.
+
+    Returns:
+        The tolerances, their worst case and a lower bound of the cost.
+
+    Raises:
+        BadInput: the worst case is no convex maximisation, clearances alone exceed a
+            limit, or even the tightest tolerances do.
+    """
+    if plan.clearance != "worst":
+        fault = f"found {plan.clearance} with callouts and a yield of 1"
+        raise BadInput(f"--clearance: {fault}, expected worst")
+    robot = plan.sources.robot
+    if robot.fits:
+        of_fits = sources_of(robot)
+        assert isinstance(of_fits, CalloutSources)
+        loose = of_fits.with_largest_clearances()
+        postures = [replace(posture, robot=loose) for posture in postures]
+    requirement = Requirement(postures, plan, replay or Replay())
+    perfect_parts = requirement.perfect_parts()
+    cases = [_case(p, plan, key) for p in postures for key in plan.limits]
+    shares, planes = np.ones(len(plan.names)), list[NDArray]()
+    for step in range(_MOST_STEPS):
+        progress("cutting planes", step, _MOST_STEPS)
+        violated = [plane for case in cases for plane in _plane(case, plan, shares)]
+        if not violated:
+            break
+        planes += violated
+        shares = cheapest_within(plan, planes, plan.least, plan.most) / plan.most
+    progress("cutting planes", _MOST_STEPS, _MOST_STEPS)
+    price_bound = plan.price(shares * plan.most)
+    shares = shares * min(_factor(case, plan, shares) for case in cases)
+    tolerances = shares * plan.most
+    verification: dict[str, Any] = {}
+    if fresh:
+        tolerances, verification = verify(requirement, tolerances, fresh, progress)
+    price = plan.price(tolerances)
+    return Allocation(
+        plan, tolerances, price, tolerances, price, price_bound, len(planes),
+        _worst(cases, tolerances / plan.most), 1.0, verification, perfect_parts,
+    )  # fmt: skip
+
+
+def _case(posture: Posture, plan: Plan, key: str) -> _Case:
+    """A limit at a posture, refused where its worst case is not convex."""
+    sources = plan.sources
+    assert isinstance(sources, CalloutSources)
+    sets = error_sets(linear_response(posture), sources)
+    where = ", ".join(f"{k} = {v:.4g}" for k, v in posture.pose().items())
+    if len(sets.rigid_rows) or (len(sets.spring_rows) and sets.clearances):
+        kind = "rigid" if len(sets.rigid_rows) else "elastic with clearance"
+        raise BadInput(
+            f"yield: found 1 for parts that are over-constrained and {kind} "
+            f"(at {where}), expected less than 1; statistics --worst-case is their "
+            "worst case"
+        )
+    firsts = np.cumsum([0, *(len(unit) for _, _, unit in zones_of_errors(sources))])
+    own = [int(plan.group[first]) for first in firsts[:-1]]
+    classes = (*own, *[-1] * (len(sets.zones) - len(own)))
+    full = np.ones(sets.screws.shape[1])
+    for columns, g in zip(sets.columns, classes, strict=True):
+        full[columns] = plan.most[g] if g >= 0 else 1.0
+    return _Case(key, replace(sets, screws=sets.screws * full), classes, where)
+
+
+def _plane(case: _Case, plan: Plan, shares: NDArray) -> list[NDArray]:
+    """The plane ``a.t <= 1`` that cuts off tolerances beyond a limit, if they are."""
+    limit = plan.limits[case.key]
+    low, _, direction = case.worst(shares)
+    if low <= limit * (1 + _TOLERANCE):
+        return []
+    supports, clearance = case.supports(direction, len(plan.names))
+    if clearance >= limit:
+        value = f"{clearance:.4g} {UNITS[case.key]} at {case.where}"
+        raise BadInput(
+            f"limit {case.key}: found clearances that alone reach {value}, expected "
+            f"less than {limit:g} {UNITS[case.key]}"
+        )
+    return [supports / plan.most / (limit - clearance)]
+
+
+def _factor(case: _Case, plan: Plan, shares: NDArray) -> float:
+    """The factor on tolerances at which the certified bound meets the limit."""
+    # the worst case is convex in the factor, so the chord from zero is above it
+    limit, high = plan.limits[case.key], case.worst(shares)[1]
+    if high <= limit:
+        return 1.0
+    alone = case.worst(shares * 0.0)[1]
+    return max(0.0, (limit - alone) / (high - alone))
+
+
+def _worst(cases: Sequence[_Case], shares: NDArray) -> dict[str, tuple[float, float]]:
+    """The largest value attained and its bound, by quantity over all postures."""
+    found: dict[str, tuple[float, float]] = {}
+    for case in cases:
+        low, high, _ = case.worst(shares)
+        before = found.get(case.key, (0.0, 0.0))
+        found[case.key] = max(before[0], low), max(before[1], high)
+    return found

@@ -1,0 +1,144 @@
+"""Statistics and worst case of the tolerances of a drawing, at the pose of a study.
+
+The table ``[statistics]`` of a study file changes the defaults.  Errors of drawn parts
+take the place of the errors of the study.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from assembly.kinematics.posture import Posture
+from assembly.model.robot import Robot
+from assembly.statistics.callout_sources import sources_of
+from assembly.statistics.experiment import Experiment, precision_for
+from assembly.statistics.importance_table import ImportanceOptions
+from assembly.statistics.monte_carlo import run_draws
+from assembly.statistics.quantities import limit_names
+from assembly.statistics.summary import summarise
+from assembly.statistics.worst_pose_report import worst_results
+from forcefit.inputs.table import BadInput, Table, nearest
+
+if TYPE_CHECKING:
+    import xarray
+
+_LEAST_BASE_DRAWS = 16  # of the Sobol indices, as on the command line
+_MOST_DRAWS = 1_000_000
+NOT_IN_BOUNDS = (
+    "tolerances of the drawing are not among these errors, and fits have their mean "
+    "clearance; both are in the statistics and in the worst case of drawn parts"
+)
+
+
+@dataclass(frozen=True)
+class DrawnTolerances:
+    """Results that a study requests on the tolerances of the robot's drawing.
+
+    Attributes:
+        draws: number of drawn machines.
+        seed: of the draws.
+        importance: base draws of the Sobol indices; 0 for none.
+        limits: [rad, m, J, ..] by quantity.
+    """
+
+    draws: int = 1000
+    seed: int = 1
+    importance: int = 64
+    limits: dict[str, float] = field(default_factory=dict)
+
+
+def read_statistics(root: Table, robot: Robot) -> DrawnTolerances | None:
+    """Return the table ``[statistics]`` of a study file, or its defaults.
+
+    Args:
+        root: root table of the file.
+        robot: robot of the study.
+
+    Returns:
+        The requested results; None of a robot without tolerances of a drawing, and
+        without the table also of one whose loops were closed by the study.
+
+    Raises:
+        BadInput: the table violates a rule, the robot has no tolerances, or the study
+            closes its loops, which leaves a misfit that no part has.
+    """
+    drawn = bool(robot.callouts or robot.fits)
+    closing = [key for key in ("rest", "mismatch") if root.has(key)]
+    if not root.has("statistics"):
+        return DrawnTolerances() if drawn and not closing else None
+    if closing:
+        fault = f'found it together with "{closing[0]}", whose misfit no part has'
+        raise root.bad("statistics", f"{fault}; expected one of them")
+    table = root.table("statistics")
+    if not drawn:
+        fault = "found one for a robot without [[tolerance]] and without fits"
+        raise root.bad("statistics", f"{fault}, expected none")
+    draws = _count(table, "draws", 1000, 2)
+    importance = _count(table, "importance", 64, 0)
+    if 0 < importance < _LEAST_BASE_DRAWS:
+        expected = f"expected 0 or at least {_LEAST_BASE_DRAWS}"
+        raise table.bad("importance", f"found {importance}, {expected}")
+    asked = DrawnTolerances(draws, table.integer("seed", 1), importance, _limits(table))
+    table.finish()
+    return asked
+
+
+def _count(table: Table, key: str, default: int, least: int) -> int:
+    """A number of draws."""
+    value = table.integer(key, default)
+    if not least <= value <= _MOST_DRAWS:
+        raise table.bad(key, f"found {value}, expected {least} to {_MOST_DRAWS}")
+    return value
+
+
+def _limits(table: Table) -> dict[str, float]:
+    """The limits by quantity, in SI units."""
+    if not table.has("limits"):
+        return {}
+    given, names = table.table("limits"), limit_names()
+    for name in given.content:
+        if name not in names:
+            fault = f"found a limit of an unknown quantity{nearest(name, names)}"
+            raise given.bad(name, fault)
+    limits = {name: given.number(name, "SI unit", above=0.0) for name in given.content}
+    given.finish()
+    return limits
+
+
+def drawn_at_pose(
+    posture: Posture, asked: DrawnTolerances, progress: Callable[[int, int], None]
+) -> tuple[dict[str, Any], "xarray.Dataset"]:
+    """Return statistics, importance and worst case of drawn parts at one pose.
+
+    Args:
+        posture: the robot's configuration; its geometric errors are not used.
+        asked: the requested results.
+        progress: called with the number of finished draws and their total.
+
+    Returns:
+        The summary with the keys of ``assembly statistics``, and the draws.  Instead of
+        ``worst_case`` it has ``worst_case_left_out``, the reason, where there is none.
+
+    Raises:
+        BadInput: a limit is one on a quantity that this robot does not have.
+    """
+    sources = sources_of(posture.robot)
+    experiment = Experiment(
+        posture, sources, asked.seed, precision=precision_for(asked.limits)
+    )
+    experiment.check_limits(asked.limits)
+    options = None
+    if asked.importance:
+        options = ImportanceOptions(asked.importance, "source")
+    data = run_draws(
+        experiment, asked.draws, progress=progress, importance=options
+    )  # fmt: skip
+    summary = {
+        "robot": posture.robot.name, "pose": posture.pose(), "seed": asked.seed,
+        "load": None, "gravity": None, **summarise(data, asked.limits),
+    }  # fmt: skip
+    try:
+        worst = {"worst_case": worst_results(experiment.energies, sources, asked.seed)}
+    except BadInput as error:
+        return summary | {"worst_case_left_out": str(error)}, data
+    return summary | worst, data
