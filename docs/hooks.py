@@ -1,8 +1,18 @@
-"""What the site does to pages besides its theme."""
+r"""Changes of the site to pages: mathematics, tables of the code's numbers, roles.
+
+Mathematics is written as on GitHub: a block of ``math``, or $`x`$ within a line.  It
+becomes MathML when the site is built, which browsers of 2023 and newer show without a
+script or a network.  ``\tag{22}`` at the end of a block is the paper's number.
+"""
 
 import re
 from pathlib import Path
 from typing import Any
+
+from latex2mathml.converter import convert
+from markdown import Markdown
+from markdown.extensions import Extension
+from markdown.inlinepatterns import InlineProcessor
 
 # a docstring's ":func:`name`", once its name is code
 _ROLE = re.compile(r"(?<![\w:]):(?:func|mod|class|meth|data|attr|math):(?=<code>)")
@@ -12,6 +22,42 @@ _NUMBER = re.compile(
     r"^_?([A-Z][A-Z_]*)(?:: .+)? = ([^\"'#\n]*\d[^\"'#\n]*)  # (.+)$", re.M
 )
 _NUMBERS = "<!-- numbers of the code -->"
+
+# number of an equation, at the end of a block
+_TAG = re.compile(r"\\tag\{([^}]+)\}\s*$")
+
+
+def on_config(config: Any, **_: Any) -> Any:
+    """Mathematics in blocks and within lines."""
+    fences = config.mdx_configs.setdefault("pymdownx.superfences", {})
+    fences["custom_fences"] = [{"name": "math", "class": "math", "format": equation}]
+    config.markdown_extensions.append(_Formulas())
+    return config
+
+
+def equation(source: str, *_: Any, **__: Any) -> str:
+    """A block of mathematics, with its number and an anchor of that number."""
+    tag = _TAG.search(source)
+    formula = convert(_TAG.sub("", source).strip(), display="block")
+    if tag is None:
+        return f'<div class="equation">{formula}</div>'
+    anchor = "eq-" + tag[1].split("-")[0].rstrip("abc")
+    number = f'<span class="equation-number">({tag[1]})</span>'
+    return f'<div class="equation" id="{anchor}">{formula}{number}</div>'
+
+
+class _Formula(InlineProcessor):
+    """Mathematics within a line."""
+
+    def handleMatch(self, m: Any, data: str) -> Any:
+        return self.md.htmlStash.store(convert(m[1])), m.start(0), m.end(0)
+
+
+class _Formulas(Extension):
+    """Registers mathematics within lines before code, which has the same backticks."""
+
+    def extendMarkdown(self, md: Markdown) -> None:
+        md.inlinePatterns.register(_Formula(r"\$`([^`]+)`\$", md), "formula", 195)
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
