@@ -22,6 +22,8 @@ _NUMBER = re.compile(
     r"^_?([A-Z][A-Z_]*)(?:: .+)? = ([^\"'#\n]*\d[^\"'#\n]*)  # (.+)$", re.M
 )
 _NUMBERS = "<!-- numbers of the code -->"
+_CHANGES = "<!-- CHANGELOG.md -->"
+_ROOT = Path(__file__).parents[1]
 
 # number of an equation, at the end of a block
 _TAG = re.compile(r"\\tag\{([^}]+)\}\s*$")
@@ -61,15 +63,17 @@ class _Formulas(Extension):
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """The table of a diagnosis's numbers, taken from the modules that hold them."""
+    """The changelog, and the numbers of a diagnosis from the modules that hold them."""
+    if _CHANGES in markdown:
+        text = (_ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+        markdown = markdown.replace(_CHANGES, text.replace("](docs/", "]("))
     return markdown.replace(_NUMBERS, _numbers()) if _NUMBERS in markdown else markdown
 
 
 def _numbers() -> str:
     """A table of all numbers of ``validation/diagnosis``."""
     rows = ["| module | number | value | what it is |", "|---|---|---|---|"]
-    root = Path(__file__).parents[1] / "validation" / "diagnosis"
-    for path in sorted(root.glob("*.py")):
+    for path in sorted((_ROOT / "validation" / "diagnosis").glob("*.py")):
         for name, value, reason in _NUMBER.findall(path.read_text(encoding="utf-8")):
             words = name.lower().replace("_", " "), reason.replace("|", "or")
             rows.append(f"| {path.stem} | {words[0]} | {value} | {words[1]} |")
