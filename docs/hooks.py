@@ -13,6 +13,7 @@ from latex2mathml.converter import convert
 from markdown import Markdown
 from markdown.extensions import Extension
 from markdown.inlinepatterns import InlineProcessor
+from mkdocs.structure.files import File
 
 # a docstring's ":func:`name`", once its name is code
 _ROLE = re.compile(r"(?<![\w:]):(?:func|mod|class|meth|data|attr|math):(?=<code>)")
@@ -35,6 +36,14 @@ def on_config(config: Any, **_: Any) -> Any:
     fences["custom_fences"] = [{"name": "math", "class": "math", "format": equation}]
     config.markdown_extensions.append(_Formulas())
     return config
+
+
+def on_files(files: Any, config: Any, **_: Any) -> Any:
+    """The notebooks of the examples, to download."""
+    for path in sorted((_ROOT / "examples" / "notebooks").glob("*.ipynb")):
+        name = f"notebooks/{path.name}"
+        files.append(File.generated(config, name, abs_src_path=str(path)))
+    return files
 
 
 def equation(source: str, *_: Any, **__: Any) -> str:
