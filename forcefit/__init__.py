@@ -83,8 +83,12 @@ _OWNERS = {
     "assembly.platform_stiffness.platform_stiffness": ("platform_stiffness",),
     "assembly.platform_stiffness.vibration": ("natural_modes",),
     "assembly.model.robot": (
-        "BeamLink", "Clearance", "Frame", "MatrixLink", "Robot",
+        "BeamLink", "Clearance", "Frame", "LockedAt", "MatrixLink", "Robot",
     ),
+    "assembly.report.show": ("show",),
+    "assembly.files.step_file": ("read_steps",),
+    "assembly.steps.bolted": ("bolt_joints",),
+    "assembly.steps.run": ("assemble_in_steps",),
     "assembly.statistics.experiment": ("Experiment",),
     "assembly.statistics.monte_carlo": ("run_draws",),
     "assembly.statistics.summary": ("summarise",),

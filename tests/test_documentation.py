@@ -67,7 +67,9 @@ def parsed(words):
     while hasattr(command, "commands"):
         name, *words = words
         command = command.commands[name]
-    return command.make_context(name, list(words))
+    # the first context decides the names of a command's help option, which are kept
+    own = app.info.context_settings
+    return command.make_context(name, list(words), **own)
 
 
 @pytest.mark.parametrize("name", sorted(PAGES))

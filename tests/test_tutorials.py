@@ -64,8 +64,9 @@ def follow(page, folder):
     return ran, compared
 
 
-def test_tutorials_folder_has_the_four_known_tutorials():
-    assert TUTORIALS == ["cad_link", "own_robot", "tolerances", "tracker"]
+def test_tutorials_folder_has_the_five_known_tutorials():
+    known = ["assembly_order", "cad_link", "own_robot", "tolerances", "tracker"]
+    assert known == TUTORIALS
 
 
 @pytest.mark.slow

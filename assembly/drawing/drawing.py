@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from assembly.callouts.callout import Callout
 from assembly.drawing.contacts import Contact
-from assembly.model.robot import BeamLink, Clearance, Link, MeshLink
+from assembly.model.robot import BeamLink, Clearance, Link, LockedAt, MeshLink
 
 # freedoms of each type: rows of the screw [RX RY RZ TX TY TZ] in the joint's axes; of a
 # universal joint its two turns have axes of their own
@@ -41,6 +41,7 @@ class JointNumbers:
         tolerance: (6,) [rad, m] standard deviations of it, or None.
         fit: ISO 286 fit whose mean radial clearance is in ``clearance``, or empty.
         contacts: further clearance, by the sizes of the contacts.
+        locked_at: where a fixed joint is bolted, with its clearance before; or None.
     """
 
     clearance: Clearance | None = None
@@ -49,6 +50,7 @@ class JointNumbers:
     tolerance: NDArray | None = None
     fit: str = ""
     contacts: tuple[Contact, ...] = ()
+    locked_at: LockedAt | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,6 +37,7 @@ _SAME = 1e-12  # [lengths, rad] error below which points and axes are the same
 _HELD = {
     "name", "parent", "translation", "rotation", "joint", "actuated", "position",
     "limits", "geometric_error", "tolerance", "clearance", "joint_stiffness", "link",
+    "locked_at",
     "mass", "centre_of_mass", "inertia", "pitch",
 }  # fmt: skip
 
@@ -222,7 +223,7 @@ def _add_mass(sheet: _Sheet, i: int) -> None:
 
 def _new_body(sheet: _Sheet, name: str) -> int:
     """Add a body, and return its number."""
-    k = 1 + max(sheet.bodies, default=0)
+    k = 1 + max((*sheet.bodies, *sheet.same), default=0)
     sheet.bodies[k] = DrawnBody(sheet.new_name(name, joint=False))
     return k
 

@@ -15,10 +15,10 @@ from assembly.drawing.callouts import frame_callouts, frame_fits
 from assembly.drawing.drawing import Drawing, DrawnBody, DrawnJoint
 from assembly.drawing.links import link_at_tip
 from assembly.drawing.parts import joint_axes, parts_of
-from assembly.drawing.tree import ROOT, Node, Step, steps_of
+from assembly.drawing.tree import ROOT, Edge, Node, Step, steps_of
 from assembly.model.placed_frames import PlacedFrame, place_frames
 from assembly.model.robot import BASE, Frame, Robot
-from forcefit.inputs.table import quoted
+from forcefit.inputs.table import BadInput, quoted
 from stiffness.screws import transform
 
 
@@ -32,6 +32,9 @@ class _Plan:
         bodies: of it, by name.
         own: names of the frames that bodies have, by node.
         carriers: name of the frame that carries what is on a node.
+        links: name of the frame of a link, by body, where that is not the body's own.
+        ends: name of the last frame of an edge that closes a loop.
+        seats: name of the frame at which that loop closes.
     """
 
     drawing: Drawing
@@ -39,6 +42,9 @@ class _Plan:
     bodies: Mapping[str, DrawnBody]
     own: Mapping[Node, str]
     carriers: Mapping[Node, str]
+    links: Mapping[str, str]
+    ends: Mapping[Edge, str]
+    seats: Mapping[Edge, str]
 
 
 def robot_of_drawing(drawing: Drawing) -> Robot:
@@ -62,7 +68,7 @@ def robot_of_drawing(drawing: Drawing) -> Robot:
         placed += _frames_of(plan, step)
         if step.closes:
             placed += _ends(plan, step)
-            closures.append((placed[-1][0].name, _seat(plan, step)))
+            closures.append((plan.ends[step.edge], plan.seats[step.edge]))
     remarks = (*_cuts(steps), *drawing.remarks)
     return Robot(
         drawing.name, drawing.platform, place_frames(placed), tuple(closures),
@@ -82,7 +88,7 @@ def _plan(drawing: Drawing, steps: list[Step]) -> _Plan:
     """Names of the frames, the users' where no joint has them."""
     joints = {joint.name: joint for joint in drawing.joints}
     bodies = {body.name: body for body in drawing.bodies}
-    taken = {part.name for joint in drawing.joints for part in parts_of(joint)}
+    taken = _part_names(drawing)
     met = {step.end for step in steps if step.closes} - {ROOT}
     massive = {(body.name, True) for body in drawing.bodies if _has_mass(body)}
     linked = {s.end for s in steps if _is_body(drawing, s)}
@@ -91,18 +97,44 @@ def _plan(drawing: Drawing, steps: list[Step]) -> _Plan:
         name = node[0] if node[1] else f"{node[0]}.near"
         if node not in own:
             own[node] = _free_name(name, taken)
-            taken.add(own[node])
+    links: dict[str, str] = {}
+    ends: dict[Edge, str] = {}
+    seats: dict[Edge, str] = {}
+    for step in steps:
+        item = step.edge.item
+        if not isinstance(item, DrawnJoint) and not _is_body(drawing, step):
+            links[item.name] = _free_name(f"{item.name}.link", taken)
+        if step.closes:
+            met_at = own.get(step.end) or _free_name(f"{item.name}.{BASE}", taken)
+            seats[step.edge] = met_at
+            ends[step.edge] = _free_name(f"{item.name}.end", taken)
     carriers = {ROOT: BASE}
     for step in steps:
         if not step.closes:
-            carriers[step.end] = own.get(step.end) or _last_name(step)
-    return _Plan(drawing, joints, bodies, own, carriers)
+            carriers[step.end] = own.get(step.end) or _last_name(step, links)
+    return _Plan(drawing, joints, bodies, own, carriers, links, ends, seats)
+
+
+def _part_names(drawing: Drawing) -> set[str]:
+    """Names of the frames of all joints, which must be different."""
+    owners: dict[str, str] = {}
+    for joint in drawing.joints:
+        for part in parts_of(joint):
+            if part.name in owners:
+                raise BadInput(
+                    f"joint {quoted(joint.name)}: found {quoted(part.name)} as the "
+                    f"name of a frame, which joint {quoted(owners[part.name])} has "
+                    "too; expected another name"
+                )
+            owners[part.name] = joint.name
+    return set(owners)
 
 
 def _free_name(name: str, taken: set[str]) -> str:
-    """The name, with an addition where a joint has it already."""
+    """The name, with an addition where another frame has it, and then taken."""
     while name in taken:
         name += ".body"
+    taken.add(name)
     return name
 
 
@@ -119,12 +151,12 @@ def _tip(body: DrawnBody) -> str | None:
     return body.ends[1] if body.ends else None
 
 
-def _last_name(step: Step) -> str:
+def _last_name(step: Step, links: Mapping[str, str]) -> str:
     """Name of the last frame of an edge."""
     item = step.edge.item
     if isinstance(item, DrawnJoint):
         return parts_of(item, step.reverse)[-1].name
-    return f"{item.name}.link"
+    return links[item.name]
 
 
 def _frames_of(plan: _Plan, step: Step) -> list[PlacedFrame]:
@@ -139,12 +171,13 @@ def _frames_of(plan: _Plan, step: Step) -> list[PlacedFrame]:
                 part.name, carrier, joint=part.kind, **motion,
                 clearance=numbers.clearance, joint_stiffness=numbers.stiffness,
                 geometric_error=numbers.error, tolerance=numbers.tolerance,
+                locked_at=numbers.locked_at,
             )  # fmt: skip
             placed.append((frame, part.pose))
             carrier = part.name
     else:
         is_body = _is_body(plan.drawing, step)
-        name = plan.own[step.end] if is_body else f"{item.name}.link"
+        name = plan.own[step.end] if is_body else plan.links[item.name]
         base, tip = (_end_pose(plan, item, k) for k in (step.reverse, not step.reverse))
         link = link_at_tip(item, base, tip, step.reverse)
         mass = _mass(item, tip) if is_body else {}
@@ -206,16 +239,10 @@ def _body_frame(plan: _Plan, node: Node, carrier: str) -> PlacedFrame:
 
 def _ends(plan: _Plan, step: Step) -> list[PlacedFrame]:
     """The frame that must meet a body's, and a frame of the base to be met."""
-    name = step.edge.item.name
-    end = Frame(f"{name}.end", _last_name(step))
+    end = Frame(plan.ends[step.edge], _last_name(step, plan.links))
     if step.end != ROOT:
         return [(end, _pose(plan, step.end))]
     item = step.edge.item
     assert isinstance(item, DrawnJoint)
     pose = transform(item.at, np.eye(3))
-    return [(Frame(_seat(plan, step)), pose), (end, pose)]
-
-
-def _seat(plan: _Plan, step: Step) -> str:
-    """Name of the frame at which a loop closes."""
-    return plan.own.get(step.end) or f"{step.edge.item.name}.{BASE}"
+    return [(Frame(plan.seats[step.edge]), pose), (end, pose)]

@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.drawing.drawing import DrawnBody, DrawnJoint, JointNumbers, perpendicular
+from assembly.drawing.parts import parts_of
 from assembly.drawing.rigid_bodies import RigidBodies, connects
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
 from assembly.model.robot import Clearance, Frame, Robot
+from forcefit.inputs.table import BadInput, quoted
 
 _SAME = 1e-12  # [lengths, sine] error below which points and directions are the same
 _PARALLEL = 1e-2  # sine of the angle below which a universal joint is not made
@@ -68,7 +70,8 @@ def found_joints(
             rows.append(following[rows[-1]])
         options = (_several(posture, rows[:n]) for n in (3, 2) if len(rows) >= n)
         joint, rows = next(filter(None, options), None) or (_single(posture, i), [i])
-        if joint.name in names:
+        others = {f.name for k, f in enumerate(robot.frames) if k not in rows}
+        if joint.name in names or others & {part.name for part in parts_of(joint)}:
             joint = replace(joint, name=frame.name)
         names.add(joint.name)
         found.append(FoundJoint(joint, tuple(rows), _ends(bodies, rows)))
@@ -123,8 +126,17 @@ def _single(posture: Posture, i: int) -> DrawnJoint:
 
 def _numbers(frame: Frame) -> JointNumbers:
     """Error, clearance and stiffness of a frame, in its axes."""
+    bolt, error = frame.locked_at, frame.geometric_error
+    if bolt is not None:  # the drawing is of the robot before it is bolted
+        if {"rx", "ry", "rz"} & set(bolt.pose):
+            raise BadInput(
+                f"frame {quoted(frame.name)}.locked_at: found a rotation of the "
+                "platform, whose axes a drawing turns; expected its translation, or "
+                "joints"
+            )
+        bolt, error = replace(bolt, screw=np.zeros(6)), error - bolt.screw
     return JointNumbers(
-        frame.clearance, frame.joint_stiffness, frame.geometric_error, frame.tolerance
+        frame.clearance, frame.joint_stiffness, error, frame.tolerance, locked_at=bolt
     )
 
 

@@ -169,6 +169,7 @@ def _reversed(part: Part) -> Part:
         stiffness=None if K is None else _flipped(K),
         error=-_FLIP_SCREW * own.error,
         tolerance=own.tolerance,
+        locked_at=own.locked_at,
         fit=own.fit,
     )
     pose = part.pose @ transform(np.zeros(3), _FLIP)

@@ -30,6 +30,7 @@ def connects(frame: Frame) -> bool:
     return (
         frame.joint != "fixed"
         or frame.clearance is not None
+        or frame.locked_at is not None
         or frame.joint_stiffness is not None
         or bool(frame.geometric_error.any())
         or frame.tolerance is not None

@@ -66,6 +66,7 @@ from assembly.model.clearance import (
     clearance_excess,
     has_bounded_motion,
 )
+from assembly.model.given_load import Load, given_load
 from assembly.model.links import own_screws
 from assembly.solvers.cones import into_cones
 from assembly.solvers.method import Method, check_method
@@ -303,7 +304,7 @@ class ExactAssembly:
 
 def solve_exact(
     posture: Posture,
-    load: ArrayLike | None = None,
+    load: Load | None = None,
     start: Assembly | None = None,
     bodies: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
@@ -317,8 +318,9 @@ def solve_exact(
     Args:
         posture: configuration of the robot, with its errors, clearances, links and
             joint springs.
-        load: (6,) [N m, N] on the platform at ``point``, base axes.  The force is dead;
-            the work of the moment is its product with the rotation vector.
+        load: (6,) [N m, N] on the platform at ``point``, base axes, or by component,
+            ``{"fz": -50}``.  The force is dead; the work of the moment is its product
+            with the rotation vector.
         start: the linear solution for this posture and these loads, if known.
         bodies: (n, 6) [N m, N] dead loads on the bodies of all frames, each at its
             frame's origin, base axes; moments are couples of dead forces.
@@ -343,7 +345,8 @@ def solve_exact(
     if method == "reference":
         _refuse_compiled(start, near)
     cut = cut_beams(posture.robot)
-    wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
+    load = np.zeros(6) if load is None else given_load(load)
+    wrench = load.copy()
     wrench[:3] += np.cross(posture.platform[:3, :3] @ np.asarray(point), wrench[3:])
     if start is not None and (
         start.posture is not posture or not start.has_loads(wrench, bodies, gravity)

@@ -1,16 +1,27 @@
 """Import and export of robots in files of any kind, by their suffix."""
 
+import logging
 import os
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Union
 
+from assembly.exchange.other_readers import has_reader, read_by_other
 from assembly.files.robot_file import Closing
 from assembly.files.robot_file import write_robot as write_robot_file
 from assembly.files.solved_links import solve_links
 from assembly.model.robot import Robot
 from assembly.robots import load_robot as load_declared
-from forcefit.inputs.table import BadInput, read_bytes
+from assembly.steps.bolted import bolt_joints
+from forcefit.inputs.errors import BadInput, describe
+from forcefit.inputs.table import read_bytes
 
+if TYPE_CHECKING:
+    import mujoco
+    import pinocchio
+
+_LOG = logging.getLogger("forcefit.load")
 OTHERS = (".urdf", ".xml", ".sdf")
 _BLANKS = b"\xef\xbb\xbf \r\n\t"  # a byte order mark and blanks
 # words in a remark which say that an omission may change results
@@ -18,30 +29,42 @@ _WEIGHTY = ("mimic:", "no platform", "no drive", "may carry load", "masses")
 
 
 def load_robot(
-    name: str | Path, close: Closing | None = None, *, links: bool = True
+    name: Union[str, Path, "mujoco.MjModel", "mujoco.MjSpec", "pinocchio.Model"],
+    close: Closing | None = None,
+    *,
+    links: bool = True,
 ) -> Robot:
-    """Return a built-in robot by its name, or the robot of a file of any kind.
+    """Return a built-in robot by its name, the robot of a file, or of a model.
 
     Args:
-        name: name such as ``"irsbot2"``, or the path of a robot file, a URDF (with its
-            loops next to it), MJCF or SDF file.
+        name: name such as ``"irsbot2"``; or the path of a robot file, a URDF (with its
+            loops next to it), MJCF or SDF file; or a ``mujoco.MjModel`` or
+            ``mujoco.MjSpec``, of which bodies, joints, equalities between them,
+            actuators and the key ``home`` are read; or a ``pinocchio.Model``, a tree
+            whose joints of one freedom are all drives.
         close: function that makes the closures of a declared robot hold, as
             :mod:`assembly.kinematics.closing` does; none if absent.
         links: whether links given by a mesh or a library are solved or read now, which
             solvers need.  Without them a robot can be placed, written and converted,
-            and its assembly zone can be computed.
+            and its assembly zone can be computed.  A robot with joints that are bolted
+            at a pose needs them always.
 
     Returns:
         The robot; its remarks include the assumptions and omissions for a file of
         another program.
 
     Raises:
-        BadInput: neither a built-in name nor a file, the file breaks a rule, or a mesh
-            or library that it names is not usable.
+        BadInput: neither a built-in name nor a file nor a model, it breaks a rule, or a
+            mesh or library that it names is not usable.
     """
-    robot = _load_declared(name, close)
+    declared = isinstance(name, str | Path)
+    robot = _load_declared(name, close) if declared else _robot_of_model(name, close)
+    for remark in robot.remarks:
+        _LOG.info("%s: %s", robot.name, remark)
     try:
-        return solve_links(robot) if links else robot
+        if links or any(frame.locked_at for frame in robot.frames):
+            robot = bolt_joints(solve_links(robot))
+        return robot
     except BadInput as error:
         raise BadInput(f"{name}: {error}") from None
 
@@ -50,12 +73,30 @@ def _load_declared(name: str | Path, close: Closing | None) -> Robot:
     """Return the robot of a name or of a file, with links as declared."""
     path = Path(name)
     if path.suffix.lower() not in OTHERS:
+        if _is_of_other(path):
+            robot = read_by_other(path)
+            return robot if close is None else close(robot)
         if os.path.isfile(path) and read_bytes(path).lstrip(_BLANKS)[:1] == b"<":
             raise BadInput(
                 f"{path}: found XML, expected a robot file, or the ending .urdf, .xml "
                 "(MJCF) or .sdf"
             )
         return load_declared(name, close)
+    return _robot_of_foreign(path, path.name, close)
+
+
+def is_robot_file(path: Path) -> bool:
+    """Return whether a file is a TOML of forcefit, not one of another program."""
+    return path.suffix.lower() not in OTHERS and not _is_of_other(path)
+
+
+def _is_of_other(path: Path) -> bool:
+    """Return whether a file has an ending that another distribution reads."""
+    return path.suffix not in {"", ".toml"} and path.is_file() and has_reader(path)
+
+
+def _robot_of_foreign(path: Path, title: str, close: Closing | None) -> Robot:
+    """Return the robot of another program's file; remarks begin with its title."""
     from assembly.exchange.foreign import robot_of_file
 
     conversion = robot_of_file(path, ask=False)[0]
@@ -65,9 +106,36 @@ def _load_declared(name: str | Path, close: Closing | None) -> Robot:
         for line in conversion.left_out
         if any(word in line for word in _WEIGHTY)
     ]
-    remarks = tuple(f"{path.name}: {line}" for line in said)
+    remarks = tuple(f"{title}: {line}" for line in said)
     robot = replace(conversion.robot, remarks=(*conversion.robot.remarks, *remarks))
     return robot if close is None else close(robot)
+
+
+def _robot_of_model(model: object, close: Closing | None) -> Robot:
+    """Return the robot of a model in memory."""
+    from assembly.exchange.mujoco_model import is_mujoco, mjcf_of_model
+    from assembly.exchange.pinocchio_model import (
+        ASSUMED,
+        is_pinocchio,
+        mjcf_of_pinocchio,
+    )
+
+    kind, assumed = type(model).__name__, tuple[str, ...]()
+    if is_mujoco(model):
+        text = mjcf_of_model(model)
+    elif is_pinocchio(model):
+        text, assumed = mjcf_of_pinocchio(model), (f"{kind}: taken: {ASSUMED}",)
+    else:
+        expected = "expected a name, a path, an MjModel, MjSpec or pinocchio.Model"
+        raise BadInput(f"load_robot: found {describe(model)} ({kind}), {expected}")
+    with TemporaryDirectory() as folder:
+        path = Path(folder, f"{kind}.xml")
+        path.write_text(text, encoding="utf-8")
+        try:
+            robot = _robot_of_foreign(path, kind, close)
+        except BadInput as error:
+            raise BadInput(str(error).replace(str(path), kind)) from None
+    return replace(robot, remarks=(*assumed, *robot.remarks)) if assumed else robot
 
 
 def write_robot(robot: Robot, path: str | Path) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.drawing.drawing import FREE_ROWS, DrawnJoint, JointNumbers, perpendicular
+from assembly.files.bolt_file import read_locked_at
 from assembly.files.drawn_clearance import read_drawn_clearance
 from assembly.files.joint_file import read_fit, read_joint_stiffness, read_pitch
 from assembly.files.written_units import SCREW, without_units
@@ -103,12 +104,25 @@ def _numbers(table: Table, kind: str, actuated: bool) -> tuple[JointNumbers, ...
     """Error, clearance and stiffness; of a universal joint for each bearing."""
     if kind != "universal":
         return (_one(table, kind, actuated),)
+    for key in ("clearance", "geometric_error", "tolerance"):
+        _refuse_count(table, key)
     bearings = []
     for which in (0, 1):
         content = {k: _bearing(table, k, which) for k in _KEYS if table.has(k)}
         place = f"{table.place}, {('first', 'second')[which]} bearing"
         bearings.append(_one(Table(content, table.file, place), "revolute", False))
     return tuple(bearings)
+
+
+def _refuse_count(table: Table, key: str) -> None:
+    """Reject a list of values for another number of bearings than two."""
+    value = table.content.get(key)
+    parts = dict if key == "clearance" else list
+    if not isinstance(value, list) or not all(isinstance(v, parts) for v in value):
+        return
+    if len(value) != 2:
+        fault = f"found a list of {len(value)}, expected one value for both bearings"
+        raise table.bad(key, f"{fault}, or two, [first, second]")
 
 
 def _bearing(table: Table, key: str, which: int) -> Any:
@@ -125,12 +139,14 @@ def _one(table: Table, kind: str, actuated: bool) -> JointNumbers:
     zero = np.zeros(6)
     error = table.array("geometric_error", (6,), "rad, m", zero, largest=LARGEST_LENGTH)
     clearance, contacts = read_drawn_clearance(table, kind)
+    clearance, bolt = read_locked_at(table, kind == "fixed", clearance)
     return JointNumbers(
         clearance=clearance,
         contacts=contacts,
         stiffness=_stiffness(table, kind, actuated),
         error=error,
         tolerance=_tolerance(table),
+        locked_at=bolt,
         fit=read_fit(table),
     )
 

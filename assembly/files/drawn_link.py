@@ -1,7 +1,7 @@
 """Links of bodies in files of ``format = 2``: units, and beams along a curve."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +10,14 @@ from assembly.files.link_file import read_link
 from assembly.files.written_units import without_units
 from assembly.model.largest import LARGEST
 from assembly.model.robot import Link, MatrixLink
-from forcefit.inputs.table import BadInput, Table, describe
+from forcefit.inputs.table import BadInput, Table, describe, nearest, quoted
 from stiffness.beam.curve import curve_compliance, curve_mass
 from stiffness.beam.curve_file import read_pieces
 
 _LENGTHS = ("radius", "inner_radius", "width", "height", "length", "wall", "web",
             "flange")  # fmt: skip
 _CURVE = ("curve", "young", "poisson", "density", "theory")
+_KINDS = ("beam", "curve", "stiffness", "mesh", "library")
 _GAP = 1e-6  # [1] of the beam's reach by which it may miss the joint at its end
 
 
@@ -45,6 +46,8 @@ def read_drawn_link(body: Table) -> Link | Curve | None:
         BadInput: a rule of the format is broken.
     """
     link = body.content.get("link")
+    if isinstance(link, dict) and not set(_KINDS) & set(link):
+        _refuse_no_kind(body.table("link"))
     if not isinstance(link, dict) or "curve" not in link:
         if isinstance(link, dict) and isinstance(link.get("beam"), dict):
             _plain_lengths(link["beam"], body, "link.beam")
@@ -55,6 +58,16 @@ def read_drawn_link(body: Table) -> Link | Curve | None:
             names = " | ".join(f'"{name}"' for name in _CURVE[1:])
             raise table.bad(key, f'found it with "curve", expected only {names}')
     return Curve(table)
+
+
+def _refuse_no_kind(link: Table) -> NoReturn:
+    """Reject a link without its kind, which may be misspelt."""
+    unknown = [key for key in link.content if key not in (*_CURVE, "pieces", "up")]
+    if unknown:
+        hint = nearest(unknown[0], _KINDS)
+        raise link.bad("", f"unknown key {quoted(unknown[0])}{hint}")
+    names = " | ".join(map(quoted, _KINDS))
+    raise link.bad("", f"found none of them, expected exactly one of {names}")
 
 
 def _plain_lengths(content: dict[str, Any], body: Table, place: str) -> None:

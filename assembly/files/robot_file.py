@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from assembly.callouts.fits import parse_fit
 from assembly.drawing.frames import robot_of_drawing
+from assembly.files.bolt_file import bolt_table, read_locked_at
 from assembly.files.callout_file import callout_table, read_frame_callouts
 from assembly.files.drawing_file import is_drawing, read_drawing
 from assembly.files.effect_file import effect_tables, with_effects
@@ -263,6 +264,9 @@ def _frame(table: Table) -> Frame:
     translation, rotation = _placement(table)
     passive = joint != "fixed" and not actuated
     own = (5 if joint == "prismatic" else 2) if passive else None
+    clearance, bolt = read_locked_at(
+        table, joint == "fixed", read_clearance(table, joint)
+    )
     frame = Frame(
         name=name,
         parent=table.text("parent", expected='the name of a frame, or "base"'),
@@ -275,7 +279,8 @@ def _frame(table: Table) -> Frame:
         limits=_limits(table),
         geometric_error=_numbers(table, "geometric_error", 6, "rad, m"),
         tolerance=_tolerance(table),
-        clearance=read_clearance(table, joint),
+        clearance=clearance,
+        locked_at=bolt,
         joint_stiffness=read_joint_stiffness(table, own),
         drive_force=_drive_force(table, passive),
         link=read_link(table),
@@ -387,7 +392,7 @@ def _check_meeting_frames(robot: Robot) -> None:
     for place, names in meeting.items():
         for name in names:
             frame = robot.frame(name)
-            keys = ("clearance", "joint_stiffness")
+            keys = ("clearance", "locked_at", "joint_stiffness")
             has = [key for key in keys if getattr(frame, key) is not None]
             if frame.joint != "fixed" or has:
                 fault = has[0] if has else f"a {frame.joint} joint"
@@ -492,13 +497,19 @@ def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
             table["actuated"] = True
         if frame.limits is not None:
             table["limits"] = list(frame.limits)
-    if np.any(frame.geometric_error):
-        table["geometric_error"] = frame.geometric_error.tolist()
+    bolt, error = frame.locked_at, frame.geometric_error
+    if bolt is not None:
+        error = error - bolt.screw
+    if np.any(error):
+        table["geometric_error"] = error.tolist()
     if frame.tolerance is not None:
         table["tolerance"] = frame.tolerance.tolist()
-    if frame.clearance is not None:
-        given = vars(frame.clearance).items()
+    clearance = frame.clearance if bolt is None else bolt.clearance
+    if clearance is not None:
+        given = vars(clearance).items()
         table["clearance"] = {k: v for k, v in given if v is not None}
+    if bolt is not None:
+        table["locked_at"] = bolt_table(bolt)
     if frame.joint_stiffness is not None:
         K = frame.joint_stiffness
         diagonal = np.array_equal(K, np.diag(np.diag(K)))

@@ -7,6 +7,7 @@ from assembly.effects import LIBRARY
 from assembly.effects.forms import FORMS
 from assembly.effects.functions import FORMULA
 from assembly.files.function_file import FUNCTION
+from assembly.model.frame import LEFT
 from assembly.model.function import KINDS
 from assembly.model.robot import JOINTS
 from forcefit.results.quantities import count, flag, number, text
@@ -61,6 +62,12 @@ _LINK = record(
     pieces_=number("springs in series of a beam"),
     parts_=text("solids of other materials", "part"),
 )  # fmt: skip
+_LOCKED_AT = Either((
+    Words(("home",)),
+    record(pose_=Each(number("pose of the platform", "m, rad")),
+           joints_=Each(number("coordinate of a drive", "rad or m")),
+           left_=Words(LEFT)),
+))  # fmt: skip
 _CLEARANCE = record(
     radial_=number("radial clearance", "m"), axial_=number("axial clearance", "m"),
     tilt_=number("tilt clearance", "rad"), spin_=number("clearance about z", "rad"),
@@ -83,6 +90,7 @@ _FRAME = record(
     geometric_error_="geometric_error",
     tolerance_=number("standard deviations of the geometric error", "rad, m", "screw"),
     clearance_=_CLEARANCE,
+    locked_at_=_LOCKED_AT,
     joint_stiffness_=Either((
         number("diagonal stiffness", "N m/rad .. N/m", "screw"), _STIFFNESS,
     )),
@@ -177,6 +185,7 @@ _JOINT = record(
     actuated_=flag("actuated"), position_=number("coordinate at home", "rad or m"),
     limits_=number("least and largest coordinate", "rad or m", "bound"),
     drive_stiffness_=number("stiffness of the drive", "N m/rad or N/m"),
+    locked_at_=_LOCKED_AT,
 )  # fmt: skip
 _LEG = record(
     name=text("name"),

@@ -24,7 +24,8 @@ from stiffness.beam.beam import section_axes
 if TYPE_CHECKING:
     from stiffness.fem.fea import FemOptions, MeshedLink
 
-_LOG = logging.getLogger(__name__)
+_LOG = logging.getLogger("forcefit.links")
+_CACHE = logging.getLogger("forcefit.cache")
 # in this process links of one shape and material are solved once
 _SOLVED: dict[str, MeshSolution] = {}
 
@@ -111,7 +112,9 @@ def _solution(frame: Frame, link: MeshLink, accuracy: float) -> MeshSolution:
     digest = _digest(named_solid(link.surface)[0])
     options = FemOptions(accuracy, link.interface)
     key = solution_key(link, digest, options)
-    if key not in _SOLVED:
+    if key in _SOLVED:
+        _CACHE.info("link of %s: known in this process", link.surface)
+    else:
         _SOLVED[key] = stored_solution(
             key, lambda: _solve(frame, link, digest, options)
         )

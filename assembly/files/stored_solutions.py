@@ -7,6 +7,7 @@ are written completely or not at all; an unusable one counts as absent.
 import hashlib
 import io
 import json
+import logging
 import os
 import time
 from collections.abc import Callable, Generator, Mapping
@@ -29,6 +30,7 @@ from forcefit.inputs.program import sources_hash
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import whole_file
 
+_CACHE = logging.getLogger("forcefit.cache")
 # libraries that read surfaces, mesh and solve: another version may round differently
 _LIBRARIES = ("numpy", "scipy", "pytetwild", "pypardiso", "mkl", "pyvista", "vtk",
               "gmsh", "meshio")  # fmt: skip
@@ -79,7 +81,9 @@ def stored_solution(key: str, solve: Callable[[], MeshSolution]) -> MeshSolution
         return solve()
     path = folder / f"link-{key[:32]}.npz"
     found = _read(path, key)
-    if found is None:
+    if found is not None:
+        _CACHE.info("finite elements of a link: stored in %s", path)
+    else:
         with _one_process(path.with_suffix(".solving")):
             found = _read(path, key)  # another process may have been faster
             if found is None:

@@ -185,6 +185,8 @@ def _tolerance(posture: Posture, least: float = ZERO) -> float:
 def _rates(posture: Posture) -> tuple[NDArray, NDArray]:
     """Closures and platform for unit joint rates, lengths over the robot's size.
 
+    The unit rate of a prismatic joint is one size: counts do not depend on the size.
+
     Returns:
         (6 closures, n) at the base's origin, (6, n) at the platform's.
     """
@@ -192,6 +194,7 @@ def _rates(posture: Posture) -> tuple[NDArray, NDArray]:
     size, i = size_of(robot), robot.index(robot.platform)
     T = posture.transforms
     screws = with_balls(robot, T, motion_screws(robot, T))
+    screws[[frame.joint == "prismatic" for frame in robot.frames]] *= size
     scale = np.array([1.0] * 3 + [size] * 3)
     blocks = closure_signs(robot)[:, :, None] * (screws / scale)
     A = np.swapaxes(blocks, 1, 2).reshape(6 * len(robot.closures), len(robot.frames))

@@ -30,7 +30,14 @@ from assembly.kinematics.track import Track
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, nearest
-from forcefit.results.display import Figures, brief, html_table, numbers, short_repr
+from forcefit.results.display import (
+    Figures,
+    brief,
+    html_table,
+    numbers,
+    short_repr,
+    show,
+)
 from stiffness.screws import rotation_matrix, rotation_vector, screw_map
 
 POSE = ("tx", "ty", "tz", "rx", "ry", "rz")
@@ -59,6 +66,7 @@ class Posture:
     mismatch: Any
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
+    show = show
 
     def _figures(self) -> Figures:
         """Return the pose of the platform and coordinates of the drives."""

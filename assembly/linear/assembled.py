@@ -49,6 +49,7 @@ from forcefit.results.display import (
     largest,
     largest_row,
     short_repr,
+    show,
 )
 from forcefit.results.text import forced_lines
 
@@ -68,7 +69,7 @@ class Assembly(Solution[N]):
     are those of :class:`~assembly.linear.solution.Solution`.
     """
 
-    summary = short_repr
+    summary, plot = short_repr, show
 
     def _figures(self) -> Figures:
         """Return the numbers that ``forcefit assembly solve`` prints."""

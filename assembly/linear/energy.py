@@ -6,7 +6,7 @@ poses to the certificate, with and without loads.  The reference
 answer's ``method`` says so.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any, overload
 
@@ -34,11 +34,12 @@ from assembly.linear.rounding import (
     stiffness_spread,
 )
 from assembly.linear.solution import with_known
+from assembly.model.given_load import Load, given_load
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
 from assembly.model.statuses import CANNOT_ASSEMBLE, NO_EQUILIBRIUM, OK, SOLVER_FAILED
 from assembly.solvers.conic import SolverFailed
-from assembly.solvers.method import Method, check_method
+from assembly.solvers.method import Method, check_method, log_reference
 
 __all__ = ["Assembly", "CannotAssemble", "solve_assembly"]
 
@@ -58,7 +59,7 @@ _Rows = dict[str, NDArray]
 
 @overload
 def solve_assembly(
-    posture: Posture, load: ArrayLike | None = None, bodies: ArrayLike | None = None,
+    posture: Posture, load: Load | None = None, bodies: ArrayLike | None = None,
     gravity: ArrayLike | None = None, errors: None = None, method: Method = "compiled",
     carried: ArrayLike | None = None,
 ) -> Assembly[float]: ...  # fmt: skip
@@ -66,7 +67,7 @@ def solve_assembly(
 
 @overload
 def solve_assembly(
-    posture: Sequence[Posture], load: ArrayLike | None = None,
+    posture: Sequence[Posture], load: Load | None = None,
     bodies: ArrayLike | None = None, gravity: ArrayLike | None = None,
     errors: ArrayLike | None = None, method: Method = "compiled",
     carried: ArrayLike | None = None,
@@ -75,7 +76,7 @@ def solve_assembly(
 
 @overload
 def solve_assembly(
-    posture: Posture, load: ArrayLike | None = None, bodies: ArrayLike | None = None,
+    posture: Posture, load: Load | None = None, bodies: ArrayLike | None = None,
     gravity: ArrayLike | None = None, *, errors: ArrayLike,
     method: Method = "compiled", carried: ArrayLike | None = None,
 ) -> Assembly[NDArray]: ...  # fmt: skip
@@ -83,7 +84,7 @@ def solve_assembly(
 
 def solve_assembly(
     posture: Posture | Sequence[Posture],
-    load: ArrayLike | None = None,
+    load: Load | None = None,
     bodies: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     errors: ArrayLike | None = None,
@@ -95,8 +96,8 @@ def solve_assembly(
     Args:
         posture: the robot's configuration; its errors, clearances, links and joint
             springs are the robot's.  Or k postures of one robot.
-        load: (6,) or (k, 6) [N m, N] wrench on the platform at its origin, base axes;
-            energy minus its work is then minimised.
+        load: (6,) or (k, 6) [N m, N] wrench on the platform at its origin, base axes,
+            or by component, ``{"fz": -50}``; energy minus its work is then minimised.
         bodies: (n, 6) or (k, n, 6) [N m, N] wrenches on the bodies of all frames, each
             at its frame's origin, base axes.
         gravity: (3,) or (k, 3) [m/s^2] base axes; links with a density and bodies with
@@ -125,6 +126,8 @@ def solve_assembly(
     check_method(method)
     if not isinstance(posture, Posture):
         posture = together(posture)
+    if isinstance(load, Mapping):
+        load = given_load(load)
     loads = no_loads(posture.robot.errors.size)
     given = any(one is not None for one in (load, bodies, gravity, carried))
     if given or driven(posture.robot):
@@ -201,10 +204,9 @@ def _solve_one(
         rows = _compiled(joints, structure, T, robot.errors[None], off, acting)
         if rows["outcome"][0] < _LEFT:
             break
-        if not _bounds_matter(structure, rows["outcome"])[0]:
+        if bounded or not _bounds_matter(structure, rows["outcome"])[0]:
+            log_reference(robot.name, "least energy", 1, 1)
             return least_energy(posture, load, loads)
-    else:
-        return least_energy(posture, load, loads)
     multipliers, residual = rows["multipliers"], rows["residual"] + rounding
     drop_zeros(rows["energy"], rows["bound"], multipliers, residual, acting is not None)
     if acting is None and not np.count_nonzero(multipliers):
@@ -249,7 +251,10 @@ def _solve_many(
         posture = posture[0]
     own = None if errors is None else np.broadcast_to(sets, (count, *sets.shape[1:]))
     points = _of_rows(posture, joints, rows, load, loads, own)
-    for i in np.flatnonzero(rows["outcome"] >= _LEFT).tolist():
+    left = np.flatnonzero(rows["outcome"] >= _LEFT).tolist()
+    if left and method == "compiled":
+        log_reference(robot.name, "least energy", len(left), count)
+    for i in left:
         one = points[i]  # posture and loads of the point
         _record(rows, points.apart, i, _by_reference(one, own_axes_free))
     residual = rows["residual"] + closure_rounding(sets, joints, structure.size)

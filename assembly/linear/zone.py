@@ -22,7 +22,7 @@ from assembly.linear.reference.zone import least_margin
 from assembly.linear.robot_structure import structure_of
 from assembly.model.point_results import N, PointResults
 from assembly.solvers.conic import SolverFailed
-from assembly.solvers.method import Method, check_method
+from assembly.solvers.method import Method, check_method, log_reference
 from forcefit.results.display import Figures
 
 MARGIN_GAP = 1e-8  # accepted distance of a margin above its bound, relative ..
@@ -155,6 +155,9 @@ def zone_margin(
     else:
         own = np.asarray(errors, dtype=float)
     margin, bound, forces, left = _compiled(posture, compliant, own, method)
+    if left.any() and method == "compiled":
+        count = int(left.sum())
+        log_reference(posture.robot.name, "zone margin", count, len(left))
     if posture.transforms.ndim == 3 and own.ndim == 2:
         if not left[0]:
             return Zone(float(margin[0]), float(bound[0]), "compiled", forces[0], "")

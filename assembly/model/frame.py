@@ -7,11 +7,14 @@ carries the children.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.model.equal_data import EqualData
 from assembly.model.inertia import inertia_fault, six_moments
 from assembly.model.link_kinds import BeamLink, Link
 from forcefit.inputs.table import BadInput, quoted
@@ -62,8 +65,40 @@ class Clearance:
             raise BadInput(f"clearance.{key}: {ONE_OF_BALL}")
 
 
+LEFT = ("least", "uniform")  # rules for the position in which a joint is bolted
+
+
 @dataclass(frozen=True, eq=False)
-class Frame:
+class LockedAt:
+    """A fixed joint with clearance that is bolted at one pose and rigid afterwards.
+
+    Attributes:
+        clearance: before it is bolted.
+        pose: components ``tx .. rz`` [m, rad] of the platform at that pose.
+        joints: or coordinates [rad or m] of drives; home if both are empty.
+        left: where the fitter leaves drawn machines: ``"least"``, the least sum of
+            squares among the positions of least energy, or ``"uniform"``, any of them.
+        screw: (6,) [rad, m] clearance that is locked in; it is part of the geometric
+            error.  Computed by :func:`assembly.steps.bolted.bolt_joints`.
+    """
+
+    clearance: Clearance
+    pose: Mapping[str, float] = field(default_factory=dict)
+    joints: Mapping[str, float] = field(default_factory=dict)
+    left: str = "least"
+    screw: NDArray = field(default_factory=lambda: np.zeros(6))
+
+    def __post_init__(self) -> None:
+        if self.left not in LEFT:
+            raise BadInput(
+                f"locked_at.left: found {quoted(self.left)}, expected one of "
+                f"{', '.join(LEFT)}"
+            )
+        object.__setattr__(self, "screw", locked(self.screw, (6,), "locked_at: screw"))
+
+
+@dataclass(frozen=True, eq=False)
+class Frame(EqualData):
     """One body and the joint at its far end; see the head of this module.
 
     Attributes:
@@ -81,6 +116,8 @@ class Frame:
         tolerance: (6,) [rad, m] standard deviations of delta l about the given value, 0
             where it is exact; None if unknown.
         clearance: clearance of the joint; None if it has none.
+        locked_at: where the joint is bolted, with its clearance before; None if it is
+            not.
         joint_stiffness: (6, 6) K_B with ``inf`` on the diagonal where rigid, or None;
             0 along a passive joint's own motion (its row and column) leaves it free.
         drive_force: [N m or N] with which a drive pushes a passive joint along its
@@ -105,6 +142,7 @@ class Frame:
     geometric_error: NDArray = field(default_factory=lambda: np.zeros(6))
     tolerance: NDArray | None = None
     clearance: Clearance | None = None
+    locked_at: LockedAt | None = None
     joint_stiffness: NDArray | None = None
     drive_force: float = 0.0
     link: Link | None = None
@@ -121,6 +159,11 @@ class Frame:
             if value is not None:
                 value = locked(value, shape, f"frame '{self.name}': {name}")
                 object.__setattr__(self, name, value)
+        if self.locked_at is not None and (self.joint != "fixed" or self.clearance):
+            raise BadInput(
+                f"frame {quoted(self.name)}.locked_at: found a joint that moves or has "
+                'a clearance besides; expected joint = "fixed"'
+            )
         if (self.joint == "helical") != (self.pitch != 0.0):
             raise BadInput(
                 f"frame {quoted(self.name)}.pitch: found {self.pitch:g} on a "
@@ -149,6 +192,12 @@ class Frame:
             # files have the upper triangle
             J = locked((self.inertia + self.inertia.T) / 2, (3, 3), "inertia")
             object.__setattr__(self, "inertia", J)
+
+    @cached_property
+    def _hash(self) -> int:
+        # what differs in random errors and identified geometries
+        numbers = self.translation.tobytes() + self.geometric_error.tobytes()
+        return hash((self.name, numbers))
 
     def _figures(self) -> Figures:
         """Return the fields in short; the rarest only where they are not zero."""

@@ -1,10 +1,13 @@
 """The kinds of elasticity of a body: a beam, a matrix, a mesh or a library."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
+
+from assembly.model.equal_data import EqualData
 
 if TYPE_CHECKING:
     from stiffness.fem.fea import MeshedLink
@@ -40,7 +43,7 @@ class BeamLink:
 
 
 @dataclass(frozen=True, eq=False)
-class MatrixLink:
+class MatrixLink(EqualData):
     """A link given by its stiffness K_E at the frame, in the frame's axes.
 
     Attributes:
@@ -49,9 +52,13 @@ class MatrixLink:
 
     stiffness: NDArray
 
+    @cached_property
+    def _hash(self) -> int:
+        return hash(self.stiffness.tobytes())
+
 
 @dataclass(frozen=True, eq=False)
-class MeshSolution:
+class MeshSolution(EqualData):
     """The finite elements of a mesh link, in the mesh's axes.
 
     Attributes:
@@ -66,6 +73,10 @@ class MeshSolution:
     young: float
     digest: str
     mass: NDArray
+
+    def _data(self) -> tuple[Any, ...]:
+        # all fields of the finite elements follow from these
+        return self.solved.link.compliance, self.young, self.digest, self.mass
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.callouts.callout import Callout
+from assembly.model.equal_data import EqualData
 from assembly.model.frame import (
     BASE,
     JOINTS,
@@ -20,6 +21,7 @@ from assembly.model.frame import (
     NO_SPIN,
     Clearance,
     Frame,
+    LockedAt,
     beam_axis,
     locked,
 )
@@ -32,22 +34,22 @@ from assembly.model.link_kinds import (
     MeshLink,
 )
 from forcefit.inputs.table import BadInput, nearest, quoted
-from forcefit.results.display import Figures, html_table, largest, short_repr
+from forcefit.results.display import Figures, html_table, largest, short_repr, show
 from stiffness.screws import rotation_matrix, transform
 
 __all__ = [
     "BASE", "JOINTS", "LOCKED", "NO_SPIN", "BeamLink", "Clearance", "Frame",
-    "LibraryLink", "Link", "MatrixLink", "MeshLink", "Robot", "beam_axis",
+    "LibraryLink", "Link", "LockedAt", "MatrixLink", "MeshLink", "Robot", "beam_axis",
     "parents_first",
 ]  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
-class Robot:
+class Robot(EqualData):
     """A manipulator.
 
     Frames are stored parents first.  Rows of every array below are frames in that
-    order.
+    order.  Robots of equal data are equal, bit by bit.
 
     Attributes:
         name: name of the robot.
@@ -89,6 +91,7 @@ class Robot:
     fits: Mapping[str, str] = field(default_factory=dict)
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
+    show = show
 
     def _figures(self) -> Figures:
         """Return the summary that is printed."""
@@ -134,6 +137,10 @@ class Robot:
         return self.frames[self.index(name)]
 
     @cached_property
+    def _hash(self) -> int:
+        return hash((self.name, self.platform, self.frames))
+
+    @cached_property
     def _rows(self) -> dict[str, int]:
         return {frame.name: i for i, frame in enumerate(self.frames)}
 
@@ -164,6 +171,15 @@ class Robot:
         """(n, 6) [rad, m] the geometric errors delta l."""
         return np.array([f.geometric_error for f in self.frames])
 
+    @property
+    def declared_errors(self) -> NDArray:
+        """(n, 6) [rad, m] the geometric errors without clearances locked in."""
+        errors = self.errors.copy()
+        for error, frame in zip(errors, self.frames, strict=True):
+            if frame.locked_at is not None:
+                error -= frame.locked_at.screw
+        return errors
+
     @cached_property
     def positions(self) -> NDArray:
         """(n,) [rad or m] joint coordinates from which the home pose is solved."""
@@ -190,16 +206,15 @@ class Robot:
         """Return the same robot with other geometric errors.
 
         Args:
-            errors: (n, 6) [rad, m] delta l of every frame.
+            errors: (n, 6) [rad, m] delta l of every frame; clearances that were
+                locked in before are not added to them.
 
         Returns:
             A new robot.
         """
         rows = locked(errors, (len(self.frames), 6), f"{self.name}: errors")
         frames = zip(self.frames, rows, strict=True)
-        return replace(
-            self, frames=tuple(replace(f, geometric_error=e) for f, e in frames)
-        )
+        return replace(self, frames=tuple(_with_error(f, e) for f, e in frames))
 
     def with_links(self, links: dict[str, Link]) -> "Robot":
         """Return the same robot with other links at the frames named."""
@@ -207,6 +222,14 @@ class Robot:
             self.index(name)
         frames = (replace(f, link=links.get(f.name, f.link)) for f in self.frames)
         return replace(self, frames=tuple(frames))
+
+
+def _with_error(frame: Frame, error: NDArray) -> Frame:
+    """Return a frame with another geometric error, nothing locked in."""
+    bolt = frame.locked_at
+    if bolt is not None:
+        bolt = replace(bolt, screw=np.zeros(6))
+    return replace(frame, geometric_error=error, locked_at=bolt)
 
 
 def _has_clearance(frame: Frame) -> bool:

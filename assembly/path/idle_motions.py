@@ -10,11 +10,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.nominal import motion_screws
+from assembly.kinematics.nominal import motion_screws, size_of
 from assembly.path.inertial_loads import InertialLoads, inertial_loads
 from assembly.path.motion import Motion, carries_matrix, idle_rates
 
 _MASSLESS = 1e-12  # of the largest inertia: below it an idle motion has none
+_ROUNDING = 1e-20  # of the whole mass on the longest arm: 1e-10 of an arm, squared
 
 
 def with_idle_accelerations(motion: Motion, gravity: NDArray) -> Motion:
@@ -50,13 +51,43 @@ def with_idle_accelerations(motion: Motion, gravity: NDArray) -> Motion:
         work(inertial_loads(replace(still, accelerations=body))) for body in bodies
     ], axis=2)  # fmt: skip
     driving = work(inertial_loads(motion, gravity))
-    solve = np.linalg.pinv(inertia, rcond=_MASSLESS, hermitian=True)
+    solve = _inverse(inertia, _ROUNDING * _largest_inertia(motion, bodies))
     second = (solve @ driving[..., None])[..., 0]
     added = sum(second[:, d, None, None] * body for d, body in enumerate(bodies))
     rates = motion.second_rates + (Z @ second[..., None])[..., 0]
     return replace(
         motion, second_rates=rates, accelerations=motion.accelerations + added
     )
+
+
+def _inverse(inertia: NDArray, least: NDArray) -> NDArray:
+    """Return the (k, d, d) pseudoinverse of symmetric matrices.
+
+    Args:
+        inertia: (k, d, d) of idle motions.
+        least: (k,) eigenvalues up to it count as 0.  The inertia of a spin without
+            mass, or of masses on its axis, is rounding: the spin would accelerate
+            until the platform falls.
+
+    Returns:
+        The pseudoinverses.
+    """
+    values, vectors = np.linalg.eigh(inertia)
+    least = np.maximum(least, _MASSLESS * values[:, -1])[:, None]
+    inverse = np.where(values > least, 1.0 / np.where(values > least, values, 1.0), 0.0)
+    return np.asarray((vectors * inverse[:, None, :]) @ vectors.swapaxes(1, 2))
+
+
+def _largest_inertia(motion: Motion, bodies: list[NDArray]) -> NDArray:
+    """Return (k,) the inertia if the whole mass moved as the fastest body does."""
+    along = np.zeros_like(motion.twists)
+    along[..., 3] = 1.0
+    still = replace(motion, twists=np.zeros_like(along), accelerations=along)
+    loads = inertial_loads(still)
+    mass = -(loads.bodies + loads.carried)[..., 3].sum(axis=1)
+    lengths = np.repeat([size_of(motion.postures.robot), 1.0], 3)
+    speed = max(np.abs(body * lengths).max(initial=0.0) for body in bodies)
+    return np.asarray(mass * speed**2)
 
 
 def _power(wrenches: NDArray, twists: NDArray, points: NDArray) -> NDArray:

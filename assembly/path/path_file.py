@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from assembly.model.robot import Robot
 from assembly.sweeps.targets import read_targets
+from forcefit.inputs.errors import LARGEST
 from forcefit.inputs.table import BadInput, quoted
 
 
@@ -78,4 +79,12 @@ def check_path(table: PathTable, where: str = "path") -> None:
         raise BadInput(
             f"{where}: {table.row_name(row)}, time: found {table.times[row]:g} s after "
             f"{table.times[row - 1]:g} s; expected times that increase"
+        )
+    small = steps.min() < 1 / LARGEST
+    if small or np.abs(table.times).max() > LARGEST:
+        row = 1 + int(np.argmin(steps) if small else np.argmax(abs(table.times[1:])))
+        raise BadInput(
+            f"{where}: {table.row_name(row)}, time: found {table.times[row]:g} s after "
+            f"{table.times[row - 1]:g} s; expected steps of at least {1 / LARGEST:g} s "
+            f"and times of at most {LARGEST:g} s"
         )

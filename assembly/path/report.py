@@ -102,9 +102,12 @@ def _verdict(summary: Mapping[str, Any]) -> str:
     """Return the conclusion in a sentence."""
     if "largest" not in summary:
         return f"No point has a result: {summary.get('reason', summary['status'])}."
-    peak = summary["largest"]["inertial_translation"]
-    size = Value(peak["value"], "m").text
-    verdict = f"Acceleration deflects the platform by at most {size}"
+    peak = summary["largest"].get("inertial_translation")
+    if peak is None:
+        verdict = "The deflection by acceleration is unknown: no equilibrium at rest"
+    else:
+        size = Value(peak["value"], "m").text
+        verdict = f"Acceleration deflects the platform by at most {size}"
     if summary["status"] != OK:
         verdict += f"; {summary['status']} {summary.get('reason', '')}"
     return verdict + "."

@@ -141,6 +141,12 @@ def remarks(errors: PathErrors) -> list[str]:
             "impacts where a clearance changes sides are left out; without a load the "
             "pose within the clearances, and the change from it, is not unique"
         )
+    fall = (errors.status == OK) & np.isnan(errors.arrays["inertial_screw"][:, 0])
+    if fall.any():
+        found.append(
+            f"at {fall.sum()} instants the robot has no equilibrium at rest under "
+            "these loads, so that the deflection by acceleration is unknown"
+        )
     if errors.free:
         found.append(
             f"{errors.free} joint motions follow neither from the path nor from the "

@@ -27,6 +27,7 @@ from assembly.linear.energy import Assembly, solve_assembly
 from assembly.linear.load import driven
 from assembly.linear.nearest_pose import nearest_pose
 from assembly.model.clearance import bound_name
+from assembly.model.given_load import Load, one_load
 from assembly.platform_stiffness.active_set import contacts
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import in_contact
@@ -127,7 +128,7 @@ def deflection_curve(
     posture: Posture,
     component: int,
     loads: Sequence[float],
-    load: ArrayLike | None = None,
+    load: Load | None = None,
     gravity: ArrayLike | None = None,
     state: Literal["contact", "exact"] = "contact",
     progress: Progress = lambda what, done, most: None,
@@ -139,7 +140,8 @@ def deflection_curve(
         posture: the robot's configuration, with its errors and clearances.
         component: index in ``[mx my mz fx fy fz]``, 0 to 5.
         loads: [N m or N] its values, in the order of application.
-        load: (6,) [N m, N] the other components, at the platform's origin, base axes.
+        load: (6,) [N m, N] the other components, at the platform's origin, base axes,
+            or by component, ``{"fz": -50}``.
         gravity: (3,) [m/s^2] base axes.
         state: ``"contact"``, by problem (22); ``"exact"``, with finite motions.
         progress: function called at each load with the steps taken there and their
@@ -165,7 +167,7 @@ def deflection_curve(
             f"deflection_curve: found component {component} and {len(loads)} loads, "
             "expected one of 0 to 5 and at least one load"
         )
-    rest = np.zeros(6) if load is None else numbers_of("load", load, 6, "N m, N")
+    rest = np.zeros(6) if load is None else one_load(load)
     loads = numbers_of("loads", loads, len(loads), "N m or N").tolist()
     largest = float(np.abs(loads).max(initial=0.0))
 

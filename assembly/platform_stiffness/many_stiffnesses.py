@@ -13,7 +13,7 @@ from assembly.linear.lanes import COMPILED, compliances_side_by_side
 from assembly.linear.robot_structure import structure_of
 from assembly.platform_stiffness.linear_tangent import owners, without_clearance
 from assembly.platform_stiffness.matrices import Part, PlatformStiffness
-from assembly.solvers.method import Method
+from assembly.solvers.method import Method, log_reference
 from forcefit.results.display import html_table, short_repr
 from stiffness.screws import screw_map
 
@@ -202,6 +202,9 @@ def many_without_clearance(posture: Posture, method: Method) -> Stiffnesses:
         off = np.full(len(T), posture.mismatch, dtype=float)
         compliances_side_by_side(structure, T, off, inner, status)
     left = (status != COMPILED) | (method == "reference")
+    if left.any() and method == "compiled":
+        count = int(left.sum())
+        log_reference(posture.robot.name, "platform stiffness", count, len(left))
     size = size_of(posture.robot)
     springs = np.zeros((len(T), joints.elastic.shape[1], 6))
     # the kernel's forces act on translations in reference lengths

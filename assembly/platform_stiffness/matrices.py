@@ -37,7 +37,7 @@ from assembly.kinematics.posture import Posture
 from assembly.solvers.method import Method
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.number_arrays import find_fault
-from forcefit.results.display import Figures, html_table, numbers, short_repr
+from forcefit.results.display import Figures, html_table, numbers, short_repr, show
 from stiffness.screws import screw_map
 
 _RANK = 1e-10  # relative size below which a motion counts as zero
@@ -114,6 +114,7 @@ class PlatformStiffness:
     method: Method
 
     __repr__, _repr_html_ = short_repr, html_table
+    plot = show
 
     def _figures(self) -> Figures:
         """Return the numbers that ``forcefit assembly stiffness`` prints first."""

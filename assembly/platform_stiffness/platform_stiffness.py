@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import Posture, together
 from assembly.linear.energy import solve_assembly
+from assembly.model.given_load import Load, one_load
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import (
     Side,
@@ -30,7 +31,7 @@ _OLD_STATES = {"without clearance": "nominal", "in contact": "contact"}
 @overload
 def platform_stiffness(
     posture: Posture, state: State = "nominal",
-    load: ArrayLike | None = None, gravity: ArrayLike | None = None,
+    load: Load | None = None, gravity: ArrayLike | None = None,
     at: ArrayLike = (0.0, 0.0, 0.0), side: Side = "holding",
     method: Method = "compiled",
 ) -> PlatformStiffness: ...  # fmt: skip
@@ -39,7 +40,7 @@ def platform_stiffness(
 @overload
 def platform_stiffness(
     posture: Sequence[Posture], state: State = "nominal",
-    load: ArrayLike | None = None, gravity: ArrayLike | None = None,
+    load: Load | None = None, gravity: ArrayLike | None = None,
     at: ArrayLike = (0.0, 0.0, 0.0), side: Side = "holding",
     method: Method = "compiled",
 ) -> Stiffnesses: ...  # fmt: skip
@@ -48,7 +49,7 @@ def platform_stiffness(
 def platform_stiffness(
     posture: Posture | Sequence[Posture],
     state: State = "nominal",
-    load: ArrayLike | None = None,
+    load: Load | None = None,
     gravity: ArrayLike | None = None,
     at: ArrayLike = (0.0, 0.0, 0.0),
     side: Side = "holding",
@@ -63,8 +64,8 @@ def platform_stiffness(
             problem (22) with the robot's errors, clearances and loads; ``"exact"``, the
             tangent of the exact equilibrium, with the stiffness that internal forces
             and loads add.
-        load: (6,) [N m, N] on the platform at its origin, base axes; without effect on
-            the classical model.
+        load: (6,) [N m, N] on the platform at its origin, base axes, or by component,
+            ``{"fz": -50}``; without effect on the classical model.
         gravity: (3,) [m/s^2] base axes; without effect on the classical model.
         at: (3,) [m] point of the platform, in its axes, at which screws and wrenches
             are read.
@@ -92,7 +93,7 @@ def platform_stiffness(
     check_method(method)
     offset = numbers_of("at", at, 3, "m")
     if load is not None:
-        load = numbers_of("load", load, 6, "N m, N")
+        load = one_load(load)
     if side not in get_args(Side):
         raise ValueError(f"platform_stiffness: no side {side!r}")
     state = cast(State, current_value("state", state, _OLD_STATES))

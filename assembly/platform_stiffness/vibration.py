@@ -28,6 +28,7 @@ from assembly.exact.equilibrium import tangent_space
 from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.exact.finite_robot import LINK
 from assembly.kinematics.posture import Posture
+from assembly.model.given_load import Load
 from assembly.model.mesh_link import mesh_link_mass
 from assembly.model.robot import BeamLink, Frame, MeshLink, Robot, beam_axis
 from assembly.platform_stiffness.exact_tangent import part_owners, platform_moves
@@ -41,6 +42,7 @@ from stiffness.beam.sections import declared_section
 from stiffness.screws import screw_map
 
 _NULL = 1e-12  # relative to the largest eigenvalue: below it neither mass nor stiffness
+_ROUNDING = 1e-14  # of the largest entry of the mass matrix: rounding of its entries
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +74,7 @@ class NaturalModes:
 def natural_modes(
     posture: Posture,
     count: int = 6,
-    load: ArrayLike | None = None,
+    load: Load | None = None,
     gravity: ArrayLike | None = None,
     state: Literal["nominal", "exact"] = "nominal",
     method: Method = "compiled",
@@ -82,8 +84,8 @@ def natural_modes(
     Args:
         posture: the robot's configuration.
         count: largest number of modes.
-        load: (6,) [N m, N] on the platform, only in the state ``"exact"``; it has no
-            mass.
+        load: (6,) [N m, N] on the platform, or by component, ``{"fz": -50}``, only in
+            the state ``"exact"``; it has no mass.
         gravity: (3,) [m/s^2], only in the state ``"exact"``.
         state: ``"nominal"``, of the nominal robot with clearances held at zero;
             ``"exact"``, around the equilibrium with errors, clearances and loads.
@@ -111,10 +113,13 @@ def natural_modes(
         load = gravity = None
     equilibrium = solve_exact(posture, load, gravity=gravity, method=method)
     D, H = tangent_space(equilibrium.expansion)
-    M = D.T @ mass_matrix(equilibrium) @ D
+    mass = mass_matrix(equilibrium)
+    M, rounding = D.T @ mass @ D, _ROUNDING * np.abs(mass).max(initial=0.0) * (D.T @ D)
     if not np.trace(M) > 0.0:
         raise BadInput(_no_mass(posture.robot))
-    squares, modes = _modes(H, M)
+    squares, modes = _modes(H, M, rounding)
+    if not squares.size:  # the mass of what moves is rounding
+        raise BadInput(_no_mass(posture.robot))
     squares, modes, idle = _without_idle(
         squares, modes, platform_moves(equilibrium.expansion) @ D
     )
@@ -164,11 +169,24 @@ def _without_idle(
     return squares[kept], turned[:, kept], int(free.sum()) - moved
 
 
-def _modes(K: NDArray, M: NDArray) -> tuple[NDArray, NDArray]:
-    """Return squared angular frequencies, lowest first, and modes of modal mass 1."""
+def _modes(K: NDArray, M: NDArray, rounding: NDArray) -> tuple[NDArray, NDArray]:
+    """Return squared angular frequencies, lowest first, and modes of modal mass 1.
+
+    Args:
+        K: (k, k) stiffness.
+        M: (k, k) mass.
+        rounding: (k, k) bound of the rounding errors of M as a quadratic form.
+
+    Returns:
+        (m,) and (k, m).
+    """
     shift = np.trace(K) / np.trace(M) or 1.0  # 1 if no part is elastic
     values, vectors = np.linalg.eigh(K + shift * M)
-    kept = values > _NULL * values.max()  # no mode without mass and spring
+    least = shift * np.sum(vectors * (rounding @ vectors), axis=0)
+    # no mode without mass and spring
+    kept = values > np.maximum(_NULL * values.max(), least)
+    if not kept.any():
+        return np.zeros(0), np.zeros((len(K), 0))
     basis = vectors[:, kept] / np.sqrt(values[kept])
     inertia, turned = np.linalg.eigh(basis.T @ M @ basis)
     heavy = inertia > _NULL * inertia.max()

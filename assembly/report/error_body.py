@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from assembly.linear.reference.pose_error import ReachableSet
+from assembly.linear.energy import Assembly
+from assembly.linear.reference.pose_error import ReachableSet, reachable_screws
+from forcefit.inputs.errors import BadInput, nearest, quoted
 from forcefit.results.display import html_table, short_repr
 
 PARTS = {"rotation": slice(0, 3), "translation": slice(3, 6)}
@@ -46,6 +48,34 @@ class ErrorBody:
     def contains(self, error: ArrayLike) -> bool:
         """Return whether an error (3,) is within all heights; False is a proof."""
         return bool(np.all(self.directions @ np.asarray(error) <= self.heights))
+
+
+def possible_errors(assembly: Assembly, part: str, assumption: str) -> ErrorBody:
+    """Return the set of errors of an assembled robot's platform.
+
+    Args:
+        assembly: of one point.
+        part: ``"rotation"`` or ``"translation"``.
+        assumption: of problem (27).
+
+    Returns:
+        The set.
+
+    Raises:
+        BadInput: no such part, or the platform moves freely, so its errors have no
+            bound.
+        SolverFailed: the cone solver failed.
+    """
+    if part not in PARTS:
+        raise BadInput(f"errors: found {quoted(part)}{nearest(part, PARTS)}")
+    reach = reachable_screws(assembly, assumption)
+    if reach.unbounded(PARTS[part].start):
+        raise BadInput(
+            f"{assembly.posture.robot.name}: found a free motion of the "
+            f"platform, so its {part} error has no bound; expected a "
+            "robot without one, or no plot of the error"
+        )
+    return error_body(reach, part)
 
 
 def error_body(reachable: ReachableSet, part: str, count: int = 200) -> ErrorBody:

@@ -1,6 +1,6 @@
 """The platform's stiffness and the parts' shares of compliance, as values and text."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,13 +21,9 @@ from assembly.platform_stiffness.matrices import PlatformStiffness
 from assembly.platform_stiffness.platform_stiffness import State
 from assembly.report.beyond_linear import far_from_linear
 from assembly.solvers.conic import SolverFailed
-from forcefit.inputs.errors import plot_label
 from forcefit.results.display import listing, numbers, rounded
 from forcefit.results.text import lines_of, table_lines, value_text
 from stiffness.screws import SCREW, WRENCH
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 DIRECTIONS = tuple(name.lower() for name in SCREW)
 # words for the two sides of a change of contact
@@ -306,28 +302,3 @@ def largest_rows(rows: dict[str, list[float]]) -> dict[str, list[float]]:
     rest = np.sum([rows[name] for name in names[_SHOWN:]], axis=0)
     first = {name: rows[name] for name in names[:_SHOWN]}
     return first | {f"{len(names) - _SHOWN} others": rest.tolist()}
-
-
-def plot_shares(results: dict[str, Any]) -> "Figure":
-    """Return a bar chart of the parts' shares in the compliance along each direction.
-
-    Args:
-        results: result of :func:`stiffness_of`.
-
-    Returns:
-        The figure; directions with an infinite compliance are empty.
-    """
-    from matplotlib.figure import Figure
-
-    rows = share_rows(results["shares"])
-    figure = Figure(figsize=(8.0, 4.5), layout="constrained")
-    axes = figure.subplots()
-    bottom = np.zeros(6)
-    for name, row in largest_rows(rows).items():
-        height = 100 * np.nan_to_num(row)
-        axes.bar(DIRECTIONS, height, bottom=bottom, label=plot_label(name))
-        bottom = bottom + height
-    axes.set_ylabel("share of the compliance [%]")
-    axes.set_title(plot_label(f"{results['robot']}: compliance of the parts"))
-    axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
-    return figure

@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import Assembly
-from assembly.linear.reference.pose_error import reachable_screws
-from assembly.report.error_body import PARTS, ErrorBody, error_body
-from forcefit.inputs.table import BadInput
+from assembly.report.error_body import ErrorBody, possible_errors
 from stiffness.screws import rotation_matrix, screw_map
 
 _SHORT = 1e-9  # [m] length below which a body is not drawn
@@ -63,14 +61,7 @@ def plot_assembly(
     """
     plotter = robot_plotter(assembly, exaggeration, off_screen)
     if errors is not None:
-        reach = reachable_screws(assembly, assumption)
-        if reach.unbounded(PARTS[errors].start):
-            raise BadInput(
-                f"{assembly.posture.robot.name}: found a free motion of the "
-                f"platform, so its {errors} error has no bound; expected a "
-                "robot without one, or no plot of the error"
-            )
-        body = error_body(reach, errors)
+        body = possible_errors(assembly, errors, assumption)
         size = 0.15 * float(np.ptp(assembly.posture.transforms[:, :3, 3], axis=0).max())
         add_error_body(
             plotter, body, assembly.posture.platform[:3, 3], size, assumption
@@ -219,15 +210,20 @@ def displaced_bodies(assembly: Assembly, closing: float = 1.0) -> DisplacedBodie
     body = turned @ (posture.robot.errors + links)[..., None]
     joint = turned @ joints[..., None]
     ends = posture.transforms[:, :3, 3]
-    starts, at_start, at_end = np.zeros_like(ends), *np.zeros((2, len(ends), 6))
+    starts, (at_start, at_end) = body_starts(posture), np.zeros((2, len(ends), 6))
     for i, parent in enumerate(posture.robot.parents):
         if parent >= 0:
-            starts[i] = ends[parent]
             at_start[i] = at_end[parent] + joint[parent, :, 0]
         carried = screw_map(starts[i] - ends[i]) @ at_start[i]
         at_end[i] = carried + body[i, :, 0]
     bends = turned @ links[..., None]
     return DisplacedBodies(starts, ends, at_start, at_end, bends[:, :3, 0])
+
+
+def body_starts(posture: Posture) -> NDArray:
+    """Return (n, 3) [m] nominal starts of all bodies: their parents' origins."""
+    origins = np.vstack([posture.transforms[:, :3, 3], np.zeros(3)])  # base at row -1
+    return origins[posture.robot.parents]
 
 
 def readable_factor(bodies: DisplacedBodies, size: float) -> float:

@@ -6,9 +6,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.kinematics.posture import Posture
 from assembly.linear.energy import Assembly
+from assembly.model.robot import Robot
 from assembly.report.error_body import ErrorBody
-from assembly.report.plot import DisplacedBodies, displaced_bodies, readable_factor
+from assembly.report.plot import (
+    DisplacedBodies,
+    body_starts,
+    displaced_bodies,
+    readable_factor,
+)
 from forcefit.page.charts import scene
 from forcefit.results.units import shown_in
 from stiffness.screws import skew
@@ -33,33 +40,56 @@ def robot_scene(
     Returns:
         HTML of a figure.
     """
+    return scene(forced_scene(assembly, closing, body), caption)
+
+
+def forced_scene(
+    assembly: Assembly, closing: NDArray | None = None, body: ErrorBody | None = None
+) -> dict[str, Any]:
+    """Return the numbers that :func:`robot_scene` draws; arguments as there."""
     posture = assembly.posture
-    bodies = displaced_bodies(assembly)
     ends = posture.transforms[:, :3, 3]
+    moved = [] if closing is None else closing[:, :, :3, 3] - ends
+    shape = None if body is None else _error_body(body, posture.platform[:3, 3])
+    return _spec(posture, displaced_bodies(assembly), moved, _forces(assembly), shape)
+
+
+def nominal_scene(posture: Posture) -> dict[str, Any]:
+    """Return the numbers of a scene of a robot without errors, clearances and loads."""
+    still = np.zeros((len(posture.robot.frames), 6))
+    bodies = DisplacedBodies(
+        body_starts(posture), posture.transforms[:, :3, 3], still, still, still[:, :3]
+    )
+    return _spec(posture, bodies, [], [], None) | {"nominal": True}
+
+
+def _spec(
+    posture: Posture, bodies: DisplacedBodies, closing: Any, forces: Any, body: Any
+) -> dict[str, Any]:
+    """Return the numbers of a scene, with its size, units and exaggeration."""
+    ends = bodies.ends
     size = float(np.ptp(np.vstack([ends, np.zeros(3)]), axis=0).max()) or 1.0
     middle = (ends.max(axis=0) + ends.min(axis=0)) / 2
     half = np.maximum(np.ptp(ends, axis=0) / 2, 0.15 * size) + 0.15 * size
     largest = float(np.linalg.norm(bodies.end_screws[:, 3:], axis=1).max())
-    spec = {
-        "bodies": [_body(assembly, bodies, i) for i in range(len(ends))],
+    return {
+        "bodies": [_body(posture.robot, bodies, i) for i in range(len(ends))],
         "closures": [
             [posture.robot.index(name) for name in pair]
             for pair in posture.robot.closures
         ],
-        "closing": [] if closing is None else closing[:, :, :3, 3] - ends,
-        "forces": _forces(assembly),
-        "body": None if body is None else _error_body(body, posture.platform[:3, 3]),
+        "closing": closing,
+        "forces": forces,
+        "body": body,
         "exaggeration": readable_factor(bodies, size),
         "box": np.stack([middle - half, middle + half], axis=1),
         "length": asdict(shown_in("m", size)),
         "displacement": asdict(shown_in("m", largest)),
     }
-    return scene(spec, caption)
 
 
-def _body(assembly: Assembly, bodies: DisplacedBodies, i: int) -> dict[str, Any]:
+def _body(robot: Robot, bodies: DisplacedBodies, i: int) -> dict[str, Any]:
     """Return a body: points along it, their displacements, and its joint."""
-    robot = assembly.posture.robot
     frame, parent = robot.frames[i], int(robot.parents[i])
     start, end = bodies.starts[i], bodies.ends[i]
     s = np.linspace(0.0, 1.0, _SAMPLES)[:, None]

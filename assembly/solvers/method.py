@@ -1,10 +1,12 @@
 """The two methods of every public solver, by name."""
 
+import logging
 from typing import Literal, get_args
 
 # the C++ code of assembly/kernels, or numpy and Clarabel only
 Method = Literal["compiled", "reference"]
 METHODS = get_args(Method)
+_LOG = logging.getLogger("forcefit.solve")
 
 
 def check_method(method: str) -> None:
@@ -19,3 +21,18 @@ def check_method(method: str) -> None:
     if method not in METHODS:
         names = " or ".join(repr(name) for name in METHODS)
         raise ValueError(f"method is {method!r}, expected {names}")
+
+
+def log_reference(robot: str, what: str, left: int, count: int) -> None:
+    """Log that the reference solves points that the compiled method did not prove.
+
+    Args:
+        robot: its name.
+        what: what is computed.
+        left: number of these points.
+        count: number of all points.
+    """
+    _LOG.info(
+        "%s: %s of %d of %d points by the reference method, because the compiled "
+        "method did not prove it", robot, what, left, count,
+    )  # fmt: skip

@@ -76,7 +76,7 @@ def bounded_position(
         (6,) [rad, m] screw, NaN if the draw has no solution or the solver fails; and
         whether the walk mixed.  Motions without any bound have their smallest size.
     """
-    from assembly.statistics.uniform_clearance import sample_uniform_position
+    from assembly.solvers.uniform_clearance import sample_uniform_position
 
     try:
         reachable = reachable_screws(draws[i], ASSUMPTION)

@@ -59,7 +59,7 @@ def position_clearances(
     Returns:
         (k, 6) [rad, m] screws, NaN where a draw has no solution; and (k,) bool, False
         where the walks of the uniform model had not mixed at their greatest length, see
-        :func:`assembly.statistics.uniform_clearance.sample_uniform_position`.
+        :func:`assembly.solvers.uniform_clearance.sample_uniform_position`.
 
     Raises:
         ValueError: ``clearance`` is not a valid model.
@@ -137,7 +137,7 @@ def _at_random(
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
     """Return clearances distributed uniformly over their set; whether walks mixed."""
-    from assembly.statistics.uniform_clearance import sample_uniform_position
+    from assembly.solvers.uniform_clearance import sample_uniform_position
 
     free = ~loaded
     rows = clearance_constraints(prepared, loaded)[:, free]

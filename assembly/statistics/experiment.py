@@ -12,6 +12,7 @@ from assembly.linear.assembled import without_rounding
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.zone import MARGINS
 from assembly.model.error_distributions import draw_generator
+from assembly.model.given_load import Load, one_load
 from assembly.model.link_stress import peak_stresses, stressed_links
 from assembly.statistics.callout_sources import CalloutSources, Sources
 from assembly.statistics.clearance_positions import (
@@ -25,6 +26,7 @@ from assembly.statistics.posture_margins import PostureMargins, prepare_margins
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.stiffness_spread import draw_stiffnesses
 from assembly.statistics.worst_clearance import PRECISION, bound_worst_errors
+from assembly.steps.bolted import bolt_generators, bolted_errors
 from forcefit.inputs.renamed import renamed_fields, warn_renamed
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
@@ -46,7 +48,8 @@ class Experiment:
             :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
         margins: whether the zone margins are computed.
         stress: whether the stress of the links is computed.
-        load: (6,) [N m, N] on the platform at its origin, base axes; none if absent.
+        load: (6,) [N m, N] on the platform at its origin, base axes, or by component,
+            ``{"fz": -50}``; none if absent.
         gravity: (3,) [m/s^2] base axes; none if absent.
         stiffness: state in which the platform's stiffness is computed, one of
             :data:`assembly.sweeps.point_stiffness.STATES` except the nominal one; empty
@@ -63,7 +66,7 @@ class Experiment:
     clearance: str = "worst"
     margins: bool = True
     stress: bool = True
-    load: tuple[float, ...] | None = None
+    load: Load | None = None
     gravity: tuple[float, ...] | None = None
     stiffness: str = ""
     precision: tuple[float, float] = PRECISION
@@ -86,6 +89,11 @@ class Experiment:
         warn_renamed("Experiment.clearance_model", "Experiment.clearance")
         return self.clearance
 
+    @cached_property
+    def wrench(self) -> tuple[float, ...] | None:
+        """(6,) [N m, N] the load on the platform, None if absent."""
+        return None if self.load is None else tuple(one_load(self.load).tolist())
+
     @property
     def used_contact_length(self) -> float | None:
         """[m] contact length of the contact model; None for other models."""
@@ -101,7 +109,7 @@ class Experiment:
             BadInput: the load acts along a motion without stiffness.
         """
         try:
-            return linear_response(self.posture, self.load, self.gravity)
+            return linear_response(self.posture, self.wrench, self.gravity)
         except FreeMotion as error:
             raise BadInput(f"{self.posture.robot.name}: {error}") from None
 
@@ -195,7 +203,9 @@ class Experiment:
         self, values: NDArray, draws: Sequence[int] | NDArray
     ) -> tuple[NDArray, NDArray, NDArray]:
         """Return records with the posture's clearances, wrenches, and their weights."""
-        errors = self.sources.errors(values)
+        robot = self.posture.robot
+        bolts = bolt_generators(robot, self.seed, draws)
+        errors = bolted_errors(robot, self.sources.errors(values), bolts)
         solved = self.energies.solve(errors)
         rows = np.zeros(len(values), dtype=self.record_type)
         rows["energy"] = solved.energy
@@ -229,7 +239,7 @@ class Experiment:
             rows[name] = zone.solve(errors).margin
         if self.stiffness:
             rows["stiffness"], rows["free_motion"] = draw_stiffnesses(
-                self.posture, errors, self.stiffness, self.load, self.gravity
+                self.posture, errors, self.stiffness, self.wrench, self.gravity
             )
         return rows, wrenches, np.broadcast_to(at_tips, wrenches.shape)
 

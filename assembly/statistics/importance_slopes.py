@@ -29,13 +29,15 @@ def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
 
     Returns:
         (2, d) rotation [rad] and translation [m] per rad or m of error; NaN for a group
-        of angles and lengths, and if none of the draws has a solution.
+        of angles and lengths, if none of the draws has a solution, and for robots with
+        bolted joints, whose locked-in clearances depend on the errors too.
     """
     sources = experiment.sources
     values = design.A[:DRAWS]
     squares = np.zeros((2, len(sources)))
     draws = experiment.energies.solve(sources.errors(values))
     known = np.isfinite(draws.energy) & np.isfinite(draws.clearances).all(axis=1)
+    known &= not any(f.locked_at for f in sources.robot.frames)
     if known.any():
         slopes = platform_slopes(experiment.energies, draws[known])
         of_sources = sources.of_numbers(slopes)

@@ -179,7 +179,7 @@ def provenance(experiment: Experiment) -> dict[str, str | int | float]:
         "precision": " ".join(map(repr, experiment.precision)),
         "margins": int(experiment.margins),
         "stress": int(experiment.stress),
-        "load": " ".join(map(repr, experiment.load or ())),
+        "load": " ".join(map(repr, experiment.wrench or ())),
         "gravity": " ".join(map(repr, experiment.gravity or ())),
         "program": f"forcefit {version('forcefit')}",
         "program_sha256": program_hash(),

@@ -13,6 +13,7 @@ from assembly.report.scene import robot_scene
 from assembly.solvers.conic import SolverFailed
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.plot import NAMES
+from assembly.steps.bolted import bolt_generators, bolt_joints
 from forcefit.page.charts import Axis, Layer, value_map
 
 if TYPE_CHECKING:
@@ -49,8 +50,10 @@ def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
     drawn = experiment.sources.draw(draw, 1, experiment.seed)
     errors = experiment.sources.errors(drawn)[0]
     robot = experiment.posture.robot.with_errors(errors)
+    rngs = bolt_generators(robot, experiment.seed, [draw])
+    robot = bolt_joints(robot, None if rngs is None else rngs[0])
     return _forced_robot(
-        replace(experiment.posture, robot=robot), experiment.load, experiment.gravity,
+        replace(experiment.posture, robot=robot), experiment.wrench, experiment.gravity,
         why=f"Draw {draw}, whose {NAMES[key]} is nearest to 95 % of them.",
     )  # fmt: skip
 

@@ -19,6 +19,7 @@ from assembly.statistics.callout_sources import CalloutSources, Sources
 from assembly.statistics.quantities import UNITS, limit_names
 from assembly.statistics.ranking import kind_of
 from assembly.statistics.requirement import COSTS, Plan
+from assembly.steps.bolted import refuse_bolted
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from stiffness.screws import SCREW
 
@@ -37,9 +38,10 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
         The plan.
 
     Raises:
-        BadInput: the file violates a rule.
+        BadInput: the file violates a rule, or a joint of the robot is bolted at a pose.
     """
     root = read_toml(path)
+    refuse_bolted(robot, "allocation of tolerances")
     cost = _choice(root, "cost", COSTS)
     distribution = _choice(root, "distribution", ("uniform", "truncated"))
     asked_yield = root.number("yield", "1", 1.0, above=0.0, largest=1.0)

@@ -31,6 +31,7 @@ from assembly.statistics.error_sets import ErrorSets, error_sets, zones_of_error
 from assembly.statistics.linear_response import LinearResponse, linear_response
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.responses import respond
+from assembly.steps.bolted import refuse_bolted
 from forcefit.inputs.table import BadInput
 
 _TOLERANCE = 3e-4  # relative to the sum of the supports along x, y and z
@@ -87,9 +88,10 @@ def worst_pose(
         The worst case, with the reading that it answers.
 
     Raises:
-        BadInput: the posture is loaded, or an independent error is unbounded or not
-            symmetric about zero.
+        BadInput: a joint is bolted at a pose, the posture is loaded, or an independent
+            error is unbounded or not symmetric about zero.
     """
+    refuse_bolted(prepared.posture.robot, "worst case")
     if prepared.loads is not None:
         raise BadInput("worst case: found a load, expected none: it is not linear then")
     if isinstance(sources, CalloutSources) and sources.fits:

@@ -19,6 +19,7 @@ from assembly.files.drawing_file import is_drawing
 from assembly.files.robot_file import declared_robot, robot_of, robot_table
 from assembly.files.solved_links import solve_links
 from assembly.model.robot import Robot
+from assembly.steps.bolted import bolt_joints
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 
 _AXES = {3: ("x", "y", "z"), 6: ("rx", "ry", "rz", "tx", "ty", "tz")}
@@ -123,7 +124,7 @@ class Design:
         """
         robot = robot_of(Table(self.changed(values), self.file, ""), self.name)
         try:
-            return solve_links(robot)
+            return bolt_joints(solve_links(robot))
         except BadInput as error:
             raise BadInput(f"{self.file}: {error}") from None
 
@@ -157,12 +158,12 @@ def load_design(name: str | Path) -> Design:
     Raises:
         BadInput: the name is neither a built-in name nor a file.
     """
-    from assembly.exchange.robot_files import OTHERS, load_robot
+    from assembly.exchange.robot_files import is_robot_file, load_robot
     from assembly.robots import BUILT_IN
 
     # an invalid file is refused before numbers are changed
     robot = load_robot(name, links=False)
-    if str(name) in BUILT_IN or Path(name).suffix.lower() in OTHERS:
+    if str(name) in BUILT_IN or not is_robot_file(Path(name)):
         return design_of(robot)
     table = read_toml(Path(name))
     if is_drawing(

@@ -33,6 +33,7 @@ from assembly.model.statuses import (
 from assembly.platform_stiffness.vibration import natural_modes
 from assembly.report.first_order import MOST_ENERGY, off_by
 from assembly.solvers.conic import SolverFailed
+from assembly.steps.bolted import bolt_generators, bolted_errors
 from assembly.sweeps.point_conditions import (
     assemble_rows,
     is_loaded,
@@ -173,7 +174,7 @@ def _solve_variant(
     postures_reached = [posture for _, posture in reachable]
     errors = None
     if question.sources is not None:
-        errors = _errors(question, points.draws[rows_reached - first])
+        errors = _errors(question, robot, points.draws[rows_reached - first])
     _solve_or_split(
         question, robot, perfect, postures_reached, errors, solved, rows_reached
     )
@@ -208,10 +209,14 @@ def _fail(solved: SolvedPoints, rows: range, status: str, reason: str) -> None:
     solved.texts["reason"].update(dict.fromkeys(rows, reason))
 
 
-def _errors(question: Question, draws: NDArray) -> NDArray:
-    """Return the (k, n, 6) [rad, m] errors of given draws."""
+def _errors(question: Question, robot: Robot, draws: NDArray) -> NDArray:
+    """Return the (k, n, 6) [rad, m] errors of given draws, bolted joints locked in."""
     pages = {page: _page(question, page) for page in np.unique(draws // _PAGE).tolist()}
-    return np.array([pages[d // _PAGE][d % _PAGE] for d in draws.tolist()])
+    own, which = np.unique(draws, return_inverse=True)
+    errors = np.array([pages[d // _PAGE][d % _PAGE] for d in own.tolist()])
+    return bolted_errors(robot, errors, bolt_generators(robot, question.seed, own))[
+        which
+    ]
 
 
 @lru_cache(maxsize=8)

@@ -180,7 +180,7 @@ def _sources(
     from assembly.model.error_distributions import read_sources
 
     closing = options.rest is not None or options.mismatch is not None
-    fixed = machine.errors if closing else None
+    fixed = machine.declared_errors if closing else None
     sources = read_sources(options.errors, machine, fixed)
     drawn = [path for path in varied if ".geometric_error." in path]
     if drawn:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from assembly.model.given_load import Load, one_load
 from assembly.model.robot import Robot
 from assembly.sweeps.dataset import open_dataset
 from assembly.sweeps.request import SweepOptions, ask_sweep
@@ -37,7 +38,7 @@ def sweep(
     wrench_of: Sequence[str] = (),
     near: float = 0.02,
     yield_strength: float | None = None,
-    load: Sequence[float] = (0.0,) * 6,
+    load: Load = (0.0,) * 6,
     gravity: Sequence[float] = (0.0,) * 3,
     under: Mapping[str, float | str] | None = None,
     state: str | None = None,
@@ -69,7 +70,8 @@ def sweep(
         wrench_of: frames whose wrenches are recorded.
         near: distance below which a singularity is reported.
         yield_strength: [Pa] yield strength of the links, for their stress and safety.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
+        load: (6,) [N m, N] on the platform at its origin, base axes, or by component,
+            ``{"fz": -50}``.
         gravity: (3,) [m/s^2] base axes.
         under: covariates on which effects of the robot's file depend.
         state: ``"nominal"``, ``"contact"`` or ``"exact"``: state in which K_C, and the
@@ -98,9 +100,9 @@ def sweep(
         SweepOptions(
             grid=grid, poses=poses, vary=vary, errors=errors, draws=draws, seed=seed,
             assumption=assumption, quantities=quantities, wrench_of=wrench_of,
-            near=near, yield_strength=yield_strength, load=load, gravity=gravity,
-            under=under or {}, state=state, frequencies=frequencies, rest=rest,
-            mismatch=mismatch,
+            near=near, yield_strength=yield_strength, load=one_load(load).tolist(),
+            gravity=gravity, under=under or {}, state=state, frequencies=frequencies,
+            rest=rest, mismatch=mismatch,
         ),
     )  # fmt: skip
     if output is None:

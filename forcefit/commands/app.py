@@ -14,6 +14,7 @@ from typing import Annotated
 import typer
 
 from forcefit.commands import assembly, report, stiffness, validation
+from forcefit.commands.check import check
 from forcefit.commands.convert import convert
 from forcefit.commands.example import example
 from forcefit.commands.help import Commands
@@ -44,6 +45,7 @@ app.add_typer(
     help="Validation by simulation and measured data.",
 )
 app.add_typer(report.app, name="report", help="Comparison of two runs.")
+app.command()(check)
 app.command()(convert)
 app.command()(example)
 app.command()(new)

@@ -32,6 +32,7 @@ from forcefit.commands.progress import one_thread
 from forcefit.commands.show import show
 from forcefit.commands.solve import solve
 from forcefit.commands.statistics import statistics, tolerances
+from forcefit.commands.steps import steps
 from forcefit.commands.sweep import sweep
 from forcefit.inputs.errors import BadInput, nearest
 
@@ -114,6 +115,7 @@ def error(
 
 
 for command in (
-    show, stiffness, deflection, frequencies, path, statistics, tolerances, sweep, plot,
+    show, stiffness, deflection, frequencies, path, statistics, tolerances, sweep,
+    steps, plot,
 ):  # fmt: skip
     app.command()(command)

@@ -37,6 +37,11 @@ EXAMPLES = {
         'forcefit assembly tolerances irsbot2 --grid "tx=-0.2:0.2:0.2,tz=-0.5" '
         "--plan examples/tolerance_allocation/mostly.toml",
     ),
+    "assembly_steps": _Example(
+        "the order in which the legs of a hexapod are joined",
+        ("examples/assembly_steps.toml",),
+        "forcefit assembly steps hexapod examples/assembly_steps.toml --best force",
+    ),
     "drawn": _Example(
         "robots as drawn: a 3-UPU, a Tricept, an Agile Eye, a toleranced four-bar",
         ("examples/drawn",),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from forcefit.inputs.assignments import parse_assignments
+from forcefit.inputs.assignments import check_components, parse_assignments
 from forcefit.inputs.errors import BadInput, checked, describe, nearest
 from forcefit.inputs.writing import check_json
 
@@ -154,24 +154,12 @@ def parse_load(texts: list[str] | None, option: str = "--load") -> list[float] |
     """
     if not texts:
         return None
+    from assembly.model.given_load import given_load
     from assembly.model.largest import LARGEST
-    from stiffness.screws import WRENCH
 
-    names = [name.lower() for name in WRENCH]
-    given = _components(texts, option, names, LARGEST)
-    return [given.get(name, 0.0) for name in names]
-
-
-def _components(
-    texts: list[str], option: str, names: Sequence[str], largest: float
-) -> dict[str, float]:
-    """Return the numbers given by component, after a check of the names."""
-    given = parse_assignments(texts, option, largest)
-    for name in given:
-        if name not in names:
-            hint = nearest(name, names)
-            raise BadInput(f'{option}: unknown component "{name[:60]}"{hint}')
-    return given
+    given = parse_assignments(texts, option, LARGEST)
+    wrench: list[float] = given_load(given, option).tolist()
+    return wrench
 
 
 def parse_gravity(texts: list[str] | None) -> list[float] | None:
@@ -273,7 +261,8 @@ def parse_direction(texts: list[str] | None) -> list[float] | None:
     from stiffness.screws import SCREW
 
     names = [name.lower() for name in SCREW]
-    given = _components(texts, "--along", names, LARGEST_LENGTH)
+    given = parse_assignments(texts, "--along", LARGEST_LENGTH)
+    check_components(given, "--along", names)
     length = math.hypot(*given.values())
     if length == 0.0 or len({name[0] for name, value in given.items() if value}) > 1:
         raise BadInput(
@@ -404,6 +393,14 @@ def note_massless(robot: Any, gravity: list[float] | None) -> None:
     from assembly.linear.load import massless
 
     for remark in massless(robot, gravity):
+        print(f"forcefit: note: {robot.name}: {remark}", file=sys.stderr)
+
+
+def note_loose(robot: Any) -> None:
+    """Print a note to stderr if a fixed joint's clearance is loose at every pose."""
+    from assembly.steps.bolted import loose_over_poses
+
+    for remark in loose_over_poses(robot):
         print(f"forcefit: note: {robot.name}: {remark}", file=sys.stderr)
 
 

@@ -71,11 +71,8 @@ def stiffness(
 ) -> None:
     """Compute the platform's stiffness, and each part's compliance."""
     from assembly.model.statuses import OK
-    from assembly.report.platform_stiffness import (
-        plot_shares,
-        stiffness_of,
-        stiffness_text,
-    )
+    from assembly.report.platform_stiffness import stiffness_of, stiffness_text
+    from assembly.report.share_pictures import plot_shares
 
     if figure is not None:
         check_writable(figure, PICTURE)

@@ -68,7 +68,7 @@ class _Links(logging.Handler):
 
 def report_loading() -> None:
     """Show progress of the finite elements that loading a robot runs."""
-    log = logging.getLogger("assembly.files.solved_links")
+    log = logging.getLogger("forcefit.links")
     log.setLevel(logging.DEBUG)
     log.handlers = [_Links()]
 

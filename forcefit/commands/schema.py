@@ -12,9 +12,8 @@ def schema(
     name: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Name of the schema: robot, campaign, or a command such as assembly "
-            "solve; without "
-            "a name all names are listed."
+            help="Name of the schema: robot, campaign, steps, or a command such as "
+            "assembly solve; without a name all names are listed."
         ),
     ] = None,
 ) -> None:
@@ -24,18 +23,20 @@ def schema(
     robot.schema.json
     """
     from assembly.files.robot_schema import ROBOT_FILE
+    from assembly.files.step_file import PLAN_FILE
     from forcefit.results.outputs import OUTPUTS
     from forcefit.results.records import Content
     from forcefit.results.schema import schema_of
     from validation.campaign.campaign_schema import CAMPAIGN_FILE
 
     files: dict[str, Content] = {"robot": ROBOT_FILE, "campaign": CAMPAIGN_FILE}
-    known: dict[str, Content] = {**files, **OUTPUTS}
+    known: dict[str, Content] = {**files, **OUTPUTS, "steps": PLAN_FILE}
     if not name:
         print("\n".join(known))
         return
     wanted = " ".join(name)
     if wanted not in known:
         raise BadInput(f"schema: found {quoted(wanted)}{nearest(wanted, known)}")
-    result = schema_of(known[wanted], f"forcefit {wanted}", file=wanted in files)
+    is_file = wanted in {*files, "steps"}
+    result = schema_of(known[wanted], f"forcefit {wanted}", file=is_file)
     print(json.dumps(result, indent=1))

@@ -20,6 +20,7 @@ from forcefit.commands.options import (
     RestOption,
     RobotArgument,
     note_closing,
+    note_loose,
     note_massless,
     parse_gravity,
     parse_load,
@@ -187,7 +188,7 @@ def statistics(
         robot, pose, joint, rest, mismatch, own_errors=not closing, note=False,
         drive_force=drive_force,
     )  # fmt: skip
-    fixed = posture.robot.errors if closing else None
+    fixed = posture.robot.declared_errors if closing else None
     independent = None
     if errors is not None:
         independent = read_sources(errors, posture.robot, fixed)
@@ -355,6 +356,7 @@ def tolerances(
         check_writable(figure, PICTURE)
     machine = load_robot(robot, closing_of(rest, mismatch))
     note_closing(machine, rest, mismatch)
+    note_loose(machine)
     asked_plan = (
         None
         if plan is None

@@ -127,7 +127,7 @@ TimeLimit = Annotated[float, typer.Option(help="Time limit of the solution [s]."
 
 def tell_progress() -> None:
     """Print the unknowns, the error and the expected time of each mesh to stderr."""
-    log = logging.getLogger("stiffness.fem.fea")
+    log = logging.getLogger("forcefit.finite_elements")
     log.setLevel(logging.INFO)
     log.handlers = [logging.StreamHandler()]
 

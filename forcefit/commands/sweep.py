@@ -17,6 +17,7 @@ from forcefit.commands.options import (
     RobotArgument,
     UnderOption,
     note_closing,
+    note_loose,
     note_massless,
     parse_covariates,
     parse_gravity,
@@ -184,6 +185,7 @@ def sweep(
             check_axes(dict(zip(asked.dims, asked.shape, strict=True)))
         update("robot", 1, 1)
     note_massless(asked.question.robot, g)
+    note_loose(asked.question.robot)
     note_closing(asked.question.robot, rest, mismatch)
     if frequencies is not None and (any(wrench or ()) or any(g or ())):
         print(

@@ -79,10 +79,11 @@ def _with_errors(
     if errors is None:
         return posture
     from assembly.model.error_distributions import read_sources
+    from assembly.steps.bolted import bolt_joints
 
     sources = read_sources(errors, posture.robot, fixed)
     errors_drawn = sources.errors(sources.draw(0, 1, seed)[0])
-    return replace(posture, robot=posture.robot.with_errors(errors_drawn))
+    return replace(posture, robot=bolt_joints(posture.robot.with_errors(errors_drawn)))
 
 
 def parse_scales(text: str) -> list[float]:
@@ -196,7 +197,7 @@ def crosscheck(
     own = errors is None or rest is mismatch is None
 
     def compare(posture: "Posture") -> Crosscheck | StiffnessCheck:
-        fixed = None if own else posture.robot.errors
+        fixed = None if own else posture.robot.declared_errors
         with_errors = _with_errors(posture, errors, seed, fixed)
         applied = apply_robot_effects(with_errors, wrench, g, covariates)
         if state is not None:
@@ -318,7 +319,7 @@ def validity(
     wrench, g = parse_load(load), parse_gravity(gravity)
     own = errors is None or rest is mismatch is None
     posture = posture_of(robot, pose, joint, rest, mismatch, own)
-    fixed = None if own else posture.robot.errors
+    fixed = None if own else posture.robot.declared_errors
     posture = _with_errors(posture, errors, seed, fixed)
     if grid is None and poses is None:
         costs = costs_at(posture, wrench, g, solids)

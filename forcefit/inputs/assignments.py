@@ -3,7 +3,24 @@
 import math
 from collections.abc import Iterable
 
-from forcefit.inputs.errors import BadInput
+from forcefit.inputs.errors import BadInput, nearest
+
+
+def check_components(given: Iterable[str], place: str, names: Iterable[str]) -> None:
+    """Raise an error if numbers are given by other names than those of components.
+
+    Args:
+        given: the names given.
+        place: option or argument, for the message.
+        names: the names of components.
+
+    Raises:
+        BadInput: a name is none of them.
+    """
+    for name in given:
+        if name not in names:
+            hint = nearest(str(name), names)
+            raise BadInput(f'{place}: unknown component "{str(name)[:60]}"{hint}')
 
 
 def parse_assignments(

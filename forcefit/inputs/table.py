@@ -10,9 +10,10 @@ import math
 import re
 import tomllib
 from collections.abc import Iterable
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +44,19 @@ __all__ = [
 _LARGEST_FILE = 64 << 20
 # a key with 100 dots, such as a.a.a. ...
 _DEEP_KEY = re.compile(r"(?<![\w-])(?:[\w-]+\s*\.\s*){100}")
+
+
+class Mending(Protocol):
+    """Replacement of faulty values while a file is read; see ``mending.py``."""
+
+    def text(self, path: str, text: str) -> str:
+        """Return the text to be read in place of that of a file."""
+
+    def root(self, content: dict[str, Any], file: str) -> "Table":
+        """Return the root table to be read in place of that of a file."""
+
+
+MENDING: ContextVar[Mending | None] = ContextVar("mending", default=None)
 
 
 def read_bytes(path: Path | str) -> bytes:
@@ -94,7 +108,8 @@ def read_text(path: Path | str) -> str:
     if (place := text.find("\0")) >= 0:
         line = text.count("\n", 0, place) + 1
         raise BadInput(f"{path}: line {line} holds NUL; expected a text file in UTF-8")
-    return text
+    mending = MENDING.get()
+    return text if mending is None else mending.text(str(path), text)
 
 
 def read_rows(path: Path | str) -> list[list[str]]:
@@ -131,8 +146,12 @@ def read_toml(path: Path | str) -> "Table":
     text = read_text(path)
     if _DEEP_KEY.search(text):  # tomllib would need minutes
         raise BadInput(f"{path}: not valid TOML: nested too deeply")
+    mending = MENDING.get()
     try:
-        return Table(tomllib.loads(text), str(path), "")
+        content = tomllib.loads(text)
+        if mending is not None:
+            return mending.root(content, str(path))
+        return Table(content, str(path), "")
     except RecursionError:
         raise BadInput(f"{path}: not valid TOML: nested too deeply") from None
     # the text of the error ends with line and column
@@ -382,7 +401,7 @@ class Table:
         value = self.require(key, "a table")
         if not isinstance(value, dict):
             raise self.bad(key, f"found {describe(value)}, expected a table")
-        return Table(value, self.file, ".".join(filter(None, (self.place, key))))
+        return self._inner(value, ".".join(filter(None, (self.place, key))), key)
 
     def tables(self, key: str) -> list["Table"]:
         """Return the tables of ``[[key]]``; none if the key is absent.
@@ -399,8 +418,15 @@ class Table:
             raise self.bad(key, message)
         prefix = f"{self.place}." if self.place else ""
         return [
-            Table(v, self.file, f"{prefix}{key}[{i}]") for i, v in enumerate(value, 1)
+            self._inner(v, f"{prefix}{key}[{i}]", key, i)
+            for i, v in enumerate(value, 1)
         ]
+
+    def _inner(
+        self, content: dict[str, Any], place: str, *at: str | int
+    ) -> "Table":  # fmt: skip
+        """Return a table inside this one, ``at`` its key and, in a list, its number."""
+        return Table(content, self.file, place)
 
     def finish(self) -> None:
         """Raise an error if the table has keys that were not read.

@@ -162,6 +162,7 @@
     const switches = {};
     const wanted = ["nominal", "forced", "joints", "names", "forces", "error body"];
     for (const name of wanted) {
+      if (spec.nominal && name === "forced") continue;
       if (name === "forces" && !spec.forces.length) continue;
       if (name === "error body" && !spec.body) continue;
       const box = element("input", "", { type: "checkbox" });
@@ -185,6 +186,7 @@
     const most = 2 * spec.exaggeration;
     const [larger, readout] = slider("exaggeration", most, most / 200, spec.exaggeration);
     larger.className = "exaggeration";
+    larger.parentNode.hidden = spec.nominal;
     let closing = null;
     if (steps) {
       closing = slider("closing", steps, 1, steps)[0];
@@ -218,16 +220,19 @@
       const started = b => b.parent < 0 ? b.nominal[0] : at[b.parent];
       const shape = (b, i) => step === null ? b.nominal.map((p, s) =>
         moved(p, b.moved[s], k)) : [started(b), at[i]];
-      const text = b => `${escaped(b.name)} (${b.kind})<br>moved by ${amount(
-        Math.hypot(...b.moved[b.moved.length - 1]), spec.displacement)}`;
+      const text = b => `${escaped(b.name)} (${b.kind})` + (spec.nominal ? ""
+        : `<br>moved by ${amount(Math.hypot(...b.moved[b.moved.length - 1]),
+          spec.displacement)}`);
       const solid = bodies.map((b, i) => [b, i]).filter(([b]) => b.long);
-      if (on("nominal")) drawn.push({ ...paths(solid.map(([b]) =>
+      if (on("nominal") && !spec.nominal) drawn.push({ ...paths(solid.map(([b]) =>
         [b.nominal, escaped(b.name)])), name: "nominal",
         line: { color: "#c3c9cf", width: 5 } });
-      for (const [name, color, elastic] of [["forced, elastic", "#c0392b", true],
-        ["forced, rigid", "#1f6fb4", false]]) {
+      const word = spec.nominal ? "nominal" : "forced";
+      for (const [kind, color, elastic] of [["elastic", "#c0392b", true],
+        ["rigid", "#1f6fb4", false]]) {
         const some = solid.filter(([b]) => b.elastic === elastic);
-        if (on("forced") && some.length) drawn.push({ ...paths(some.map(([b, i]) =>
+        const name = `${word}, ${kind}`;
+        if (on(word) && some.length) drawn.push({ ...paths(some.map(([b, i]) =>
           [shape(b, i), text(b)])), name, line: { color, width: 8 } });
       }
       if (on("joints") || on("names")) drawn.push({ type: "scatter3d", name: "joints",

@@ -110,7 +110,7 @@ def page(content: Page) -> str:
     return piece(
         "page", content, {True: "good", None: "mixed", False: "bad"}[content.good],
         _provenance(content.provenance), plain(content.results), style, script,
-        _plotly() if drawn else "",
+        packed_plotly() if drawn else "",
     )  # fmt: skip
 
 
@@ -185,7 +185,7 @@ def _digest(path: Path) -> str:
 
 
 @cache
-def _plotly() -> str:
+def packed_plotly() -> str:
     """Return plotly.js with the traces that pages use, compressed, as text.
 
     ``plotly/build.mjs`` builds it.  A browser decompresses it in 0.1 s.

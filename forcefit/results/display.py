@@ -36,6 +36,21 @@ def short_repr(self: Any) -> str:
     return listing(title(self), _figures(self))
 
 
+def show(self: Any, **options: Any) -> Any:
+    """Return a picture: interactive in a notebook, a figure of matplotlib elsewhere.
+
+    Args:
+        self: what is drawn.
+        options: of ``forcefit.show``.
+
+    Returns:
+        The picture of ``forcefit.show``.
+    """
+    import forcefit  # whose public names are imported at their first use
+
+    return forcefit.show(self, **options)
+
+
 def listing(title: str, lines: Mapping[str, str], notes: Sequence[str] = ()) -> str:
     """Return a title, aligned lines of words and values, and notes."""
     width = max(map(len, lines), default=0)

@@ -267,6 +267,51 @@ _SWEEP = Record(
     ).content,
     closed=False,
 )  # fmt: skip
+_BY_QUANTILE = Each(number("quantile", ""))
+_STEP = record(
+    "platform_screw",
+    name=text("name of the step"), kind=text("kind of the step"),
+    energy=number("energy of all springs, fixtures included", "J"),
+    work=number("work of the step", "J"),
+    load_work=number("work of the loads that act before and after", "J"),
+    lost=number("energy lost by a release", "J"),
+    closing_force=number("largest closing force", "N"),
+    closing_moment=number("largest closing moment", "N m"),
+    closing_wrench=number("closing wrench, axes of the closure or fixture", "N m, N",
+                          "wrench_component"),
+    opening=number("opening before, as far as free motions cannot close it", "rad, m",
+                   "screw"),
+    left_open_=number("opening that the step leaves", "rad, m", "screw"),
+    spring_back_=number("motion of what is released, in its axes", "rad, m", "screw"),
+    reading_=number("reading", "rad or m", "component"),
+    exceeded_=flag("needs more than the allowed force"),
+    adjustment_=number("change of the geometric error", "rad or m", "component"),
+    wrenches=Each(number("wrench locked in afterwards", "N m, N", "wrench_component")),
+)  # fmt: skip
+_STEPS = record(
+    "remarks platform_screw?", _POSTURE, steps=Listed(_STEP),
+    order_=record(
+        objective=Words(("force", "energy", "error")), value=number("value", ""),
+        bound=number("lower bound in any order", ""),
+        given=number("value in the order given", ""), searched=count("states computed"),
+        steps=text("names of the steps", "step"),
+    ),
+    influences_=Listed(record(
+        locked=text("step that holds the opening that it finds", "step"),
+        joined=text("step that may move this opening", "step"),
+        zero=flag("closing the part does not move the opening, for any errors"),
+        free=flag("a free motion moves both openings"),
+        coefficients=Listed(number(
+            "motion of a locked component by the closing wrench",
+            "rad or m per N m or N",
+        )),
+    )),
+    first_energy_=number("energy before the first step", "J"),
+    energy_=number("energy of the assembled machine", "J"),
+    work_=number("work of all steps", "J"), lost_=number("energy lost", "J"),
+    peak_force_=number("largest closing force", "N"),
+    draws_=count("machines"), quantiles_=Each(Each(_BY_QUANTILE)),
+)  # fmt: skip
 _PEAK = record(
     "time unit?", value=number("largest value", ""), frame_=text("frame of the body")
 )  # fmt: skip
@@ -293,6 +338,7 @@ ASSEMBLY: Mapping[str, Content] = {
     "assembly statistics": _STATISTICS,
     "assembly tolerances": _TOLERANCES,
     "assembly sweep": _SWEEP,
+    "assembly steps": _STEPS,
     "assembly path": _PATH,
     "convert": record(
         "robot left_out", platform=text("platform"), frames=count("frames"),

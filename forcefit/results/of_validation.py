@@ -1,4 +1,4 @@
-"""Records of the JSON of cross-checks, ``study`` and ``report compare``."""
+"""Records of the JSON of cross-checks, ``study``, ``check`` and ``report compare``."""
 
 from collections.abc import Mapping
 
@@ -88,6 +88,13 @@ _CHANGE = record(
 VALIDATION: Mapping[str, Content] = {
     "validation crosscheck": CROSSCHECK,
     "validation validity": _VALIDITY,
+    "check": record(
+        "passed",
+        files=Listed(
+            record(file=text("file"), kind=text("kind of file"),
+                   messages=text("messages", "message")),
+        ),
+    ),
     "report compare": record(
         compared=text("files", "file"), same=count("equal values"),
         changes=Listed(_CHANGE), only_in_one=Listed(_CHANGE),

@@ -47,7 +47,7 @@ from stiffness.surface.patches import (
 )
 from stiffness.surface.surface import Surface, read_surface
 
-_LOG = logging.getLogger(__name__)
+_LOG = logging.getLogger("forcefit.finite_elements")
 _SETUP = 2.0  # [s] time of a solution that does not depend on the mesh
 # share of the budget's seconds for the mesher; the rest is for the solver
 _MESHER = 0.6

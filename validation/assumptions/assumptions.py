@@ -9,6 +9,7 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble
 from assembly.linear.load import driven
 from assembly.linear.reference.reduction import FreeMotion
+from assembly.model.given_load import Load, given_load
 from assembly.model.robot import BeamLink
 from assembly.solvers.conic import SolverFailed
 from stiffness.mesh.fit_to_patches import MeshFailed
@@ -35,7 +36,7 @@ NOTHING = "nothing to compare: without errors and load no model deforms"
 
 def assumption_costs(
     posture: Posture,
-    load: ArrayLike | None = None,
+    load: Load | None = None,
     gravity: ArrayLike | None = None,
     solids: bool = False,
 ) -> dict[str, Cost | str]:
@@ -45,7 +46,8 @@ def assumption_costs(
 
     Args:
         posture: the robot's configuration.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
+        load: (6,) [N m, N] on the platform at its origin, base axes, or by component,
+            ``{"fz": -50}``.
         gravity: (3,) [m/s^2] base axes; none if absent.
         solids: whether beams are compared with meshed solids, which takes some seconds
             for each cross-section.
@@ -53,6 +55,7 @@ def assumption_costs(
     Returns:
         Mapping from each assumption to its error, or to the reason why it is not known.
     """
+    load = None if load is None else given_load(load)
     tight = replace(posture, robot=without_clearance(posture.robot))
     computed: dict[str, Callable[[], Cost]] = {
         "linear closures": lambda: closure_cost(tight, load),

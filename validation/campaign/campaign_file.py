@@ -59,11 +59,12 @@ class _Declared:
     per_session: tuple[str, ...]
 
 
-def read_campaign(folder: Path | str) -> Campaign:
+def read_campaign(folder: Path | str, *, links: bool = True) -> Campaign:
     """Return the campaign of a folder.
 
     Args:
         folder: folder with a file ``campaign.toml``, or that file.
+        links: whether links given by meshes are solved, which diagnoses need.
 
     Returns:
         The campaign, with joint coordinates of every configuration.
@@ -76,7 +77,7 @@ def read_campaign(folder: Path | str) -> Campaign:
     root = read_toml(_declaration(folder))
     robot_name = root.text("robot", expected="a built-in robot or a robot file")
     declared = _declared(root)
-    return _campaign(declared, _read_robot(root, robot_name))
+    return _campaign(declared, _read_robot(root, robot_name, links))
 
 
 def read_commands(source: Path | str, robot: Robot) -> Campaign:
@@ -312,7 +313,7 @@ def _read_noise(root: Table) -> NDArray:
     return noise
 
 
-def _read_robot(root: Table, name: str) -> Robot:
+def _read_robot(root: Table, name: str, links: bool) -> Robot:
     """Return robot: a built-in one, or one of a file next to the campaign's file."""
     if name in BUILT_IN:
         return BUILT_IN[name]()
@@ -322,7 +323,7 @@ def _read_robot(root: Table, name: str) -> Robot:
             f"found {quoted(name)}, neither a built-in robot nor a file in this folder"
         )
         raise root.bad("robot", f"{message}{nearest(name, BUILT_IN)}")
-    return load_robot(path)
+    return load_robot(path, links=links)
 
 
 def _commanded(table: MeasurementTable, robot: Robot) -> str:

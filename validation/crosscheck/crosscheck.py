@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble, failure_status, solve_assembly
 from assembly.linear.reference.reduction import FreeMotion
+from assembly.model.given_load import Load, given_load
 from assembly.model.statuses import FAILS, OK, PASSED, SIMULATION_FAILED, UNDECIDED
 from assembly.solvers.conic import SolverFailed
 from forcefit.results.display import html_table, short_repr
@@ -198,7 +199,7 @@ class Crosscheck:
 def crosscheck(
     posture: Posture,
     scales: Sequence[float] = SCALES,
-    load: ArrayLike | None = None,
+    load: Load | None = None,
     links: str = "beam",
     gravity: ArrayLike | None = None,
     time_limit: float = TIME_LIMIT,
@@ -210,7 +211,8 @@ def crosscheck(
         posture: the robot's configuration.
         scales: factors on errors, clearances and load, > 0, at least two different
             ones; smaller ones are added if a check is undecided.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
+        load: (6,) [N m, N] on the platform at its origin, base axes, or by component,
+            ``{"fz": -50}``.
         links: ``"beam"``: beams are geometrically exact; ``"spring"``: every link is
             its K_E in the simulation too, which checks everything but the beams;
             ``"fem"``: meshed links are solids in floating frames.
@@ -230,7 +232,7 @@ def crosscheck(
     """
     robot = posture.robot if clearances else without_clearance(posture.robot)
     compared = replace(posture, robot=robot)
-    wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
+    wrench = np.zeros(6) if load is None else given_load(load)
     force = wrench * [0, 0, 0, 1, 1, 1]  # the moment acts as a couple of dead forces
     model = replace(link_models(robot, links), elements=ELEMENTS, clearances=clearances)
     g = np.zeros(3) if gravity is None else np.array(gravity, dtype=float)

@@ -12,6 +12,7 @@ from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.clearance import BOUNDS, own_cone
 from assembly.model.robot import Frame, Robot
 from assembly.solvers.conic import SolverFailed
+from assembly.steps.bolted import bolt_joints
 
 ERROR, CLEARANCE = "geometric error", "clearance"
 
@@ -58,11 +59,12 @@ def _by_translation(row: dict[str, Any]) -> tuple[float, float]:
 def _improved(robot: Robot) -> list[tuple[str, str, Robot]]:
     """Yield robots that each lack one of the robot's imperfections."""
     cases = []
+    declared = robot.declared_errors
     for i, frame in enumerate(robot.frames):
-        if robot.errors[i].any():
-            errors = robot.errors.copy()
+        if declared[i].any():
+            errors = declared.copy()
             errors[i] = 0.0
-            cases.append((frame.name, ERROR, robot.with_errors(errors)))
+            cases.append((frame.name, ERROR, bolt_joints(robot.with_errors(errors))))
     for i, frame in enumerate(robot.frames):
         tight = _tight(frame)
         if tight is not None:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from assembly.report.platform_stiffness import DIRECTIONS, largest_rows, share_rows
-from forcefit.page.charts import Axis, chart, label
+from assembly.report.share_pictures import share_chart
 from forcefit.page.tables import table
 from stiffness.screws import SCREW
 
@@ -43,15 +43,7 @@ def platform_section(stiffness: dict[str, Any]) -> str:
         + f"<p>Eigen-stiffnesses [N/m], angles times "
         f"{stiffness['characteristic_length']:.4g} m: {eigen}.</p>"
         "<p>Shares of the parts in the compliance along each axis [%], the largest "
-        "first.</p>" + table(["part", *DIRECTIONS], blame) + _chart(dict(shares))
+        "first.</p>"
+        + table(["part", *DIRECTIONS], blame)
+        + share_chart(stiffness["shares"], "The parts of the table.")
     )
-
-
-def _chart(shares: dict[str, list[float]]) -> str:
-    """Return the chart of the largest shares, with a bar for each direction."""
-    traces = [
-        {"type": "bar", "name": label(name), "x": list(DIRECTIONS), "y": row}
-        for name, row in shares.items()
-    ]
-    share = Axis("share of the compliance", options={"tickformat": ".0%"})
-    return chart(traces, Axis(""), share, "The parts of the table.", bars="stack")

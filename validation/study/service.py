@@ -52,12 +52,13 @@ class Service:
         return bool(self.load.any() or self.gravity.any())
 
 
-def read_service(root: Table, robot: Robot) -> Service | None:
+def read_service(root: Table, robot: Robot, links: bool = True) -> Service | None:
     """Return the table ``[service]`` of a study file; None if it is absent.
 
     Args:
         root: root table of the file.
         robot: robot of the study.
+        links: whether its links given by meshes are solved, and masses are known.
 
     Returns:
         The requested results.
@@ -80,7 +81,7 @@ def read_service(root: Table, robot: Robot) -> Service | None:
         raise table.bad(
             "frequencies", f"found {service.frequencies}, expected at most {_MODES}"
         )
-    if service.frequencies:
+    if service.frequencies and links:
         try:
             check_masses(robot)
         except BadInput as error:

@@ -19,6 +19,7 @@ from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_named
 from assembly.model.robot import BeamLink, MeshLink, Robot
 from assembly.robots import BUILT_IN
+from assembly.steps.bolted import bolt_joints, loose_over_poses
 from assembly.sweeps.targets import parse_grid
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from forcefit.results.display import html_table, short_repr
@@ -69,12 +70,16 @@ class Study:
     __repr__, _repr_html_ = short_repr, html_table
 
 
-def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
+def read_study(
+    path: Path | str, folder: Path | str | None = None, *, links: bool = True
+) -> Study:
     """Return a study from its file.
 
     Args:
         path: path of the TOML file.
         folder: folder of the report, instead of the one in the file.
+        links: whether links given by meshes are solved; a study without them cannot be
+            run.
 
     Returns:
         The study; its whole content has been checked.
@@ -84,17 +89,18 @@ def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
     """
     path = Path(path)
     root = read_toml(path)
-    robot = _robot(root, path.parent)
+    robot = _robot(root, path.parent, links)
     robot, errors = _errors(root, robot)
     if root.has("rest") or root.has("mismatch"):
         errors = "; ".join([errors, *robot.remarks])
+    errors = "; ".join([errors, *loose_over_poses(robot)])
     source, meshes, accuracy = _links(root, robot)
     pose = _pose(root)
     grid = root.text("grid", " ").strip()
     by_key = {"maps": "grid", "crosscheck": "scales"}
     asked_by_key = {check for check, key in by_key.items() if root.has(key)}
     scales = _scales(root)
-    service = read_service(root, robot)
+    service = read_service(root, robot, links)
     checks, named = _checks(root, bool(meshes), bool(grid), bool(scales))
     threads = [quoted(frame.name) for frame in robot.frames if frame.pitch]
     if threads and "crosscheck" in checks:
@@ -139,20 +145,20 @@ def _files(path: Path, root: Table, meshes: dict[str, MeshLink]) -> tuple[Path, 
     )
 
 
-def _robot(root: Table, folder: Path) -> Robot:
+def _robot(root: Table, folder: Path, links: bool) -> Robot:
     """Return the robot, built in or from a file, with closures that hold."""
     name = root.text("robot", expected="a built-in robot or a robot file")
     if name in BUILT_IN:
-        return _closed(root, name)
+        return _closed(root, name, links)
     if not os.path.isfile(folder / name):
         problem = (
             f"found {quoted(name)}, neither a built-in robot nor a file in this folder"
         )
         raise root.bad("robot", f"{problem}{nearest(name, BUILT_IN)}")
-    return _closed(root, folder / name)
+    return _closed(root, folder / name, links)
 
 
-def _closed(root: Table, name: Path | str) -> Robot:
+def _closed(root: Table, name: Path | str, links: bool) -> Robot:
     """Return the robot with closures adjusted as the keys of the study request."""
     rest = root.text("rest") if root.has("rest") else None
     mismatch = root.choice("mismatch", ("spring",)) if root.has("mismatch") else None
@@ -179,7 +185,7 @@ def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
     if not root.has("errors"):
         return robot, "geometric errors as in the robot file"
     closing = root.has("rest") or root.has("mismatch")
-    fixed = robot.errors if closing else np.zeros_like(robot.errors)
+    fixed = robot.declared_errors if closing else np.zeros_like(robot.errors)
     table = root.table("errors")
     if table.has("explicit"):
         rows = table.table("explicit")
@@ -189,7 +195,7 @@ def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
                 errors[robot.index(frame)] = rows.array(name, (6,), "rad, m")
         table.finish()
         given = "geometric errors given in the study file"
-        return robot.with_errors(fixed + errors), given
+        return bolt_joints(robot.with_errors(fixed + errors)), given
     draw = ErrorDraw(
         _frames(table, robot, [f.name for f in robot.frames]),
         tuple(table.array("least", (6,), "rad, m")),
@@ -204,7 +210,7 @@ def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
     table.finish()
     signs = "all positive" if draw.signs == "literal" else "random signs"
     sentence = f"geometric errors drawn with seed {draw.seed}, {signs}"
-    return robot.with_errors(fixed + draw_errors(robot, draw)), sentence
+    return bolt_joints(robot.with_errors(fixed + draw_errors(robot, draw))), sentence
 
 
 def _frames(table: Table, robot: Robot, default: list[str]) -> tuple[str, ...]:

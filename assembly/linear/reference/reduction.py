@@ -44,6 +44,7 @@ from stiffness.screws import SCREW
 
 _STILL = 1e-6  # relative to the largest motion: smaller ones count as rounding
 _NAMED = 4  # largest number of joints that a message names
+_LOAD_ROUNDING = 1e-13  # of the largest load: smaller ones count as rounding
 
 
 class FreeMotion(ValueError):
@@ -232,12 +233,26 @@ def _load_multipliers(
     multipliers = np.linalg.lstsq(A_q.T, -drive, rcond=RANK)[0]
     # the residual is orthogonal to A_q's rows: a free motion, which the load drives
     left = A_q.T @ multipliers + drive
-    if np.abs(left).max(initial=0.0) > 1e-8 * np.abs(drive).max(initial=1e-300):
+    most = np.maximum(
+        1e-8 * np.abs(drive).max(initial=1e-300),
+        _load_rounding(lin, joints, frame_loads),
+    )
+    if (np.abs(left) > most).any():
         raise FreeMotion(
             "the load drives a motion that no joint or spring resists: "
             + _motion_text(lin, joints.free @ left)
         )
     return multipliers
+
+
+def _load_rounding(
+    lin: Linearisation, joints: VirtualJoints, frame_loads: FrameLoads
+) -> NDArray:
+    """Return (free motions,) bounds of the rounding of the loads along them."""
+    lengths = in_reference_lengths(lin.size)  # of a screw; of a wrench its inverse
+    largest = np.abs(frame_loads.joint.reshape(-1, 6) / lengths).max(initial=0.0)
+    sizes = np.tile(lengths, len(joints.free) // 6) @ np.abs(joints.free)
+    return np.asarray(_LOAD_ROUNDING * largest * sizes)
 
 
 def _motion_text(lin: Linearisation, screws: NDArray) -> str:

@@ -249,3 +249,57 @@ def test_directions_of_a_mesh_are_kept(tmp_path):
         axis = between_origins(robot.frames[i]) if link.axis is None else link.axis
         found.append([R @ axis / np.linalg.norm(axis), R @ link.frame_up])
     np.testing.assert_allclose(found[1], found[0], atol=1e-12)
+
+
+BALL_ON_A_TABLE = """
+format = 2
+name = "ball"
+platform = "table"
+platform_at = [0.1, 0, 0.2]
+[[body]]
+name = "table"
+[[joint]]
+name = "ball"
+type = "spherical"
+between = ["table", "base"]
+at = [0, 0, 0]
+geometric_error = [0, 0, 0, 1e-4, 2e-4, 3e-4]
+"""
+ROD_TO_THE_PLATE_AND_FLAG = """
+name = "flag"
+platform = "plate"
+[[frame]]
+name = "p"
+parent = "base"
+translation = [0.3, 0, 0]
+joint = "revolute"
+[[frame]]
+name = "plate"
+parent = "p"
+[[frame]]
+name = "q"
+parent = "base"
+joint = "revolute"
+actuated = true
+[[frame]]
+name = "rod"
+parent = "q"
+translation = [0.3, 0, 0]
+link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }
+[[frame]]
+name = "flag"
+parent = "plate"
+translation = [0, 0.1, 0]
+link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }
+[[closure]]
+frames = ["rod", "plate"]
+"""
+
+
+@pytest.mark.parametrize("text", [BALL_ON_A_TABLE, ROD_TO_THE_PLATE_AND_FLAG])
+def test_names_of_bodies_and_joints_stay_different_in_conversions(text, tmp_path):
+    """A ball with an error of its last frame, and a body that joins another."""
+    (tmp_path / "given.toml").write_text(text)
+    convert(tmp_path / "given.toml", tmp_path / "frames.toml", version=1)
+    done = convert(tmp_path / "frames.toml", tmp_path / "drawn.toml", version=2)
+    assert done.difference < SAME

@@ -187,3 +187,31 @@ def test_a_link_is_the_same_from_either_end():
         found.append(platform_stiffness(home_posture(drawn)).stiffness)
     size = np.sqrt(np.diag(found[0]))
     assert np.abs((found[1] - found[0]) / np.outer(size, size)).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("name", "reverse"),
+    [("bar.link", True), ("bar.end", True), ("d.end", False), ("d.base", False)],
+)
+def test_a_body_may_have_the_name_of_a_frame_that_closes_a_loop(name, reverse):
+    """A four-bar whose loop closes in its elastic bar, or at the base."""
+
+    def compliance(name):
+        link = {"link": MatrixLink(1e6 * np.eye(6)), "ends": ("b", "c")}
+        ends = [("base", "crank"), ("crank", "bar"), ("bar", name), (name, "base")]
+        a, b, c, d = (e[::-1] if reverse and e[0] != "base" else e for e in ends)
+        pins = [
+            pin("a", *a, 0.0, actuated=True), pin("b", *b, 0.1), pin("c", *c, 0.2),
+            pin("d", *d, 0.3),
+        ]  # fmt: skip
+        drawn = robot(*pins, bodies=("crank", "bar", name), platform=name,
+                      links={"bar": link, name: {"mass": 1.0}})  # fmt: skip
+        return platform_stiffness(home_posture(drawn)).compliance
+
+    np.testing.assert_allclose(compliance(name), compliance("rocker"), atol=1e-15)
+
+
+def pin(name, first, second, x, **more):
+    z, x_axis = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+    at = np.array([x, x * (0.3 - x), 0.0])
+    return DrawnJoint(name, "revolute", first, second, at, z, x_axis, x_axis, **more)

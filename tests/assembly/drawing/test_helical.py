@@ -46,6 +46,17 @@ def test_screw_lift_has_one_freedom_and_three_redundant_constraints(read):
     assert (found.freedoms_drives_locked, found.redundant_constraints) == (0, 3)
 
 
+@pytest.mark.parametrize("factor", [1e-6, 1e3])
+def test_mobility_of_the_lift_does_not_depend_on_its_size(factor, read):
+    robot = read()
+    frames = tuple(
+        replace(f, translation=factor * f.translation, pitch=factor * f.pitch)
+        for f in robot.frames
+    )
+    found = mobility(home_posture(replace(robot, frames=frames)))
+    assert (found.freedoms, found.redundant_constraints) == (1, 3)
+
+
 def test_turn_of_the_screw_moves_the_table_by_the_pitch(read):
     """Down if a right-hand screw turns about +z, up if a left-hand one does."""
     for text, step in ((LIFT, -0.005), (LIFT.replace('"5 mm"', '"-5 mm"'), 0.005)):

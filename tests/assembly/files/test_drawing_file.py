@@ -608,6 +608,23 @@ REFUSED = {
     "a pad on a slide": (
         "drive_stiffness = 2e7", "clearance = { pad = { gap = 1e-5 } }",
         'leg "leg".joint "slide".clearance.pad: found one on a prismatic joint, exp'),
+    "clearances of three bearings": (
+        "axis2 = [0, 1, 0]", "axis2 = [0, 1, 0]\nclearance = [{}, {}, {}]",
+        'leg "leg".joint "upper".clearance: found a list of 3, expected one'),
+    "errors of one bearing in a list": (
+        "axis2 = [0, 1, 0]",
+        "axis2 = [0, 1, 0]\ngeometric_error = [[0, 0, 0, 0, 0, 0]]",
+        'leg "leg".joint "upper".geometric_error: found a list of 1, expected one '),
+    "a misspelt curve": (
+        "beam = { radius", "curv = { radius",
+        'leg "leg".body "rod".link: unknown key "curv"; did you mean "curve"?'),
+    "a link of no kind": (
+        'beam = { radius = "15 mm" }, ', "",
+        'expected exactly one of "beam" | "curve" | "stiffness" | "mesh" | "library"'),
+    "the name of another joint's frame": (
+        'name = "slide"', 'name = "lower.second"',
+        'joint "leg1.lower.second": found "leg1.lower.second" as the name of a frame, '
+        'which joint "leg1.lower" has too; expected another name'),
     "copies": (
         "count = 3", "count = 0",
         'leg "leg".repeat.count: found 0, expected a whole number >= 1'),

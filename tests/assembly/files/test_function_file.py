@@ -92,8 +92,8 @@ REFUSED = {
     "no formula": (FORMULA, "a*sin(3*q) + b", "a*sin(3*q",
         ".formula: found 'a*sin(3*q', expected a formula such as \"a*sin(q)\""),
     "a call": (FORMULA, "a*sin(3*q) + b", "__import__('os')",
-        '.formula: found "__import__", which is no function; valid: abs, atan, cos, '
-        "exp, log, sign, sin, sqrt, tan, tanh"),
+        '.formula: found "__import__", expected the name of a function; valid: abs, '
+        "atan, cos, exp, log, sign, sin, sqrt, tan, tanh"),
     "an unknown name": (FORMULA, "a*sin(3*q) + b", "a*sin(3*p) + b",
         '.formula: found "p", which is neither a variable nor a parameter; valid: a, '
         "b, drive, q, q_drive"),

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.mobility import mobility
-from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import home_posture
 from assembly.model.robot import Frame, Robot
 from tests.linkages_for_tests import five_bar, four_bar
@@ -45,12 +44,11 @@ def test_freedoms_and_overconstraint_equal_hand_counts(robot, counts):
 @pytest.mark.parametrize("count", [2, 3, 5])
 @pytest.mark.parametrize("joint", ["prismatic", "revolute"])
 def test_least_singular_value_of_parallel_joints_equals_its_closed_form(joint, count):
-    """Rows q1 - qk: 1, or sqrt(2) of a single row; translations over the size."""
+    """Rows q1 - qk: 1, or sqrt(2) of a single row, in rad and in sizes of the robot."""
     robot = side_by_side(*[joint] * count)
     least = np.sqrt(2.0) if count == 2 else 1.0
-    expected = least / size_of(robot) if joint == "prismatic" else least
     found = mobility(home_posture(robot)).smallest_singular_value
-    assert found == pytest.approx(expected)
+    assert found == pytest.approx(least)
 
 
 def test_robot_without_closures_has_no_positive_singular_value():

@@ -11,6 +11,7 @@ from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
 from forcefit.inputs.errors import BadInput
+from stiffness.screws import rotation_matrix
 from tests.robots_for_tests import planar_four_bar
 
 L, RADIUS, E, RHO, G = 0.8, 0.02, 70e9, 2700.0, 9.81
@@ -114,6 +115,27 @@ def test_large_loads_deflect_by_the_compliance(size):
     )
     compliance = platform_stiffness(posture).compliance[5, 5]
     assert twice - once == pytest.approx(compliance * size, rel=1e-6)
+
+
+@pytest.mark.parametrize(("shift", "hangs"), [(0.0, True), (1e-9, False)])
+def test_pendulum_is_in_equilibrium_only_where_it_hangs(shift, hangs):
+    """Its hinge, turned and off the origin, carries 2 kg; its moment is rounding.
+
+    A mass centre that is 1 nm off turns it.
+    """
+    at, turn = np.array([0.1, 0.2, 0.7]), np.array([-0.3, 0.2, 0.9])
+    inside = rotation_matrix(turn).T @ [shift, 0.0, -0.3]
+    frames = (
+        Frame("hinge", translation=at, rotation=turn, joint="revolute"),
+        Frame("bob", "hinge", mass=2.0, centre_of_mass=inside),
+    )
+    posture = home_posture(Robot("pendulum", "bob", frames))
+    if hangs:
+        answer = solve_assembly(posture, gravity=[0, 0, -G])
+        assert np.linalg.norm(answer.wrenches[0, 3:]) == pytest.approx(2.0 * G)
+    else:
+        with pytest.raises(FreeMotion, match="it moves hinge rz"):
+            solve_assembly(posture, gravity=[0, 0, -G])
 
 
 def test_load_about_a_free_hinge_is_refused_with_its_unit_motion():

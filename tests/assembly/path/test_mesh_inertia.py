@@ -64,7 +64,10 @@ def turned_arm(link):
 
 def with_mass(M):
     """A mesh link along x whose solution has this mass matrix."""
-    solved = SimpleNamespace(centers=np.array([[0, 0, 0], [LENGTH, 0, 0]]))
+    solved = SimpleNamespace(
+        centers=np.array([[0, 0, 0], [LENGTH, 0, 0]]),
+        link=SimpleNamespace(compliance=np.zeros((6, 6))),
+    )
     link = MeshLink(Path("rod.stl"), "x=0", "x=1", E, 0.3, RHO)
     return replace(link, solution=MeshSolution(solved, E, "", M))
 

@@ -5,15 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from assembly.files.robot_file import read_robot
 from assembly.kinematics.posture import home_posture, place_many, together
 from assembly.model.robot import BeamLink, Clearance, Frame, Robot, beam_axis
 from assembly.path.motion import follow_path
 from assembly.path.path_errors import path_errors
 from assembly.path.path_file import PathTable
+from assembly.path.report import path_page
+from assembly.path.summary import path_summary
 from assembly.path.trajectory import Trajectory, profiled
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
 from assembly.sweeps.targets import goals_of
+from forcefit.page.page import Provenance
 from stiffness.beam.sections import declared_section
 from tests.assembly.path.moving_robots_for_tests import GRAVITY, hinge, instants, rod
 from tests.assembly.path.test_motion import CASES, path_of
@@ -187,3 +191,87 @@ def test_paper_robot_at_20_g_needs_54_ms_for_100_mm():
     mirrored = found.inertial[::-1] * [1, -1, -1, -1, 1, 1]
     size = np.abs(found.inertial).max()
     np.testing.assert_allclose(mirrored, found.inertial, atol=1e-6 * size)
+
+
+def test_falling_pendulum_has_no_deflection_at_rest_to_compare_with():
+    """A level rod of 2 kg falls with 3 g / 4 at its centre: its hinge holds m g / 4."""
+    rail = Frame("rail", rotation=[0.0, np.pi / 2, 0.0], joint="prismatic",
+                 actuated=True)  # fmt: skip
+    cart = Frame("cart", "rail", rotation=[0.0, -np.pi / 2, 0.0], mass=1.0)
+    pin = Frame("pin", "cart", joint="revolute")
+    bob = Frame("bob", "pin", [0.5, 0.0, 0.0], **rod(2.0, 0.5))
+    robot = Robot("crane", "cart", (rail, cart, pin, bob))
+    errors = path_errors(robot, instants(["q.rail"], [[0.0]], [[0.0]], [[0.0]]),
+                         gravity=GRAVITY)  # fmt: skip
+    summary = path_summary(errors)
+    assert summary["status"] == "ok"
+    assert summary["largest"]["force"]["value"] == pytest.approx(4.905 + 9.81)
+    assert "inertial_translation" not in summary["largest"]
+    assert any("no equilibrium at rest" in one for one in summary["remarks"])
+    assert "unknown" in path_page(summary, errors, Provenance())
+
+
+SPHERICAL_ENDS = """
+format = 2
+platform = "plate"
+platform_at = [0, 0, 0.5]
+[[body]]
+name = "plate"
+mass = 3.0
+centre = [0, 0, 0.5]
+"""
+LEG = """
+[[leg]]
+name = "leg{name}"
+repeat = {{ count = 3, about = [0, 0, 1] }}
+body = [{{ name = "nut" }}, {{ name = "screw", mass = {mass}, centre = {middle} }}]
+joint = [
+    {{ name = "low", type = "{kind}", between = ["base", "nut"], at = {low}, {axes} }},
+    {{ name = "drive", type = "prismatic", between = ["nut", "screw"], at = {low}, axis = {along}, actuated = true }},
+    {{ name = "top", type = "spherical", between = ["screw", "plate"], at = {top} }},
+]
+"""  # noqa: E501
+
+
+def six_legs(file, kind, mass=0.0):
+    """A Gough platform whose six legs have masses on their axes; and a leg's vector."""
+    text = SPHERICAL_ENDS
+    for name, below, above in (("a", 10, 50), ("b", 110, 70)):
+        low, top = (
+            np.array([r * np.cos(np.radians(at)), r * np.sin(np.radians(at)), z])
+            for r, at, z in ((0.5, below, 0.0), (0.25, above, 0.5))
+        )
+        along = top - low
+        first = np.cross(along, [0.0, 0.0, 1.0])
+        second = np.cross(along, first)
+        axes = f"axis = {first.tolist()}, axis2 = {second.tolist()}"
+        text += LEG.format(
+            name=name, kind=kind, mass=mass, axes=axes, low=low.tolist(),
+            top=top.tolist(), along=along.tolist(), middle=(low + 0.7 * along).tolist(),
+        )  # fmt: skip
+    file.write_text(text)
+    return read_robot(file), along
+
+
+def test_drives_carry_the_platform_where_massless_legs_spin_freely(tmp_path):
+    """Six equal legs between balls: each drive has m (g + a) / (6 cos(angle to z))."""
+    robot, along = six_legs(tmp_path / "six_sps.toml", "spherical")
+    names = ["tx", "ty", "tz", "rx", "ry", "rz"]
+    pose = [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]
+    path = instants(names, [pose], [np.zeros(6)], [[0, 0, 5.0, 0, 0, 0]])
+    errors = path_errors(robot, path, gravity=[0.0, 0.0, -9.81])
+    expected = 3.0 * (9.81 + 5.0) / (6 * along[2] / np.linalg.norm(along))
+    np.testing.assert_allclose(errors.arrays["drive_force"][0], expected, rtol=1e-9)
+
+
+def test_legs_with_masses_on_their_axes_may_spin_without_a_change(tmp_path):
+    """Balls at the base let them spin, universal joints do not: the same forces."""
+    names = ["tx", "ty", "tz", "rx", "ry", "rz"]
+    pose, rate, second = [0.05, -0.02, 0.55, 0.1, -0.1, 0.2], [0.5] * 6, [-3.0] * 6
+    forces = []
+    for kind in ("spherical", "universal"):
+        robot, _ = six_legs(tmp_path / f"{kind}.toml", kind, mass=0.8)
+        path = instants(names, [pose], [rate], [second])
+        errors = path_errors(robot, path, gravity=[0.0, 0.0, -9.81])
+        forces.append(errors.arrays["drive_force"][0])
+    np.testing.assert_allclose(forces[0], forces[1], rtol=1e-9)

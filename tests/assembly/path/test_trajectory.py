@@ -136,6 +136,8 @@ def test_path_that_cannot_be_made_is_refused(call, message):
     ("content", "message"),
     [
         ("time,pose.tx\n0,0\n1,0.1\n1,0.2\n", r'row "3", time: found 1 s after 1 s'),
+        ("time,pose.tx\n0,0\n1e-300,0.1\n", "expected steps of at least 1e-15 s"),
+        ("time,pose.tx\n0,0\n1,0\n1e30,0.1\n", r'row "3", time: found 1e\+30 s after'),
         ("time,pose.tx\n0,0\n", "found one row, expected at least two poses"),
         ("time,pose.tx\n", "found only a header"),
         ("", "found nothing"),

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from assembly.files.robot_file import read_robot
 from assembly.files.solved_links import solved_link
 from assembly.kinematics.posture import home_posture
 from assembly.model.mesh_link import mesh_link_mass
@@ -159,3 +160,44 @@ def test_frequencies_of_a_meshed_bar_equal_those_of_the_beam():
         for frame in (solid, beam)
     )
     np.testing.assert_allclose(by_mesh, by_beam, rtol=0.02)
+
+
+SCREWS_AND_RODS = """
+format = 2
+platform = "plate"
+platform_at = [0.02, 0.03, 0.35]
+[[body]]
+name = "plate"
+mass = 2.5
+centre = [0.01, 0.02, 0.5]
+inertia = [0.02, 0.03, 0.025, 0.002, -0.001, 0.003]
+[[leg]]
+name = "screw"
+repeat = { count = 3, about = [1, 0.2, 2], at = [0.1, 0, 0.1] }
+body = [
+    { name = "low" },
+    { name = "high", link = { beam = { radius = 0.012 }, young = 2.1e11, poisson = 0.3 } },
+]
+joint = [
+    { name = "u", type = "universal", between = ["low", "base"], at = [0.3, 0, 0], axis = [1, 0, 0.2], axis2 = [0, 1, 0] },
+    { name = "nut", type = "helical", between = ["high", "low"], at = [0.25, 0, 0.1], axis = [-0.1, 0, 0.3], pitch = -0.005, actuated = true, drive_stiffness = 200 },
+    { name = "s", type = "spherical", between = ["plate", "high"], at = [0.2, 0, 0.3] },
+]
+[[leg]]
+name = "tie"
+repeat = { count = 3, about = [1, 0.2, 2], at = [0.1, 0, 0.1] }
+body = [{ name = "rod", link = { beam = { radius = 0.03, inner_radius = 0.024 }, young = 7e10, poisson = 0.33 } }]
+joint = [
+    { name = "x", type = "spherical", between = ["base", "rod"], at = [0.3, 0.1, 0] },
+    { name = "y", type = "spherical", between = ["rod", "plate"], at = [0.1, 0.15, 0.3], joint_stiffness = [0, 0, 0, 1e8, 1e8, 1e8] },
+]
+"""  # noqa: E501
+
+
+def test_massless_rods_that_spin_freely_leave_the_frequencies_as_they_are(tmp_path):
+    """Expected: K and M of all bodies' twists, constraints by their null space."""
+    file = tmp_path / "robot.toml"
+    file.write_text(SCREWS_AND_RODS)
+    modes = natural_modes(home_posture(read_robot(file)), 3)
+    expected = [241.53112443, 349.76392046, 970.11496002]
+    np.testing.assert_allclose(modes.frequencies, expected, rtol=1e-8)

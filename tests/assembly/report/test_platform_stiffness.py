@@ -6,12 +6,8 @@ import pytest
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.model.robot import Frame, MatrixLink, Robot
-from assembly.report.platform_stiffness import (
-    DIRECTIONS,
-    plot_shares,
-    stiffness_of,
-    stiffness_text,
-)
+from assembly.report.platform_stiffness import DIRECTIONS, stiffness_of, stiffness_text
+from assembly.report.share_pictures import plot_shares
 from assembly.robots import load_robot
 
 

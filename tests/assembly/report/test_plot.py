@@ -100,16 +100,16 @@ def test_error_body_of_a_loaded_robot_uses_the_frozen_assumption(
     run, tmp_path, monkeypatch
 ):
     """The assumption budget, the default without a load, needs an unloaded robot."""
-    import assembly.report.plot
+    import assembly.report.error_body
 
     readings = []
-    reach = assembly.report.plot.reachable_screws
+    reach = assembly.report.error_body.reachable_screws
 
     def noted(answer, reading):
         readings.append(reading)
         return reach(answer, reading)
 
-    monkeypatch.setattr(assembly.report.plot, "reachable_screws", noted)
+    monkeypatch.setattr(assembly.report.error_body, "reachable_screws", noted)
     write_robot(irsbot2_with(NUMBERS["cases"][0]), tmp_path / "robot.toml")
     words = [tmp_path / "robot.toml", "--pose", "tx=0.1,tz=-0.5", "--error-body",
              "translation", "--figure", tmp_path / "x.jpg"]  # fmt: skip

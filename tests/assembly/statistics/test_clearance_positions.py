@@ -11,12 +11,12 @@ from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import draw_generator, tolerance_sources
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
+from assembly.solvers.uniform_clearance import sample_uniform_position
 from assembly.statistics.clearance_positions import (
     loaded_clearances,
     position_clearances,
 )
 from assembly.statistics.linear_response import linear_response
-from assembly.statistics.uniform_clearance import sample_uniform_position
 from tests.robots_for_tests import in_millimetres
 
 

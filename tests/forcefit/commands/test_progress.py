@@ -54,7 +54,7 @@ def test_progress_shows_the_links_solved_while_a_robot_is_read(
     """A line for each link whose finite elements run;
     on a terminal a bar for all three."""
     monkeypatch.setenv("FORCE_COLOR" if terminal else "NO_COLOR", "1")
-    log = logging.getLogger("assembly.files.solved_links")
+    log = logging.getLogger("forcefit.links")
     before = log.level, log.handlers
     try:
         report_loading()
@@ -72,7 +72,7 @@ def test_progress_shows_the_links_solved_while_a_robot_is_read(
 
 def test_progress_bar_is_completed_when_a_link_is_refused(monkeypatch, tmp_path):
     """The count is complete after a failure, so that no bar stays on the terminal."""
-    log, told = logging.getLogger("assembly.files.solved_links"), []
+    log, told = logging.getLogger("forcefit.links"), []
     handler = logging.Handler()
     handler.emit = lambda record: told.append((record.done, record.total))
     link = MeshLink(tmp_path / "none.stl", "z=0", "z=0.1", 7e10, 0.3)

@@ -99,7 +99,7 @@ def test_stress_at_the_face_between_two_solids_is_that_of_each_material(rod):
 
 
 @pytest.mark.parametrize(("given", "message"), [
-    (["rod"], 'solid "tube" has no material; expected one of its own'),
+    (["rod"], 'solid "tube" has no material; expected a material of this solid'),
     (["", "rood"], r'no solid "rood"; did you mean "rod"\?'),
     (["", "rod+tub"], r'no solid "tub"; did you mean "tube"\?'),
 ])  # fmt: skip

@@ -193,7 +193,7 @@ def test_missing_entry_or_library_is_refused_by_name(spec, tmp_path):
         read_entry(spec.folder, "round-beam")
     with pytest.raises(BadInput, match="no entry"):
         read_entry(spec.folder, "../links/x")
-    with pytest.raises(BadInput, match="no library there"):
+    with pytest.raises(BadInput, match="found no library"):
         read_entry(tmp_path / "absent", "x")
 
 

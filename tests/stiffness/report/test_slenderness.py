@@ -240,7 +240,7 @@ section = { width = 0.01, height = 0.02, wall = 0.001 }
         (("up = [0, 1, 0]", "upp = [0, 1, 0]"), 'unknown key "upp"'),
         (
             ("up = [0, 1, 0]", "tip_section = { radius = 0.1 }"),
-            "a taper has lengths of the same names",
+            "found different lengths at both ends of a tapered piece",
         ),
     ],
 )
@@ -287,7 +287,8 @@ def test_comparison_reports_a_section_turned_by_90_degrees(axis):
         assert turned.better_turn == (90, pytest.approx(0.02))
         assert np.abs(turned.difference).max() > 5
         assert (
-            "axes look swapped: turned by 90 degrees about base" in turned.explanation
+            "axes seem to be exchanged: rotated by 90 degrees about base"
+            in turned.explanation
         )
         assert "Held faces" not in turned.explanation
         assert comparison_results(turned)["axes_turned"] == 90

@@ -1,12 +1,15 @@
 """The paper's robot with errors, and terms of the model broken for one test."""
 
-from functools import partial
+import sys
+from functools import lru_cache, partial
 
 import pytest
 
 from assembly.kinematics.posture import place_robot
 from assembly.robots import load_robot
 from tests.robots_for_tests import with_papers_errors
+
+Cached = type(lru_cache(len))
 
 
 @pytest.fixture(scope="module")
@@ -21,11 +24,11 @@ def posture(irsbot2):
 
 @pytest.fixture
 def broken(monkeypatch):
-    """Break a term of the numpy model, and clear cached columns.
+    """Break a term of the numpy model, and clear all that was computed with it.
 
-    The compiled model has each term a second time.
+    Robots of equal data share what is cached.  The compiled model has each term a
+    second time.
     """
-    from assembly.linear.closure import _virtual_joints
     from assembly.linear.energy import solve_assembly
     from validation.crosscheck import crosscheck
 
@@ -33,7 +36,16 @@ def broken(monkeypatch):
         mutation(monkeypatch)
         reference = partial(solve_assembly, method="reference")
         monkeypatch.setattr(crosscheck, "solve_assembly", reference)
-        _virtual_joints.cache_clear()
+        forget()
 
     yield breaks
-    _virtual_joints.cache_clear()
+    forget()
+
+
+def forget():
+    """Clear the caches of all functions."""
+    for name, module in list(sys.modules.items()):
+        if name.partition(".")[0] in {"stiffness", "assembly", "validation"}:
+            for value in vars(module).values():
+                if isinstance(value, Cached):
+                    value.cache_clear()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from assembly.model.error_distributions import draw_generator
-from assembly.statistics.uniform_clearance import (
+from assembly.solvers.uniform_clearance import (
     _ellipsoid,
     diagnose,
     is_mixed,

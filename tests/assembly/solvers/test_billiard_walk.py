@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from assembly.model.error_distributions import draw_generator
-from assembly.statistics.billiard_walk import Positions
+from assembly.solvers.billiard_walk import Positions
 
 FLIGHT = 2.0  # mean time of a trajectory
 

@@ -1,0 +1,117 @@
+"""Import of a model of Pinocchio that is in memory: ``pinocchio.Model``.
+
+The model is written as MJCF, which is read as a file is.  It is a tree; its loops, if
+any, are in objects of their own, which are not read.  Every joint of one freedom counts
+as a drive, as in a URDF that names none.
+
+Sources:
+    Pinocchio documentation, Model and JointModel: motion subspaces have the linear part
+    first; a link that a fixed joint holds belongs to the joint before it.
+"""
+
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement, tostring
+
+import numpy as np
+
+from assembly.exchange.mujoco_model import words
+from assembly.exchange.orientation import to_quaternion
+from forcefit.inputs.errors import BadInput, quoted
+
+_SEVERAL = {"JointModelSpherical": "ball", "JointModelFreeFlyer": "free"}
+ASSUMED = "every joint of one freedom as a drive"
+_LARGEST = 1e6  # [rad, m] larger limits are none
+
+
+def is_pinocchio(model: object) -> bool:
+    """Return whether an object is a model of Pinocchio."""
+    kind = type(model)
+    return kind.__module__.startswith("pinocchio") and kind.__name__ == "Model"
+
+
+def mjcf_of_pinocchio(model: Any) -> str:
+    """Return a model as the text of an MJCF file.
+
+    Args:
+        model: ``pinocchio.Model``.
+
+    Returns:
+        The text; bodies have the names of the model's frames of bodies, or of joints.
+
+    Raises:
+        BadInput: a joint of a kind that MJCF lacks; the message names it.
+    """
+    root = Element("mujoco", model=model.name or "pinocchio model")
+    SubElement(root, "compiler", angle="radian")
+    bodies = [SubElement(root, "worldbody")]
+    drives = SubElement(root, "actuator")
+    for i in range(1, model.njoints):
+        above, name = bodies[model.parents[i]], model.names[i]
+        frames = [f for f in model.frames if f.parentJoint == i and _is_body(f)]
+        own = next((f for f in frames if f.placement.isIdentity(1e-12)), None)
+        body = SubElement(
+            above, "body", _pose(model.jointPlacements[i]),
+            name=f"{name}.body" if own is None else own.name,
+        )  # fmt: skip
+        bodies.append(body)
+        _add_mass(body, model.inertias[i])
+        if _add_joint(model, body, i):
+            SubElement(drives, "general", name=name, joint=name)
+        for frame in frames:
+            if frame is not own:  # a link that a fixed joint holds
+                SubElement(body, "body", _pose(frame.placement), name=frame.name)
+    return tostring(root, encoding="unicode")
+
+
+def _is_body(frame: Any) -> bool:
+    """Return whether a frame is that of a body."""
+    return str(frame.type).rpartition(".")[2] == "BODY"
+
+
+def _pose(placement: Any) -> dict[str, str]:
+    """Return a placement as attributes."""
+    quaternion = to_quaternion(np.array(placement.rotation))
+    return {"pos": words(placement.translation), "quat": words(quaternion)}
+
+
+def _add_mass(body: Element, inertia: Any) -> None:
+    """Add the mass of a body, its moments about its centre in the joint's axes."""
+    if inertia.mass:
+        J = np.array(inertia.inertia)
+        six = [J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]]
+        SubElement(body, "inertial", pos=words(inertia.lever), mass=words(inertia.mass),
+                   fullinertia=words(six))  # fmt: skip
+
+
+def _add_joint(model: Any, body: Element, i: int) -> bool:
+    """Add a joint to its body; return whether it has one freedom."""
+    joint, name = model.joints[i], model.names[i]
+    several = _SEVERAL.get(joint.shortname())
+    if several == "free":
+        SubElement(body, "freejoint", name=name)
+        return False
+    if several is not None:
+        SubElement(body, "joint", name=name, type=several)
+        return False
+    data = joint.createData()
+    q = np.zeros(model.nq)
+    q[joint.idx_q] = 1.0 if joint.nq > joint.nv else 0.0  # cosine and sine of an angle
+    joint.calc(data, q)
+    S = np.reshape(data.S, (6, -1))
+    turns, slides = np.any(S[3:]), np.any(S[:3])
+    if joint.nv != 1 or turns == slides:
+        kind = joint.shortname()
+        raise BadInput(
+            f"Model: joint {quoted(name)}: found a {kind}, expected a revolute, "
+            "prismatic, spherical or free joint"
+        )
+    given = {"name": name, "type": "hinge" if turns else "slide",
+             "axis": words(S[3:] if turns else S[:3])}  # fmt: skip
+    if joint.nq == 1:
+        ends = [float(limits[joint.idx_q]) for limits in (
+            model.lowerPositionLimit, model.upperPositionLimit,
+        )]  # fmt: skip
+        if max(map(abs, ends)) < _LARGEST and ends[0] < ends[1]:
+            given |= {"limited": "true", "range": words(ends)}
+    SubElement(body, "joint", given)
+    return True

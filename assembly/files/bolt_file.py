@@ -1,0 +1,82 @@
+"""The key ``locked_at`` of a fixed joint: the pose at which it is bolted."""
+
+from typing import Any
+
+from assembly.kinematics.posture import POSE
+from assembly.model.frame import LEFT
+from assembly.model.largest import LARGEST_LENGTH
+from assembly.model.robot import Clearance, LockedAt
+from forcefit.inputs.table import Table, describe
+
+_EXPECTED = (
+    '"home", { pose = { tx = .. } } or { joints = { NAME = .. } }, with left = '
+    '"uniform" for a random position'
+)
+
+
+def read_locked_at(
+    table: Table, fixed: bool, clearance: Clearance | None
+) -> tuple[Clearance | None, LockedAt | None]:
+    """Return the clearance of a joint in use, and where it is bolted.
+
+    Args:
+        table: table of the joint.
+        fixed: whether the joint is a fixed one.
+        clearance: clearance given there.
+
+    Returns:
+        The clearance and None without the key; else None and the bolt.
+
+    Raises:
+        BadInput: the joint is not fixed or has no clearance, or the pose is not given
+            as expected.
+    """
+    key = "locked_at"
+    if not table.has(key):
+        return clearance, None
+    if not fixed or clearance is None:
+        what = "a fixed joint without clearance" if fixed else "a joint that moves"
+        fault = f"found {what}, expected a fixed joint with a clearance"
+        raise table.bad(key, fault)
+    value = table.content[key]
+    if value == "home":
+        return None, LockedAt(clearance)
+    if not isinstance(value, dict) or {"pose", "joints"} <= set(value):
+        raise table.bad(key, f"found {describe(value)}, expected {_EXPECTED}")
+    inner = table.table(key)
+    pose, joints = _numbers(inner, "pose", POSE), _numbers(inner, "joints", None)
+    left = inner.choice("left", LEFT, "least")
+    inner.finish()
+    if not pose and not joints and set(value) != {"left"}:
+        raise table.bad(key, f"found no coordinate, expected {_EXPECTED}")
+    return None, LockedAt(clearance, pose, joints, left)
+
+
+def _numbers(table: Table, key: str, names: tuple[str, ...] | None) -> dict[str, float]:
+    """Return the coordinates of a table by name; empty if it is absent."""
+    if not table.has(key):
+        return {}
+    inner = table.table(key)
+    numbers = {
+        name: inner.number(name, "rad or m", largest=LARGEST_LENGTH)
+        for name in (inner.content if names is None else names)
+        if inner.has(name)
+    }
+    inner.finish()
+    return numbers
+
+
+def bolt_table(bolt: LockedAt) -> Any:
+    """Return the value of ``locked_at``.
+
+    Args:
+        bolt: the pose at which a joint is bolted.
+
+    Returns:
+        Plain values of the file format.
+    """
+    given = {"pose": bolt.pose, "joints": bolt.joints}
+    table: dict[str, Any] = {k: dict(v) for k, v in given.items() if v}
+    if bolt.left != "least":
+        table["left"] = bolt.left
+    return table or "home"

@@ -1,0 +1,284 @@
+"""Plan files: the steps in which a robot is assembled (``docs/assembly_steps.md``)."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import inf
+from pathlib import Path
+
+import numpy as np
+
+from assembly.files.written_units import without_units
+from assembly.model.largest import LARGEST, LARGEST_LENGTH
+from assembly.model.robot import Robot
+from assembly.steps.plan import (
+    Adjust,
+    Fix,
+    Join,
+    Measure,
+    Plan,
+    Preload,
+    Release,
+    Step,
+    check_plan,
+)
+from forcefit.inputs.table import BadInput, Table, describe, nearest, quoted, read_toml
+from forcefit.results.quantities import flag, number, text
+from forcefit.results.records import (
+    Each,
+    Either,
+    Listed,
+    WithUnits,
+    Words,
+    record,
+)
+from stiffness.screws import SCREW, WRENCH
+
+KINDS = ("fix", "join", "clamp", "preload", "release", "measure", "adjust")
+_COMPONENTS = tuple(name.lower() for name in SCREW)
+_LOADS = tuple(name.lower() for name in WRENCH)
+_MOST_STEPS = 1000
+
+_PART = Either((text("frame"), text("the two frames of a closure", "frame")))
+_NAMES = Listed(Words(_COMPONENTS))
+_POSITION = Each(number("displacement", "rad or m"))
+PLAN_FILE = record(
+    step=Listed(WithUnits(record(
+        name_=text("name of the step"),
+        fix_=text("frame that a fixture holds"), join_=_PART,
+        clamp_=text("frame that is clamped"), preload_=text("frame that is loaded"),
+        release_=Either((text("name of a step"), text("names of steps", "step"))),
+        measure_=_PART, adjust_=text("frame whose geometric error is changed"),
+        at_=_POSITION, stiffness_=Each(number("stiffness", "N m/rad or N/m")),
+        locked_=Either((flag("bolted as it lies"), _NAMES)),
+        force_limit_=number("largest closing force", "N"),
+        leave_open_=flag("leave the opening that the limit does not close"),
+        load_=Each(number("load", "N m or N")), components_=_NAMES,
+        reading_=_PART, of_=_NAMES, increment_=number("increment", "rad or m"),
+    ))),
+)  # fmt: skip
+
+
+def read_steps(path: Path | str, robot: Robot) -> Plan:
+    """Return the plan of a file, checked against a robot.
+
+    Args:
+        path: TOML file with ``[[step]]`` tables.
+        robot: the robot to be assembled.
+
+    Returns:
+        The plan.
+
+    Raises:
+        BadInput: the file breaks a rule, or does not fit the robot.
+    """
+    root = read_toml(path)
+    tables = root.tables("step")
+    root.finish()
+    if not 0 < len(tables) <= _MOST_STEPS:
+        fault = f"found {len(tables)}" if tables else "missing"
+        raise root.bad("step", f"{fault}; expected 1 to {_MOST_STEPS} [[step]]")
+    plan = Plan(_named([_step(table, robot) for table in tables], tables))
+    try:
+        check_plan(plan, robot)
+    except BadInput as error:
+        raise BadInput(f"{root.file}: {error}") from None
+    return plan
+
+
+def _named(steps: list[Step], tables: list[Table]) -> tuple[Step, ...]:
+    """Return the steps; names that are not given are numbered where they repeat."""
+    count: dict[str, int] = {}
+    named = []
+    for step, table in zip(steps, tables, strict=True):
+        number = count[step.name] = count.get(step.name, 0) + 1
+        if number > 1 and "name" not in table.content:
+            step = replace(step, name=f"{step.name} {number}")
+        named.append(step)
+    return tuple(named)
+
+
+def _step(table: Table, robot: Robot) -> Step:
+    """Return one ``[[step]]``."""
+    given = [kind for kind in KINDS if table.has(kind)]
+    if len(given) != 1:
+        found = f"found {' and '.join(given)}" if given else "found none of its kinds"
+        fault = f"{found}, expected one of {', '.join(KINDS)}"
+        raise table.bad(given[-1] if given else "", fault)
+    kind = given[0]
+    step = _READERS[kind](table, _name(table, kind), robot)
+    table.finish()
+    return step
+
+
+def _name(table: Table, kind: str) -> str:
+    """Return the name of a step; by default its kind and what it acts on."""
+    value = table.content[kind]
+    parts = value if isinstance(value, list) else [value]
+    return table.text("name", f"{kind} {' - '.join(map(str, parts))}", longest=400)
+
+
+def _fix(table: Table, name: str, robot: Robot) -> Fix:
+    """Return a fixture; where nothing is given it holds the nominal position."""
+    position = _values(table, "at", "rad or m")
+    if position is None:
+        position = dict.fromkeys(SCREW, 0.0)
+    return _held(table, Fix(name, _frame(table, "fix", robot), position))
+
+
+def _clamp(table: Table, name: str, robot: Robot) -> Step:
+    """Return a clamp: where the frame lies, at a position, or with a force."""
+    frame = _frame(table, "clamp", robot)
+    if not table.has("load"):
+        position = _values(table, "at", "rad or m")
+        return _held(table, Fix(name, frame, position, kind="clamp"))
+    if table.has("at"):
+        raise table.bad("at", 'found together with "load", expected only one of them')
+    return Preload(name, frame, _wrench(table))
+
+
+def _held(table: Table, fix: Fix) -> Fix:
+    """Return a fixture with its stiffness."""
+    stiffness = _values(table, "stiffness", "N m/rad or N/m") or {}
+    for component, value in stiffness.items():
+        if not 0 < value <= LARGEST:
+            fault = f"found {value:g}, expected a number > 0, at most {LARGEST:g}"
+            raise table.bad(f"stiffness.{component.lower()}", fault)
+        if fix.position is not None and component not in fix.position:
+            fault = 'found a component that "at" leaves free, expected one it holds'
+            raise table.bad(f"stiffness.{component.lower()}", fault)
+    return replace(fix, stiffness=stiffness)
+
+
+def _join(table: Table, name: str, robot: Robot) -> Join:
+    """Return a closure that is closed, or a joint that is bolted."""
+    part = _part(table, "join", robot)
+    locked: tuple[str, ...] = ()
+    if isinstance(table.content.get("locked"), bool):
+        locked = SCREW if table.boolean("locked", False) else ()
+    elif table.has("locked"):
+        locked = _names(table, "locked")
+    limit = inf
+    if table.has("force_limit"):
+        limit = table.number("force_limit", "N", least=0.0, largest=LARGEST)
+    leave_open = table.boolean("leave_open", False)
+    if isinstance(part, str) and (locked or limit < inf or leave_open):
+        key = "locked" if locked else "force_limit" if limit < inf else "leave_open"
+        fault = "found with a joint, which is bolted as it lies; expected a closure"
+        raise table.bad(key, fault)
+    if leave_open and limit == inf:
+        raise table.bad("leave_open", 'found without "force_limit", expected both')
+    return Join(name, part, locked, limit, leave_open)
+
+
+def _preload(table: Table, name: str, robot: Robot) -> Preload:
+    """Return a load that stays until it is released."""
+    return Preload(name, _frame(table, "preload", robot), _wrench(table))
+
+
+def _release(table: Table, name: str, robot: Robot) -> Release:
+    """Return the steps whose holds end."""
+    value = table.require("release", "the name of an earlier step, or a list of them")
+    names = value if isinstance(value, list) else [value]
+    if not names or not all(isinstance(n, str) for n in names):
+        fault = f"found {describe(value)}, expected the name of an earlier step"
+        raise table.bad("release", fault)
+    return Release(name, tuple(names))
+
+
+def _measure(table: Table, name: str, robot: Robot) -> Measure:
+    """Return a reading."""
+    part = _part(table, "measure", robot)
+    return Measure(name, part, _names(table, "components", SCREW))
+
+
+def _adjust(table: Table, name: str, robot: Robot) -> Adjust:
+    """Return an adjustment, and the reading that it makes least."""
+    components = _names(table, "components")
+    reading = _part(table, "reading", robot)
+    of: tuple[str, ...] = SCREW
+    if isinstance(reading, str):
+        of = _names(table, "of")
+        if len({c[0] for c in of}) > 1:
+            fault = "found rotations and translations together, expected one kind"
+            raise table.bad("of", fault)
+    dimension = "length" if components[0][0] == "T" else "angle"
+    without_units(table, "increment", dimension)
+    increment = table.number("increment", "rad or m", 0.0, least=0.0, largest=1e3)
+    if increment and len({c[0] for c in components}) > 1:
+        fault = "found for rotations and translations together, expected one kind"
+        raise table.bad("increment", fault)
+    frame = _frame(table, "adjust", robot)
+    return Adjust(name, frame, components, Measure(name, reading, of), increment)
+
+
+_READERS: dict[str, Callable[[Table, str, Robot], Step]] = {
+    "fix": _fix, "join": _join, "clamp": _clamp, "preload": _preload,
+    "release": _release, "measure": _measure, "adjust": _adjust,
+}  # fmt: skip
+
+
+def _frame(table: Table, key: str, robot: Robot) -> str:
+    """Return the name of a frame."""
+    name = table.text(key, expected="the name of a frame")
+    names = [frame.name for frame in robot.frames]
+    if name not in names:
+        fault = f"found {quoted(name)}, expected the name of a frame"
+        raise table.bad(key, f"{fault}{nearest(name, names)}")
+    return name
+
+
+def _part(table: Table, key: str, robot: Robot) -> tuple[str, str] | str:
+    """Return a frame, or the closure of two frames in either order."""
+    value = table.require(key, "a frame, or the two frames of a closure")
+    if isinstance(value, str):
+        return _frame(table, key, robot)
+    proper = isinstance(value, list) and all(isinstance(v, str) for v in value)
+    for pair in (value, value[::-1]) if proper and len(value) == 2 else ():
+        if tuple(pair) in robot.closures:
+            return pair[0], pair[1]
+    known = ", ".join(f'["{a}", "{b}"]' for a, b in robot.closures) or "no closure"
+    fault = f"found {describe(value)}, expected a frame or one of the closures {known}"
+    raise table.bad(key, fault)
+
+
+def _names(
+    table: Table, key: str, default: tuple[str, ...] | None = None
+) -> tuple[str, ...]:
+    """Return components of a screw."""
+    if default is not None and not table.has(key):
+        return default
+    expected = f"a list of {', '.join(_COMPONENTS)}"
+    value = table.require(key, expected)
+    proper = isinstance(value, list) and all(v in _COMPONENTS for v in value)
+    if not proper or not value or len(set(value)) < len(value):
+        raise table.bad(key, f"found {describe(value)}, expected {expected}")
+    return tuple(v.upper() for v in value)
+
+
+def _values(table: Table, key: str, unit: str) -> dict[str, float] | None:
+    """Return numbers by component of a screw; None if absent."""
+    if not table.has(key):
+        return None
+    inner, values = table.table(key), {}
+    for name in _COMPONENTS:
+        if unit == "rad or m":
+            without_units(inner, name, "angle" if name[0] == "r" else "length")
+        if inner.has(name):
+            largest = LARGEST_LENGTH if unit == "rad or m" else LARGEST
+            values[name.upper()] = inner.number(name, unit, largest=largest)
+    inner.finish()
+    if not values:
+        raise table.bad(key, f"found none, expected some of {', '.join(_COMPONENTS)}")
+    return values
+
+
+def _wrench(table: Table) -> np.ndarray:
+    """Return the (6,) [N m, N] wrench of ``load``."""
+    inner = table.table("load") if table.has("load") else None
+    if inner is None:
+        raise table.bad("load", "missing; expected such as { fz = -50 }")
+    values = [inner.number(name, "N m or N", 0.0, largest=LARGEST) for name in _LOADS]
+    inner.finish()
+    if not any(values):
+        raise table.bad("load", f"found none, expected some of {', '.join(_LOADS)}")
+    return np.array(values)

@@ -1,0 +1,95 @@
+"""Whether the order of assembly matters, in words and plain values."""
+
+from itertools import takewhile
+from typing import Any
+
+from assembly.steps.influence import (
+    Influence,
+    depends_on_state,
+    influences,
+    why_order_matters,
+)
+from assembly.steps.machine import Machine
+from assembly.steps.plan import Join, Plan
+from assembly.steps.state import State
+
+
+def influences_among_joins(
+    machine: Machine, state: State, plan: Plan, number: int
+) -> list[Influence]:
+    """Return the influences among the joins that begin with a step.
+
+    Args:
+        machine: columns and rows of the robot.
+        state: before the step.
+        plan: the steps.
+        number: of the step, from 0.
+
+    Returns:
+        None where the step is not the first of its joins, or clearances are loose.
+    """
+    before = plan.steps[number - 1] if number else None
+    if isinstance(before, Join) or not state.is_linear(machine):
+        return []
+    run = list(takewhile(lambda s: isinstance(s, Join), plan.steps[number:]))
+    return influences(machine, state, [s for s in run if isinstance(s, Join)])
+
+
+def about_influences(plan: Plan, found: list[Influence]) -> list[str]:
+    """Return whether the order matters, and which steps move which openings.
+
+    Args:
+        plan: the steps.
+        found: influences among its joins.
+
+    Returns:
+        Sentences.
+    """
+    moved: dict[str, list[str]] = {pair.locked: [] for pair in found}
+    for pair in found:
+        moved[pair.locked] += [] if pair.zero else [pair.joined]
+    still = [name for name, steps in moved.items() if not steps]
+    if {s.name for s in plan.steps if depends_on_state(s)} == set(still):
+        return [
+            "the order of joins next to each other does not change the assembled "
+            f"machine: they do not move what {', '.join(still)} finds (influence "
+            "coefficients zero); it changes the closing forces"
+        ]
+    remarks = [about_order(plan)]
+    for name, steps in moved.items():
+        moving = f"{', '.join(steps)} moves it" if steps else "no join next to it does"
+        remarks.append(f"{name} holds an opening as it lies: {moving}")
+    return remarks
+
+
+def influence_values(pair: Influence) -> dict[str, Any]:
+    """Return the influence of one join on another as plain values.
+
+    Args:
+        pair: the two joins.
+
+    Returns:
+        Values by name.
+    """
+    return {
+        "locked": pair.locked, "joined": pair.joined, "zero": pair.zero,
+        "free": pair.free, "coefficients": pair.coefficients,
+    }  # fmt: skip
+
+
+def about_order(plan: Plan) -> str:
+    """Return whether a step depends on the order, in a sentence.
+
+    Args:
+        plan: the steps.
+
+    Returns:
+        The sentence.
+    """
+    why = why_order_matters(plan)
+    if why:
+        return f"the order matters: these steps hold what they find: {why}"
+    return (
+        "the order does not change the assembled machine, because every part is joined "
+        "at a fixed position; it changes the closing forces"
+    )

@@ -1,0 +1,105 @@
+"""Pictures in Python: interactive in a notebook, a figure of matplotlib elsewhere."""
+
+from typing import TYPE_CHECKING, Any
+
+from assembly.kinematics.posture import Posture, home_posture
+from assembly.linear.energy import Assembly
+from assembly.model.robot import Robot
+from assembly.platform_stiffness.matrices import PlatformStiffness
+from assembly.report.error_body import possible_errors
+from assembly.report.platform_stiffness import stiffness_values
+from assembly.report.scene import forced_scene, nominal_scene
+from assembly.report.scene_figure import scene_figure
+from assembly.report.share_pictures import plot_shares, share_chart
+from forcefit.inputs.errors import BadInput
+from forcefit.inputs.packages import naming_packages
+from forcefit.page.charts import scene
+from forcefit.page.picture import Picture, in_notebook, picture
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Shown = Robot | Posture | Assembly | PlatformStiffness
+_NOMINAL = "Red: elastic links; blue: rigid bodies; orange: driven joints."
+_FORCED = f"Nominal (grey) and forced robot of least energy. {_NOMINAL}"
+_SHARES = "Shares of the parts in the compliance of the platform along each axis."
+
+
+def show(
+    thing: Shown,
+    *,
+    errors: str | None = None,
+    assumption: str = "frozen",
+    interactive: bool | None = None,
+) -> "Picture | Figure":
+    """Return a picture of a robot, or of a result, of one point.
+
+    Args:
+        thing: a robot, drawn in its home pose; a posture; an assembly, nominal and
+            forced, its displacements exaggerated; or a stiffness of the platform, the
+            shares of its parts.
+        errors: ``"translation"`` or ``"rotation"`` adds the possible platform errors
+            within the clearances to an assembly.
+        assumption: of problem (27), for these errors: ``"frozen"``, ``"free"`` or
+            ``"budget"``.
+        interactive: True for the scene of reports, which a notebook shows and a browser
+            opens (its ``html``); False for a figure of matplotlib; absent, a scene in a
+            notebook and a figure elsewhere.
+
+    Returns:
+        The scene; or the figure, which is not shown: ``savefig`` writes it, and
+        ``pyplot.show()`` opens a window.
+
+    Raises:
+        BadInput: another object, many points, errors of what is no assembly or has a
+            free motion, or matplotlib is not installed.
+        SolverFailed: the cone solver failed for the errors.
+    """
+    if interactive is None:
+        interactive = in_notebook()
+    if errors is not None and not isinstance(thing, Assembly):
+        kind = type(thing).__name__
+        raise BadInput(f"show: found errors of a {kind}, expected of an Assembly")
+    if isinstance(thing, PlatformStiffness):
+        return _shares(thing, interactive)
+    spec, name, caption = _scene(thing, errors, assumption)
+    if interactive:
+        return picture(name, scene(spec, caption))
+    with naming_packages("show", "a browser: show(.., interactive=True)"):
+        return scene_figure(spec, name)
+
+
+def _scene(
+    thing: object, errors: str | None, assumption: str
+) -> tuple[dict[str, Any], str, str]:
+    """Return the numbers of a scene, the robot's name, and a caption."""
+    if isinstance(thing, Robot):
+        return nominal_scene(home_posture(thing)), thing.name, _NOMINAL
+    if not isinstance(thing, Posture | Assembly):
+        expected = "expected a Robot, Posture, Assembly or PlatformStiffness"
+        raise BadInput(f"show: found {type(thing).__name__}, {expected}")
+    posture = thing if isinstance(thing, Posture) else thing.posture
+    many = isinstance(thing, Assembly) and thing.of_many
+    if many or posture.transforms.ndim > 3:
+        kind = type(thing).__name__
+        raise BadInput(f"show: found a {kind} of many points, expected one of them")
+    if isinstance(thing, Posture):
+        return nominal_scene(thing), thing.robot.name, _NOMINAL
+    body, caption = None, _FORCED
+    if errors is not None:
+        body = possible_errors(thing, errors, assumption)
+        caption += f" Yellow: possible {errors} errors (assumption {assumption})."
+    return forced_scene(thing, body=body), posture.robot.name, caption
+
+
+def _shares(stiffness: PlatformStiffness, interactive: bool) -> "Picture | Figure":
+    """Return the shares of the parts in the compliance."""
+    shares = stiffness_values(stiffness, stiffness.point)["shares"]
+    name = stiffness.posture.robot.name
+    if interactive:
+        return picture(name, share_chart(shares, _SHARES))
+    with naming_packages("show", "a browser: show(.., interactive=True)"):
+        from matplotlib import pyplot
+
+        figure = pyplot.figure(figsize=(8.0, 4.5), layout="constrained")
+        return plot_shares({"shares": shares, "robot": name}, figure)

@@ -1,0 +1,195 @@
+"""Page of the order of assembly: its steps, and the machine after each of them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from assembly.linear.assembled import Assembly
+from assembly.linear.closure import linearise
+from assembly.linear.load import no_loads
+from assembly.report.plot import displaced_bodies
+from assembly.report.scene import robot_scene
+from assembly.steps.machine import Machine
+from assembly.steps.state import State
+from forcefit.page.charts import BLUE, RED, Axis, chart, grid
+from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
+from forcefit.page.tables import Cell, Column, Value, table
+
+_ASSUMED = (
+    "Small screws at one pose: every step is linear, contacts of clearances excepted.",
+    "No friction, no yield; each step ends at rest.",
+    "Where no force determines a position in a clearance, it stays as close as "
+    "possible to where the last step left it.",
+)
+_UNITS = {"force": "N", "energy": "J", "error": "m"}
+
+
+def steps_page(
+    results: Mapping[str, Any], machine: Machine, states: Sequence[State],
+    provenance: Provenance,
+) -> str:  # fmt: skip
+    """Return the page of a plan that was carried out.
+
+    Args:
+        results: of :func:`assembly.report.steps.steps_of`.
+        machine: robot at the pose at which it is assembled.
+        states: after each step.
+        provenance: command and files.
+
+    Returns:
+        HTML, which needs no other file.
+    """
+    done = results["status"] == "ok"
+    verdict = (
+        f"All {len(results['steps'])} steps are carried out: "
+        if done else f"{results.get('reason', '')}; "
+    )  # fmt: skip
+    return page(
+        Page(
+            title=f"{results['robot']}: the order of assembly",
+            verdict=f"{verdict}{results['remarks'][0]}.",
+            good=None if done else False,
+            tiles=_tiles(results) if done else [],
+            about=f"{len(results['steps'])} steps.",
+            body=[
+                section("Steps", _table(results), _charts(results)),
+                section("The machine", _scene(machine, states)) if states else "",
+                _order(results),
+                _machines(results),
+            ],
+            assumed=_ASSUMED,
+            provenance=provenance,
+            results=results,
+        )
+    )
+
+
+def _tiles(results: Mapping[str, Any]) -> list[Tile]:
+    """Return the main figures of the assembled machine."""
+    screw = np.asarray(results["platform_screw"])
+    peak, energy = results["peak_force"], results["energy"]
+    turn, shift = np.linalg.norm(screw[:3]), np.linalg.norm(screw[3:])
+    lost: list[str | Value] = [Value(results["lost"], "J"), " lost at releases."]
+    return [
+        Tile("Largest closing force", [Value(peak, "N")], ["of a step that joins."]),
+        Tile("Energy that stays", [Value(energy, "J")], lost),
+        Tile(
+            "Platform error",
+            [Value(float(shift), "m"), " and ", Value(float(turn), "rad")],
+            ["of the assembled machine."],
+        ),
+    ]
+
+
+def _table(results: Mapping[str, Any]) -> str:
+    """Return a row for each step."""
+    head: list[str | Column] = [
+        "step", Column("energy", "J"), Column("work", "J"), Column("lost", "J"),
+        Column("closing force", "N"), Column("closing moment", "N m"),
+        Column("platform, translation", "m"), Column("platform, rotation", "rad"),
+    ]  # fmt: skip
+    rows: list[list[Cell]] = []
+    for step in results["steps"]:
+        screw = np.asarray(step["platform_screw"])
+        name = step["name"] + (" (too much force)" if step.get("exceeded") else "")
+        keys = ("energy", "work", "lost", "closing_force", "closing_moment")
+        sizes = [float(np.linalg.norm(part)) for part in (screw[3:], screw[:3])]
+        rows.append([name, *(step[key] for key in keys), *sizes])
+    return table(head, rows, "steps")
+
+
+def _charts(results: Mapping[str, Any]) -> str:
+    """Return energy and closing force of the steps."""
+    numbers = list(range(1, len(results["steps"]) + 1))
+    charts = []
+    for key, words, unit, colour in (
+        ("energy", "energy", "J", BLUE), ("closing_force", "closing force", "N", RED)
+    ):  # fmt: skip
+        trace = {
+            "type": "bar", "x": numbers, "y": [s[key] for s in results["steps"]],
+            "marker": {"color": colour},
+        }  # fmt: skip
+        caption = f"{words.capitalize()} after each step, in the order of the table."
+        charts.append(chart([trace], Axis("step"), Axis(words, unit), caption))
+    return grid(*charts)
+
+
+def _scene(machine: Machine, states: Sequence[State]) -> str:
+    """Return the machine, which the reader carries through the steps."""
+    assemblies = [assembly_of(machine, state) for state in states]
+    closing = np.repeat(machine.posture.transforms[None], len(states), axis=0)
+    for transforms, assembly in zip(closing, assemblies, strict=True):
+        transforms[:, :3, 3] += displaced_bodies(assembly).end_screws[:, 3:]
+    caption = (
+        "Bodies after the steps, exaggerated; the control for the closing shows the "
+        "state after each step. Parts that are not yet joined lie where they are free."
+    )
+    return robot_scene(assemblies[-1], closing, None, caption)
+
+
+def assembly_of(machine: Machine, state: State) -> Assembly:
+    """Return the displacements of one partly assembled machine.
+
+    Args:
+        machine: columns and rows of the robot.
+        state: of one machine.
+
+    Returns:
+        Its screws; closures that are not joined are open.  Wrenches are those of the
+        joined closures.
+    """
+    posture, found = machine.posture, state.found
+    robot = posture.robot.with_errors(state.errors[0].reshape(-1, 6))
+    multipliers = np.zeros((len(robot.closures), 6))
+    for name, own in state.multipliers().items():
+        hold = state.holds[name]
+        if not isinstance(hold.part, str):
+            row = robot.closures.index(hold.part)
+            path = posture.paths[robot.index(hold.part[0])]
+            wrench = np.linalg.solve(path.T, own[0] * machine.scale)
+            multipliers[row] = wrench / machine.scale
+    return Assembly(
+        linearisation=linearise(replace(posture, robot=robot)), joints=machine.joints,
+        load=np.zeros(6), frame_loads=no_loads(robot.errors.size),
+        elastic=found.springs[0], clearances=found.clearances[0],
+        motions=machine.free_size * found.motions[0],
+        multipliers=multipliers.ravel(), energy_without_clearance=0.0,
+        method="reference",
+    )  # fmt: skip
+
+
+def _order(results: Mapping[str, Any]) -> str:
+    """Return the order that was searched; empty without."""
+    order = results.get("order")
+    if order is None:
+        return ""
+    unit = _UNITS[order["objective"]]
+    parts: list[str | Value] = [
+        f"Least {order['objective']}: ", Value(order["value"], unit),
+        "; in any order at least ", Value(order["bound"], unit),
+    ]  # fmt: skip
+    if order["given"] is not None:
+        parts += ["; as given ", Value(order["given"], unit)]
+    names = ", ".join(order["steps"])
+    return section("The best order", paragraph(*parts, "."), paragraph(f"{names}."))
+
+
+def _machines(results: Mapping[str, Any]) -> str:
+    """Return the quantiles of many machines; empty without."""
+    if "quantiles" not in results:
+        return ""
+    head: list[str | Column] = [
+        "step", Column("force, median", "N"), Column("force, 95 %", "N"),
+        Column("energy, 95 %", "J"), Column("translation, 95 %", "m"),
+        Column("rotation, 95 %", "rad"),
+    ]  # fmt: skip
+    rows: list[list[Cell]] = [
+        [
+            name, q["closing_force"]["0.5"], q["closing_force"]["0.95"],
+            q["energy"]["0.95"], q["translation"]["0.95"], q["rotation"]["0.95"],
+        ]
+        for name, q in results["quantiles"].items()
+    ]  # fmt: skip
+    return section(f"{results['draws']} machines", table(head, rows, "machines"))

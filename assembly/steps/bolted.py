@@ -1,0 +1,222 @@
+"""Joints that are bolted at one pose and rigid afterwards (``locked_at``).
+
+At the pose where a joint is bolted its clearance gives way, so that the closures need
+the least energy, without loads; among such clearances those of the least sum of
+squares, in units of their bounds.  The clearance stays there at all other poses, as if
+it were a geometric error.  Joints are bolted in the order of the frames; those at the
+same pose together.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.posture import Posture, place_robot
+from assembly.linear.reference.energy import CannotAssemble
+from assembly.model.error_distributions import draw_generator
+from assembly.model.robot import Frame, LockedAt, Robot
+from assembly.solvers.conic import SolverFailed
+from assembly.steps.left_anywhere import (
+    positions_left_anywhere,
+)
+from assembly.steps.machine import Machine, machine_at
+from assembly.steps.plan import Plan
+from assembly.steps.state import first_state
+from forcefit.inputs.table import BadInput, quoted
+from forcefit.results.display import numbers
+
+BOLT_STREAM = 4  # stream of random numbers of bolted joints, see draw_generator
+_ROUNDED = 1e-12  # share of its bound below which a clearance is rounding
+_BOLTED = "is bolted at"  # words of a remark
+
+
+def bolt_joints(robot: Robot, rng: np.random.Generator | None = None) -> Robot:
+    """Return a robot with the clearances of its bolted joints locked in.
+
+    Args:
+        robot: robot whose links are solved.
+        rng: of a drawn machine, see :func:`bolted_errors`.
+
+    Returns:
+        The robot; the screws locked in are part of its geometric errors.  The same
+        object if no joint is bolted.
+
+    Raises:
+        BadInput: the pose of a bolt is out of reach, or the robot cannot be assembled
+            there; the message names the frame.
+    """
+    if not any(frame.locked_at for frame in robot.frames):
+        return robot
+    declared = robot.declared_errors
+    rngs = None if rng is None else [rng]
+    total = bolted_errors(robot, declared[None], rngs)[0]
+    frames = []
+    for frame, error, own in zip(robot.frames, total, declared, strict=True):
+        bolt = frame.locked_at
+        if bolt is not None:
+            bolt = replace(bolt, screw=error - own)
+        frames.append(replace(frame, geometric_error=error, locked_at=bolt))
+    kept = [remark for remark in robot.remarks if _BOLTED not in remark]
+    remarks = [_remark(frame) for frame in frames if frame.locked_at is not None]
+    return replace(robot, frames=tuple(frames), remarks=(*kept, *remarks))
+
+
+def _remark(frame: Frame) -> str:
+    """Return the position in which a joint is bolted."""
+    assert frame.locked_at is not None
+    screw = numbers(frame.locked_at.screw)
+    drawn = ", drawn machines anywhere at least energy"
+    rule = drawn if frame.locked_at.left == "uniform" else ""
+    return f"joint {quoted(frame.name)} {_BOLTED} {screw} rad, m in its clearance{rule}"
+
+
+def bolt_generators(
+    robot: Robot, seed: int, draws: Sequence[int] | NDArray
+) -> list[np.random.Generator] | None:
+    """Return the generators of the positions in which drawn machines are bolted.
+
+    Args:
+        robot: any robot.
+        seed: seed of all draws.
+        draws: numbers of the draws.
+
+    Returns:
+        One for each draw; None if no position is random.
+    """
+    if all(f.locked_at is None or f.locked_at.left == "least" for f in robot.frames):
+        return None
+    numbers = np.asarray(draws).tolist()
+    return [draw_generator(seed, number, BOLT_STREAM) for number in numbers]
+
+
+def bolted_errors(
+    robot: Robot, errors: NDArray, rngs: Sequence[np.random.Generator] | None = None
+) -> NDArray:
+    """Return the errors of machines with the clearances of bolted joints locked in.
+
+    Args:
+        robot: robot of n frames whose links are solved; its own errors do not matter.
+        errors: (k, n, 6) [rad, m] of k machines, nothing locked in.
+        rngs: k generators of drawn machines, for joints left ``"uniform"``; where
+            absent, they are left at the least sum of squares.
+
+    Returns:
+        (k, n, 6) [rad, m] with the screws locked in; the same object if no joint is
+        bolted.
+
+    Raises:
+        BadInput: see :func:`bolt_joints`.
+    """
+    total = errors
+    for frames, machine in _bolts(_AsMade(robot)):
+        try:
+            state = first_state(machine, Plan(()), total, None)
+        except (CannotAssemble, SolverFailed) as error:
+            place = f"{robot.name}: frame {quoted(robot.frames[frames[0]].name)}"
+            raise BadInput(f"{place}.locked_at: {error}") from None
+        u = state.found.clearances
+        bolt = robot.frames[frames[0]].locked_at
+        if rngs is not None and bolt is not None and bolt.left == "uniform":
+            u = positions_left_anywhere(machine, state, rngs)
+        moved = np.where(np.abs(u) > _ROUNDED, u, 0.0) @ machine.cones.T
+        total = total.copy()
+        total[:, frames] += moved.reshape(total.shape)[:, frames]
+    return total
+
+
+class _AsMade:
+    """A robot by identity, whose bolts are placed once."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _AsMade) and other.robot is self.robot
+
+    def __hash__(self) -> int:
+        return id(self.robot)
+
+
+@lru_cache(maxsize=16)
+def _bolts(made: _AsMade) -> list[tuple[list[int], Machine]]:
+    """Return the frames bolted at each pose, and the machine there."""
+    robot = made.robot
+    rows = [i for i, frame in enumerate(robot.frames) if frame.locked_at is not None]
+    bolts, open_ = [], set(rows)
+    for _, group in groupby(rows, lambda i: _pose(robot.frames[i])):
+        frames = list(group)
+        bolts.append((frames, machine_at(_posture(robot, frames[0], open_))))
+        open_ -= set(frames)
+    return bolts
+
+
+def _pose(frame: Frame) -> tuple:
+    """Return what two frames that are bolted together have in common."""
+    bolt = frame.locked_at
+    assert bolt is not None
+    return sorted(bolt.pose.items()), sorted(bolt.joints.items()), bolt.left
+
+
+def _posture(robot: Robot, row: int, open_: set[int]) -> Posture:
+    """Return the posture of a bolt, joints not yet bolted loose."""
+    frames = tuple(
+        _loose(frame) if i in open_ else frame for i, frame in enumerate(robot.frames)
+    )
+    bolt = robot.frames[row].locked_at
+    assert isinstance(bolt, LockedAt)
+    try:
+        loose = replace(robot, frames=frames).with_errors(np.zeros((len(frames), 6)))
+        return place_robot(loose, dict(bolt.pose) or None, dict(bolt.joints) or None)
+    except BadInput as error:
+        place = f"frame {quoted(robot.frames[row].name)}.locked_at"
+        raise BadInput(f"{place}: {error}") from None
+
+
+def _loose(frame: Frame) -> Frame:
+    """Return a frame before it is bolted."""
+    bolt = frame.locked_at
+    assert bolt is not None
+    return replace(frame, clearance=bolt.clearance, locked_at=None)
+
+
+def refuse_bolted(robot: Robot, what: str) -> None:
+    """Refuse a robot with bolted joints, where errors must act linearly.
+
+    Args:
+        robot: any robot.
+        what: what is computed, in words.
+
+    Raises:
+        BadInput: a joint is bolted at a pose.
+    """
+    bolted = [frame.name for frame in robot.frames if frame.locked_at is not None]
+    if bolted:
+        raise BadInput(
+            f"{robot.name}: frame {quoted(bolted[0])}.locked_at: found a joint that is "
+            f"bolted at a pose, which the {what} does not cover; expected none, or "
+            "assembly statistics, which bolts every drawn machine"
+        )
+
+
+def loose_over_poses(robot: Robot) -> list[str]:
+    """Return a remark on fixed joints whose clearance is loose at every pose.
+
+    Args:
+        robot: robot that is computed at several poses.
+
+    Returns:
+        A list of one sentence, or empty.
+    """
+    loose = [f.name for f in robot.frames if f.joint == "fixed" and f.clearance]
+    if not loose:
+        return []
+    return [
+        (
+            f"the clearance of the fixed joint {', '.join(map(quoted, loose))} is "
+            'loose at every pose; where it is bolted at one pose, expected "locked_at"'
+        )
+    ]

@@ -1,0 +1,254 @@
+"""The least energy of a partly assembled robot, for many sets of errors at once.
+
+The small screws of all frames are s = e + E y + U u + F q: errors, springs, clearances
+and free motions (:mod:`assembly.linear.closure`).  A step of assembly holds rows
+
+    R s + L y_f = b
+
+of the closures joined so far and of the fixtures, where y_f are the springs of the
+fixtures.  The equilibrium minimises y.y / 2 less the work of the loads.  Its
+multipliers are the wrenches of the rows.  The elimination is that of
+:mod:`assembly.linear.reference.reduction`.
+
+Where the energy leaves clearances and free motions undetermined, they stay as close as
+possible to where the last step left them (least sum of squares, clearances in units of
+their bounds, lengths in reference lengths).
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import svd
+
+from assembly.kinematics.ranks import RANK, ROWS_RANK, noise_of, rank_of
+from assembly.linear.reference.energy import CannotAssemble
+from assembly.linear.reference.reduction import FreeMotion, complement
+from assembly.solvers.conic import SolverFailed, minimise_energy
+
+_OPEN = 1e-12  # [rad, reference lengths] closure error that counts as rounding
+_ROUNDING = 1e-14  # share of the largest right side that counts as rounding
+_SOLVED = 1e-11  # share of its terms below which a strain counts as the solver's error
+_DRIVEN = 1e-8  # share of a load along a free motion that counts as rounding
+
+
+class Held(NamedTuple):
+    """Rows that hold a partly assembled robot; m rows, k machines.
+
+    Attributes:
+        rows: (m, 6n) on the screws of all frames, lengths in reference lengths.
+        right: (k, m) right sides.
+        roots: (m, nf) columns of the fixtures' springs, energy y.y / 2.
+    """
+
+    rows: NDArray
+    right: NDArray
+    roots: NDArray
+
+
+class Movable(NamedTuple):
+    """Columns of the screws that may move.
+
+    Attributes:
+        springs: (6n, ny) of links and joint springs, energy y.y / 2.
+        cones: (6n, nu) of clearances, in units of their bounds.
+        group: (nu,) cone of each clearance, counted from 0.
+        free: (6n, nq) of free motions, lengths in reference lengths.
+        on_springs: (k, ny) [sqrt(2 J)] loads on the springs.
+        on_cones: (k, nu) [J] loads on the clearances.
+        on_free: (k, nq) [J] loads on the free motions.
+    """
+
+    springs: NDArray
+    cones: NDArray
+    group: NDArray
+    free: NDArray
+    on_springs: NDArray
+    on_cones: NDArray
+    on_free: NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """The unknowns at least energy, of k machines.
+
+    Attributes:
+        springs: (k, ny) [sqrt(2 J)] scaled deformations of links and joints.
+        fixtures: (k, nf) [sqrt(2 J)] scaled deformations of the fixtures.
+        clearances: (k, nu) in units of their bounds.
+        motions: (k, nq) free motions.
+        multipliers: (k, m) [J] of the rows held: derivative of the energy with respect
+            to their right sides.
+    """
+
+    springs: NDArray
+    fixtures: NDArray
+    clearances: NDArray
+    motions: NDArray
+    multipliers: NDArray
+
+    @property
+    def energy(self) -> NDArray:
+        """(k,) [J] of all springs, those of the fixtures among them."""
+        links = np.vecdot(self.springs, self.springs)
+        return (links + np.vecdot(self.fixtures, self.fixtures)) / 2
+
+
+class _Split(NamedTuple):
+    """Rows split into those with springs and those without."""
+
+    basis: NDArray
+    values: NDArray
+    elastic: NDArray
+    rigid: NDArray
+    spread: NDArray
+
+
+def equilibrium(
+    held: Held, movable: Movable, last: tuple[NDArray, NDArray], tolerance: float = RANK
+) -> Equilibrium:
+    """Return the equilibrium of least energy closest to the last state.
+
+    Args:
+        held: rows held, their right sides less the part of all fixed screws.
+        movable: columns that may move, and the loads on them.
+        last: clearances (k, nu) and free motions (k, nq) before.
+        tolerance: relative size below which a singular value counts as zero.
+
+    Returns:
+        The equilibrium.
+
+    Raises:
+        CannotAssemble: rows without springs contradict each other.
+        FreeMotion: a load drives a motion that nothing resists.
+        SolverFailed: the solver of the clearances gave up.
+    """
+    R = held.rows
+    B_q, B_u = R @ movable.free, R @ movable.cones
+    B_y = np.hstack([R @ movable.springs, held.roots])
+    ny = movable.springs.shape[1]
+    Z = complement(B_q, tolerance) if B_q.shape[1] else np.eye(len(R))
+    start = _balancing(B_q, movable.on_free)
+    loaded = np.zeros((len(start), B_y.shape[1]))
+    loaded[:, :ny] = movable.on_springs
+    loaded += start @ B_y
+    right = (held.right - loaded @ B_y.T) @ Z
+    rounding = _ROUNDING * np.abs(held.right).max(axis=1, initial=0.0)
+    right[np.abs(right) <= rounding[:, None]] = 0.0
+    split = _split(Z.T @ B_y, tolerance, noise_of(B_y))
+    u, strains, inner = _least(
+        split, Z.T @ B_u, right, movable, start @ B_u, last[0], noise_of(B_u)
+    )
+    y = loaded + strains @ split.spread.T
+    q = _moved(B_q, held.right - y @ B_y.T - u @ B_u.T, last[1])
+    return Equilibrium(y[:, :ny], y[:, ny:], u, q, start + inner @ Z.T)
+
+
+def without_idle_weight(movable: Movable, weight: NDArray, rows: NDArray) -> Movable:
+    """Return the loads without weight along motions that nothing holds.
+
+    Args:
+        movable: columns that may move, and the loads on them.
+        weight: (nq,) [J] part of the loads on the free motions that is weight.
+        rows: (m, 6n) rows held.
+
+    Returns:
+        The same; the fitter carries parts that are still free.
+    """
+    if not len(weight):
+        return movable
+    _, S, Vt = (
+        np.linalg.svd(rows @ movable.free)
+        if len(rows)
+        else (0, (), np.eye(len(weight)))
+    )
+    idle = Vt[rank_of(np.asarray(S), RANK) :]
+    return movable._replace(on_free=movable.on_free - weight @ idle.T @ idle)
+
+
+def _balancing(B_q: NDArray, drive: NDArray) -> NDArray:
+    """Return (k, m) multipliers that balance the loads on the free motions."""
+    if not drive.any():
+        return np.zeros((len(drive), len(B_q)))
+    start = np.linalg.lstsq(B_q.T, -drive.T, rcond=RANK)[0].T
+    left = np.abs(start @ B_q + drive).max()
+    if left > _DRIVEN * np.abs(drive).max():
+        raise FreeMotion("a load drives a motion that nothing resists")
+    return start
+
+
+def _split(A: NDArray, tolerance: float, noise: float) -> _Split:
+    """Return the rows with springs and those without, by singular values."""
+    if not A.size:
+        count = A.shape[0]
+        none = np.zeros((count, 0)), np.eye(count), np.zeros((A.shape[1], 0))
+        return _Split(A, np.zeros(0), *none)
+    U, S, Vt = svd(A, full_matrices=True)
+    rank = rank_of(S, tolerance, noise)
+    return _Split(A, S[:rank], U[:, :rank], U[:, rank:], Vt[:rank].T)
+
+
+def _least(
+    split: _Split, A_u: NDArray, right: NDArray, movable: Movable, by_motions: NDArray,
+    last: NDArray, noise: float,
+) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
+    """Return clearances, strains and inner multipliers of every machine."""
+    S = split.values
+    h, rigid = right @ split.elastic / S, right @ split.rigid
+    if not A_u.shape[1]:
+        _check_closed(rigid, right)
+        return np.zeros((len(right), 0)), h, h / S @ split.elastic.T
+    G = -(split.elastic.T @ A_u) / S[:, None]
+    U, values, _ = svd(split.rigid.T @ A_u, full_matrices=True)
+    rank = rank_of(values, ROWS_RANK, noise)
+    _check_closed(rigid @ U[:, rank:], right)
+    H, k = U[:, :rank].T @ split.rigid.T @ A_u, rigid @ U[:, :rank]
+    d = movable.on_cones + by_motions
+    u, strains, inner = np.zeros_like(last), np.zeros_like(h), np.zeros_like(right)
+    for i in range(len(right)):
+        least = minimise_energy(G, h[i], d[i], H, k[i], movable.group)
+        if not least.feasible:
+            raise CannotAssemble("neither springs nor clearances can close the rows")
+        u[i] = _closest(least.clearances, last[i], np.vstack([G, H, d[i]]), movable)
+        strains[i] = G @ u[i] + h[i]
+        terms = np.abs(G) @ np.abs(u[i]) + np.abs(h[i])
+        strains[i][np.abs(strains[i]) <= _SOLVED * terms.max(initial=0.0)] = 0.0
+        rigid_part = split.rigid @ U[:, :rank] @ least.rigid_multipliers
+        inner[i] = split.elastic @ (strains[i] / S) + rigid_part
+    return u, strains, inner
+
+
+def _check_closed(rigid: NDArray, right: NDArray) -> None:
+    """Refuse rows without springs and clearances that stay open."""
+    left = np.abs(rigid).max(initial=0.0)
+    if left > _OPEN + 1e-9 * np.abs(right).max(initial=0.0):
+        raise CannotAssemble(
+            f"a rigid part stays open by {left:.3g} rad or reference lengths: no "
+            "clearance or spring acts there"
+        )
+
+
+def _closest(u: NDArray, last: NDArray, rows: NDArray, movable: Movable) -> NDArray:
+    """Return the clearances closest to the last ones, of the same energy."""
+    size = np.linalg.norm(rows, axis=1)
+    rows = rows[size > 0] / size[size > 0, None]
+    _, S, Vt = np.linalg.svd(rows) if len(rows) else (0, np.zeros(0), np.eye(len(u)))
+    kept = Vt[: rank_of(S, ROWS_RANK)]
+    if len(kept) == len(u):
+        return u
+    zero = np.zeros(len(u))
+    try:
+        closest = minimise_energy(
+            np.eye(len(u)), -last, zero, kept, kept @ u, movable.group
+        )
+    except SolverFailed:
+        return u
+    return closest.clearances if closest.feasible else u
+
+
+def _moved(B_q: NDArray, right: NDArray, last: NDArray) -> NDArray:
+    """Return the free motions that fit the rows, closest to the last ones."""
+    if not B_q.shape[1]:
+        return last
+    return last + (right - last @ B_q.T) @ np.linalg.pinv(B_q, rcond=RANK).T

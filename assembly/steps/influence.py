@@ -1,0 +1,188 @@
+"""Whether the order of the joins changes the assembled machine.
+
+A join that is locked as it lies holds the opening G_k x that it finds.  The joins S
+before it have moved this opening by A_kS lambda_S + B_k q, where
+
+======  ======================  =====================================================
+symbol  code                    meaning
+======  ======================  =====================================================
+A_kj    ``coefficients``        G_k K^-1 G_j^T, the influence coefficient of j at k
+B_k     ``free``                opening at k by motions that nothing resists
+lambda                          wrenches of the joins before
+======  ======================  =====================================================
+
+K is the stiffness of the machine before the first of these joins.  If A_kj = 0 for all
+other joins j, and no free motion moves k together with one of them, then k finds the
+same opening after every set of other joins: its place in the order does not matter.
+Free motions that move only the opening at j, such as that of its own pin, are left out
+together with the wrenches that they do not carry.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import null_space
+
+from assembly.steps.machine import Machine
+from assembly.steps.plan import Adjust, Fix, Join, Plan, Step, rows_of
+from assembly.steps.state import State
+
+_ZERO = 1e-9  # share of the own coefficients below which an influence is rounding
+_FREE = 1e-11  # share of the largest stiffness below which a motion is free
+
+
+@dataclass(frozen=True, eq=False)
+class Influence:
+    """What closing one part does to the opening at another one.
+
+    Attributes:
+        locked: step that holds the opening that it finds.
+        joined: another step.
+        coefficients: (p, r) [rad, m per N m, N] motion of the p components that are
+            locked, by the r components of the closing wrench.
+        free: whether a free motion moves both openings.
+        zero: whether closing the part does not move the opening, for any errors.
+    """
+
+    locked: str
+    joined: str
+    coefficients: NDArray
+    free: bool
+    zero: bool
+
+
+def why_order_matters(plan: Plan) -> str:
+    """Return why the final state depends on the order; empty if it cannot.
+
+    Args:
+        plan: any plan.
+
+    Returns:
+        The steps that depend on the state that they find, in words.
+    """
+    steps = [step.name for step in plan.steps if depends_on_state(step)]
+    return ", ".join(steps)
+
+
+def depends_on_state(step: Step) -> bool:
+    """Return whether a step holds something at a position that it finds.
+
+    Args:
+        step: any step.
+
+    Returns:
+        True for parts locked as they lie, force limits that leave an opening, clamps
+        where the part lies, and adjustments.
+    """
+    if isinstance(step, Join):
+        return isinstance(step.part, str) or bool(step.locked) or step.leave_open
+    return isinstance(step, Adjust) or (isinstance(step, Fix) and not step.position)
+
+
+def influences(machine: Machine, state: State, run: Sequence[Join]) -> list[Influence]:
+    """Return the influence of joins on those that hold what they find.
+
+    Args:
+        machine: columns and rows of the robot.
+        state: before the first of the joins; its clearances are bolted.
+        run: joins that may change places.
+
+    Returns:
+        One for each pair of a join that depends on the state and another join.
+    """
+    rows = [_rows(machine, join) for join in run]
+    bodies, free = _motions(machine, state)
+    moved = [W @ free for W in rows]
+    alone = [_moving_alone(moved, j) for j in range(len(run))]
+    found = []
+    for k, locked in enumerate(run):
+        if not depends_on_state(locked):
+            continue
+        chosen = rows_of(locked.locked) if locked.locked else slice(None)
+        at_k = rows[k][chosen] @ bodies
+        shared = moved[k][chosen] @ (np.eye(len(alone[k])) - alone[k] @ alone[k].T)
+        for j, joined in enumerate(run):
+            if j == k:
+                continue
+            carried = _carried(moved[j] @ alone[j])
+            at_j = carried @ rows[j] @ bodies
+            small = _size(at_k @ at_j.T) <= _ZERO * _norm(at_k) * _norm(at_j)
+            both = min(_size(shared), _size(carried @ moved[j])) > _ZERO
+            units = _unit(machine, locked)[chosen], _unit(machine, joined)
+            A = np.where(small, 0.0, at_k @ at_j.T) * np.outer(*units)
+            zero = small and not both
+            found.append(Influence(locked.name, joined.name, A, both, zero))
+    return found
+
+
+def _moving_alone(moved: list[NDArray], j: int) -> NDArray:
+    """Return the free motions, in columns, that move only one part's opening."""
+    others = np.vstack([np.zeros((1, moved[j].shape[1])), *moved[:j], *moved[j + 1 :]])
+    return null_space(others, rcond=_ZERO) if others.size else np.zeros((0, 0))
+
+
+def _carried(motions: NDArray) -> NDArray:
+    """Return the projection on wrenches that do no work on a part's own motions."""
+    return np.eye(len(motions)) - motions @ np.linalg.pinv(motions, rcond=_ZERO)
+
+
+def _norm(A: NDArray) -> float:
+    """Return the largest norm of a row."""
+    return float(np.linalg.norm(A, axis=1).max(initial=0.0))
+
+
+def _size(A: NDArray) -> float:
+    """Return the largest entry."""
+    return float(np.abs(A).max(initial=0.0))
+
+
+def _unit(machine: Machine, join: Join) -> NDArray:
+    """Return the units of a join's rows: reference lengths become m."""
+    if isinstance(join.part, str):
+        frames = np.abs(machine.free).reshape(-1, 6, machine.free.shape[1]).any(axis=1)
+        return machine.free_size[frames[machine.posture.robot.index(join.part)]]
+    return 1 / machine.scale
+
+
+def _rows(machine: Machine, join: Join) -> NDArray:
+    """Return the rows that a join holds, on springs and free motions."""
+    ny = machine.springs.shape[1]
+    if isinstance(join.part, str):
+        row = machine.posture.robot.index(join.part)
+        own = np.abs(machine.free)[6 * row : 6 * row + 6].any(axis=0)
+        motions = np.eye(len(own))[own]
+        return np.hstack([np.zeros((len(motions), ny)), motions])
+    rows = machine.rows(join.part)
+    return np.hstack([rows @ machine.springs, rows @ machine.free])
+
+
+def _motions(machine: Machine, state: State) -> tuple[NDArray, NDArray]:
+    """Return elastic motions, scaled so that A = W W^T, and free motions.
+
+    Returns:
+        Columns on springs and free motions that keep what is held.
+    """
+    movable, _, motions = machine.movable((), tuple(state.bolted.values()), 1)
+    holds = list(state.holds.values())
+    ny, nq = machine.springs.shape[1], machine.free.shape[1]
+    size = 1 / max(_size(machine.springs), 1e-300)  # springs as large as free motions
+    roots = [hold.roots for hold in holds]
+    columns = np.hstack([machine.springs * size, machine.free[:, motions]])
+    held = [hold.rows @ columns for hold in holds]
+    nf = sum(root.shape[1] for root in roots)
+    R = np.zeros((sum(map(len, held)), columns.shape[1] + nf))
+    row, column = 0, columns.shape[1]
+    for on, root in zip(held, roots, strict=True):
+        R[row : row + len(on), : columns.shape[1]] = on
+        R[row : row + len(on), column : column + root.shape[1]] = root * size
+        row, column = row + len(on), column + root.shape[1]
+    N = null_space(R, rcond=machine.tolerance) if len(R) else np.eye(R.shape[1])
+    strains = np.vstack([N[:ny], N[columns.shape[1] :]])
+    h, V = np.linalg.eigh(strains.T @ strains)
+    x = np.zeros((ny + nq, N.shape[1]))
+    x[:ny] = N[:ny] * size
+    x[ny + np.flatnonzero(motions)] = N[ny : columns.shape[1]]
+    loose = h <= _FREE
+    return (x @ V[:, ~loose]) / (size * np.sqrt(h[~loose])), x @ V[:, loose]

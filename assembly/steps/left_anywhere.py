@@ -1,0 +1,82 @@
+"""Random positions of clearances that no force determines.
+
+At least energy, clearances that carry load are at their bounds.  The others may move
+without strain; their positions are a convex set, in which all are equally likely
+(:mod:`assembly.solvers.uniform_clearance`).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import null_space
+
+from assembly.solvers.uniform_clearance import sample_uniform_position
+from assembly.steps.machine import Machine
+from assembly.steps.state import State
+
+_SAME = 1e-10  # relative size below which a singular value counts as zero
+_LOADED = 1e-9  # share of the energy above which the force of a clearance loads it
+
+
+def positions_left_anywhere(
+    machine: Machine, state: State, rngs: Sequence[np.random.Generator]
+) -> NDArray:
+    """Return clearances that are uniform over all positions of least energy.
+
+    Args:
+        machine: columns and rows of the robot.
+        state: of k machines at least energy, without loads.
+        rngs: k generators.
+
+    Returns:
+        (k, nu) clearances in units of their bounds.
+    """
+    u = state.found.clearances.copy()
+    rows = np.vstack([
+        np.zeros((1, len(machine.cones))),
+        *(h.rows for h in state.holds.values()),
+    ])
+    of_cones, of_motions = rows @ machine.cones, rows @ machine.free
+    loaded = _loaded(machine, state, of_cones[1:])
+    # the mixture of a walk is judged by random combinations of all clearances
+    judged = np.random.default_rng(0).normal(size=(6, u.shape[1]))
+    for i, rng in enumerate(rngs):
+        # near the least load that presses a clearance, forces are the solver's error:
+        # if the set has an interior with all clearances, none is loaded
+        for free in (np.ones_like(loaded[i]), ~loaded[i]):
+            Z = _directions(of_cones[:, free], of_motions)
+            own, starts = u[i, free].copy(), _starts(machine.joints.group[free])
+            sample_uniform_position(
+                Z, starts, np.ascontiguousarray(judged[:, free]), own, rng
+            )
+            moved = bool((own != u[i, free]).any())
+            u[i, free] = own
+            if moved or free.all() and not loaded[i].any():
+                break
+    return u
+
+
+def _directions(of_cones: NDArray, of_motions: NDArray) -> NDArray:
+    """Return the orthonormal directions in which clearances move without strain."""
+    together = null_space(np.hstack([of_cones, of_motions]), rcond=_SAME)
+    U, S, _ = np.linalg.svd(together[: of_cones.shape[1]], full_matrices=False)
+    return np.ascontiguousarray(U[:, S > _SAME])
+
+
+def _loaded(machine: Machine, state: State, of_cones: NDArray) -> NDArray:
+    """Return (k, nu) bool: clearances with a force at their bound (complementarity)."""
+    group, energy = machine.joints.group, state.found.energy
+    cones = (group[:, None] == np.unique(group)).astype(float)
+    forces = np.sqrt((state.found.multipliers @ of_cones) ** 2 @ cones)
+    slack = np.maximum(0.0, 1.0 - np.sqrt(state.found.clearances**2 @ cones))
+    # force times slack is about the solver's gap, so one of them is nearly zero
+    scale = np.maximum(energy, 1e-18)[:, None]
+    loaded = (forces > scale * slack) & (forces > _LOADED * scale)
+    return loaded @ cones.T > 0
+
+
+def _starts(group: NDArray) -> NDArray:
+    """Return the (cones + 1,) first columns of the cones, and their number."""
+    first = np.unique(group, return_index=True)[1]
+    return np.append(first, len(group)).astype(np.int64)

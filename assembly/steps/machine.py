@@ -1,0 +1,188 @@
+"""A robot at a posture as arrays: columns that move, rows of closures and frames."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.closure_rates import closure_signs
+from assembly.kinematics.posture import Posture
+from assembly.kinematics.ranks import RANK, rank_tolerance
+from assembly.linear.closure import (
+    VirtualJoints,
+    checked_size,
+    in_reference_lengths,
+    virtual_joints,
+)
+from assembly.linear.load import FrameLoads
+from assembly.steps.equilibrium import Equilibrium, Movable
+
+Part = tuple[str, str] | str
+
+
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """A robot of n frames at a posture.
+
+    Attributes:
+        posture: pose at which it is assembled.
+        joints: columns of its springs, clearances and free motions.
+        size: [m] reference length.
+    """
+
+    posture: Posture
+    joints: VirtualJoints
+    size: float
+
+    @property
+    def springs(self) -> NDArray:
+        """(6n, ny) columns of links and joint springs."""
+        return self.joints.elastic
+
+    @property
+    def cones(self) -> NDArray:
+        """(6n, nu) columns of clearances, in units of their bounds."""
+        return self.joints.cones
+
+    @cached_property
+    def free_size(self) -> NDArray:
+        """(nq,) size of each free motion: 1 rad, or the reference length [m]."""
+        angles = np.tile(np.repeat([True, False], 3), len(self.joints.free) // 6)
+        turns = self.joints.free[angles].any(axis=0)
+        return np.where(turns, 1.0, self.size)
+
+    @cached_property
+    def free(self) -> NDArray:
+        """(6n, nq) columns of free motions, lengths in reference lengths."""
+        return self.joints.free * self.free_size
+
+    @property
+    def scale(self) -> NDArray:
+        """(6,) factors that make lengths comparable with angles."""
+        return in_reference_lengths(self.size)
+
+    @property
+    def tolerance(self) -> float:
+        """Relative size below which a singular value counts as zero."""
+        return rank_tolerance(float(self.posture.mismatch))
+
+    def rows(self, part: Part) -> NDArray:
+        """Return the rows of a frame's screw or of a closure's opening.
+
+        Args:
+            part: a frame, or the two frames of a closure.
+
+        Returns:
+            (6, 6n) in the axes of the frame, or of the closure's first one, at its
+            origin; lengths in reference lengths.
+        """
+        robot, paths = self.posture.robot, self.posture.paths
+        if isinstance(part, str):
+            row = robot.index(part)
+            signs = robot.on_path[row].astype(float)
+        else:
+            row = robot.index(part[0])
+            signs = closure_signs(robot)[robot.closures.index(part)].astype(float)
+        at_platform = np.swapaxes(signs[:, None, None] * paths, 0, 1).reshape(6, -1)
+        return self.scale[:, None] * np.linalg.solve(paths[row], at_platform)
+
+    def movable(
+        self, loads: Sequence[FrameLoads], bolted: Sequence[int], count: int
+    ) -> tuple[Movable, NDArray, NDArray]:
+        """Return the columns that may move, and the loads on them.
+
+        Args:
+            loads: loads that act.
+            bolted: frames whose joints are bolted as they lie.
+            count: number of machines.
+
+        Returns:
+            The columns; (nu,) and (nq,) bool of the clearances and motions in them.
+        """
+        frames = np.repeat(~np.isin(np.arange(len(self.springs) // 6), bolted), 6)
+        cones = np.abs(self.cones)[frames].any(axis=0)
+        motions = np.abs(self.free)[frames].any(axis=0)
+        body, joint = np.zeros((2, len(self.springs)))
+        for load in loads:
+            body, joint = body + load.body, joint + load.joint
+        springs, free = self.springs, self.free[:, motions]
+        on = np.where(self.joints.links, body @ springs, joint @ springs)
+        group = np.unique(self.joints.group[cones], return_inverse=True)[1]
+        acting = (on, joint @ self.cones[:, cones], joint @ free)
+        movable = Movable(
+            springs, self.cones[:, cones], group, free,
+            *(np.repeat(row[None], count, axis=0) for row in acting),
+        )  # fmt: skip
+        return movable, cones, motions
+
+    def screws(self, errors: NDArray, found: Equilibrium) -> NDArray:
+        """Return the (k, 6n) [rad, m] screws of all frames.
+
+        Args:
+            errors: (k, 6n) geometric errors.
+            found: springs, clearances and free motions.
+
+        Returns:
+            Their sum.
+        """
+        moved = found.springs @ self.springs.T + found.clearances @ self.cones.T
+        return errors + moved + found.motions @ self.free.T
+
+    def platform_screw(self, errors: NDArray, found: Equilibrium) -> NDArray:
+        """Return the (k, 6) [rad, m] platform's screw at its origin, base axes."""
+        robot = self.posture.robot
+        row = robot.index(robot.platform)
+        own = self.screws(errors, found) @ self.rows(robot.platform).T / self.scale
+        return own @ self.posture.paths[row].T
+
+    def opening(
+        self, errors: NDArray, found: Equilibrium, holds: Mapping[str, Any], hold: Any
+    ) -> NDArray:
+        """Return the opening of rows that free motions cannot close.
+
+        Args:
+            errors: (k, 6n) geometric errors.
+            found: springs, clearances and free motions.
+            holds: rows that hold already.
+            hold: the rows that are to be closed.
+
+        Returns:
+            (k, m) right side less the rows' value, lengths in reference lengths.
+        """
+        open_ = hold.right - self.screws(errors, found) @ hold.rows.T
+        rows = [other.rows @ self.free for other in holds.values()]
+        held = np.vstack([np.zeros((1, self.free.shape[1])), *rows])
+        _, S, Vt = np.linalg.svd(held)
+        moving = Vt[np.sum(S > self.tolerance * S[:1].clip(1e-300)) :].T
+        columns = hold.rows @ self.free @ moving
+        return open_ - open_ @ np.linalg.pinv(columns, rcond=RANK).T @ columns.T
+
+    def work(self, loads: Sequence[FrameLoads], state: Any) -> NDArray:
+        """Return the (k,) [J] work of loads on all screws of a state."""
+        found, links = state.found, self.joints.links
+        of_links = found.springs * links @ self.springs.T + state.errors
+        of_joints = found.springs * ~links @ self.springs.T
+        of_joints += found.clearances @ self.cones.T + found.motions @ self.free.T
+        work = np.zeros(len(state.errors))
+        for load in loads:
+            work += of_links @ load.body + of_joints @ load.joint
+        return work
+
+
+def machine_at(posture: Posture) -> Machine:
+    """Return the arrays of a robot at a posture.
+
+    Args:
+        posture: pose at which it is assembled.
+
+    Returns:
+        The machine.
+
+    Raises:
+        BadInput: a geometric error is beyond 1e6 rad or m.
+    """
+    robot = posture.robot
+    return Machine(posture, virtual_joints(robot), checked_size(robot))

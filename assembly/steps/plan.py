@@ -1,0 +1,240 @@
+"""A plan of assembly: its steps as data.
+
+Screws of a frame are read at its origin in its axes, after its joint; the opening of a
+closure at the origin of its first frame, in the axes of that frame.  Components are
+those of a screw, ``RX RY RZ TX TY TZ``.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.model.robot import Robot
+from forcefit.inputs.table import BadInput, nearest, quoted
+from stiffness.screws import SCREW
+
+Closure = tuple[str, str]
+GRAVITY = "gravity"  # name of the weights among the loads of steps
+
+
+@dataclass(frozen=True)
+class Fix:
+    """A fixture holds a frame at a position.
+
+    Attributes:
+        name: of the step.
+        frame: frame that is held.
+        position: [rad, m] by component, the errors of the fixture; the other components
+            are free.  None holds all six where the frame lies.
+        stiffness: [N m/rad, N/m] of the fixture by component; rigid where absent.
+        kind: ``"fix"`` or ``"clamp"``, its name in results.
+    """
+
+    name: str
+    frame: str
+    position: Mapping[str, float] | None
+    stiffness: Mapping[str, float] = field(default_factory=dict)
+    kind: str = "fix"
+
+
+@dataclass(frozen=True)
+class Join:
+    """A closure is closed, or a joint with clearance is bolted.
+
+    Attributes:
+        name: of the step.
+        part: the two frames of a closure, or the frame whose joint is bolted as it
+            lies.
+        locked: components of the closure's opening that are bolted as they lie; the
+            others are closed.
+        force_limit: [N] largest closing force.
+        leave_open: whether the opening that the limit leaves is locked in; otherwise
+            the closure is closed and the excess is reported.
+    """
+
+    name: str
+    part: Closure | str
+    locked: tuple[str, ...] = ()
+    force_limit: float = inf
+    leave_open: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Preload:
+    """A wrench on a frame's body, until it is released.
+
+    Attributes:
+        name: of the step.
+        frame: frame whose body is loaded.
+        wrench: (6,) [N m, N] at the frame's origin, base axes.
+    """
+
+    name: str
+    frame: str
+    wrench: NDArray
+
+
+@dataclass(frozen=True)
+class Release:
+    """Fixtures, clamps, preloads or joints of earlier steps are removed together.
+
+    Attributes:
+        name: of the step.
+        steps: names of these steps.
+    """
+
+    name: str
+    steps: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A reading.
+
+    Attributes:
+        name: of the step.
+        part: frame whose screw is read, or closure whose opening is read.
+        components: components that are read.
+    """
+
+    name: str
+    part: Closure | str
+    components: tuple[str, ...] = SCREW
+
+
+@dataclass(frozen=True)
+class Adjust:
+    """A shim or an adjustable joint takes up a reading.
+
+    Attributes:
+        name: of the step.
+        frame: frame whose geometric error is changed.
+        components: components of it that are changed.
+        reading: what becomes least: components of a frame's screw, or the energy that
+            closing a closure would need.
+        increment: [rad or m] to a multiple of which changes are rounded; 0 if
+            continuous.
+    """
+
+    name: str
+    frame: str
+    components: tuple[str, ...]
+    reading: Measure
+    increment: float = 0.0
+
+
+Step = Fix | Join | Preload | Release | Measure | Adjust
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Steps of assembly, in order.
+
+    Closures that no step joins are closed before the first step; joints that no step
+    bolts keep their clearance.
+
+    Attributes:
+        steps: the steps.
+    """
+
+    steps: tuple[Step, ...]
+
+    def joined(self) -> set[Closure]:
+        """Return the closures that a step joins."""
+        parts = {s.part for s in self.steps if isinstance(s, Join)}
+        return {part for part in parts if not isinstance(part, str)}
+
+
+def check_plan(plan: Plan, robot: Robot) -> None:
+    """Refuse steps that do not fit a robot or each other.
+
+    Args:
+        plan: any plan.
+        robot: the robot to be assembled.
+
+    Raises:
+        BadInput: a name is used twice or unknown, a part is joined twice, or what is
+            released is not held; the message begins with the step.  Or a drive of the
+            robot applies a force.
+    """
+    driven = [frame.name for frame in robot.frames if frame.drive_force]
+    if driven:
+        raise BadInput(
+            f"{robot.name}: frame {quoted(driven[0])}.drive_force: found a drive that "
+            "applies a force, which steps of assembly do not compute; expected none"
+        )
+    taken = {closure_name(closure): "a closure" for closure in robot.closures}
+    taken |= {GRAVITY: "the weights"}
+    names: set[str] = set()
+    held: dict[str, Closure | str | None] = {}
+    for number, step in enumerate(plan.steps, 1):
+        where = f"step[{number}] {quoted(step.name)}"
+        if step.name in names:
+            raise BadInput(f"{where}: the name of an earlier step, expected another")
+        if step.name in taken:
+            raise BadInput(f"{where}: the name of {taken[step.name]}, expected another")
+        names.add(step.name)
+        for part in _parts_of(step):
+            _check_part(where, part, robot)
+        if isinstance(step, Join):
+            _check_join(where, step, robot, held)
+        if isinstance(step, (Fix, Preload, Join)):
+            held[step.name] = step.part if isinstance(step, Join) else None
+        if isinstance(step, Release):
+            for name in step.steps:
+                if name not in held:
+                    found = f"found {quoted(name)}{nearest(name, held)}"
+                    raise BadInput(f"{where}.release: {found}, expected {_held(held)}")
+                del held[name]
+
+
+def _parts_of(step: Step) -> list[Closure | str]:
+    """Return the frames and closures that a step names."""
+    if isinstance(step, Release):
+        return []
+    if isinstance(step, (Join, Measure)):
+        return [step.part]
+    return [step.frame, *([step.reading.part] if isinstance(step, Adjust) else [])]
+
+
+def _check_part(where: str, part: Closure | str, robot: Robot) -> None:
+    """Refuse a frame or a closure that the robot does not have."""
+    if isinstance(part, str):
+        try:
+            robot.index(part)
+        except BadInput as error:
+            raise BadInput(f"{where}: {error}") from None
+    elif part not in robot.closures:
+        known = ", ".join(f'["{a}", "{b}"]' for a, b in robot.closures) or "no closure"
+        found = f'found no closure ["{part[0]}", "{part[1]}"]'
+        raise BadInput(f"{where}: {found}, expected one of {known}")
+
+
+def _check_join(where: str, step: Join, robot: Robot, held: Mapping) -> None:
+    """Refuse what is joined already, and a joint that has nothing to bolt."""
+    if step.part in held.values():
+        raise BadInput(f"{where}.join: found a part that is joined already")
+    if isinstance(step.part, str):
+        frame = robot.frame(step.part)
+        if frame.clearance is None and (not frame.passive or frame.compliant):
+            found = f"found {quoted(step.part)}, whose joint has no clearance"
+            raise BadInput(f"{where}.join: {found} and no motion to bolt")
+
+
+def _held(held: Mapping) -> str:
+    """Return the names that may be released, in words."""
+    names = ", ".join(map(quoted, held))
+    return f"one of {names}" if names else "an earlier step that holds something"
+
+
+def closure_name(closure: Closure) -> str:
+    """Return the name under which a closure holds that no step joins."""
+    return f"{closure[0]} - {closure[1]}"
+
+
+def rows_of(components: tuple[str, ...]) -> NDArray:
+    """Return the indices of components of a screw."""
+    return np.array([SCREW.index(c) for c in components], dtype=int)

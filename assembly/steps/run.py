@@ -1,0 +1,312 @@
+"""A plan carried out on one machine, or on many that differ in their errors.
+
+The machine is linear in small screws, at one posture.  Each step changes what is held;
+then the springs find the equilibrium from the last state (``equilibrium.py``).
+
+======  ==================  ==========  ==============================================
+symbol  code                shape       meaning
+======  ==================  ==========  ==============================================
+E       ``energy``          (k,)        [J] of all springs, those of fixtures included
+lambda  ``closing_wrench``  (k, 6)      [N m, N] that closes a closure, at its peak
+gamma   ``opening``         (k, 6)      [rad, m] before it is closed
+======  ==================  ==========  ==============================================
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.kinematics.posture import Posture
+from assembly.linear.assembled import without_rounding
+from assembly.linear.load import loads_on_frames
+from assembly.steps.adjusting import adjustment_of, with_adjustment
+from assembly.steps.machine import Machine, machine_at
+from assembly.steps.plan import (
+    GRAVITY,
+    Fix,
+    Join,
+    Measure,
+    Plan,
+    Preload,
+    Release,
+    Step,
+    check_plan,
+    rows_of,
+)
+from assembly.steps.state import (
+    State,
+    closed_rows,
+    first_state,
+    fixture_rows,
+    reading_of,
+    settle,
+    with_hold,
+    without,
+)
+
+_ROUNDED = 1e-13  # share of the energies below which their difference is rounding
+_HALVINGS = 50  # of the share of an opening that a limited force closes
+
+
+@dataclass(frozen=True, eq=False)
+class StepResult:
+    """One step of k machines.
+
+    Attributes:
+        step: the step.
+        energy: (k,) [J] afterwards.
+        work: (k,) [J] of the step: of the closing wrench, of a clamp, or of a preload
+            that grows slowly.
+        load_work: (k,) [J] of the loads that acted before and after.
+        lost: (k,) [J] energy that a release loses.
+        closing_wrench: (k, 6) [N m, N] peak, in the axes of the closure or fixture; 0
+            for other steps.
+        opening: (k, 6) [rad, m] of the closure before, as far as free motions cannot
+            close it; what a force limit leaves open is in ``left_open``.
+        left_open: (k, 6) [rad, m] opening that the step leaves.
+        exceeded: (k,) bool, whether closing needs more than the allowed force.
+        spring_back: (k, 6) [rad, m] motion of what is released, the last one named, in
+            its axes.
+        reading: (k, p) [rad or m] of a measurement.
+        adjustment: (k, a) [rad or m] change that an adjustment makes.
+        platform_screw: (k, 6) [rad, m] afterwards, at its origin, base axes.
+        wrenches: (k, 6) [N m, N] locked in afterwards, by step that holds, in its axes.
+        balance: (k,) [J] difference of the work, or of the energy lost, from half the
+            multipliers times the opening; NaN with clearances or gravity.
+    """
+
+    step: Step
+    energy: NDArray
+    work: NDArray
+    load_work: NDArray
+    lost: NDArray
+    closing_wrench: NDArray
+    opening: NDArray
+    left_open: NDArray
+    exceeded: NDArray
+    spring_back: NDArray
+    reading: NDArray
+    adjustment: NDArray
+    platform_screw: NDArray
+    wrenches: dict[str, NDArray]
+    balance: NDArray
+
+    @property
+    def closing_force(self) -> NDArray:
+        """(k,) [N] force part of the closing wrench."""
+        return np.linalg.norm(self.closing_wrench[:, 3:], axis=1)
+
+
+def assemble_in_steps(
+    plan: Plan,
+    posture: Posture,
+    errors: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+) -> list[StepResult]:
+    """Carry out a plan.
+
+    Args:
+        plan: the steps.
+        posture: pose at which the robot of n frames is assembled.
+        errors: (k, n, 6) [rad, m] geometric errors of k machines; the robot's if
+            absent.
+        gravity: (3,) [m/s^2] base axes; acts from the beginning.  It does not move
+            parts that nothing holds yet.
+
+    Returns:
+        The results, step by step.
+
+    Raises:
+        BadInput: the plan does not fit the robot.
+        CannotAssemble: rigid parts contradict each other.
+        FreeMotion: a load drives a motion that nothing resists.
+        SolverFailed: the solver of the clearances gave up.
+    """
+    check_plan(plan, posture.robot)
+    machine = machine_at(posture)
+    state = first_state(machine, plan, errors, gravity)
+    results = []
+    for step in plan.steps:
+        state, result = carry_out(machine, state, step)
+        results.append(result)
+    return results
+
+
+def carry_out(machine: Machine, state: State, step: Step) -> tuple[State, StepResult]:
+    """Carry out one step.
+
+    Args:
+        machine: columns and rows of the robot.
+        state: before the step.
+        step: of a plan that was checked.
+
+    Returns:
+        The state after it, and the result.
+    """
+    blank = _blank(machine, state, step)
+    if isinstance(step, Join) and isinstance(step.part, str):
+        after = replace(state, bolted=state.bolted | {step.name: _row(machine, step)})
+        return _told(machine, state, settle(machine, after), blank)
+    if isinstance(step, Join):
+        return _join(machine, state, step, blank)
+    if isinstance(step, Fix):
+        hold = fixture_rows(machine, state, step)
+        after = settle(machine, with_hold(state, step.name, hold))
+        return _told(machine, state, after, blank)
+    if isinstance(step, Preload):
+        bodies = np.zeros((len(machine.posture.robot.frames), 6))
+        bodies[machine.posture.robot.index(step.frame)] = step.wrench
+        loads = loads_on_frames(machine.posture, None, bodies)
+        after = replace(state, loads=state.loads | {step.name: loads})
+        return _told(machine, state, settle(machine, after), blank)
+    if isinstance(step, Release):
+        after = settle(machine, without(state, step.steps))
+        return _told(machine, state, after, blank)
+    if isinstance(step, Measure):
+        reading = reading_of(machine, state, step)
+        return state, replace(blank, reading=reading)
+    amount = adjustment_of(machine, state, step)
+    after = settle(machine, with_adjustment(machine, state, step, amount))
+    return _told(machine, state, after, replace(blank, adjustment=amount))
+
+
+def _row(machine: Machine, step: Join) -> int:
+    """Return the frame whose joint a step bolts."""
+    return machine.posture.robot.index(str(step.part))
+
+
+def _join(
+    machine: Machine, state: State, step: Join, blank: StepResult
+) -> tuple[State, StepResult]:
+    """Close a closure, with its locked components as they lie."""
+    assert not isinstance(step.part, str)
+    hold = closed_rows(machine, state, step.part)
+    opening = machine.opening(state.errors, state.found, state.holds, hold)
+    locked = rows_of(step.locked)
+    as_it_lies = machine.screws(state.errors, state.found) @ hold.rows.T
+    hold.right[:, locked] = as_it_lies[:, locked]
+    opening[:, locked] = 0.0
+    blank = replace(blank, opening=-opening / machine.scale)
+
+    def closed(share: NDArray) -> State:
+        right = hold.right - (1 - share)[:, None] * opening
+        joined = with_hold(state, step.name, replace(hold, right=right))
+        return settle(machine, joined)
+
+    def force(after: State) -> NDArray:
+        wrench = after.multipliers()[step.name] * machine.scale
+        return np.linalg.norm(wrench[:, 3:], axis=1)
+
+    after = closed(np.ones(len(opening)))
+    needed = force(after)
+    exceeded = needed > step.force_limit * (1 + 1e-12)
+    if step.leave_open and exceeded.any():
+        linear = state.is_linear(machine)
+        share = _share(linear, step.force_limit, needed, lambda s: force(closed(s)))
+        after = closed(share)
+        left = -(1 - share)[:, None] * opening / machine.scale
+        blank = replace(blank, left_open=left)
+    return _told(machine, state, after, replace(blank, exceeded=exceeded))
+
+
+def _share(linear: bool, limit: float, needed: NDArray, force: Callable) -> NDArray:
+    """Return the (k,) shares of the openings that a limited force closes."""
+    share = np.minimum(1.0, limit / np.maximum(needed, 1e-300))
+    if linear:
+        return share  # the force is proportional to the share
+    low, high = np.zeros_like(needed), np.ones_like(needed)
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        within = force(middle) <= limit
+        low, high = np.where(within, middle, low), np.where(within, high, middle)
+    return np.where(needed > limit, low, 1.0)
+
+
+def _blank(machine: Machine, state: State, step: Step) -> StepResult:
+    """Return the result of a step that changes nothing."""
+    k = len(state.errors)
+    zero, six, empty = np.zeros(k), np.zeros((k, 6)), np.zeros((k, 0))
+    return StepResult(
+        step=step, energy=state.found.energy, work=zero, load_work=zero, lost=zero,
+        closing_wrench=six, opening=six, left_open=six, exceeded=np.zeros(k, bool),
+        spring_back=six, reading=empty, adjustment=empty,
+        platform_screw=machine.platform_screw(state.errors, state.found),
+        wrenches=_wrenches(machine, state), balance=zero,
+    )  # fmt: skip
+
+
+def _wrenches(machine: Machine, state: State) -> dict[str, NDArray]:
+    """Return the (k, 6) [N m, N] wrenches of all holds, each in its own axes."""
+    found = state.multipliers()
+    wrenches = np.zeros((len(state.errors), len(found), 6))
+    for i, (name, multipliers) in enumerate(found.items()):
+        chosen = state.holds[name].components
+        wrenches[:, i, chosen] = multipliers * machine.scale[chosen]
+    if found:
+        wrenches = without_rounding(wrenches)
+    return {name: wrenches[:, i] for i, name in enumerate(found)}
+
+
+def _told(
+    machine: Machine, before: State, after: State, result: StepResult
+) -> tuple[State, StepResult]:
+    """Return the state after a step, and its result with energies and wrenches."""
+    step = result.step
+    kept = [after.loads[name] for name in after.loads if name in before.loads]
+    load_work = machine.work(kept, after) - machine.work(kept, before)
+    gained = after.found.energy - before.found.energy - load_work
+    size = after.found.energy + before.found.energy + np.abs(load_work)
+    gained = np.where(np.abs(gained) <= _ROUNDED * size, 0.0, gained)
+    wrenches = _wrenches(machine, after)
+    releasing = isinstance(step, Release)
+    linear = before.is_linear(machine) and GRAVITY not in after.loads
+    half = _half_work(machine, before, after, step)
+    return after, replace(
+        result, energy=after.found.energy, load_work=load_work,
+        work=np.zeros_like(gained) if releasing else gained,
+        lost=0.0 - gained if releasing else np.zeros_like(gained),
+        closing_wrench=wrenches.get(step.name, np.zeros((len(gained), 6))),
+        spring_back=_spring_back(machine, before, after, step), wrenches=wrenches,
+        platform_screw=machine.platform_screw(after.errors, after.found),
+        balance=gained - half if linear else np.full(len(gained), np.nan),
+    )  # fmt: skip
+
+
+def _half_work(machine: Machine, before: State, after: State, step: Step) -> NDArray:
+    """Return the (k,) [J] work of a linear step, by its wrenches and openings.
+
+    It is half of the wrench that a step adds, or that a release removes, times the
+    motion against it; NaN for steps that do neither.
+    """
+    old = machine.screws(before.errors, before.found)
+    new = machine.screws(after.errors, after.found)
+    if step.name in after.holds:
+        hold, multipliers = after.holds[step.name], after.multipliers()[step.name]
+        return np.vecdot(multipliers, hold.right - old @ hold.rows.T) / 2
+    loads = before.loads if isinstance(step, Release) else after.loads
+    names = step.steps if isinstance(step, Release) else (step.name,)
+    acting = [loads[name] for name in names if name in loads]
+    half = (machine.work(acting, after) - machine.work(acting, before)) / 2
+    if not isinstance(step, Release):
+        return half if acting else np.full(len(new), np.nan)
+    for name in names:
+        if name in before.holds:
+            hold, multipliers = before.holds[name], before.multipliers()[name]
+            half = half - np.vecdot(multipliers, hold.right - new @ hold.rows.T) / 2
+    return half
+
+
+def _spring_back(machine: Machine, before: State, after: State, step: Step) -> NDArray:
+    """Return the (k, 6) [rad, m] motion of the last hold that a step releases."""
+    motion = np.zeros((len(after.errors), 6))
+    released = step.steps if isinstance(step, Release) else ()
+    for name in released:
+        if name in before.holds:
+            hold = before.holds[name]
+            old = machine.screws(before.errors, before.found) @ hold.rows.T
+            new = machine.screws(after.errors, after.found) @ hold.rows.T
+            motion = np.zeros_like(motion)
+            motion[:, hold.components] = (new - old) / machine.scale[hold.components]
+    return motion

@@ -1,0 +1,308 @@
+"""The order in which parts are joined: which one needs the least force or error.
+
+Only steps that join are permuted, among themselves and between the other steps.  If
+all of them are closed at fixed positions, the state after each depends only on the set
+joined so far; the least peak force is a shortest path over the 2^n sets, with the
+largest force in place of the sum.  The path is searched from its end, because the state
+of a set has the closing forces of all its parts.  If joints are bolted as they lie, the
+orders are searched by branch and bound: the peak force never falls, and without loads
+joining a part never lowers the energy, so both bound the orders not yet searched.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from heapq import heappop, heappush
+from itertools import groupby
+from math import inf
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from assembly.kinematics.posture import Posture
+from assembly.linear.reference.energy import CannotAssemble
+from assembly.steps.influence import depends_on_state
+from assembly.steps.machine import Machine, machine_at
+from assembly.steps.plan import Join, Plan, Step, check_plan
+from assembly.steps.run import StepResult, carry_out
+from assembly.steps.state import State, closed_rows, first_state, settle
+from forcefit.inputs.table import BadInput, quoted
+
+Objective = Literal["force", "energy", "error"]
+OBJECTIVES: tuple[Objective, ...] = ("force", "energy", "error")
+ALL_ORDERS = 8  # joins in a run of which all orders are searched, without a bound
+_EQUAL = 1e-9  # share by which an order must be better than the given one
+MOST_STATES = 200_000  # states that are computed: some minutes
+
+
+# a partial order: its state, its peak force, steps done and left
+_Partial = tuple[State, float, tuple[Step, ...], tuple[Step, ...]]
+
+
+@dataclass(frozen=True)
+class BestOrder:
+    """The best order of a plan.
+
+    Attributes:
+        plan: the plan in that order.
+        value: of the objective [N, J or m].
+        bound: lower bound over all orders; equal to ``value`` where all were searched.
+        given: value of the plan as given; inf if it cannot be assembled.
+        searched: number of sets or of partial orders that were computed.
+        method: ``"sets"`` or ``"orders"``.
+    """
+
+    plan: Plan
+    value: float
+    bound: float
+    given: float
+    searched: int
+    method: str
+
+
+def best_order(
+    plan: Plan,
+    posture: Posture,
+    objective: Objective = "force",
+    gravity: ArrayLike | None = None,
+    progress: Callable[[int], None] = lambda done: None,
+    most: int = MOST_STATES,
+) -> BestOrder:
+    """Return the order of the joining steps with the least value of an objective.
+
+    Args:
+        plan: the steps; runs of consecutive joining steps are permuted.
+        posture: pose at which the robot is assembled.
+        objective: ``"force"`` [N], the largest closing force of a step; ``"energy"``
+            [J], stored at the end; ``"error"`` [m], the translation of the platform at
+            the end.
+        gravity: (3,) [m/s^2] base axes.
+        progress: called with the number of states computed.
+        most: number of states after which a search ends with a bound.
+
+    Returns:
+        The order, with a bound.
+
+    Raises:
+        BadInput: the plan does not fit the robot, no order can be assembled, or there
+            are too many joining steps.
+    """
+    check_plan(plan, posture.robot)
+    machine = machine_at(posture)
+    start = first_state(machine, plan, None, gravity)
+    runs = [list(run) for _, run in groupby(plan.steps, lambda s: isinstance(s, Join))]
+    longest = max((len(run) for run in runs if isinstance(run[0], Join)), default=0)
+    search = _Search(machine, objective, progress, most)
+    given = search.value_of(start, plan.steps)
+    pinned = not any(isinstance(s, Join) and depends_on_state(s) for s in plan.steps)
+    if pinned and objective == "force":
+        found = _over_sets(search, start, runs, given)
+        if found.value < given * (1 - _EQUAL):
+            return found
+        return replace(found, plan=plan, value=given, bound=min(given, found.bound))
+    if objective == "error" and longest > ALL_ORDERS:
+        raise BadInput(
+            f"order: found {longest} joining steps in a row, expected at most "
+            f"{ALL_ORDERS} for the least error, which no partial order bounds"
+        )
+    return _over_orders(search, start, plan, given)
+
+
+@dataclass(eq=False)
+class _Search:
+    """A search: the machine, its objective and the number of states computed."""
+
+    machine: Machine
+    objective: Objective
+    progress: Callable[[int], None]
+    most: int
+    done: int = 0
+
+    def carry_out(self, state: State, step: Step) -> tuple[State, StepResult] | None:
+        """Return a step carried out; None if it cannot be."""
+        self.done += 1
+        self.progress(self.done)
+        try:
+            return carry_out(self.machine, state, step)
+        except CannotAssemble:
+            return None
+
+    def closing_forces(
+        self, start: State, run: list[Step], chosen: int
+    ) -> list[tuple[int, float]]:
+        """Return the [N] closing force of each part of a set, were it joined last."""
+        self.done += 1
+        self.progress(self.done)
+        joined = [k for k in range(len(run)) if chosen >> k & 1]
+        holds = dict(start.holds)
+        for k in joined:
+            step = run[k]
+            assert isinstance(step, Join)
+            assert not isinstance(step.part, str)
+            holds[step.name] = closed_rows(self.machine, start, step.part)
+        try:
+            found = settle(self.machine, replace(start, holds=holds)).multipliers()
+        except CannotAssemble:
+            raise BadInput(
+                "order: the robot cannot be assembled in any order"
+            ) from None
+        wrenches = [found[run[k].name][0] * self.machine.scale for k in joined]
+        forces = [float(np.linalg.norm(wrench[3:])) for wrench in wrenches]
+        return list(zip(joined, forces, strict=True))
+
+    def value(self, peak: float, state: State) -> float:
+        """Return the objective of a state that was reached with a peak force."""
+        if self.objective == "force":
+            return peak
+        if self.objective == "energy":
+            return float(state.found.energy[0])
+        screw = self.machine.platform_screw(state.errors, state.found)[0]
+        return float(np.linalg.norm(screw[3:]))
+
+    def bound(self, peak: float, state: State, left: tuple[Step, ...]) -> float:
+        """Return a lower bound of the objective after the steps that are left."""
+        if self.objective == "force":
+            return peak
+        only_joins = all(isinstance(step, Join) for step in left)
+        if self.objective == "energy" and only_joins and not state.loads:
+            return float(state.found.energy[0])
+        return 0.0
+
+    def value_of(self, state: State, steps: tuple[Step, ...]) -> float:
+        """Return the objective of steps in their order; inf if they cannot be."""
+        peak = 0.0
+        for step in steps:
+            found = self.carry_out(state, step)
+            if found is None:
+                return inf
+            state, peak = found[0], max(peak, _force(found[1]))
+        return self.value(peak, state)
+
+
+def _force(result: StepResult) -> float:
+    """Return the [N] closing force of a step; 0 if it does not join."""
+    return float(result.closing_force[0]) if isinstance(result.step, Join) else 0.0
+
+
+def _over_sets(
+    search: _Search, state: State, runs: list[list[Step]], given: float
+) -> BestOrder:
+    """Return the best order where the state depends only on the set joined."""
+    steps: list[Step] = []
+    peak = bound = 0.0
+    for run in runs:
+        if isinstance(run[0], Join):
+            run, worst, least = _bottleneck(search, state, run)
+            peak, bound = max(peak, worst), max(bound, least)
+        for step in run:
+            found = search.carry_out(state, step)
+            if found is None:
+                raise BadInput(
+                    f"step {quoted(step.name)}: the robot cannot be assembled"
+                )
+            state = found[0]
+        steps += run
+    return BestOrder(Plan(tuple(steps)), peak, bound, given, search.done, "sets")
+
+
+def _bottleneck(
+    search: _Search, start: State, run: list[Step]
+) -> tuple[list[Step], float, float]:
+    """Return the order of one run with the least peak force, that force and its bound.
+
+    The search goes backwards, from the set of all parts, by increasing peak force: one
+    equilibrium has the closing forces of all parts that may have been joined last.
+    After the largest number of states, or Ctrl-C, the part that needs the least force
+    comes last each time.
+    """
+    chosen = (1 << len(run)) - 1
+    best, later = {chosen: 0.0}, {chosen: -1}
+    heap, bound = [(0.0, len(run), chosen)], 0.0
+    try:
+        while heap[0][2] and search.done < search.most:
+            peak, _, chosen = heappop(heap)
+            if peak > best[chosen]:
+                continue
+            bound = peak
+            for k, force in search.closing_forces(start, run, chosen):
+                left, worst = chosen & ~(1 << k), max(peak, force)
+                if worst < best.get(left, inf):
+                    best[left], later[left] = worst, k
+                    heappush(heap, (worst, left.bit_count(), left))
+        bound, _, chosen = heap[0]
+    except KeyboardInterrupt:
+        pass
+    peak, order = best[chosen], _joined_after(chosen, later)
+    while chosen:
+        forces = search.closing_forces(start, run, chosen)
+        k, force = min(forces, key=lambda pair: pair[1])
+        chosen, peak, order = chosen & ~(1 << k), max(peak, force), [k, *order]
+    return [run[k] for k in order], peak, bound
+
+
+def _joined_after(chosen: int, later: dict[int, int]) -> list[int]:
+    """Return the parts joined after a set, in order."""
+    order = []
+    while (k := later[chosen]) >= 0:
+        order.append(k)
+        chosen |= 1 << k
+    return order
+
+
+def _over_orders(search: _Search, start: State, plan: Plan, given: float) -> BestOrder:
+    """Return the best order by depth first search with bounds.
+
+    After the largest number of states, or Ctrl-C, the orders not yet searched count
+    with their bounds.
+
+    Raises:
+        BadInput: no order can be assembled.
+        KeyboardInterrupt: Ctrl-C before an order was found.
+    """
+    best, value = plan.steps, given
+    stack: list[_Partial] = [(start, 0.0, (), plan.steps)]
+    try:
+        while stack and search.done < search.most:
+            state, peak, done, left = stack[-1]
+            if not left and search.value(peak, state) < value * (1 - _EQUAL):
+                best, value = done, search.value(peak, state)
+            children = []
+            if left and search.bound(peak, state, left) < value:
+                children = _children(search, *stack[-1])
+            # the most promising one is searched first
+            stack[-1:] = sorted(children, key=lambda c: -search.value(c[1], c[0]))
+    except KeyboardInterrupt:
+        if value == inf:
+            raise
+    if value == inf:
+        raise BadInput("order: the robot cannot be assembled in any order")
+    bounds = [search.bound(peak, state, left) for state, peak, _, left in stack]
+    bound = min([value, *bounds])
+    return BestOrder(
+        replace(plan, steps=best), value, bound, given, search.done, "orders"
+    )
+
+
+def _children(
+    search: _Search, state: State, peak: float, done: tuple[Step, ...],
+    left: tuple[Step, ...],
+) -> list[_Partial]:  # fmt: skip
+    """Return a partial order continued by each step that may come next."""
+    children = []
+    for step, others in _choices(left):
+        found = search.carry_out(state, step)
+        if found is not None:
+            worst = max(peak, _force(found[1]))
+            children.append((found[0], worst, (*done, step), others))
+    return children
+
+
+def _choices(left: tuple[Step, ...]) -> Iterator[tuple[Step, tuple[Step, ...]]]:
+    """Yield the steps that may come next, with those that are left then."""
+    if not isinstance(left[0], Join):
+        yield left[0], left[1:]
+        return
+    for i, step in enumerate(left):
+        if not isinstance(step, Join):
+            return
+        yield step, left[:i] + left[i + 1 :]

@@ -1,0 +1,96 @@
+"""The command ``forcefit assembly steps``."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from forcefit.commands.answer import answer
+from forcefit.commands.options import (
+    GravityOption,
+    JointOption,
+    JsonOption,
+    MismatchOption,
+    PoseOption,
+    RestOption,
+    RobotArgument,
+    parse_gravity,
+    posture_of,
+)
+from forcefit.commands.progress import one_thread, progress_lines
+from forcefit.commands.report import ReportOption, provenance
+from forcefit.inputs.errors import BadInput, nearest
+from forcefit.inputs.writing import write_text
+
+if TYPE_CHECKING:
+    from assembly.steps.state import State
+
+
+def steps(
+    robot: RobotArgument,
+    plan: Annotated[Path, typer.Argument(help="Steps of assembly (TOML).")],
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
+    gravity: GravityOption = None,
+    best: Annotated[
+        str | None,
+        typer.Option(
+            help="Search the order of the joining steps with the least force (the "
+            "largest closing force) | energy (at the end) | error (translation of the "
+            "platform at the end)."
+        ),
+    ] = None,
+    errors: Annotated[
+        Path | None,
+        typer.Option(help="Distributions of errors of many machines (TOML)."),
+    ] = None,
+    draws: Annotated[
+        int | None, typer.Option(help="Number of machines.", min=1, max=10**7)
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed.", min=0, max=2**63 - 1)] = 1,
+    report: ReportOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Assemble the robot step by step, in the order of a plan.
+
+    Each step is an equilibrium that starts from the last: closing forces, energies,
+    spring-back at releases, wrenches locked in.
+    """
+    from assembly.files.step_file import read_steps
+    from assembly.model.error_distributions import read_sources
+    from assembly.report.steps import drawn_steps, steps_of, steps_text
+    from assembly.report.steps_page import steps_page
+    from assembly.steps.machine import machine_at
+    from assembly.steps.search import OBJECTIVES, best_order
+
+    if (errors is None) != (draws is None):
+        raise BadInput("steps: found only one of --errors and --draws, expected both")
+    posture = posture_of(robot, pose, joint, rest, mismatch)
+    asked, g = read_steps(plan, posture.robot), parse_gravity(gravity)
+    sources = None if errors is None else read_sources(errors, posture.robot)
+    order = None
+    states: list[State] = []
+    with one_thread():
+        if best is not None:
+            if best not in OBJECTIVES:
+                raise BadInput(
+                    f'--best: found "{best[:60]}"{nearest(best, OBJECTIVES)}'
+                )
+            with progress_lines() as update:
+                order = best_order(
+                    asked, posture, best, g, lambda done: update("orders", done, done)
+                )
+        results = steps_of(asked, posture, g, order, best or "", states)
+        if sources is not None and draws is not None and results["status"] == "ok":
+            drawn = sources.errors(sources.draw(0, draws, seed))
+            carried = asked if order is None else order.plan
+            with progress_lines() as update:
+                results |= drawn_steps(
+                    carried, posture, drawn, g, lambda d, n: update("machines", d, n)
+                )
+    if report is not None:
+        machine, source = machine_at(posture), provenance(robot, plan, errors)
+        write_text(steps_page(results, machine, states, source), report)
+    answer(results, steps_text(results), results["status"], json)

@@ -1,0 +1,103 @@
+"""Loads by component: the same wrench, and its effect by closed forms."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import forcefit as ff
+from assembly.kinematics.posture import home_posture
+from assembly.model.given_load import given_load
+from assembly.model.robot import BeamLink, Frame, Robot
+from assembly.statistics.experiment import Experiment
+from forcefit.commands.options import parse_load
+from forcefit.inputs.table import BadInput
+
+FORCE, LENGTH = 50.0, 0.4
+STIFFNESS = 2e11 * np.pi * 0.01**4 / 4  # [N m^2] of a round bar of 10 mm radius
+ROOT = Path(__file__).parents[3]
+HEXAPOD = ff.load_robot("hexapod")
+SOURCES = ff.read_sources(ROOT / "examples" / "hexapod_errors.toml", HEXAPOD)
+TIP = -FORCE * LENGTH**3 / (3 * STIFFNESS)  # [m]
+
+
+def cantilever():
+    beam = BeamLink({"radius": 0.01}, 2e11, 0.3, theory="euler", density=7800.0)
+    tip = Frame("tip", translation=[LENGTH, 0, 0], link=beam)
+    return home_posture(Robot("bar", "tip", (tip,)))
+
+
+def test_force_by_name_bends_a_cantilever():
+    """F L^3 / (3 E I)."""
+    forced = ff.solve_assembly(cantilever(), {"fz": -FORCE})
+    assert forced.platform_screw[5] == pytest.approx(TIP)
+    exact = ff.solve_exact(cantilever(), load={"fz": -FORCE})
+    assert exact.platform_screw[5] == pytest.approx(TIP, rel=1e-4)
+
+
+def test_moment_and_force_by_name_superpose():
+    """M L^2 / (2 E I) of a moment about -y is up; this one removes the deflection."""
+    moment = -2 / 3 * FORCE * LENGTH
+    forced = ff.solve_assembly(cantilever(), {"fz": -FORCE, "my": moment})
+    assert abs(forced.platform_screw[5]) < 1e-9 * abs(TIP)
+
+
+def test_list_by_name_is_a_load_for_each_point():
+    forces = np.array([-50.0, 0.0, 25.0])
+    many = ff.solve_assembly(cantilever(), {"fz": forces})
+    np.testing.assert_allclose(
+        many.platform_screw[:, 5], -forces / FORCE * TIP, atol=1e-18
+    )
+
+
+SAME = {
+    "platform_stiffness": lambda load: (
+        ff.platform_stiffness(cantilever(), "exact", load).stiffness
+    ),
+    "deflection_curve": lambda load: (
+        ff.deflection_curve(cantilever(), 3, [0.0, 10.0], load).screws
+    ),
+    "natural_modes": lambda load: (
+        ff.natural_modes(cantilever(), 2, load, state="exact").frequencies
+    ),
+    "sweep": lambda load: (
+        ff.sweep("irsbot2", grid="tx=0:0.1:0.1,tz=-0.5", load=load, assumption="none")
+        .energy.values
+    ),
+    "Experiment": lambda load: (
+        Experiment(home_posture(HEXAPOD), SOURCES, load=load).energies.load
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", sorted(SAME))
+def test_load_by_name_is_the_load_in_order(name):
+    by_name, in_order = {"fz": -50, "mx": 1.5}, [1.5, 0, 0, 0, 0, -50]
+    np.testing.assert_array_equal(SAME[name](by_name), SAME[name](in_order))
+    assert not np.array_equal(SAME[name](by_name), SAME[name]([0.0] * 6))
+
+
+def test_command_line_and_python_read_the_same_load():
+    assert parse_load(["fz=-50,mx=1.5"]) == [1.5, 0, 0, 0, 0, -50]
+    assert given_load({"fz": -50, "mx": 1.5}).tolist() == [1.5, 0, 0, 0, 0, -50]
+
+
+@pytest.mark.parametrize(
+    ("load", "message"),
+    [
+        ({"fq": 1.0}, 'load: unknown component "fq"; valid: fx, fy, fz, mx, my, mz'),
+        ({"FZ": 1.0}, 'load: unknown component "FZ"'),
+        ({"fz": "heavy"}, "load fz: found 'heavy', expected a number [N]"),
+        ({"my": np.nan}, "load my: found nan, expected a number [N m] of size"),
+        ({"fz": [1, 2], "fx": [1, 2, 3]}, "load: found fz 2, fx 3 numbers"),
+    ],
+)  # fmt: skip
+def test_load_that_is_none_is_named(load, message):
+    with pytest.raises(BadInput) as found:
+        ff.solve_assembly(cantilever(), load)
+    assert str(found.value).startswith(message)
+
+
+def test_several_loads_where_one_is_expected_are_named():
+    with pytest.raises(BadInput, match=r"load: found .* expected 6 numbers \[N m, N\]"):
+        ff.platform_stiffness(cantilever(), load={"fz": [1.0, 2.0]})

@@ -1,0 +1,165 @@
+"""Pictures in Python show the numbers of the mechanics, in a notebook and elsewhere."""
+
+import html
+import re
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from matplotlib import pyplot
+from mpl_toolkits.mplot3d.art3d import Line3D, Poly3DCollection
+
+import forcefit as ff
+from assembly.kinematics.posture import home_posture
+from assembly.linear.energy import solve_assembly
+from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.inputs.table import BadInput
+from tests.forcefit.page.test_browser import browser, wait
+from tests.pages_for_tests import parse
+
+FORCE, LENGTH = 50.0, 0.4
+STIFFNESS = 2e11 * np.pi * 0.01**4 / 4  # [N m^2] of a round bar of 10 mm radius
+
+
+@pytest.fixture(autouse=True)
+def _windows_are_closed():
+    yield
+    pyplot.close("all")
+
+
+def cantilever():
+    """A round bar along x, held at its base."""
+    beam = BeamLink({"radius": 0.01}, 2e11, 0.3, theory="euler")
+    tip = Frame("tip <b>", translation=[LENGTH, 0, 0], link=beam)
+    return home_posture(Robot("bar <i>", "tip <b>", (tip,)))
+
+
+def bent():
+    return solve_assembly(cantilever(), [0, 0, 0, 0, 0, -FORCE])
+
+
+def lines_of(figure):
+    """Points in the unit of the axes, by the name in the legend."""
+    (axes,) = figure.axes
+    return {
+        line.get_label(): np.column_stack(line.get_data_3d())
+        for line in axes.lines
+        if isinstance(line, Line3D)
+    }
+
+
+def test_figure_of_a_loaded_bar_follows_the_elastic_line():
+    """w(L) = F L^3 / (3 E I), exaggerated by the factor of the title; in mm."""
+    figure = bent().plot(interactive=False)
+    lines = lines_of(figure)
+    title = figure.axes[0].get_title()
+    assert title.startswith("bar <i>")
+    factor = float(title.rpartition("x ")[2])
+    tip = -FORCE * LENGTH**3 / (3 * STIFFNESS)
+    assert lines["forced, elastic"][-2] == pytest.approx([
+        1e3 * LENGTH,
+        0,
+        1e3 * factor * tip,
+    ])
+    assert lines["nominal"][-2] == pytest.approx([1e3 * LENGTH, 0, 0])
+    assert figure.axes[0].get_zlabel() == "z [mm]"
+
+
+def test_figure_of_a_robot_shows_its_home_pose():
+    """A crank of 0.3 m turned to 90 degrees, and a bar of 0.2 m straight on."""
+    drive = Frame("drive", joint="revolute", actuated=True, position=np.pi / 2)
+    elbow = Frame("elbow", "drive", translation=[0.3, 0, 0])
+    tip = Frame("tip", "elbow", translation=[0.2, 0, 0])
+    figure = Robot("arm", "tip", (drive, elbow, tip)).show()
+    drawn = lines_of(figure)["nominal, rigid"]
+    expected = [[0, 0, 0], [0, 300, 0], [0, 300, 0], [0, 500, 0]]
+    ends = drawn[np.isfinite(drawn).all(axis=1)].reshape(2, -1, 3)[:, [0, -1]]
+    np.testing.assert_allclose(ends.reshape(4, 3), expected, atol=1e-10)
+
+
+def test_pyplot_can_open_a_window_of_the_figure():
+    assert cantilever().show() in map(pyplot.figure, pyplot.get_fignums())
+
+
+def test_bars_show_springs_in_series_by_their_compliance():
+    """Of k and 2 k in series the first has two thirds of the compliance."""
+    soft = MatrixLink(np.diag([1e3, 1e3, 1e3, 1e5, 1e5, 1e5]))
+    stiff = MatrixLink(np.diag([2e3, 2e3, 2e3, 2e5, 2e5, 2e5]))
+    frames = (Frame("a", link=soft), Frame("b", "a", link=stiff))
+    K_C = platform_stiffness(home_posture(Robot("two", "b", frames)))
+    (axes,) = K_C.plot().axes
+    heights = {c.get_label(): [bar.get_height() for bar in c] for c in axes.containers}
+    np.testing.assert_allclose(heights["a link"], 200 / 3)
+    np.testing.assert_allclose(heights["b link"], 100 / 3)
+    (spec,) = parse(K_C.plot(interactive=True).html).figures
+    assert spec["traces"][0]["y"] == pytest.approx([2 / 3] * 6)
+
+
+def slack():
+    """A bar whose tip may move by 0.2 mm within its joint."""
+    joint = Frame("joint", clearance=ff.Clearance(radial=2e-4, axial=1e-4))
+    tip = Frame("tip", "joint", translation=[LENGTH, 0, 0])
+    return solve_assembly(home_posture(Robot("slack", "tip", (joint, tip))))
+
+
+def test_errors_within_a_clearance_are_in_both_kinds_of_picture():
+    figure = slack().plot(errors="translation", assumption="frozen")
+    assert any(isinstance(c, Poly3DCollection) for c in figure.axes[0].collections)
+    page = slack().plot(errors="translation", interactive=True)
+    (spec,) = parse(page.html).figures
+    largest = np.linalg.norm(spec["body"]["points"], axis=1).max()
+    # a cylinder's edge: radius and half height
+    assert largest == pytest.approx(np.hypot(2e-4, 1e-4), rel=0.03)
+
+
+def test_notebook_gets_the_interactive_scene(monkeypatch):
+    """``get_ipython()`` has a kernel in a notebook, and none in a console."""
+    shell = SimpleNamespace()
+    module = SimpleNamespace(get_ipython=lambda: shell)
+    monkeypatch.setitem(sys.modules, "IPython", module)
+    assert not hasattr(bent().plot(), "html")
+    shell.kernel = object()
+    picture = bent().plot()
+    (srcdoc,) = re.findall(r'srcdoc="([^"]*)"', picture._repr_html_())
+    assert html.unescape(srcdoc) == picture.html
+    (spec,) = parse(picture.html).figures
+    moved = np.array(spec["bodies"][0]["moved"])
+    assert moved[-1, 2] == pytest.approx(-FORCE * LENGTH**3 / (3 * STIFFNESS))
+    assert "<i>" not in picture.html
+    assert "http://" not in picture.html.replace("http://www.w3.org/", "")
+
+
+@pytest.mark.parametrize(
+    ("thing", "options", "message"),
+    [
+        (lambda: 3.0, {}, "show: found float, expected a Robot"),
+        (lambda: solve_assembly([cantilever()] * 2), {}, "Assembly of many points"),
+        (cantilever, {"errors": "translation"}, "errors of a Posture"),
+        (slack, {"errors": "translaton"}, "translation"),
+    ],
+)
+def test_what_cannot_be_shown_is_named(thing, options, message):
+    with pytest.raises(BadInput, match=message):
+        ff.show(thing(), **options)
+
+
+@pytest.mark.slow
+def test_browser_draws_a_nominal_robot_in_its_frame(tmp_path):
+    frame = ff.load_robot("hexapod").show(interactive=True)._repr_html_()
+    (tmp_path / "cell.html").write_text(f"<meta charset=utf-8>{frame}", "utf-8")
+    tab = browser()
+    try:
+        tab.get((tmp_path / "cell.html").as_uri())
+        tab.switch_to.frame(tab.find_element("tag name", "iframe"))
+        wait(tab, "return document.documentElement.dataset.drawn")
+        script = "return document.querySelector('.plot').data.map(t => t.name)"
+        assert tab.execute_script(script) == [
+            "nominal, elastic", "nominal, rigid", "joints",
+        ]  # fmt: skip
+        slider = "return document.querySelector('.exaggeration').offsetParent === null"
+        assert tab.execute_script(slider)
+        assert not [e for e in tab.get_log("browser") if e["level"] == "SEVERE"]
+    finally:
+        tab.quit()

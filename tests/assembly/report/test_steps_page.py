@@ -1,0 +1,73 @@
+"""The page of the order of assembly."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.linear.energy import solve_assembly
+from assembly.report.plot import displaced_bodies
+from assembly.report.steps import drawn_steps, steps_of
+from assembly.report.steps_page import assembly_of, steps_page
+from assembly.robots import load_robot
+from assembly.steps.machine import machine_at
+from assembly.steps.plan import Join, Plan
+from forcefit.page.page import Provenance
+from tests.pages_for_tests import parse
+
+
+def pinned(posture):
+    """All closures joined one after another, and the states in between."""
+    plan = Plan(tuple(Join(" - ".join(c), c) for c in posture.robot.closures))
+    states = []
+    results = steps_of(plan, posture, states=states)
+    return results, machine_at(posture), states
+
+
+@pytest.fixture
+def four_bar(rng):
+    robot = load_robot("four_bar")
+    frames = tuple(replace(frame, clearance=None) for frame in robot.frames)
+    scale = np.repeat([1e-3, 1e-4], 3)
+    errors = rng.normal(size=robot.errors.shape) * scale
+    return home_posture(replace(robot, frames=frames).with_errors(errors))
+
+
+def test_assembled_machine_has_the_bodies_and_wrenches_of_solve_assembly(four_bar):
+    results, machine, states = pinned(four_bar)
+    found, expected = assembly_of(machine, states[-1]), solve_assembly(four_bar)
+    assert results["energy"] == pytest.approx(expected.energy, rel=1e-9)
+    size = np.abs(expected.tip_wrenches).max()
+    assert found.tip_wrenches == pytest.approx(expected.tip_wrenches, abs=1e-7 * size)
+    assert found.link_screws == pytest.approx(expected.link_screws, abs=1e-12)
+    mine, yours = displaced_bodies(found), displaced_bodies(expected)
+    platform = four_bar.robot.index(four_bar.robot.platform)
+    assert mine.end_screws[platform] == pytest.approx(
+        yours.end_screws[platform], abs=1e-10
+    )
+
+
+def test_page_has_the_numbers_of_every_step(four_bar):
+    results, machine, states = pinned(four_bar)
+    page = parse(steps_page(results, machine, states, Provenance()))
+    assert page.fetched == []
+    assert page.results["energy"] == pytest.approx(results["energy"])
+    shown = [row[1].value for row in page.tables[0][1:]]
+    assert shown == pytest.approx([step["energy"] for step in results["steps"]])
+    scene = next(f for f in page.figures if "closing" in f)
+    assert np.shape(scene["closing"])[0] == len(results["steps"])
+
+
+def test_interrupted_draws_have_the_quantiles_of_the_machines_so_far(four_bar, rng):
+    """Blocks of 10000 machines: the second one is interrupted."""
+    plan = Plan(tuple(Join(" - ".join(c), c) for c in four_bar.robot.closures))
+    errors = rng.normal(size=(20_001, *four_bar.robot.errors.shape)) * 1e-5
+
+    def stop(done, total):
+        if done == 20_000:
+            raise KeyboardInterrupt
+
+    part = drawn_steps(plan, four_bar, errors, progress=stop)
+    assert part["draws"] == 20_000
+    assert part == drawn_steps(plan, four_bar, errors[:20_000])

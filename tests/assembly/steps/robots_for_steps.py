@@ -1,0 +1,102 @@
+"""Robots of the worked cases of the order of assembly."""
+
+import numpy as np
+
+from assembly.kinematics.posture import home_posture
+from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from stiffness.screws import rotation_vector
+
+STIFF = 1e9  # [N m/rad, N/m] of directions in which no worked case moves
+
+
+def spring(k, component):
+    """Return a link of stiffness k along one component."""
+    diagonal = np.full(6, STIFF)
+    diagonal[component] = k
+    return MatrixLink(np.diag(diagonal))
+
+
+def leg(name, k, error, s=0.0, clearance=None):
+    """Return a leg from the base, elastic along z, at x = s."""
+    return Frame(
+        name, "base", translation=[s, 0, 0], link=spring(k, 5), clearance=clearance,
+        geometric_error=[0, 0, 0, 0, 0, error],
+    )  # fmt: skip
+
+
+def three_legs(clearances=(None, None, None)):
+    """Three legs on a platform that a guide leaves free along z."""
+    legs = zip((1e6, 2e6, 3e6), (30e-6, -20e-6, 50e-6), clearances, strict=True)
+    frames = [
+        Frame("guide", "base", joint="prismatic"),
+        Frame("platform", "guide"),
+        *(leg(f"leg{i}", k, d, clearance=c) for i, (k, d, c) in enumerate(legs, 1)),
+    ]
+    closures = tuple(("platform", f"leg{i}") for i in (1, 2, 3))
+    return home_posture(Robot("three legs", "platform", tuple(frames), closures))
+
+
+Y_AXIS = rotation_vector(np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]))
+
+
+def planar_platform(places, errors, k=1e6):
+    """A platform free along z and about y on legs at x = places."""
+    frames = [
+        Frame("guide", "base", joint="prismatic"),
+        Frame("turn", "guide", rotation=Y_AXIS, joint="revolute"),
+        Frame("platform", "turn", rotation=-Y_AXIS),
+    ]
+    closures = []
+    for i, (s, error) in enumerate(zip(places, errors, strict=True), 1):
+        frames += [
+            leg(f"leg{i}", k, error, s),
+            Frame(f"pin{i}", f"leg{i}", rotation=Y_AXIS, joint="revolute"),
+            Frame(f"end{i}", f"pin{i}", rotation=-Y_AXIS),
+            Frame(f"seat{i}", "platform", translation=[s, 0, 0]),
+        ]
+        closures.append((f"seat{i}", f"end{i}"))
+    return home_posture(Robot("planar", "platform", tuple(frames), tuple(closures)))
+
+
+def two_bars(gap):
+    """Two bars in one line between walls, together short of the distance."""
+    frames = (
+        Frame("bar1", "base", translation=[0, 0, 0.5], link=spring(1e6, 5)),
+        Frame("joint", "bar1", geometric_error=[0, 0, 0, 0, 0, -gap]),
+        Frame("bar2", "joint", translation=[0, 0, 0.5], link=spring(3e6, 5)),
+        Frame("wall", "base", translation=[0, 0, 1.0]),
+    )
+    return home_posture(Robot("two bars", "bar2", frames, (("wall", "bar2"),)))
+
+
+def portal():
+    """A portal of beams on a base beam, both without axial and shear strain."""
+
+    def bar(width, height, up):
+        area = {"area": 10.0, "I_z": width**3 * height / 12}
+        I_y = width * height**3 / 12
+        section = area | {"I_y": I_y, "J": 1e-6, "shear_y": 1.0, "shear_z": 1.0}
+        return BeamLink(section, 2.1e11, 0.3, theory="euler", up=up)
+
+    wide = bar(0.06, 0.03, (0.0, 0.0, 1.0))
+    thin = bar(0.03, 0.03, (0.0, 1.0, 0.0))
+    frames = (
+        Frame("x", "base", rotation=[0, np.pi / 2, 0], joint="prismatic"),
+        Frame("z", "x", rotation=[0, -np.pi / 2, 0], joint="prismatic"),
+        Frame("turn", "z", rotation=Y_AXIS, joint="revolute"),
+        Frame("foot1", "turn", rotation=-Y_AXIS),
+        Frame("foot2", "foot1", translation=[0.6, 0, 0], link=wide),
+        Frame("top1", "foot1", translation=[0, 0, 0.4], link=thin),
+        Frame("corner", "top1", translation=[0.6, 0, 0], link=thin),
+        Frame("top2", "foot2", translation=[0, 0, 0.4], link=thin),
+    )
+    return home_posture(Robot("portal", "top1", frames, (("corner", "top2"),)))
+
+
+def gough_points():
+    """Return the joints' centres of a Gough platform, base and platform, (6, 3)."""
+    low = np.radians([-10, 10, 110, 130, 230, 250])
+    high = np.radians([310, 50, 70, 170, 190, 290])
+    base = np.c_[0.5 * np.cos(low), 0.5 * np.sin(low), np.zeros(6)]
+    top = np.c_[0.25 * np.cos(high), 0.25 * np.sin(high), np.full(6, 0.5)]
+    return base, top

@@ -1,0 +1,384 @@
+"""Joints bolted at one pose: against cvxpy with kinematics written here.
+
+The robot is a four-bar on a stand with slotted holes; an error tilts one of its pins.
+"""
+
+from dataclasses import replace
+
+import cvxpy as cp
+import numpy as np
+import pytest
+
+from assembly.exchange.robot_files import load_robot
+from assembly.files.robot_file import write_robot
+from assembly.kinematics.posture import place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.model.error_distributions import read_sources, tolerance_sources
+from assembly.model.links import link_compliances
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.linear_response import linear_response
+from assembly.statistics.tolerance_file import read_plan
+from assembly.statistics.worst_pose import worst_pose
+from assembly.steps.bolted import bolt_joints, loose_over_poses
+from assembly.sweeps.robot_sweep import sweep
+from forcefit.inputs.table import BadInput
+from stiffness.screws import rotation_matrix
+
+STEEL = "link = { beam = { radius = 0.02 }, young = 2.1e11, poisson = 0.3 }"
+PIN = "clearance = { radial = 1e-5, axial = 1e-5, tilt = 1e-4 }"
+PIVOT = "joint_stiffness = [1e5, 1e5, 0, 1e8, 1e8, 1e8]"
+FOUR_BAR = f"""
+name = "bolted_four_bar"
+platform = "coupler"
+[[frame]]
+name = "crank"
+parent = "base"
+joint = "revolute"
+actuated = true
+position = 1.2
+joint_stiffness = [1e5, 1e5, 1e5, 1e8, 1e8, 1e8]
+[[frame]]
+name = "pin1"
+parent = "crank"
+translation = [0.2, 0, 0]
+joint = "revolute"
+position = -0.6752308876405433
+{PIN}
+{PIVOT}
+{STEEL}
+[[frame]]
+name = "coupler"
+parent = "pin1"
+translation = [0.5, 0, 0]
+{STEEL}
+[[frame]]
+name = "stand"
+parent = "base"
+translation = [0.6, 0.1, 0]
+clearance = {{ radial = 1e-3, axial = 1e-3, tilt = 1e-2, spin = 1e-2 }}
+LOCKED
+[[frame]]
+name = "pivot"
+parent = "stand"
+joint = "revolute"
+position = 1.8451052827279508
+{PIVOT}
+[[frame]]
+name = "pin2"
+parent = "pivot"
+translation = [0.35, 0, 0]
+joint = "revolute"
+position = -1.3203361703684942
+geometric_error = [5e-3, 0, 0, 0, 0, 0]
+{PIN}
+{PIVOT}
+{STEEL}
+[[frame]]
+name = "end"
+parent = "pin2"
+[[closure]]
+frames = ["coupler", "end"]
+"""
+ANGLES = (0.4, 0.8, 1.2, 1.6, 2.0)
+
+
+def four_bar(tmp_path, locked_at=""):
+    path = tmp_path / "four_bar.toml"
+    key = f"locked_at = {locked_at}" if locked_at else ""
+    path.write_text(FOUR_BAR.replace("LOCKED", key))
+    return path
+
+
+def at_angle(angle):
+    return f"{{ joints = {{ crank = {angle} }} }}"
+
+
+def energy_by_cvxpy(robot, posture, errors, locked=None):
+    """Return the least energy and the least clearance of the stand, by cvxpy.
+
+    Chains of finite transforms, screws carried to the base's origin; ``locked`` fixes
+    the stand's clearance.
+    """
+    at = {"base": np.eye(4)}
+    carried, signs = {}, {}
+    for frame, q in zip(robot.frames, posture.coordinates, strict=True):
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = rotation_matrix(frame.rotation), frame.translation
+        own = at[frame.parent] @ T
+        carried[frame.name] = own
+        turned = np.eye(4)
+        if frame.joint == "revolute":
+            turned[:3, :3] = rotation_matrix([0, 0, q])
+        at[frame.name] = own @ turned
+        signs[frame.name] = -1 if frame.name in ("stand", "pivot", "pin2", "end") else 1
+    total, energy, cones, stand = 0, 0, [], None
+    links = link_compliances(robot)
+    for i, frame in enumerate(robot.frames):
+        T = carried[frame.name]
+        p = T[:3, 3]
+        cross = np.array([[0, -p[2], p[1]], [p[2], 0, -p[0]], [-p[1], p[0], 0]])
+        A = np.zeros((6, 6))
+        A[:3, :3] = A[3:, 3:] = T[:3, :3]
+        A[3:, :3] = cross @ T[:3, :3]
+        moved = errors[i].copy()
+        if frame.link is not None:
+            y = cp.Variable(6)
+            moved = moved + np.linalg.cholesky(links[i]) @ y
+            energy += cp.sum_squares(y) / 2
+        if frame.joint_stiffness is not None:
+            K = np.diag(frame.joint_stiffness)
+            roots = np.zeros(6)
+            roots[K > 0] = 1 / np.sqrt(K[K > 0])
+            y = cp.Variable(6)
+            moved = moved + np.diag(roots) @ y
+            energy += cp.sum_squares(y) / 2
+        if frame.joint == "revolute" and not frame.actuated:
+            moved = moved + np.eye(6)[:, 2:3] @ cp.Variable(1)
+        bound = frame.clearance or (frame.locked_at and frame.locked_at.clearance)
+        if frame.name == "stand" and locked is not None:
+            moved = moved + locked
+        elif bound is not None:
+            u = cp.Variable(6)
+            sizes = [(slice(0, 2), bound.tilt), (slice(3, 5), bound.radial)]
+            sizes += [(slice(5, 6), bound.axial)]
+            sizes += [(slice(2, 3), bound.spin)] if bound.spin else []
+            for rows, size in sizes:
+                cones.append(cp.norm(u[rows] / size) <= 1)
+            if not bound.spin:
+                cones.append(u[2] == 0)
+            moved = moved + u
+            stand = u if frame.name == "stand" else stand
+        total = total + signs[frame.name] * (A @ moved)
+    scale = 1e3  # springs of sqrt(2 J) are small numbers
+    problem = cp.Problem(cp.Minimize(scale * energy), [total * scale == 0, *cones])
+    problem.solve(solver=cp.CLARABEL)
+    return problem.value / scale, None if stand is None else stand.value
+
+
+@pytest.mark.parametrize("angle", [0.4, 1.2, 2.0])
+def test_energy_over_the_stroke_is_that_of_the_stand_bolted_at_one_pose(
+    tmp_path, angle
+):
+    """The screw locked in is compared through the energies that it causes."""
+    robot = load_robot(four_bar(tmp_path, at_angle(angle)))
+    errors, screw = robot.declared_errors, robot.frame("stand").locked_at.screw
+    assert errors[robot.index("pin2"), 0] == 5e-3
+    there = place_robot(robot, joints={"crank": angle})
+    least, _ = energy_by_cvxpy(robot, there, errors)
+    own = solve_assembly(there).energy
+    assert own == pytest.approx(least, abs=2e-6)
+    assert energy_by_cvxpy(robot, there, errors, screw)[0] == pytest.approx(
+        least, abs=2e-6
+    )
+    for other in ANGLES:
+        posture = place_robot(robot, joints={"crank": other})
+        expected, _ = energy_by_cvxpy(robot, posture, errors, screw)
+        assert solve_assembly(posture).energy == pytest.approx(expected, abs=2e-6)
+
+
+def test_bolting_multiplies_the_energy_over_the_stroke(tmp_path):
+    """Loose, the slots give way at every pose; bolted they do at one of them."""
+    loose = load_robot(four_bar(tmp_path))
+    energies = {}
+    for name in ("loose", 0.4, 1.2, 2.0):
+        key = at_angle(name) if name != "loose" else ""
+        robot = loose if not key else load_robot(four_bar(tmp_path, key))
+        energies[name] = max(
+            solve_assembly(place_robot(robot, joints={"crank": a})).energy
+            for a in ANGLES
+        )
+    assert energies["loose"] < 1e-6
+    assert min(energies[a] for a in (0.4, 1.2, 2.0)) > 0.02
+
+
+def test_statistics_bolt_every_drawn_machine_with_its_own_errors(tmp_path):
+    robot = load_robot(four_bar(tmp_path, at_angle(0.4)))
+    sources = tolerance_sources(robot, np.array([1e-3] * 3 + [1e-4] * 3), ("pin2",))
+    posture = place_robot(robot, joints={"crank": 2.0})
+    experiment = Experiment(posture, sources, 7, "least", margins=False, stress=False)
+    rows = experiment.solve(0, 6)
+    errors = sources.errors(sources.draw(0, 6, 7))
+    for row, own in zip(rows, errors, strict=True):
+        machine = bolt_joints(robot.with_errors(own))
+        alone = solve_assembly(replace(posture, robot=machine)).energy
+        assert row["energy"] == pytest.approx(alone, rel=1e-6, abs=1e-12)
+        assert np.any(machine.frame("stand").locked_at.screw)
+
+
+def test_sweep_has_the_energies_of_the_bolted_robot(tmp_path):
+    path = four_bar(tmp_path, at_angle(1.2))
+    robot = load_robot(path)
+    data = sweep(path, grid="q.crank=0.4:2.0:0.4", assumption="none")
+    expected = [
+        solve_assembly(place_robot(robot, joints={"crank": a})).energy for a in ANGLES
+    ]
+    energies = np.asarray(data["energy"]).ravel()
+    assert energies == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_sweep_bolts_every_draw_with_its_own_errors(tmp_path):
+    path = four_bar(tmp_path, at_angle(0.4))
+    errors = tmp_path / "errors.toml"
+    errors.write_text('[[errors]]\nframes = ["pin2"]\nmost = [5e-3, 0, 0, 0, 0, 0]\n')
+    data = sweep(
+        path, grid="q.crank=0.8:2.0:0.4", errors=errors, draws=5, assumption="none"
+    )
+    robot = load_robot(path)
+    sources = read_sources(errors, robot)
+    for i, own in enumerate(sources.errors(sources.draw(0, 5, 1))):
+        machine = bolt_joints(robot.with_errors(own))
+        alone = [
+            solve_assembly(place_robot(machine, joints={"crank": a})).energy
+            for a in ANGLES[1:]
+        ]
+        energies = np.asarray(data["energy"].isel(draw=i)).ravel()
+        assert energies == pytest.approx(alone, rel=1e-6, abs=1e-12)
+
+
+def test_sweep_bolts_every_design(tmp_path):
+    path = four_bar(tmp_path, at_angle(0.4))
+    data = sweep(
+        path, grid="q.crank=2.0", assumption="none",
+        vary=["pin2.link.beam.radius=0.01,0.02"],
+    )  # fmt: skip
+    energies = np.asarray(data["energy"]).ravel()
+    robot = load_robot(path)
+    own = solve_assembly(place_robot(robot, joints={"crank": 2.0})).energy
+    assert energies[1] == pytest.approx(own, rel=1e-9)
+    assert 0 < energies[0] < energies[1]
+
+
+def test_robot_with_a_bolted_joint_is_written_as_it_was_read(tmp_path):
+    robot = load_robot(four_bar(tmp_path, at_angle(0.4)))
+    write_robot(robot, tmp_path / "again.toml")
+    again = load_robot(tmp_path / "again.toml")
+    assert again.errors == pytest.approx(robot.errors, abs=1e-15)
+    bolt = again.frame("stand").locked_at
+    assert bolt.joints == {"crank": 0.4}
+    assert bolt.clearance == robot.frame("stand").locked_at.clearance
+
+
+@pytest.mark.parametrize(
+    ("key", "text"),
+    [
+        ('"here"', 'expected "home", {'),
+        ("{ joints = { crnak = 1.0 } }", "crnak"),
+        ("{ joints = {} }", "found no coordinate"),
+        ("{ pose = { tx = 5.0 } }", "locked_at"),
+    ],
+)
+def test_bad_pose_of_a_bolt_is_one_line(tmp_path, key, text):
+    with pytest.raises(BadInput) as caught:
+        load_robot(four_bar(tmp_path, key))
+    assert text in str(caught.value)
+    assert "locked_at" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_bolt_of_a_joint_without_clearance_is_refused(tmp_path):
+    path = tmp_path / "robot.toml"
+    text = FOUR_BAR.replace("LOCKED", "").replace(
+        'name = "end"', 'name = "end"\nlocked_at = "home"'
+    )
+    path.write_text(text)
+    with pytest.raises(BadInput, match="a fixed joint without clearance"):
+        load_robot(path)
+
+
+def test_remark_names_fixed_joints_that_are_loose_at_every_pose(tmp_path):
+    assert '"stand"' in loose_over_poses(load_robot(four_bar(tmp_path)))[0]
+    assert loose_over_poses(load_robot(four_bar(tmp_path, at_angle(0.4)))) == []
+
+
+def test_tolerances_of_a_bolted_robot_are_refused_in_one_line(tmp_path):
+    robot = load_robot(four_bar(tmp_path, at_angle(0.4)))
+    plan = tmp_path / "plan.toml"
+    plan.write_text('cost = "inverse"\n')
+    with pytest.raises(BadInput, match="bolted at a pose"):
+        read_plan(plan, robot)
+
+
+DRAWN = """
+format = 2
+platform = "tool"
+platform_at = [0.2, 0, 0]
+[[body]]
+name = "stand"
+[[body]]
+name = "tool"
+[[joint]]
+name = "slot"
+type = "fixed"
+between = ["base", "stand"]
+at = [0, 0, 0]
+clearance = { radial = 1e-3 }
+locked_at = "home"
+[[joint]]
+name = "pivot"
+type = "revolute"
+between = ["stand", "tool"]
+at = [0.1, 0, 0]
+axis = [0, 0, 1]
+actuated = true
+"""
+
+
+def test_fixed_joint_of_a_drawn_robot_is_bolted_at_its_pose(tmp_path):
+    path = tmp_path / "drawn.toml"
+    path.write_text(DRAWN)
+    frame = load_robot(path).frame("slot")
+    assert frame.clearance is None
+    assert frame.locked_at.clearance.radial == 1e-3
+
+
+def test_moving_joint_of_a_drawn_robot_is_not_bolted(tmp_path):
+    path = tmp_path / "drawn.toml"
+    path.write_text(DRAWN.replace("actuated = true", 'locked_at = "home"'))
+    with pytest.raises(BadInput, match="found a joint that moves"):
+        load_robot(path)
+
+
+def test_sweep_notes_a_joint_that_is_loose_at_every_pose(tmp_path, run):
+    words = ("--grid", "q.crank=0.4", "--assumption", "none", "-o", tmp_path / "a.nc")
+    _, _, loose = run("assembly", "sweep", four_bar(tmp_path), *words)
+    assert 'note: bolted_four_bar: the clearance of the fixed joint "stand"' in loose
+    _, _, bolted = run(
+        "assembly", "sweep", four_bar(tmp_path, at_angle(0.4)), *words[:-1],
+        tmp_path / "b.nc",
+    )  # fmt: skip
+    assert "fixed joint" not in bolted
+
+
+def test_solve_notes_where_a_joint_is_bolted(tmp_path, run):
+    path = four_bar(tmp_path, at_angle(0.4))
+    status, out, _ = run("assembly", "solve", path, "--joint", "crank=2.0")
+    assert status == 0
+    assert out.count('joint "stand" is bolted at') == 1
+
+
+def test_conversion_to_bodies_and_joints_keeps_the_bolt(tmp_path, run):
+    path, drawn = four_bar(tmp_path, at_angle(0.4)), tmp_path / "bodies.toml"
+    status, _, err = run("convert", path, "--format", "2", "-o", drawn)
+    assert status == 0, err
+    energies = [
+        solve_assembly(place_robot(load_robot(p), joints={"crank": 2.0})).energy
+        for p in (path, drawn)
+    ]
+    assert energies[1] == pytest.approx(energies[0], rel=1e-6)
+
+
+def test_conversion_of_a_bolt_at_a_rotation_of_the_platform_is_refused(tmp_path, run):
+    path = four_bar(tmp_path, "{ pose = { rz = 0.5 } }")
+    drawn = tmp_path / "bodies.toml"
+    status, _, err = run("convert", path, "--format", "2", "-o", drawn)
+    assert status == 2
+    assert "locked_at: found a rotation of the platform" in err
+    assert not drawn.exists()
+
+
+def test_worst_case_of_a_bolted_robot_is_refused(tmp_path):
+    robot = load_robot(four_bar(tmp_path, at_angle(0.4)))
+    sources = tolerance_sources(robot, np.full(6, 1e-4), ("pin2",))
+    prepared = linear_response(place_robot(robot, joints={"crank": 2.0}))
+    with pytest.raises(BadInput, match="bolted at a pose"):
+        worst_pose(prepared, sources, "translation")

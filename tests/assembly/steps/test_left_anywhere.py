@@ -1,0 +1,183 @@
+"""Random positions in which joints are bolted: against distributions known by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from assembly.exchange.robot_files import load_robot
+from assembly.files.robot_file import write_robot
+from assembly.kinematics.posture import place_robot
+from assembly.model.error_distributions import read_sources, tolerance_sources
+from assembly.model.robot import Clearance, Frame, LockedAt, Robot
+from assembly.statistics.experiment import Experiment
+from assembly.steps.bolted import bolt_generators, bolt_joints, bolted_errors
+from assembly.sweeps.robot_sweep import sweep
+from forcefit.inputs.table import BadInput
+from tests.assembly.steps.robots_for_steps import spring
+from tests.assembly.steps.test_bolted import four_bar
+
+COUNT = 2000
+UNIFORM = {"left": "uniform"}
+
+
+def pin(name, radius, error, **more):
+    """Return a rigid leg on a bolted pin of a disc, and its end."""
+    bolt = LockedAt(Clearance(**radius), **more)
+    return (
+        Frame(name, "base", geometric_error=error, locked_at=bolt),
+        Frame(f"{name}.end", name),
+    )
+
+
+def bolted(robot, count=COUNT, seed=3):
+    """Return the screws locked in of many machines without other errors."""
+    errors = np.repeat(robot.errors[None], count, axis=0)
+    rngs = bolt_generators(robot, seed, range(count))
+    return bolted_errors(robot, errors, rngs) - errors
+
+
+def platform_of_two_pins(radius, distance):
+    """A platform free along x and y on two pins that are apart by an error along x."""
+    frames = [
+        Frame("y", "base", rotation=[-np.pi / 2, 0, 0], joint="prismatic"),
+        Frame("back", "y", rotation=[np.pi / 2, 0, 0]),
+        Frame("x", "back", rotation=[0, np.pi / 2, 0], joint="prismatic"),
+        Frame("platform", "x", rotation=[0, -np.pi / 2, 0]),
+    ]
+    frames += pin("left", radius, [0, 0, 0, 0, 0, 0], **UNIFORM)
+    frames += pin("right", radius, [0, 0, 0, distance, 0, 0], **UNIFORM)
+    closures = (("platform", "left.end"), ("platform", "right.end"))
+    return Robot("two pins", "platform", tuple(frames), closures)
+
+
+def test_disc_of_an_open_slot_is_filled_evenly():
+    """The squared radius of a uniform disc is uniform; so is the axial clearance."""
+    frames = pin("slot", {"radial": 1e-3, "axial": 2e-4}, np.zeros(6), **UNIFORM)
+    screws = bolted(Robot("slot", "slot.end", frames, ()))[:, 0]
+    squares = (screws[:, 3] ** 2 + screws[:, 4] ** 2) / 1e-6
+    assert stats.kstest(squares, "uniform").pvalue > 1e-3
+    assert stats.kstest(screws[:, 5] / 4e-4 + 0.5, "uniform").pvalue > 1e-3
+    assert not screws[:, :3].any()
+
+
+def test_platform_between_two_pins_is_left_anywhere_that_both_allow():
+    """0 +- 20 um and 30 +- 20 um: the platform is uniform in [10, 20] um."""
+    frames = [Frame("guide", "base", joint="prismatic"), Frame("platform", "guide")]
+    for name, error in (("left", 0.0), ("right", 30e-6)):
+        axial = {"axial": 20e-6}
+        frames += pin(name, axial, [0, 0, 0, 0, 0, error], **UNIFORM)
+    closures = (("platform", "left.end"), ("platform", "right.end"))
+    screws = bolted(Robot("pins", "platform", tuple(frames), closures))
+    left, right = screws[:, 2, 5], screws[:, 4, 5]
+    assert left - right == pytest.approx(np.full(COUNT, 30e-6), rel=1e-9)
+    assert stats.kstest(left / 10e-6 - 1, "uniform").pvalue > 1e-3
+
+
+def test_two_round_pins_leave_the_platform_anywhere_in_the_lens(rng):
+    """Uniform in the lens of two discs, drawn here by rejection."""
+    robot = platform_of_two_pins({"radial": 1e-4}, 1e-4)
+    left = bolted(robot)[:, 4, 3:5] / 1e-4
+    points = rng.uniform(-1, 1, (40_000, 2))
+    shifted = points - [1, 0]
+    inside = (points**2).sum(axis=1) <= 1
+    inside &= (shifted**2).sum(axis=1) <= 1
+    for axis in (0, 1):
+        found = stats.ks_2samp(left[:, axis], points[inside, axis])
+        assert found.pvalue > 1e-3
+
+
+def test_pins_that_must_be_forced_are_left_where_the_energy_is_least():
+    """A single position closes: apart by two radii, both pins touch."""
+    robot = platform_of_two_pins({"radial": 1e-4}, 2e-4)
+    screws = bolted(robot, 20)
+    assert screws[:, 4, 3] == pytest.approx(np.full(20, 1e-4), rel=1e-5)
+    assert screws[:, 4, 4] == pytest.approx(np.zeros(20), abs=1e-6)
+
+
+def test_pin_pressed_to_its_bound_leaves_the_other_clearance_anywhere():
+    """Apart by 50 um with +- 20 um, both pins press a leg; its slot across is free."""
+    frames = [Frame("guide", "base", joint="prismatic"), Frame("platform", "guide")]
+    frames += pin("left", {"axial": 20e-6}, np.zeros(6), **UNIFORM)
+    frames += pin("right", {"axial": 20e-6}, [0, 0, 0, 0, 0, 50e-6], **UNIFORM)
+    frames[4] = replace(frames[4], link=spring(1e6, 5))
+    slot, end = pin("slot", {"radial": 1e-3}, np.zeros(6), **UNIFORM)
+    closures = (("platform", "left.end"), ("platform", "right.end"))
+    robot = Robot("pressed", "platform", (*frames, slot, end), closures)
+    screws = bolted(robot, 400)
+    assert screws[:, 2, 5] == pytest.approx(np.full(400, 20e-6), rel=1e-5)
+    assert screws[:, 4, 5] == pytest.approx(np.full(400, -20e-6), rel=1e-5)
+    squares = (screws[:, 6, 3:5] ** 2).sum(axis=1) / 1e-6
+    assert stats.kstest(squares, "uniform").pvalue > 1e-3
+
+
+def experiment_of(robot):
+    sources = tolerance_sources(robot, np.array([1e-3] * 3 + [1e-4] * 3), ("pin2",))
+    posture = place_robot(robot, joints={"crank": 2.0})
+    return Experiment(posture, sources, 7, "least", margins=False, stress=False)
+
+
+def test_draw_has_the_same_position_whatever_else_is_drawn(tmp_path):
+    key = '{ joints = { crank = 0.4 }, left = "uniform" }'
+    robot = load_robot(four_bar(tmp_path, key))
+    experiment = experiment_of(robot)
+    rows, alone = experiment.solve(0, 6), experiment.solve(4, 1)
+    assert rows["energy"][4] == pytest.approx(alone["energy"][0], rel=1e-6)
+    least = experiment_of(
+        load_robot(four_bar(tmp_path, "{ joints = { crank = 0.4 } }"))
+    )
+    assert not np.allclose(rows["energy"], least.solve(0, 6)["energy"], rtol=1e-3)
+
+
+def test_position_left_anywhere_needs_no_more_energy_where_it_is_bolted(tmp_path):
+    """The walk keeps the strains at the pose of the bolt."""
+    key = '{ joints = { crank = 0.4 }, left = "uniform" }'
+    robot = load_robot(four_bar(tmp_path, key))
+    experiment = experiment_of(robot)
+    there = replace(
+        experiment, posture=place_robot(robot, joints={"crank": 0.4})
+    ).solve(0, 8)
+    loose = load_robot(four_bar(tmp_path))
+    least = replace(
+        experiment_of(loose), posture=place_robot(loose, joints={"crank": 0.4})
+    ).solve(0, 8)
+    assert there["energy"] == pytest.approx(least["energy"], rel=1e-5, abs=1e-9)
+
+
+def test_sweep_and_statistics_leave_a_draw_at_the_same_position(tmp_path):
+    key = '{ joints = { crank = 0.4 }, left = "uniform" }'
+    path = four_bar(tmp_path, key)
+    errors = tmp_path / "errors.toml"
+    errors.write_text('[[errors]]\nframes = ["pin2"]\nmost = [5e-3, 0, 0, 0, 0, 0]\n')
+    data = sweep(
+        path, grid="q.crank=2.0", errors=errors, draws=3, seed=7, assumption="none"
+    )
+    robot = load_robot(path)
+    own = replace(experiment_of(robot), sources=read_sources(errors, robot))
+    energies = np.asarray(data["energy"]).ravel()
+    assert energies == pytest.approx(own.solve(0, 3)["energy"], rel=1e-6, abs=1e-12)
+
+
+def test_rule_of_a_bolt_is_written_as_it_was_read(tmp_path):
+    robot = load_robot(four_bar(tmp_path, '{ left = "uniform" }'))
+    write_robot(robot, tmp_path / "again.toml")
+    bolt = load_robot(tmp_path / "again.toml").frame("stand").locked_at
+    assert bolt.left == "uniform"
+    assert not bolt.pose
+    assert not bolt.joints
+
+
+@pytest.mark.parametrize("key", ['{ left = "normal" }', "{ left = 3 }"])
+def test_unknown_rule_of_a_bolt_is_refused_in_one_line(tmp_path, key):
+    with pytest.raises(BadInput) as caught:
+        load_robot(four_bar(tmp_path, key))
+    assert "locked_at.left: found" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_robot_that_is_not_drawn_is_bolted_at_the_least_sum_of_squares():
+    frames = pin("slot", {"radial": 1e-3}, np.zeros(6), **UNIFORM)
+    robot = bolt_joints(Robot("slot", "slot.end", frames, ()))
+    assert not robot.frame("slot").locked_at.screw.any()
+    assert robot.remarks[-1].endswith("drawn machines anywhere at least energy")

@@ -1,0 +1,609 @@
+"""Worked cases of the order of assembly, each built as a robot.
+
+The expected numbers are those of springs in one direction, by hand (see each test); a
+platform on three legs stands at x = sum k d / sum k.
+"""
+
+from dataclasses import replace
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.linear.energy import solve_assembly
+from assembly.linear.reference.reduction import FreeMotion
+from assembly.model.placed_frames import place_frames
+from assembly.model.robot import Clearance, Frame, Robot
+from assembly.robots import load_robot
+from assembly.robots.placing import at, ball_joint, cardan_joint
+from assembly.steps.plan import Adjust, Fix, Join, Measure, Plan, Preload, Release
+from assembly.steps.run import assemble_in_steps
+from forcefit.inputs.table import BadInput
+from stiffness.screws import SCREW
+from tests.assembly.steps.robots_for_steps import (
+    gough_points,
+    planar_platform,
+    portal,
+    spring,
+    three_legs,
+    two_bars,
+)
+
+LEG = {i: ("platform", f"leg{i}") for i in (1, 2, 3)}
+Z = ("TZ",)
+
+
+def join_leg(i, **more):
+    return Join(f"join {i}", LEG[i], **more)
+
+
+def test_two_bars_and_a_gap_store_and_lose_what_the_springs_say():
+    """F = g k1 k2 / (k1 + k2), E = F g / 2; a wall removed loses all of it."""
+    bolt = Join("bolt", ("wall", "bar2"))
+    plan = Plan((bolt, Release("wall removed", ("bolt",))))
+    closed, released = assemble_in_steps(plan, two_bars(2e-4))
+    assert closed.closing_force == pytest.approx(150.0)
+    assert closed.energy == pytest.approx(15e-3)
+    assert closed.work == pytest.approx(15e-3)
+    assert abs(closed.opening[0, 5]) == pytest.approx(2e-4)
+    assert released.energy == pytest.approx(0.0, abs=1e-15)
+    assert released.lost == pytest.approx(15e-3)
+    assert abs(released.spring_back[0, 5]) == pytest.approx(2e-4)
+
+
+def test_a_bolt_of_limited_force_leaves_the_opening_that_the_springs_say():
+    """90 N of 150 N close 120 um of 200 um: 80 um open, E = 0.36 * 15 mJ."""
+    bolt = Join("bolt", ("wall", "bar2"), force_limit=90.0, leave_open=True)
+    (closed,) = assemble_in_steps(Plan((bolt,)), two_bars(2e-4))
+    assert closed.exceeded.all()
+    assert closed.closing_force == pytest.approx(90.0)
+    assert abs(closed.left_open[0, 5]) == pytest.approx(8e-5)
+    assert closed.energy == pytest.approx(5.4e-3)
+
+
+def test_a_force_limit_without_leave_open_is_reported_only():
+    bolt = Join("bolt", ("wall", "bar2"), force_limit=90.0)
+    (closed,) = assemble_in_steps(Plan((bolt,)), two_bars(2e-4))
+    assert closed.exceeded.all()
+    assert closed.closing_force == pytest.approx(150.0)
+
+
+@pytest.mark.parametrize("order", list(permutations((1, 2, 3))))
+def test_pinned_legs_end_in_the_same_state_in_every_order(order):
+    """x = sum k d / sum k = 23.33 um, E = 2.967 mJ, forces k (x - d)."""
+    last = assemble_in_steps(Plan(tuple(join_leg(i) for i in order)), three_legs())[-1]
+    assert last.platform_screw[0, 5] == pytest.approx(140 / 6 * 1e-6)
+    assert last.energy == pytest.approx(2.966667e-3, rel=1e-6)
+    forces = [abs(last.wrenches[f"join {i}"][0, 5]) for i in (1, 2, 3)]
+    assert forces == pytest.approx([6.666667, 86.666667, 80.0], rel=1e-6)
+
+
+def test_each_pinned_leg_needs_the_closing_force_of_the_springs_so_far():
+    results = assemble_in_steps(
+        Plan(tuple(join_leg(i) for i in (1, 2, 3))), three_legs()
+    )
+    x = [r.platform_screw[0, 5] for r in results]
+    assert x == pytest.approx([30e-6, -10e-6 / 3, 70e-6 / 3])
+    energies = [r.energy[0] for r in results]
+    assert energies == pytest.approx([0.0, 0.8333333e-3, 2.966667e-3], rel=1e-6)
+    last = results[-1]
+    assert abs(last.opening[0, 5]) == pytest.approx(53.33333e-6)
+    assert last.closing_force == pytest.approx(80.0)
+    assert last.work == pytest.approx(2.133333e-3, rel=1e-6)
+
+
+def test_pinned_while_clamped_then_released_leaves_the_same_state():
+    clamp = Fix("clamp", "platform", {"TZ": 10e-6})
+    joins = tuple(join_leg(i) for i in (1, 2, 3))
+    results = assemble_in_steps(
+        Plan((clamp, *joins, Release("free", ("clamp",)))), three_legs()
+    )
+    assert results[3].platform_screw[0, 5] == pytest.approx(10e-6)
+    assert results[4].platform_screw[0, 5] == pytest.approx(140 / 6 * 1e-6)
+    assert results[4].energy == pytest.approx(2.966667e-3, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("last", "x", "energy"),
+    [(1, 22.0e-6, 2.94e-3), (2, 45.0e-6, 0.15e-3), (3, -10e-6 / 3, 0.8333333e-3)],
+)
+def test_last_leg_bolted_as_it_lies_leaves_the_pose_of_the_two_others(last, x, energy):
+    first = [i for i in (1, 2, 3) if i != last]
+    steps = (*(join_leg(i) for i in first), join_leg(last, locked=Z))
+    result = assemble_in_steps(Plan(steps), three_legs())[-1]
+    assert result.platform_screw[0, 5] == pytest.approx(x)
+    assert result.energy == pytest.approx(energy, rel=1e-6)
+    assert result.closing_force == pytest.approx(0.0, abs=1e-9)
+
+
+def test_leg_bolted_while_the_platform_is_clamped_springs_back_by_its_share():
+    """Leg 3 is free of force at 10 um: x = (k1 d1 + k2 d2 + k3 10) / sum k."""
+    steps = (
+        join_leg(1), join_leg(2), Fix("clamp", "platform", {"TZ": 10e-6}),
+        join_leg(3, locked=Z), Release("free", ("clamp",)),
+    )  # fmt: skip
+    result = assemble_in_steps(Plan(steps), three_legs())[-1]
+    assert result.platform_screw[0, 5] == pytest.approx(10e-6 / 3)
+    forces = [abs(result.wrenches[f"join {i}"][0, 5]) for i in (1, 2, 3)]
+    assert forces == pytest.approx([26.66667, 46.66667, 20.0], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("place", "order", "z", "turn", "energy"),
+    [
+        (0.3, (3, 4), 18.46154e-6, -30.76923e-6, 0.4923077e-3),
+        (0.3, (4, 3), 18.0e-6, -40.0e-6, 0.52e-3),
+    ],
+)
+def test_slot_before_the_pin_differs_where_the_pin_moves_the_slot(
+    place, order, z, turn, energy
+):
+    """Legs at 0 and 0.4 m, 40 um pinned at 0.1 m, a slot at 0.3 m; read at 0 m."""
+    posture = planar_platform([0.0, 0.4, 0.1, place], [0, 0, 40e-6, 0])
+    ways = {3: (), 4: Z}
+    steps = tuple(
+        Join(f"join {i}", (f"seat{i}", f"end{i}"), locked=ways.get(i, ()))
+        for i in (1, 2, *order)
+    )
+    result = assemble_in_steps(Plan(steps), posture)[-1]
+    slope = -result.platform_screw[0, 1]  # +RY lowers positive x
+    assert slope == pytest.approx(turn)
+    assert result.energy == pytest.approx(energy, rel=1e-6)
+    assert result.platform_screw[0, 5] == pytest.approx(z)
+
+
+def test_slot_where_the_pin_does_not_move_it_ends_alike_in_both_orders():
+    """A pin at 0.1 m on legs at 0 and 0.4 m does not lift the platform at 0.6 m."""
+    posture = planar_platform([0.0, 0.4, 0.1, 0.6], [0, 0, 40e-6, 0])
+    ends = []
+    for order in ((3, 4), (4, 3)):
+        steps = tuple(
+            Join(f"{i}", (f"seat{i}", f"end{i}"), locked=Z if i == 4 else ())
+            for i in (1, 2, *order)
+        )
+        ends.append(assemble_in_steps(Plan(steps), posture)[-1])
+    assert ends[0].platform_screw == pytest.approx(ends[1].platform_screw, abs=1e-16)
+    assert ends[0].energy == pytest.approx(ends[1].energy)
+
+
+def test_portal_welded_to_a_bent_base_keeps_its_share_of_the_rotation():
+    """k_base = 2 EI / L and the portal's own stiffness against turned feet."""
+    E = 2.1e11
+    I_b, I_c = 0.06 * 0.03**3 / 12, 0.03**4 / 12
+    h, L = 0.4, 0.6
+    k_b = 2 * E * I_b / L
+    inner = (2 * I_c / h) / (4 * I_c / h + 2 * I_c / L)
+    k_p = (2 * E * I_c / h) * (2 - inner)
+    kept = 1e-3 * k_p / (k_b + k_p)
+    bent = {"TX": 0.0, "TZ": 0.0, "RY": 1e-3}
+    steps = (
+        Fix("clamp 1", "foot1", bent), Fix("clamp 2", "foot2", {"RY": -1e-3}),
+        Join("weld", ("corner", "top2"), locked=("RX", "RY", "RZ", "TX", "TY", "TZ")),
+        Release("free", ("clamp 1", "clamp 2")),
+        Measure("foot 1", "foot1", ("RY",)), Measure("foot 2", "foot2", ("RY",)),
+    )  # fmt: skip
+    results = assemble_in_steps(Plan(steps), portal())
+    assert results[1].energy == pytest.approx(k_b * 1e-3**2, rel=1e-6)
+    assert results[2].work == pytest.approx(0.0, abs=1e-12)
+    turn = results[4].reading - results[5].reading
+    assert turn[0, 0] == pytest.approx(2 * kept, rel=1e-5)
+    assert results[3].energy == pytest.approx(k_b * 1e-3 * kept, rel=1e-5)
+
+
+def test_work_of_all_steps_is_the_final_energy_and_the_losses():
+    steps = (
+        join_leg(1), join_leg(2), Fix("clamp", "platform", {"TZ": 10e-6}),
+        Preload("press", "platform", np.array([0, 0, 0, 0, 0, -30.0])),
+        join_leg(3, locked=Z), Release("free", ("clamp",)), Release("end", ("press",)),
+    )  # fmt: skip
+    results = assemble_in_steps(Plan(steps), three_legs())
+    work = sum(r.work + r.load_work for r in results)
+    lost = sum(r.lost for r in results)
+    assert work == pytest.approx(results[-1].energy + lost, rel=1e-9)
+    assert lost > 0
+    for result in results:
+        assert np.abs(result.balance).max() < 1e-12 * 0.01 + 1e-15
+
+
+def legs_with_pins(places, bounds, k=(None, None, 2e6)):
+    """Legs on the platform of a guide: pins are rigid, other legs elastic."""
+    frames = [Frame("guide", "base", joint="prismatic"), Frame("platform", "guide")]
+    for i, (d, bound, stiffness) in enumerate(zip(places, bounds, k, strict=False), 1):
+        frames.append(
+            Frame(
+                f"leg{i}",
+                "base",
+                geometric_error=[0, 0, 0, 0, 0, d],
+                clearance=None if bound is None else Clearance(axial=bound),
+                link=None if stiffness is None else spring(stiffness, 5),
+            )  # fmt: skip
+        )
+    closures = tuple(("platform", f"leg{i + 1}") for i in range(len(places)))
+    return home_posture(Robot("pins", "platform", tuple(frames), closures))
+
+
+@pytest.mark.parametrize("order", [(1, 2), (2, 1)])
+def test_two_pins_with_clearance_leave_the_platform_where_both_reach(order):
+    """0 +- 20 um and 30 +- 20 um: the platform lies in [10, 20] um."""
+    posture = legs_with_pins((0.0, 30e-6), (20e-6, 20e-6))
+    results = assemble_in_steps(Plan(tuple(join_leg(i) for i in order)), posture)
+    z = results[-1].platform_screw[0, 5]
+    assert 10e-6 - 1e-12 < z < 20e-6 + 1e-12
+    assert results[-1].energy == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("at", "force"), [(-20e-6, 60.0), (0.0, 20.0), (10e-6, 0.0), (15e-6, 0.0)]
+)
+def test_slot_bolted_after_one_pin_costs_what_its_place_in_the_clearance_says(
+    at, force
+):
+    """Pin 2 then forces the platform to 10 um against a leg of 2e6 N/m at x3."""
+    posture = legs_with_pins((0.0, 30e-6, 0.0), (20e-6, 20e-6, None))
+    steps = (
+        join_leg(1), Fix("clamp", "platform", {"TZ": at}), join_leg(3, locked=Z),
+        Release("free", ("clamp",)), join_leg(2),
+    )  # fmt: skip
+    last = assemble_in_steps(Plan(steps), posture)[-1]
+    assert abs(last.wrenches["join 3"][0, 5]) == pytest.approx(force, abs=1e-3)
+    assert last.energy == pytest.approx(force**2 / 4e6, abs=1e-7)
+
+
+def test_a_load_seats_the_clearance_in_which_the_slot_is_bolted():
+    """A weight presses the platform to -20 um of pin 1: pin 2 then needs 60 N."""
+    posture = legs_with_pins((0.0, 30e-6, 0.0), (20e-6, 20e-6, None))
+    down = np.array([0, 0, 0, 0, 0, -5.0])
+    steps = (
+        join_leg(1), Preload("weight", "platform", down), join_leg(3, locked=Z),
+        Release("no weight", ("weight",)), join_leg(2),
+    )  # fmt: skip
+    results = assemble_in_steps(Plan(steps), posture)
+    assert results[2].platform_screw[0, 5] == pytest.approx(-20e-6, rel=1e-6)
+    force = abs(results[-1].wrenches["join 3"][0, 5])
+    assert force == pytest.approx(60.0, rel=1e-6)
+
+
+def test_a_joint_with_clearance_that_is_bolted_keeps_its_place():
+    """Pin 1 bolted at -20 um acts as a rigid pin there."""
+    posture = legs_with_pins((0.0, 30e-6), (20e-6, None), k=(1e6, None))
+    down = np.array([0, 0, 0, 0, 0, -5.0])
+    steps = (
+        join_leg(1), Preload("weight", "platform", down), Join("bolt", "leg1"),
+        Release("no weight", ("weight",)), join_leg(2),
+    )  # fmt: skip
+    last = assemble_in_steps(Plan(steps), posture)[-1]
+    # the leg's end rests 20 um below, so pin 2 lifts it by 50 um
+    assert abs(last.wrenches["join 1"][0, 5]) == pytest.approx(50.0, rel=1e-6)
+
+
+def gough(errors, seventh=False):
+    """Legs of a Gough platform on a body with six freedoms: 5e6 N/m each."""
+    base, top = gough_points()
+    if seventh:
+        base, top = np.vstack([base, SEVENTH[0]]), np.vstack([top, SEVENTH[1]])
+    placed = [
+        (Frame("y", "base", joint="prismatic"), at([0, 0, 0.5], [0, 1, 0])),
+        (Frame("x", "y", joint="prismatic"), at([0, 0, 0.5], [1, 0, 0], [0, 1, 0])),
+        (Frame("z", "x", joint="prismatic"), at([0, 0, 0.5])),
+        *ball_joint("turn", "z", np.array([0, 0, 0.5]), X, Y),
+        (Frame("platform", "turn_3"), at([0, 0, 0.5])),
+    ]
+    closures = []
+    for i, (a, b) in enumerate(zip(base, top, strict=True), 1):
+        along = (b - a) / np.linalg.norm(b - a)
+        first = np.cross([0.0, 0.0, 1.0], along)
+        second = np.cross(along, first)
+        axial = at(b, along, first)
+        length = Frame(
+            f"leg{i}", f"foot{i}_2", link=spring(5e6, 5),
+            geometric_error=[0, 0, 0, 0, 0, errors[i - 1]],
+        )  # fmt: skip
+        placed += [
+            *cardan_joint(f"foot{i}", "base", a, first, second),
+            (length, axial),
+            *ball_joint(f"head{i}", f"leg{i}", b, first, second),
+            (Frame(f"end{i}", f"head{i}_3"), axial),
+            (Frame(f"seat{i}", "platform"), axial),
+        ]
+        closures.append((f"seat{i}", f"end{i}"))
+    frames = place_frames(placed)
+    return home_posture(Robot("gough", "platform", frames, tuple(closures)))
+
+
+X, Y = np.array([1.0, 0, 0]), np.array([0, 1.0, 0])
+SEVENTH = ([0.0, 0.0, 0.0], [0.1, 0.0, 0.5])
+LENGTHS = np.array([40, -25, 10, -35, 20, 30]) * 1e-6
+
+
+def inverse_jacobian():
+    """Return the map from lengths to the platform's screw, from Pluecker lines."""
+    base, top = gough_points()
+    along = (top - base) / np.linalg.norm(top - base, axis=1, keepdims=True)
+    arms = top - [0, 0, 0.5]
+    return np.linalg.inv(np.hstack([np.cross(arms, along), along]))
+
+
+def join_legs(count, but=()):
+    return tuple(
+        Join(f"join {i}", (f"seat{i}", f"end{i}"))
+        for i in range(1, count + 1)
+        if i not in but
+    )
+
+
+def test_gough_platform_moves_by_the_inverse_jacobian_without_force():
+    last = assemble_in_steps(Plan(join_legs(6)), gough(LENGTHS))[-1]
+    expected = inverse_jacobian() @ LENGTHS
+    assert last.platform_screw[0] == pytest.approx(expected, rel=1e-9)
+    assert np.linalg.norm(expected[3:]) == pytest.approx(23.3e-6, abs=0.05e-6)
+    assert np.linalg.norm(expected[:3]) == pytest.approx(189e-6, abs=0.5e-6)
+    assert last.energy == pytest.approx(0.0, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("components", "change", "left"),
+    [(("TZ",), -40.0e-6, 6.6e-6), (("TX", "TY", "TZ"), -34.1e-6, 5.4e-6)],
+)
+def test_one_adjustable_leg_brings_one_reading_to_zero_and_not_the_pose(
+    components, change, left
+):
+    reading = Measure("pose", "platform", components)
+    steps = (*join_legs(6), Adjust("shim", "leg6", ("TZ",), reading))
+    last = assemble_in_steps(Plan(steps), gough(LENGTHS))[-1]
+    assert last.adjustment[0, 0] == pytest.approx(change, abs=0.05e-6)
+    assert np.linalg.norm(last.platform_screw[0, 3:]) == pytest.approx(left, abs=5e-8)
+
+
+def test_an_adjustment_is_rounded_to_its_increment():
+    reading = Measure("pose", "platform", ("TZ",))
+    steps = (*join_legs(6), Adjust("shim", "leg6", ("TZ",), reading, 25e-6))
+    last = assemble_in_steps(Plan(steps), gough(LENGTHS))[-1]
+    assert last.adjustment[0, 0] == pytest.approx(-50e-6)
+
+
+def test_seventh_leg_cut_to_the_measured_length_is_free_of_force():
+    """Pinned it is open by gamma: S = k / (1 + sum of shares^2), W = S gamma^2/2."""
+    J = inverse_jacobian()
+    a, b = map(np.array, SEVENTH)
+    along = (b - a) / np.linalg.norm(b - a)
+    line = np.r_[np.cross(b - [0, 0, 0.5], along), along]
+    shares = line @ J
+    gamma = shares @ LENGTHS
+    S = 5e6 / (1 + shares @ shares)
+    posture, last = gough(np.r_[LENGTHS, 0.0], seventh=True), ("seat7", "end7")
+    pinned = assemble_in_steps(Plan((*join_legs(6), Join("last", last))), posture)[-1]
+    assert pinned.closing_force == pytest.approx(S * abs(gamma), rel=1e-6)
+    assert pinned.work == pytest.approx(S * gamma**2 / 2, rel=1e-6)
+    assert np.linalg.norm(pinned.opening[0, 3:]) == pytest.approx(abs(gamma), rel=1e-6)
+    cut = Adjust("cut", "leg7", ("TZ",), Measure("gap", last))
+    results = assemble_in_steps(Plan((*join_legs(6), cut, Join("last", last))), posture)
+    assert abs(results[-2].adjustment[0, 0]) == pytest.approx(abs(gamma), rel=1e-6)
+    assert results[-1].closing_force == pytest.approx(0.0, abs=1e-6)
+    assert results[-1].platform_screw[0] == pytest.approx(J @ LENGTHS, rel=1e-6)
+
+
+def test_many_machines_have_the_results_of_each_alone(rng):
+    errors = rng.normal(size=(4, 5, 6)) * [0, 0, 0, 0, 0, 3e-5]
+    posture = three_legs()
+    plan = Plan((join_leg(1), join_leg(3), join_leg(2, locked=Z)))
+    many = assemble_in_steps(plan, posture, errors)
+    for i, own in enumerate(errors):
+        alone = assemble_in_steps(plan, posture, own[None])
+        for one, several in zip(alone, many, strict=True):
+            assert one.energy == pytest.approx(several.energy[i], rel=1e-9, abs=1e-18)
+            assert one.closing_force == pytest.approx(
+                several.closing_force[i], rel=1e-9, abs=1e-9
+            )
+
+
+@pytest.mark.parametrize(
+    ("steps", "text"),
+    [
+        ((join_leg(1), join_leg(1)), "the name of an earlier step"),
+        ((join_leg(1), Join("again", LEG[1])), "joined already"),
+        ((Release("free", ("clamp",)),), 'found "clamp"'),
+        ((Fix("clamp", "platfrom", None),), 'no frame "platfrom"'),
+        ((Join("j", ("leg1", "leg2")),), 'no closure ["leg1", "leg2"]'),
+        ((Join("bolt", "leg1"),), "no clearance and no motion to bolt"),
+    ],
+)
+def test_a_plan_that_does_not_fit_is_refused_in_one_line(steps, text):
+    with pytest.raises(BadInput, match="step") as caught:
+        assemble_in_steps(Plan(steps), three_legs())
+    assert text in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_release_before_welding_leaves_no_force_in_the_portal():
+    bent = {"TX": 0.0, "TZ": 0.0, "RY": 1e-3}
+    every = ("RX", "RY", "RZ", "TX", "TY", "TZ")
+    steps = (
+        Fix("clamp 1", "foot1", bent), Fix("clamp 2", "foot2", {"RY": -1e-3}),
+        Release("free", ("clamp 1", "clamp 2")),
+        Join("weld", ("corner", "top2"), locked=every),
+    )  # fmt: skip
+    results = assemble_in_steps(Plan(steps), portal())
+    assert results[-1].energy == pytest.approx(0.0, abs=1e-15)
+    assert results[2].lost == pytest.approx(results[1].energy, rel=1e-9)
+
+
+def test_influence_coefficients_give_the_spring_back_of_clamped_parts():
+    """U = K_assembly^-1 (sum of K_part V), two parts clamped to nominal."""
+    k, V = np.array([1e6, 2e6]), np.array([30e-6, -20e-6])
+    steps = (
+        Fix("clamp", "platform", {"TZ": 0.0}), join_leg(1), join_leg(2),
+        Release("free", ("clamp",)),
+    )  # fmt: skip
+    posture = legs_with_pins(V, (None, None), k=tuple(k))
+    results = assemble_in_steps(Plan(steps), posture)
+    expected = (k @ V) / k.sum()
+    assert results[-1].platform_screw[0, 5] == pytest.approx(expected)
+    assert results[-1].spring_back[0, 5] == pytest.approx(expected)
+    for i in (1, 2):  # the closing wrench presses each part to nominal
+        assert results[i].closing_force == pytest.approx(abs(k[i - 1] * V[i - 1]))
+
+
+def test_spring_of_a_fixture_shares_the_closing_force():
+    """A leg closed against a fixture of 2e6 N/m: series of both springs."""
+    fix = Fix("fixture", "platform", {"TZ": 0.0}, {"TZ": 2e6})
+    results = assemble_in_steps(Plan((fix, join_leg(1))), three_legs_alone())
+    series = 1e6 * 2e6 / 3e6
+    assert results[-1].closing_force == pytest.approx(series * 30e-6)
+    assert results[-1].energy == pytest.approx(series * 30e-6**2 / 2)
+    assert results[-1].platform_screw[0, 5] == pytest.approx(10e-6)
+
+
+def three_legs_alone():
+    """Leg 1 of the three legs."""
+    return legs_with_pins((30e-6,), (None,), k=(1e6,))
+
+
+def test_weight_bends_the_leg_before_the_slot_is_bolted():
+    """100 N on leg 1 of 1e6 N/m: 100 um down; the slot of leg 2 stays there."""
+    posture = legs_with_pins((0.0, 0.0), (None, None), k=(1e6, 1e6))
+    frames = [
+        replace(f, mass=10.0) if f.name == "platform" else f
+        for f in posture.robot.frames
+    ]
+    posture = home_posture(replace(posture.robot, frames=tuple(frames)))
+    down = [0, 0, -10.0]
+    for second, expected in (
+        (join_leg(2, locked=Z), -100e-6),
+        (join_leg(2), -50e-6),
+    ):
+        plan = Plan((join_leg(1), second))
+        results = assemble_in_steps(plan, posture, gravity=down)
+        assert results[0].platform_screw[0, 5] == pytest.approx(-100e-6)
+        assert results[1].platform_screw[0, 5] == pytest.approx(expected)
+
+
+def test_preload_on_a_part_that_nothing_holds_is_refused():
+    press = Preload("press", "platform", np.array([0, 0, 0, 0, 0, -10.0]))
+    with pytest.raises(FreeMotion, match="nothing resists"):
+        assemble_in_steps(Plan((press,)), legs_open())
+
+
+def legs_open():
+    """Three legs, the platform free before the first is joined."""
+    posture = three_legs()
+    return replace(posture, robot=replace(posture.robot, closures=()))
+
+
+def test_legs_cut_to_increments_leave_the_rounding_of_their_lengths(rng):
+    """All six legs cut to 10 um: x = J r, |r| <= 5 um; at most 11.9, 12.4, 6.1 um."""
+    cuts = tuple(
+        Adjust(
+            f"cut {i}",
+            f"leg{i}",
+            ("TZ",),
+            Measure("gap", (f"seat{i}", f"end{i}")),
+            1e-5,
+        )  # fmt: skip
+        for i in range(1, 7)
+    )
+    held = Fix("fixture", "platform", dict.fromkeys(SCREW, 0.0))
+    plan = Plan((held, *cuts, *join_legs(6), Release("free", ("fixture",))))
+    posture = gough(np.zeros(6))
+    lengths = rng.uniform(-1e-4, 1e-4, (50, 6))
+    errors = np.zeros((50, len(posture.robot.frames), 6))
+    for i in range(6):
+        errors[:, posture.robot.index(f"leg{i + 1}"), 5] = lengths[:, i]
+    last = assemble_in_steps(plan, posture, errors)[-1]
+    J = inverse_jacobian()
+    rounding = lengths - 1e-5 * np.round(lengths / 1e-5)
+    assert last.platform_screw == pytest.approx(rounding @ J.T, abs=1e-12)
+    most = 5e-6 * np.abs(J).sum(axis=1)
+    assert most[3:] == pytest.approx([11.9e-6, 12.4e-6, 6.1e-6], abs=0.05e-6)
+    assert (np.abs(last.platform_screw) <= most).all()
+
+
+@pytest.mark.parametrize(("increment", "change"), [(0.0, -50e-6), (40e-6, -40e-6)])
+def test_shim_closes_without_force_where_the_clearance_lies(increment, change):
+    """Pin 1 lies in the middle of +- 20 um: leg 2, 50 um long, is cut to it; rounded
+    to 40 um, the clearance takes up the 10 um left."""
+    posture = legs_with_pins((0.0, 50e-6), (20e-6, None), k=(1e6, 1e6))
+    shim = Adjust("shim", "leg2", ("TZ",), Measure("gap", LEG[2]), increment)
+    steps = (join_leg(1), shim, join_leg(2))
+    results = assemble_in_steps(Plan(steps), posture)
+    assert results[1].adjustment[0, 0] == pytest.approx(change, rel=1e-6)
+    assert results[2].closing_force == pytest.approx(0.0, abs=1e-5)
+    alone = assemble_in_steps(Plan((join_leg(1), join_leg(2))), posture)
+    assert alone[-1].closing_force == pytest.approx(15.0)  # 30 um on 5e5 N/m
+
+
+@pytest.mark.parametrize(
+    ("name", "component"), [("four_bar", "TZ"), ("3rrr", "RX"), ("four_bar", "TX")]
+)
+def test_shim_of_a_robot_with_clearances_needs_the_least_energy_of_all(
+    name, component, rng
+):
+    """Against a scan of the shim, each length closed with loose clearances."""
+    robot = load_robot(name)
+    errors = rng.normal(size=robot.errors.shape) * np.repeat([3e-3, 3e-4], 3)
+    posture = home_posture(robot.with_errors(errors))
+    *others, last = robot.closures
+    frame = robot.frame(last[1])
+    joins = tuple(Join(f"{i}", part) for i, part in enumerate(others))
+    shim = Adjust("shim", frame.name, (component,), Measure("gap", last))
+    results = assemble_in_steps(Plan((*joins, shim, Join("last", last))), posture)
+    change, found = results[-2].adjustment[0, 0], results[-1].energy[0]
+    energies = []
+    for other in change + np.array([-1e-4, -1e-5, 1e-5, 1e-4]):
+        moved = errors.copy()
+        moved[robot.index(frame.name), SCREW.index(component)] += other
+        other_posture = home_posture(robot.with_errors(moved))
+        closed = assemble_in_steps(Plan((*joins, Join("last", last))), other_posture)
+        energies.append(closed[-1].energy[0])
+    assert found <= min(energies) * (1 + 1e-6) + 1e-10
+    if component == "TX":  # in the plane, where the joints close without a shim
+        assert change == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("before", "reading", "text"),
+    [
+        ((), Measure("z", "platform", Z), "a frame as the reading"),
+        (
+            (Preload("weight", "platform", np.array([0, 0, 0, 0, 0, -1.0])),),
+            Measure("gap", LEG[2]), 'the loads "weight"',
+        ),
+    ],
+)  # fmt: skip
+def test_adjustment_that_is_no_least_energy_is_refused_in_one_line(
+    before, reading, text
+):
+    posture = legs_with_pins((0.0, 30e-6), (20e-6, None))
+    shim = Adjust("shim", "leg2", ("TZ",), reading)
+    steps = (join_leg(1), *before, shim, join_leg(2))
+    with pytest.raises(BadInput, match='step "shim": found clearances') as caught:
+        assemble_in_steps(Plan(steps), posture)
+    assert text in str(caught.value)
+
+
+def test_adjustment_is_possible_once_every_clearance_is_bolted():
+    """Pin 1 bolted in the middle of its clearance: leg 2 is cut to it."""
+    posture = legs_with_pins((10e-6, 30e-6), (20e-6, None), k=(1e6, 1e6))
+    cut = Adjust("cut", "leg2", ("TZ",), Measure("gap", LEG[2]))
+    steps = (Join("bolt", "leg1"), join_leg(1), cut, join_leg(2))
+    results = assemble_in_steps(Plan(steps), posture)
+    assert results[2].adjustment[0, 0] == pytest.approx(-20e-6)
+    assert results[3].closing_force == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["four_bar", "five_bar", "3rrr", "irsbot2", "delta"])
+def test_pinned_robots_with_clearances_store_what_solve_assembly_says(name, rng):
+    """The compiled solver has an elimination of its own; any order ends there."""
+    robot = load_robot(name)
+    errors = rng.normal(size=robot.errors.shape) * np.repeat([3e-3, 3e-4], 3)
+    if name == "irsbot2":  # other parts of its parallelograms are rigid
+        known = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
+        errors[[not f.name.endswith(known) for f in robot.frames]] = 0.0
+    posture = home_posture(robot.with_errors(errors))
+    order = rng.permutation(len(robot.closures))
+    joins = (Join(f"{i}", robot.closures[i]) for i in order)
+    results = assemble_in_steps(Plan(tuple(joins)), posture)
+    expected = solve_assembly(posture)
+    assert results[-1].energy[0] == pytest.approx(expected.energy, rel=1e-5, abs=1e-9)
+    work = sum(result.work + result.load_work for result in results)
+    assert work == pytest.approx(results[-1].energy, rel=1e-9, abs=1e-12)

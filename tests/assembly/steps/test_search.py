@@ -1,0 +1,190 @@
+"""The best order, against all orders carried out one by one."""
+
+from dataclasses import replace
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.model.robot import Frame, Robot
+from assembly.steps.influence import why_order_matters
+from assembly.steps.plan import Fix, Join, Plan, Release
+from assembly.steps.run import assemble_in_steps
+from assembly.steps.search import OBJECTIVES, best_order
+from forcefit.inputs.table import BadInput
+from tests.assembly.steps.robots_for_steps import leg, planar_platform, three_legs
+
+LEG = {i: ("platform", f"leg{i}") for i in (1, 2, 3)}
+
+
+def join(i, **more):
+    return Join(f"{i}", (f"seat{i}", f"end{i}"), **more)
+
+
+def outcome(plan, posture, objective):
+    results = assemble_in_steps(plan, posture)
+    if objective == "force":
+        return max(r.closing_force[0] for r in results if isinstance(r.step, Join))
+    if objective == "energy":
+        return results[-1].energy[0]
+    return np.linalg.norm(results[-1].platform_screw[0, 3:])
+
+
+def test_least_peak_force_of_three_legs_is_that_of_the_springs():
+    """Closing forces by hand: the last leg needs 6.7, 86.7 or 80 N; before it two legs
+    close with k_i k_j / (k_i + k_j) |d_i - d_j|."""
+    steps = tuple(Join(f"{i}", LEG[i]) for i in (1, 2, 3))
+    found = best_order(Plan(steps), three_legs(), "force")
+    k, d = np.array([1e6, 2e6, 3e6]), np.array([30e-6, -20e-6, 50e-6])
+    peaks = []
+    for a, b, c in permutations(range(3)):
+        pair = k[a] * k[b] / (k[a] + k[b])
+        x = (k[a] * d[a] + k[b] * d[b]) / (k[a] + k[b])
+        all_of = (k[a] + k[b]) * k[c] / k.sum()
+        peaks.append(max(pair * abs(d[a] - d[b]), all_of * abs(d[c] - x)))
+    assert found.value == pytest.approx(min(peaks))
+    assert found.bound == found.value
+    assert found.method == "sets"
+    assert outcome(found.plan, three_legs(), "force") == pytest.approx(min(peaks))
+
+
+@pytest.mark.parametrize("objective", OBJECTIVES)
+@pytest.mark.parametrize("slots", [(), (4,), (2, 5)])
+def test_best_order_is_the_best_of_all_orders(objective, slots, rng):
+    errors = rng.normal(size=5) * 40e-6
+    posture = planar_platform([0.0, 0.4, 0.1, 0.3, 0.25], errors)
+    locked = {i: ("TZ",) if i in slots else () for i in range(1, 6)}
+    steps = tuple(join(i, locked=locked[i]) for i in range(1, 6))
+    found = best_order(Plan(steps), posture, objective)
+    every = [outcome(Plan(order), posture, objective) for order in permutations(steps)]
+    assert found.value == pytest.approx(min(every), rel=1e-9, abs=1e-15)
+    assert found.bound == pytest.approx(found.value)
+    assert found.given == pytest.approx(every[0])
+    assert outcome(found.plan, posture, objective) == pytest.approx(
+        found.value, rel=1e-9, abs=1e-15
+    )
+
+
+def test_only_joining_steps_between_other_steps_change_places():
+    steps = (
+        Join("1", LEG[1]), Fix("clamp", "platform", None), Join("3", LEG[3]),
+        Join("2", LEG[2]), Release("free", ("clamp",)),
+    )  # fmt: skip
+    found = best_order(Plan(steps), three_legs(), "force")
+    names = [step.name for step in found.plan.steps]
+    assert (names[0], names[1], names[4]) == ("1", "clamp", "free")
+    assert sorted(names[2:4]) == ["2", "3"]
+
+
+def test_order_matters_where_a_step_holds_what_it_finds():
+    pinned = Plan(tuple(Join(f"{i}", LEG[i]) for i in (1, 2, 3)))
+    assert why_order_matters(pinned) == ""
+    slot = replace(pinned.steps[1], locked=("TZ",))
+    assert why_order_matters(Plan((*pinned.steps[:1], slot))) == "2"
+    lying = Plan((Fix("clamp", "platform", None), *pinned.steps))
+    assert why_order_matters(lying) == "clamp"
+    placed = Plan((Fix("clamp", "platform", {"TZ": 0.0}), *pinned.steps))
+    assert why_order_matters(placed) == ""
+
+
+def test_least_error_of_too_many_joins_is_refused():
+    posture = planar_platform(np.linspace(0, 0.4, 9), np.zeros(9))
+    steps = tuple(join(i, locked=("TZ",)) for i in range(1, 10))
+    with pytest.raises(BadInput, match="at most 8"):
+        best_order(Plan(steps), posture, "error")
+
+
+@pytest.mark.parametrize("objective", ["force", "energy"])
+@pytest.mark.parametrize("most", [20, 60])
+def test_search_that_ends_early_brackets_the_best_order(objective, most, rng):
+    errors = rng.normal(size=5) * 40e-6
+    posture = planar_platform([0.0, 0.4, 0.1, 0.3, 0.25], errors)
+    steps = tuple(join(i, locked=("TZ",) if i in (2, 5) else ()) for i in range(1, 6))
+    every = best_order(Plan(steps), posture, objective)
+    early = best_order(Plan(steps), posture, objective, most=most)
+    assert early.bound <= every.value * (1 + 1e-9)
+    assert every.value <= early.value * (1 + 1e-9)
+    assert early.searched < every.searched
+
+
+def legs_along_z(rng, count):
+    """Legs of a platform that a guide leaves free along z: stiffnesses and errors."""
+    k, d = rng.uniform(1e6, 3e6, count), rng.normal(size=count) * 3e-5
+    frames = [
+        Frame("guide", "base", joint="prismatic"),
+        Frame("platform", "guide"),
+        *(leg(f"leg{i}", *kd) for i, kd in enumerate(zip(k, d, strict=True))),
+    ]
+    closures = tuple(("platform", f"leg{i}") for i in range(count))
+    robot = Robot("legs", "platform", tuple(frames), closures)
+    return home_posture(robot), Plan(tuple(Join(b, (a, b)) for a, b in closures)), k, d
+
+
+def least_peak(k, d):
+    """Return the least peak force over all 2^n sets: leg i needs k_i (d_i - x)."""
+    sets = np.arange(1 << len(k))
+    chosen = sets[:, None] >> np.arange(len(k)) & 1
+    x = chosen @ (k * d) / np.maximum(chosen @ k, 1.0)
+    best = np.full(len(sets), np.inf)
+    best[0] = 0.0
+    for size in range(1, len(k) + 1):
+        layer = sets[chosen.sum(axis=1) == size]
+        for i in range(len(k)):
+            with_i = layer[layer >> i & 1 == 1]
+            force = k[i] * np.abs(d[i] - x[with_i])
+            peak = np.maximum(best[with_i & ~(1 << i)], force)
+            best[with_i] = np.minimum(best[with_i], peak)
+    return best[-1]
+
+
+def test_least_peak_force_of_twelve_pinned_legs_is_that_of_all_their_sets(rng):
+    posture, plan, k, d = legs_along_z(rng, 12)
+    found = best_order(plan, posture, "force")
+    assert found.value == pytest.approx(least_peak(k, d), rel=1e-9)
+    assert found.bound == pytest.approx(found.value)
+    assert outcome(found.plan, posture, "force") == pytest.approx(found.value)
+
+
+@pytest.mark.parametrize("most", [12, 20, 40])
+def test_search_over_sets_that_ends_early_brackets_the_least_peak_force(most, rng):
+    posture, plan, k, d = legs_along_z(rng, 9)
+    found = best_order(plan, posture, "force", most=most)
+    least = least_peak(k, d)
+    assert found.bound <= least * (1 + 1e-9)
+    assert least <= found.value * (1 + 1e-9)
+    assert outcome(found.plan, posture, "force") == pytest.approx(found.value)
+
+
+def test_interrupted_search_over_sets_brackets_the_least_peak_force(rng):
+    posture, plan, k, d = legs_along_z(rng, 9)
+
+    def stop(done):
+        if done == 14:
+            raise KeyboardInterrupt
+
+    found = best_order(plan, posture, "force", progress=stop)
+    least = least_peak(k, d) * (1 + 1e-9)
+    assert found.bound <= least <= found.value * (1 + 2e-9)
+
+
+def test_interrupted_search_returns_the_best_order_so_far():
+    posture = planar_platform([0.0, 0.4, 0.1, 0.3], [0, 3e-5, 4e-5, -2e-5])
+    steps = tuple(join(i, locked=("TZ",) if i == 4 else ()) for i in range(1, 5))
+
+    def stop(done):
+        if done == 12:
+            raise KeyboardInterrupt
+
+    found = best_order(Plan(steps), posture, "force", progress=stop)
+    assert found.bound <= found.value <= found.given
+
+
+def test_slot_last_or_first_decides_the_error_of_nine_legs():
+    """Beyond 8 joins the least energy is searched with bounds: zero, slots first."""
+    errors = np.array([0, 0, 10, 20, -10, 5, 15, -5, 25]) * 1e-6
+    posture = planar_platform(np.linspace(0, 0.4, 9), errors)
+    steps = tuple(join(i, locked=("TZ",) if i > 2 else ()) for i in range(1, 10))
+    found = best_order(Plan(steps[::-1]), posture, "energy")
+    assert found.value == pytest.approx(0.0, abs=1e-15)
+    assert found.bound == pytest.approx(0.0, abs=1e-15)
