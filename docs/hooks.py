@@ -1,8 +1,19 @@
-"""What the site does to pages besides its theme."""
+r"""Changes of the site to pages: mathematics, tables of the code's numbers, roles.
+
+Mathematics is written as on GitHub: a block of ``math``, or $`x`$ within a line.  It
+becomes MathML when the site is built, which browsers of 2023 and newer show without a
+script or a network.  ``\tag{22}`` at the end of a block is the paper's number.
+"""
 
 import re
 from pathlib import Path
 from typing import Any
+
+from latex2mathml.converter import convert
+from markdown import Markdown
+from markdown.extensions import Extension
+from markdown.inlinepatterns import InlineProcessor
+from mkdocs.structure.files import File
 
 # a docstring's ":func:`name`", once its name is code
 _ROLE = re.compile(r"(?<![\w:]):(?:func|mod|class|meth|data|attr|math):(?=<code>)")
@@ -12,18 +23,66 @@ _NUMBER = re.compile(
     r"^_?([A-Z][A-Z_]*)(?:: .+)? = ([^\"'#\n]*\d[^\"'#\n]*)  # (.+)$", re.M
 )
 _NUMBERS = "<!-- numbers of the code -->"
+_CHANGES = "<!-- CHANGELOG.md -->"
+_ROOT = Path(__file__).parents[1]
+
+# number of an equation, at the end of a block
+_TAG = re.compile(r"\\tag\{([^}]+)\}\s*$")
+
+
+def on_config(config: Any, **_: Any) -> Any:
+    """Mathematics in blocks and within lines."""
+    fences = config.mdx_configs.setdefault("pymdownx.superfences", {})
+    fences["custom_fences"] = [{"name": "math", "class": "math", "format": equation}]
+    config.markdown_extensions.append(_Formulas())
+    return config
+
+
+def on_files(files: Any, config: Any, **_: Any) -> Any:
+    """The notebooks of the examples, to download."""
+    for path in sorted((_ROOT / "examples" / "notebooks").glob("*.ipynb")):
+        name = f"notebooks/{path.name}"
+        files.append(File.generated(config, name, abs_src_path=str(path)))
+    return files
+
+
+def equation(source: str, *_: Any, **__: Any) -> str:
+    """A block of mathematics, with its number and an anchor of that number."""
+    tag = _TAG.search(source)
+    formula = convert(_TAG.sub("", source).strip(), display="block")
+    if tag is None:
+        return f'<div class="equation">{formula}</div>'
+    anchor = "eq-" + tag[1].split("-")[0].rstrip("abc")
+    number = f'<span class="equation-number">({tag[1]})</span>'
+    return f'<div class="equation" id="{anchor}">{formula}{number}</div>'
+
+
+class _Formula(InlineProcessor):
+    """Mathematics within a line."""
+
+    def handleMatch(self, m: Any, data: str) -> Any:
+        return self.md.htmlStash.store(convert(m[1])), m.start(0), m.end(0)
+
+
+class _Formulas(Extension):
+    """Registers mathematics within lines before code, which has the same backticks."""
+
+    def extendMarkdown(self, md: Markdown) -> None:
+        md.inlinePatterns.register(_Formula(r"\$`([^`]+)`\$", md), "formula", 195)
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """The table of a diagnosis's numbers, taken from the modules that hold them."""
+    """The changelog, and the numbers of a diagnosis from the modules that hold them."""
+    if _CHANGES in markdown:
+        text = (_ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+        markdown = markdown.replace(_CHANGES, text.replace("](docs/", "]("))
     return markdown.replace(_NUMBERS, _numbers()) if _NUMBERS in markdown else markdown
 
 
 def _numbers() -> str:
     """A table of all numbers of ``validation/diagnosis``."""
     rows = ["| module | number | value | what it is |", "|---|---|---|---|"]
-    root = Path(__file__).parents[1] / "validation" / "diagnosis"
-    for path in sorted(root.glob("*.py")):
+    for path in sorted((_ROOT / "validation" / "diagnosis").glob("*.py")):
         for name, value, reason in _NUMBER.findall(path.read_text(encoding="utf-8")):
             words = name.lower().replace("_", " "), reason.replace("|", "or")
             rows.append(f"| {path.stem} | {words[0]} | {value} | {words[1]} |")

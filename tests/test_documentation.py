@@ -233,6 +233,13 @@ def imperfect(folder, run):
     (folder / "my_robot.toml").write_text(text.replace(name, name + error))
 
 
+def with_errors(folder, run):
+    """The robot of the gallery, which its page writes."""
+    code = next(text for kind, _, text in blocks(DOCS / "gallery.md")
+                if kind == "python")  # fmt: skip
+    exec(compile(code, "gallery", "exec"), {})
+
+
 def own_robot(folder, run):
     """The robot of the tutorial."""
     text = _block("tutorials/own_robot", "my_robot.toml")
@@ -245,9 +252,11 @@ def _block(page, title):
 
 
 STAGE = {
-    "campaigns": [campaign], "commands": [arm, plans, robots, links, tracker],
+    "campaigns": [campaign],
+    "commands": [arm, plans, robots, links, tracker, with_errors],
     "conversion": [robots], "correction": [arm], "diagnosis": [campaign],
-    "effects": [crank], "gallery": [plans, own_robot], "link_exchange": [links],
+    "effects": [crank], "gallery": [plans, own_robot, with_errors],
+    "link_exchange": [links],
     "reports": [campaign, plans, runs], "sweeps": [plans, robots],
     "tolerances": [imperfect], "tracker_import": [tracker],
 }  # fmt: skip

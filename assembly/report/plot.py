@@ -14,6 +14,27 @@ from assembly.linear.energy import Assembly
 from assembly.report.error_body import ErrorBody, possible_errors
 from stiffness.screws import rotation_matrix, screw_map
 
+_SHORT = 1e-9  # [m] length below which a body is not drawn
+
+
+@dataclass(frozen=True, eq=False)
+class DisplacedBodies:
+    """Positions, displacements and bending of each body of an assembled robot.
+
+    Attributes:
+        starts: (n, 3) [m] nominal start of each frame's body, base axes.
+        ends: (n, 3) [m] nominal end of each frame's body, base axes.
+        start_screws: (n, 6) [rad, m] small screw of the start, read at the start.
+        end_screws: (n, 6) [rad, m] small screw of the end, read at the end.
+        bends: (n, 3) [rad] elastic rotation of the end relative to the start.
+    """
+
+    starts: NDArray
+    ends: NDArray
+    start_screws: NDArray
+    end_screws: NDArray
+    bends: NDArray
+
 
 def plot_assembly(
     assembly: Assembly,
@@ -45,7 +66,7 @@ def plot_assembly(
         add_error_body(
             plotter, body, assembly.posture.platform[:3, 3], size, assumption
         )
-        _fill_window(plotter)
+        fill_window(plotter)
     return plotter
 
 
@@ -73,16 +94,11 @@ def robot_plotter(
     size = float(np.ptp(bodies.ends, axis=0).max()) or 1.0
     exaggeration_factor = exaggeration or readable_factor(bodies, size)
     plotter = pyvista.Plotter(off_screen=off_screen, window_size=(1100, 800))
-    for i, frame in enumerate(assembly.posture.robot.frames):
-        start, end = bodies.starts[i], bodies.ends[i]
-        if np.linalg.norm(end - start) < 1e-9:
-            continue
-        grey = pyvista.Line(start, end).tube(radius=0.005 * size)
-        plotter.add_mesh(grey, color="lightgrey")
-        line = pyvista.Spline(_shape(bodies, i, exaggeration_factor), 40).tube(
-            radius=0.008 * size
-        )
-        plotter.add_mesh(line, color="crimson" if frame.link else "steelblue")
+    for start, end in zip(bodies.starts, bodies.ends, strict=True):
+        if np.linalg.norm(end - start) >= _SHORT:
+            grey = pyvista.Line(start, end).tube(radius=0.005 * size)
+            plotter.add_mesh(grey, color="lightgrey")
+    add_bodies(plotter, assembly, bodies, exaggeration_factor, size)
     _add_joint_axes(plotter, assembly.posture, size)
     caption = (
         f"displacements x {exaggeration_factor:g}; red: elastic links; grey: nominal; "
@@ -91,8 +107,33 @@ def robot_plotter(
     plotter.add_text(caption, font_size=9, name="caption")
     plotter.add_axes()
     plotter.view_vector((0.55, -1.0, 0.35))
-    _fill_window(plotter)
+    fill_window(plotter)
     return plotter
+
+
+def add_bodies(
+    plotter: Any, assembly: Assembly, bodies: DisplacedBodies, factor: float,
+    size: float,
+) -> None:  # fmt: skip
+    """Add the displaced bodies to a plot, in place of those added before.
+
+    Args:
+        plotter: plotter of pyvista.
+        assembly: assembly of the robot.
+        bodies: result of :func:`displaced_bodies`.
+        factor: exaggeration of the displacements.
+        size: [m] size of the robot.
+    """
+    import pyvista
+
+    for i, frame in enumerate(assembly.posture.robot.frames):
+        if np.linalg.norm(bodies.ends[i] - bodies.starts[i]) >= _SHORT:
+            line = pyvista.Spline(_shape(bodies, i, factor), 40)
+            plotter.add_mesh(
+                line.tube(radius=0.008 * size), name=f"body {frame.name}",
+                color="crimson" if frame.link else "steelblue", reset_camera=False,
+                render=False,
+            )  # fmt: skip
 
 
 def _add_joint_axes(plotter: Any, posture: Posture, size: float) -> None:
@@ -107,7 +148,7 @@ def _add_joint_axes(plotter: Any, posture: Posture, size: float) -> None:
         plotter.add_mesh(rod, color="darkorange" if frame.actuated else "#202020")
 
 
-def _fill_window(plotter: Any) -> None:
+def fill_window(plotter: Any) -> None:
     """Point the camera at the middle of the scene, which then fills the window."""
     # share of the window; captions are above and below
     camera, share = plotter.camera, 0.85
@@ -151,38 +192,23 @@ def add_error_body(
     plotter.add_text(caption, position="lower_left", font_size=9, name="body")
 
 
-@dataclass(frozen=True, eq=False)
-class DisplacedBodies:
-    """Positions, displacements and bending of each body of an assembled robot.
-
-    Attributes:
-        starts: (n, 3) [m] nominal start of each frame's body, base axes.
-        ends: (n, 3) [m] nominal end of each frame's body, base axes.
-        start_screws: (n, 6) [rad, m] small screw of the start, read at the start.
-        end_screws: (n, 6) [rad, m] small screw of the end, read at the end.
-        bends: (n, 3) [rad] elastic rotation of the end relative to the start.
-    """
-
-    starts: NDArray
-    ends: NDArray
-    start_screws: NDArray
-    end_screws: NDArray
-    bends: NDArray
-
-
-def displaced_bodies(assembly: Assembly) -> DisplacedBodies:
+def displaced_bodies(assembly: Assembly, closing: float = 1.0) -> DisplacedBodies:
     """Return the displacements of all bodies by the small screws along the tree.
 
     Args:
         assembly: assembly of a robot of n frames.
+        closing: share of the deformations and of the joints' motions; 0: the bodies
+            have their geometric errors only, and closures are open.
 
     Returns:
         The bodies in the robot's order of frames.
     """
     posture = assembly.posture
     turned = screw_map(np.zeros(3), posture.transforms[:, :3, :3])
-    body = turned @ (posture.robot.errors + assembly.link_screws)[..., None]
-    joint = turned @ (assembly.clearance_screws + assembly.joint_screws)[..., None]
+    links = closing * assembly.link_screws
+    joints = closing * (assembly.clearance_screws + assembly.joint_screws)
+    body = turned @ (posture.robot.errors + links)[..., None]
+    joint = turned @ joints[..., None]
     ends = posture.transforms[:, :3, 3]
     starts, (at_start, at_end) = body_starts(posture), np.zeros((2, len(ends), 6))
     for i, parent in enumerate(posture.robot.parents):
@@ -190,7 +216,7 @@ def displaced_bodies(assembly: Assembly) -> DisplacedBodies:
             at_start[i] = at_end[parent] + joint[parent, :, 0]
         carried = screw_map(starts[i] - ends[i]) @ at_start[i]
         at_end[i] = carried + body[i, :, 0]
-    bends = turned @ assembly.link_screws[..., None]
+    bends = turned @ links[..., None]
     return DisplacedBodies(starts, ends, at_start, at_end, bends[:, :3, 0])
 
 

@@ -47,6 +47,11 @@ EXAMPLES = {
         ("examples/drawn",),
         "forcefit assembly solve examples/drawn/tricept.toml --load fx=100",
     ),
+    "notebooks": _Example(
+        "notebooks for Jupyter: a five-bar from robot file to report, a 3-UPU",
+        ("examples/notebooks",),
+        "jupyter lab examples/notebooks/own_robot.ipynb",
+    ),
     "campaign": _Example(
         "measurements of an arm whose model lacks an effect",
         ("examples/campaign",),

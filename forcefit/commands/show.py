@@ -19,6 +19,7 @@ from forcefit.commands.options import (
     parse_load,
     posture_of,
 )
+from forcefit.inputs.animation import ANIMATION, save_animation
 from forcefit.inputs.errors import BadInput, checked, nearest
 from forcefit.inputs.packages import need
 from forcefit.inputs.writing import PIXELS, check_writable, save_pixels, write_json
@@ -30,10 +31,18 @@ def show(
         Path | None,
         typer.Option(
             "--figure",
-            help="Picture to write: PNG, JPEG, BMP or TIFF; without it and --json a "
-            "window opens.",
+            help="Picture to write: PNG, JPEG, BMP or TIFF, with --closing GIF; "
+            "without it and --json a window opens.",
         ),
     ] = None,
+    closing: Annotated[
+        bool,
+        typer.Option(
+            "--closing",
+            help="Show the robot closing as an animation: from bodies with geometric "
+            "errors to the assembly of least energy.",
+        ),
+    ] = False,
     pose: PoseOption = None,
     joint: JointOption = None,
     rest: RestOption = None,
@@ -68,11 +77,18 @@ def show(
     from assembly.linear.reference.reduction import FreeMotion
     from assembly.report.error_body import PARTS
     from assembly.report.mobility import shown_of, shown_text
+    from assembly.report.plot_closing import closing_pictures
     from assembly.solvers.conic import SolverFailed
 
     drawn = figure is not None or json is None
     if figure is not None:
-        check_writable(figure, PIXELS)
+        check_writable(figure, ANIMATION if closing else PIXELS)
+    elif closing:
+        raise BadInput("--closing: found no --figure, expected --figure FILE.gif")
+    if closing and error_body is not None:
+        raise BadInput(
+            "--closing: found it together with --error-body, expected one of them"
+        )
     for option, value, valid in (
         ("--error-body", error_body, PARTS), ("--assumption", assumption, ASSUMPTIONS)
     ):  # fmt: skip
@@ -102,7 +118,10 @@ def show(
         raise BadInput("no display to open a window on; name a file with --figure")
     try:
         assembly = solve_assembly(posture, wrench)
-        _draw(assembly, figure, exaggeration, error_body, assumption)
+        if closing and figure is not None:
+            save_animation(closing_pictures(assembly, exaggeration), figure)
+        else:
+            _draw(assembly, figure, exaggeration, error_body, assumption)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         print(f"{failure_status(error)}: {error}")
         raise typer.Exit(1) from None

@@ -1,0 +1,121 @@
+"""Rotation by clearance of a 3-UPU with locked drives, by finite geometry alone.
+
+The table of docs/seoul.md.  A leg's twist is the angle about the leg between the inner
+axes of its two universal joints.  Four hinges that tilt by at most c permit a twist of
+4 c / (u n), where u is along the leg and n normal to the axes of a universal joint.
+"""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from assembly.exchange.robot_files import load_robot
+from assembly.kinematics.posture import place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.linear.pose_error import bound_pose_error
+from tests.test_tutorials import DOCS, ROOT, blocks
+
+BASE, PLATFORM, TILT = 0.24, 0.08, 2e-4  # [m], [m], [rad]
+ANGLES = 2 * np.pi * np.arange(3) / 3
+RADIAL = np.stack([np.cos(ANGLES), np.sin(ANGLES), 0 * ANGLES], axis=1)
+TANGENTIAL = np.cross([0, 0, 1], RADIAL)
+
+
+def unit(vectors):
+    """Vectors along the last axis divided by their lengths."""
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def hinge_tilts(position, outer, turns):
+    """(n, 3) [rad] total tilt of the hinges of each leg, drives locked."""
+    lengths = np.linalg.norm(position + (PLATFORM - BASE) * RADIAL, axis=1)
+    rotations = Rotation.from_rotvec(turns).as_matrix()
+    corners = np.einsum("nab,kb->nka", rotations, RADIAL) * PLATFORM - BASE * RADIAL
+    x = np.tile(position, (len(turns), 1))
+    for _ in range(6):  # Newton: lengths to the position
+        legs = x[:, None] + corners
+        longer = np.linalg.norm(legs, axis=-1) - lengths
+        x = x - np.linalg.solve(unit(legs), longer[..., None])[..., 0]
+    along = unit(x[:, None] + corners)
+    low = unit(np.cross(outer, along))
+    high = unit(np.cross(np.einsum("nab,kb->nka", rotations, outer), along))
+    sine = (along * np.cross(low, high)).sum(-1)
+    twist = np.arctan2(sine, (low * high).sum(-1))
+    return twist * (along * np.cross(outer, low)).sum(-1)
+
+
+def farthest(position, outer, tilt, rays, step):
+    """The rays that go farthest until a hinge is at its limit, and how far [rad]."""
+    rays, steps = unit(rays), 0
+    while True:
+        tilts = hinge_tilts(position, outer, (steps + 1) * step * rays)
+        possible = np.abs(tilts).max(axis=1) <= 4 * tilt
+        if not possible.any():
+            return rays, steps * step
+        rays, steps = rays[possible], steps + 1
+
+
+def largest_finite_rotation(position, outer, tilt):
+    """[rad] of rotations that are reached along a ray, drives locked.
+
+    Rays lead to the corners of the first-order limits, and near the plane of the two
+    most sensitive rotations; then near the farthest of these rays.
+    """
+    limits = hinge_tilts(position, outer, 1e-6 * np.eye(3)).T / 1e-6
+    corners = [np.linalg.pinv(limits) @ signs for signs in product([1, -1], repeat=3)]
+    basis = np.linalg.svd(limits)[2]
+    around, aside = np.meshgrid(np.arange(0, 2 * np.pi, np.pi / 60),
+                                np.linspace(-0.06, 0.06, 31))  # fmt: skip
+    near = np.stack([aside, np.cos(around), np.sin(around)], axis=-1) @ basis
+    rays = np.vstack([corners, near.reshape(-1, 3)])
+    rays, _ = farthest(position, outer, tilt, rays, tilt)
+    shifts = np.stack(np.meshgrid(*3 * [0.02 * np.linspace(-1, 1, 7)]), -1) @ basis
+    shifts = np.vstack([shifts.reshape(-1, 3), 0.1 * shifts.reshape(-1, 3)])
+    return farthest(position, outer, tilt, rays[0] + shifts, tilt / 10)[1]
+
+
+@pytest.fixture(scope="module")
+def seoul(tmp_path_factory):
+    """The robot of the page."""
+    path = tmp_path_factory.mktemp("seoul") / "seoul.toml"
+    texts = {title: text for _, title, text in blocks(DOCS / "seoul.md")}
+    path.write_text(texts["seoul.toml"])
+    return load_robot(path)
+
+
+def first_order(robot, position):
+    """[rad] bound of (27)."""
+    pose = dict(zip(("tx", "ty", "tz"), position, strict=True))
+    return bound_pose_error(solve_assembly(place_robot(robot, pose))).rotation_error[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("x", "y", "shown"),
+    [(0.0, 0.0, 45), (0.02, 0.01, 74), (0.05, 0.02, 21.5), (0.1, 0.05, 8.9)],
+)
+def test_finite_rotation_is_at_least_that_of_the_page(x, y, shown):
+    """A search along rays finds less than the largest rotation."""
+    found = largest_finite_rotation((x, y, 0.45), RADIAL, TILT)
+    assert shown <= 1e3 * found <= 1.04 * shown
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [1e-1, 1e-2])
+def test_first_order_rotation_is_the_limit_of_small_clearances(seoul, factor):
+    """The relative difference is of the order of the rotation over 49 mrad."""
+    position = (0.02, 0.01, 0.45)
+    bound = first_order(seoul, position)
+    finite = largest_finite_rotation(position, RADIAL, factor * TILT) / factor
+    assert finite == pytest.approx(bound, rel=factor + 0.01)
+
+
+@pytest.mark.slow
+def test_first_order_rotation_of_tsais_robot_is_that_of_finite_geometry():
+    """Its axes are far from a singular posture: rotations of 3 mrad are small."""
+    robot = load_robot(ROOT / "examples" / "drawn" / "three_upu.toml")
+    for position in ((0.0, 0.0, 0.45), (0.02, 0.01, 0.45)):
+        finite = largest_finite_rotation(position, TANGENTIAL, TILT)
+        assert finite == pytest.approx(first_order(robot, position), rel=0.02)
