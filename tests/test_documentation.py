@@ -222,6 +222,7 @@ def plans(folder, run):
         shutil.copy(ROOT / "examples" / "tolerance_allocation" / "mostly.toml",
                     folder / name)  # fmt: skip
     (folder / "path.csv").write_text("pose.tx,pose.tz\n0.0,-0.5\n0.1,-0.5\n")
+    (folder / "study.toml").write_text('robot = "irsbot2"\n')
 
 
 def imperfect(folder, run):
