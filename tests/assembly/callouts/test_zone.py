@@ -130,7 +130,10 @@ def test_normal_interval_has_three_cp_deviations_to_its_limit(cp):
     assert shift_along(1e-4, [1, 0, 0]).deviation(cp) == pytest.approx(1 / (3 * cp))
 
 
-@pytest.mark.parametrize("zone", [POSITION, BOTH, plane_position(4e-5, 0.04, 0.03)])
+@pytest.mark.parametrize("zone", [
+    POSITION, BOTH,
+    pytest.param(plane_position(4e-5, 0.04, 0.03), marks=pytest.mark.slow),
+])  # fmt: skip
 def test_truncated_draws_stay_in_the_zone_and_have_its_covariance(zone):
     screws = drawn(zone, "truncated", 0.6)
     sizes = [np.linalg.norm(screws @ b.T, axis=1).max() for b in zone.bounds]

@@ -42,6 +42,7 @@ _MAY = {
     "assembly/files/stored_solutions.py",  # through whole_file
     "assembly/sweeps/dataset.py",  # NetCDF through whole_file
     "forcefit/commands/show.py",  # pixels of a screenshot
+    "assembly/report/plot_closing.py",  # likewise
     "forcefit/page/page.py",  # into memory
     "assembly/statistics/replay.py",  # likewise
     "validation/study/report.py",  # likewise

@@ -29,7 +29,8 @@ def layer(contrast):
 @pytest.mark.parametrize(("region", "size"), [
     ("z=0.02..0.027", (0.03, 0.03, 0.007)),
     ("x=0.011..0.02,z=0.02..0.0271", (0.009, 0.03, 0.0071)),
-    ("x=0.004..0.0227,y=0.009..0.0203,z=0.013..0.0371", (0.0187, 0.0113, 0.0241)),
+    pytest.param("x=0.004..0.0227,y=0.009..0.0203,z=0.013..0.0371",
+                 (0.0187, 0.0113, 0.0241), marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_mesh_is_cut_along_the_faces_of_a_box(region, size):
     """The elements of the region fill its volume, and no other element changes."""

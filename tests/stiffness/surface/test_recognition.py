@@ -121,6 +121,7 @@ def domed_bar():
     return check_surface(points, np.concatenate(triangles), "domed bar")
 
 
+@pytest.mark.slow
 def test_cylinders_next_to_a_hump_are_recognised_separately():
     """The facets lack 0.44 % of the integral of pi r^2.
 
