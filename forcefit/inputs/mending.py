@@ -111,9 +111,13 @@ class _Mended:
         key = re.split(r"[:.\[]", rest, maxsplit=1)[0]
         if not rest[len(key) :].startswith(": missing"):
             return self._leave_out((table.file, path))
-        if hint is not None and hint[0].startswith("; found "):
+        place = table.file, (*path, key)
+        # a key that was left out here is missing: no other key is meant
+        if hint is not None and hint[0].startswith("; found ") and (
+            place not in self.values
+        ):  # fmt: skip
             return self._rename((table.file, (*path, hint[1])), key)
-        return self._replace((table.file, (*path, key)), None)
+        return self._replace(place, None)
 
     def _rename(self, place: Place, name: str) -> tuple[bool, bool]:
         """Read a value under another name, or not at all."""

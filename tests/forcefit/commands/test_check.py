@@ -62,6 +62,7 @@ KINDS = {
     "robot of bodies": (DRAWN, (), load_robot, [
         ('radius = "60 mm"', 'radius = "60 kg"'),
         ("mass = 40", "mass = -40"),
+        ('platform_at = [0, 0, "', 'platform_at = [0, 0, "m'),
         ('between = ["tube", "platform"]', 'between = ["tub", "platform"]'),
         ("drive_stiffness = 1.5e8", "drive_stifness = 1.5e8"),
         ("count = 3", "count = 0"),
