@@ -4,6 +4,7 @@
 free motions there, and :func:`mobility_near` counts again at postures close to it.
 """
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +25,10 @@ _PLATFORM_RANK = 1e-6
 _ERROR = 10.0  # error of free motions, over the ratio of singular values
 _NOISE = 1e-14  # relative rounding of singular values
 _DISTANCE = 0.05  # [rad or lengths] distance of nearby postures
-_NEIGHBOURS = 2  # number of nearby postures
+_NEIGHBOURS = 16  # largest number of nearby postures
+_AGREEING = 3  # number of nearby postures whose agreement suffices
+_EXACT = 1e-12  # [rad, m] closure error of a posture that is closed but for rounding
+_LEAST = 1e-8  # relative size of singular values that count as zero there
 _CLOSED = 1e-6  # [rad, m] largest closure error of a nearby posture
 _BACK = 0.1  # share of the distance: a posture nearer than this has returned
 
@@ -158,16 +162,26 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
         return NearMobility(here.freedoms, here)
     scale = np.where([f.joint == "prismatic" for f in robot.frames], size_of(robot), 1)
     found: list[Mobility] = []
+    agreeing: Counter[tuple[int, int]] = Counter()
     returned = 0
     for track in near_postures(robot, q, posture.transforms, _DISTANCE, _NEIGHBOURS):
         to, open_by = track.coordinates[0], float(track.mismatch[0])
         if np.linalg.norm((to - q) / scale) < _BACK * _DISTANCE:
             returned += 1
         elif open_by < _CLOSED:
-            found.append(mobility(Posture(robot, to, track.transforms[0], open_by)))
+            # singular values grow with the square of the distance from a singularity
+            least = _LEAST if open_by < _EXACT else ZERO
+            near = mobility(Posture(robot, to, track.transforms[0], open_by), least)
+            found.append(near)
+            if near.overconstraint == 0 and near.freedoms_drives_locked == 0:
+                break
+            if open_by < _EXACT:
+                agreeing[near.freedoms, near.freedoms_drives_locked] += 1
+        if _AGREEING in {returned, *agreeing.values()}:
+            break
     if not found:
         # where the correction did not converge, none is known to be less
-        return NearMobility(0 if returned == _NEIGHBOURS else here.freedoms, None)
+        return NearMobility(0 if returned == _AGREEING else here.freedoms, None)
     least = min(found, key=lambda m: (m.freedoms, m.freedoms_drives_locked))
     return NearMobility(min(least.freedoms, here.freedoms), least)
 

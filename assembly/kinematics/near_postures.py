@@ -13,6 +13,9 @@ from assembly.kinematics.nominal import Target, follow, mobile, size_of
 from assembly.kinematics.track import Track
 from assembly.model.robot import Robot
 
+_CORRECTIONS = 3  # more of them: near a singularity they converge slowly
+_ROUNDING = 1e-13  # [rad, m] closure error that is rounding
+
 
 def near_postures(
     robot: Robot, q: NDArray, T: NDArray, distance: float, count: int
@@ -31,7 +34,12 @@ def near_postures(
     """
     free = Target(coordinates=np.full((1, len(q)), np.nan))
     for step in _steps_aside(robot, T, distance, count):
-        yield follow(robot, q + step, free, guess=True)
+        track = follow(robot, q + step, free, guess=True)
+        for _ in range(_CORRECTIONS):
+            if track.mismatch[0] < _ROUNDING:
+                break
+            track = follow(robot, track.coordinates[0], free, guess=True)
+        yield track
 
 
 def _steps_aside(robot: Robot, T: NDArray, distance: float, count: int) -> NDArray:
