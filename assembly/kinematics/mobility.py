@@ -158,7 +158,7 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
         The number of freedoms, and the counts at a nearby posture that has it.
     """
     robot, q = posture.robot, posture.coordinates
-    if here.freedoms == 0 or _certainly_least(posture, here):
+    if here.freedoms == 0 or _certainly_least(here):
         return NearMobility(here.freedoms, here)
     scale = np.where([f.joint == "prismatic" for f in robot.frames], size_of(robot), 1)
     found: list[Mobility] = []
@@ -170,10 +170,10 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
             returned += 1
         elif open_by < _CLOSED:
             # singular values grow with the square of the distance from a singularity
-            least = _LEAST if open_by < _EXACT else ZERO
-            near = mobility(Posture(robot, to, track.transforms[0], open_by), least)
+            zero = _LEAST if open_by < _EXACT else ZERO
+            near = mobility(Posture(robot, to, track.transforms[0], open_by), zero)
             found.append(near)
-            if near.overconstraint == 0 and near.freedoms_drives_locked == 0:
+            if _certainly_least(near):
                 break
             if open_by < _EXACT:
                 agreeing[near.freedoms, near.freedoms_drives_locked] += 1
@@ -186,7 +186,7 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
     return NearMobility(min(least.freedoms, here.freedoms), least)
 
 
-def _certainly_least(posture: Posture, here: Mobility) -> bool:
+def _certainly_least(here: Mobility) -> bool:
     """Whether no posture has fewer freedoms: all closures independent, drives hold."""
     return here.overconstraint == 0 and here.freedoms_drives_locked == 0
 
