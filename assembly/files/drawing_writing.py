@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.drawing.drawing import Drawing, DrawnBody, DrawnJoint, JointNumbers
-from assembly.files.bolt_file import bolt_table
 from assembly.files.effect_file import effect_tables
+from assembly.files.joint_file import joint_table
 from assembly.files.link_file import link_table
 from assembly.files.robot_file import root_table
 from assembly.files.toml_text import file_text
@@ -122,18 +122,7 @@ def _none(key: str) -> Any:
 
 def _numbers_table(own: JointNumbers) -> dict[str, Any]:
     """Return the keys of a joint's or a bearing's numbers."""
-    table: dict[str, Any] = {}
-    bolt = own.locked_at
-    clearance = own.clearance if bolt is None else bolt.clearance
-    if clearance is not None:
-        given = vars(clearance).items()
-        table["clearance"] = {k: v for k, v in given if v is not None}
-    if bolt is not None:
-        table["locked_at"] = bolt_table(bolt)
-    if own.stiffness is not None:
-        K = own.stiffness
-        diagonal = np.array_equal(K, np.diag(np.diag(K)))
-        table["joint_stiffness"] = (np.diag(K) if diagonal else K).tolist()
+    table = joint_table(own.clearance, own.locked_at, own.stiffness)
     if own.error.any():
         table["geometric_error"] = own.error.tolist()
     if own.tolerance is not None:

@@ -1,14 +1,16 @@
 """Clearance and stiffness of a joint, read from a robot file."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.callouts.fits import Fit, FittedEnd, clearance_fit
+from assembly.files.bolt_file import bolt_table
 from assembly.model.frame import ONE_OF_BALL, SLIDING_BALL
 from assembly.model.largest import LARGEST, LARGEST_LENGTH
-from assembly.model.robot import LOCKED, NO_SPIN, Clearance
+from assembly.model.robot import LOCKED, NO_SPIN, Clearance, LockedAt
 from forcefit.inputs.number_arrays import find_fault, number_array
 from forcefit.inputs.table import BadInput, Table
 
@@ -260,3 +262,30 @@ def definite(table: Table, key: str, K: NDArray) -> NDArray:
             "scaled to a unit diagonal, expected > 0",
         )
     return np.where(K == K.T, K, K / 2 + K.T / 2)
+
+
+def joint_table(
+    clearance: Clearance | None, bolt: LockedAt | None, stiffness: NDArray | None
+) -> dict[str, Any]:
+    """Return the clearance, bolt and springs of a joint as keys of a robot file.
+
+    Args:
+        clearance: clearance in use, if any.
+        bolt: where the joint is bolted, with the clearance that it has before.
+        stiffness: (6, 6) K_B, a list of its diagonal in the file if it has no others.
+
+    Returns:
+        Keys and plain values; those that are absent are left out.
+    """
+    table: dict[str, Any] = {}
+    clearance = clearance if bolt is None else bolt.clearance
+    if clearance is not None:
+        given = vars(clearance).items()
+        table["clearance"] = {k: v for k, v in given if v is not None}
+    if bolt is not None:
+        table["locked_at"] = bolt_table(bolt)
+    if stiffness is not None:
+        diagonal = np.diag(stiffness)
+        alone = np.array_equal(stiffness, np.diag(diagonal))
+        table["joint_stiffness"] = (diagonal if alone else stiffness).tolist()
+    return table

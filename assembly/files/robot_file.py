@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from assembly.callouts.fits import FittedEnd, parse_fit
 from assembly.drawing.frames import robot_of_drawing
-from assembly.files.bolt_file import bolt_table, read_locked_at
+from assembly.files.bolt_file import read_locked_at
 from assembly.files.callout_file import callout_table, read_frame_callouts
 from assembly.files.drawing_file import is_drawing, read_drawing
 from assembly.files.effect_file import effect_tables, with_effects
 from assembly.files.inertia_file import read_inertia
 from assembly.files.joint_file import (
+    joint_table,
     read_clearance,
     read_fit,
     read_fitted_end,
@@ -537,16 +538,7 @@ def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
         table["geometric_error"] = error.tolist()
     if frame.tolerance is not None:
         table["tolerance"] = frame.tolerance.tolist()
-    clearance = frame.clearance if bolt is None else bolt.clearance
-    if clearance is not None:
-        given = vars(clearance).items()
-        table["clearance"] = {k: v for k, v in given if v is not None}
-    if bolt is not None:
-        table["locked_at"] = bolt_table(bolt)
-    if frame.joint_stiffness is not None:
-        K = frame.joint_stiffness
-        diagonal = np.array_equal(K, np.diag(np.diag(K)))
-        table["joint_stiffness"] = (np.diag(K) if diagonal else K).tolist()
+    table |= joint_table(frame.clearance, bolt, frame.joint_stiffness)
     if frame.drive_force:
         table["drive_force"] = frame.drive_force
     if frame.link is not None:
