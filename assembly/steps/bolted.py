@@ -20,9 +20,7 @@ from assembly.linear.reference.energy import CannotAssemble
 from assembly.model.error_distributions import draw_generator
 from assembly.model.robot import Frame, LockedAt, Robot
 from assembly.solvers.conic import SolverFailed
-from assembly.steps.left_anywhere import (
-    positions_left_anywhere,
-)
+from assembly.steps.left_anywhere import positions_left_anywhere
 from assembly.steps.machine import Machine, machine_at
 from assembly.steps.plan import Plan
 from assembly.steps.state import first_state
@@ -117,7 +115,7 @@ def bolted_errors(
         BadInput: the pose of a bolt is out of reach.
     """
     total = errors
-    for frames, machine in _bolts(_AsMade(robot)):
+    for frames, machine in _bolts(robot):
         try:
             state = first_state(machine, Plan(()), total, None)
         except (CannotAssemble, SolverFailed) as error:
@@ -133,23 +131,9 @@ def bolted_errors(
     return total
 
 
-class _AsMade:
-    """A robot by identity, whose bolts are placed once."""
-
-    def __init__(self, robot: Robot) -> None:
-        self.robot = robot
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _AsMade) and other.robot is self.robot
-
-    def __hash__(self) -> int:
-        return id(self.robot)
-
-
 @lru_cache(maxsize=16)
-def _bolts(made: _AsMade) -> list[tuple[list[int], Machine]]:
+def _bolts(robot: Robot) -> list[tuple[list[int], Machine]]:
     """Return the frames bolted at each pose, and the machine there."""
-    robot = made.robot
     rows = [i for i, frame in enumerate(robot.frames) if frame.locked_at is not None]
     bolts, open_ = [], set(rows)
     for _, group in groupby(rows, lambda i: _pose(robot.frames[i])):
