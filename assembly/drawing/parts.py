@@ -57,7 +57,7 @@ def parts_of(joint: DrawnJoint, reverse: bool = False) -> list[Part]:
 def _contact_part(
     joint: DrawnJoint, suffix: str, pose: NDArray, contact: Contact
 ) -> Part:
-    """One fixed frame, beside the frame of this suffix and pose."""
+    """One fixed frame with a contact, near the frame of this suffix and pose."""
     name = ".".join(filter(None, (joint.name, suffix, contact.suffix)))
     end = contact.end
     if end is not None:

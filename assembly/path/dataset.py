@@ -25,7 +25,7 @@ def path_dataset(errors: PathErrors, command: str = "") -> "xarray.Dataset":
 
     Returns:
         Data set over ``time`` with units and meaning of every variable; its attributes
-        are the robot, the law of the motion and the program.
+        are the robot, the profile and the program.
     """
     import xarray
 

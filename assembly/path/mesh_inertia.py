@@ -2,8 +2,8 @@
 
 The consistent mass matrix of its finite elements, for motions of its two interfaces,
 multiplies the accelerations of both ends.  A difference to the resultant force and
-moment of the rigid link, due to mass beside the line between the ends where it turns,
-is shared by both ends.
+moment of the rigid link, due to mass off the line between the ends where it turns, is
+shared by both ends.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Time laws of a motion from rest to rest, s from 0 to 1 in the time 1.
+"""Profiles of a motion from rest to rest, s from 0 to 1 in the time 1.
 
 ==========  ========================  ==========  ============  ====================
 name        s                         peak speed  acceleration  jumps
@@ -25,13 +25,13 @@ Law = Callable[[NDArray], tuple[NDArray, NDArray, NDArray]]
 
 
 def _polynomial(*coefficients: float) -> Law:
-    """Return the law of a polynomial, constant term first."""
+    """Return the profile of a polynomial, constant term first."""
     s = Polynomial(coefficients)
     return lambda t: (s(t), s.deriv()(t), s.deriv(2)(t))
 
 
 def _trapezoid(t: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the law of constant acceleration, speed and deceleration, a third each."""
+    """Return acceleration, constant speed and deceleration, a third each."""
     left = np.minimum(t, 1 - t)  # time since rest, or until rest
     ramp = left < 1 / 3
     way = np.where(ramp, 2.25 * left**2, 1.5 * left - 0.25)
@@ -46,4 +46,4 @@ PROFILES: dict[str, Law] = {
     "seventh": _polynomial(0, 0, 0, 0, 35, -84, 70, -20),
     "trapezoid": _trapezoid,
 }
-JUMPING = frozenset({"trapezoid"})  # laws whose acceleration jumps
+JUMPING = frozenset({"trapezoid"})  # profiles whose acceleration jumps

@@ -159,11 +159,11 @@ def path_text(summary: dict[str, Any]) -> str:
     """Return a summary as text: times, largest values and drive forces."""
     lines = lines_of(summary, "status reason")
     periods = summary["periods"]
-    beside = f", {periods:.3g} periods of {summary['first_frequency']:.4g} Hz"
+    in_periods = f", {periods:.3g} periods of {summary['first_frequency']:.4g} Hz"
     lines |= {
         "law": LAWS.get(summary["law"], summary["law"]),
         "path time": in_unit(summary["duration"], "s")
-        + (beside if np.isfinite(periods) else ""),
+        + (in_periods if np.isfinite(periods) else ""),
         "points": f"{summary['points']}, {summary['solved']} solved",
     }
     text = [listing(summary["robot"], lines)]

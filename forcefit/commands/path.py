@@ -40,7 +40,8 @@ def path(
     profile: Annotated[
         str | None,
         typer.Option(
-            help="Law of the motion from rest to rest: quintic | seventh | trapezoid."
+            help="Profile of the motion from rest to rest: quintic | seventh | "
+            "trapezoid."
         ),
     ] = None,
     duration: Annotated[
@@ -95,8 +96,7 @@ def path(
 
     Masses must be declared.  Vibration is left out.
     """
-    from assembly.path.path_errors import path_errors
-    from assembly.path.request import PathTimes, trajectory_of
+    from assembly.path.request import PathTimes, errors_along_path
     from assembly.path.summary import path_summary, path_text
     from assembly.sweeps.dataset import check_dataset
 
@@ -110,9 +110,8 @@ def path(
     )  # fmt: skip
     machine = _closed(robot, rest, mismatch)
     with one_thread(), progress_lines() as update:
-        trajectory = trajectory_of(machine, path, times)
-        errors = path_errors(
-            machine, trajectory, load=wrench, gravity=g, assumption=assumption,
+        errors = errors_along_path(
+            machine, path, times=times, load=wrench, gravity=g, assumption=assumption,
             progress=lambda done, total: update("points", done, total),
         )  # fmt: skip
     summary = path_summary(errors)
