@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import block_diag, coo_array, csc_matrix, diags_array, hstack, vstack
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.assembled import all_loads
-from assembly.linear.closure import linearise, virtual_joints
-from assembly.linear.reference import as_printed
-from assembly.linear.reference.reduction import reduce_problem
-from assembly.model.robot import Robot
-from assembly.solvers import conic
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.assembled import all_loads
+from forcefit.assembly.linear.closure import linearise, virtual_joints
+from forcefit.assembly.linear.reference import as_printed
+from forcefit.assembly.linear.reference.reduction import reduce_problem
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.solvers import conic
 
 LOAD = np.array([1.0, 2.0, 3.0, 30.0, 10.0, -100.0])  # [N m, N] on the platform
 GRAVITY = np.array([0.0, 0.0, -9.81])  # [m/s^2]

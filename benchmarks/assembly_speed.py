@@ -7,7 +7,7 @@ grid of its workspace.  Printed, in this order:
 - microseconds of processor time a point for the energy (22), at the errors times 1 and
   times 0.2, by cvxpy rebuilt for every point (SI units), cvxpy with parameters (scaled,
   DPP; its matrices ready made), Clarabel on the full problem, Clarabel on the problem
-  reduced by ``assembly.linear.reference.reduction`` (reduction counted), a batch of
+  reduced by ``forcefit.assembly.linear.reference.reduction`` (reduction counted), a batch of
   moreau's on the full problem (to its 1e-8, without our certificate), our reference in
   numpy, ``solve_assembly``, of one posture and of many (linearisation, reduction,
   certificate counted), with the ratio of cvxpy's DPP to each;
@@ -38,12 +38,6 @@ from pathlib import Path
 
 import numpy as np
 
-from assembly.kinematics.posture import Posture, place_many, place_robot, together
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.zone import zone_margin
-from assembly.model.robot import Robot
-from assembly.robots.irsbot2 import NAMES, irsbot2
 from benchmarks.assembly_peers import (
     GRAVITY,
     LOAD,
@@ -55,6 +49,17 @@ from benchmarks.assembly_peers import (
     loaded_matrices,
     moreau_batched,
 )
+from forcefit.assembly.kinematics.posture import (
+    Posture,
+    place_many,
+    place_robot,
+    together,
+)
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.robots.irsbot2 import NAMES, irsbot2
 
 NUMBERS = Path(__file__).parents[1] / "tests" / "irsbot2_numbers.json"
 SAMPLE = 24  # points of the slow ways

@@ -117,11 +117,13 @@ def prepare(folder: Path, commands: list[str]) -> None:
     for command in KILLED:
         child = os.fork()
         if not child:
-            import assembly.statistics.monte_carlo
-            import assembly.sweeps.sweep
+            import forcefit.assembly.statistics.monte_carlo
+            import forcefit.assembly.sweeps.sweep
 
-            assembly.sweeps.sweep.write_sweep = lambda *_: os._exit(0)
-            assembly.statistics.monte_carlo.save_dataset = lambda *_: os._exit(0)
+            forcefit.assembly.sweeps.sweep.write_sweep = lambda *_: os._exit(0)
+            forcefit.assembly.statistics.monte_carlo.save_dataset = lambda *_: os._exit(
+                0
+            )
             run(shlex.split(command))
             os._exit(1)
         assert os.waitpid(child, 0)[1] == 0, command

@@ -144,8 +144,8 @@ def write_foreign(folder: Path) -> None:
     Args:
         folder: with the robot ``arm.toml``.
     """
-    from assembly.files.robot_file import read_robot
-    from assembly.kinematics.posture import place_robot
+    from forcefit.assembly.files.robot_file import read_robot
+    from forcefit.assembly.kinematics.posture import place_robot
 
     robot = read_robot(folder / "arm.toml")
     drives = [frame.name for frame in robot.frames if frame.actuated]

@@ -40,10 +40,10 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy; children are many
 
 import numpy as np
 
-import assembly.statistics.monte_carlo as monte_carlo
-import assembly.sweeps.sweep as sweeps
-from assembly.sweeps import journal
+import forcefit.assembly.statistics.monte_carlo as monte_carlo
+import forcefit.assembly.sweeps.sweep as sweeps
 from benchmarks.kills_commands import COMMANDS, SHARES, Case, inputs
+from forcefit.assembly.sweeps import journal
 
 WAYS = {signal.SIGKILL: 12, signal.SIGTERM: 2, signal.SIGINT: 3, "full": 3}
 

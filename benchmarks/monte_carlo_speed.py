@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from assembly.kinematics.posture import place_robot
-from assembly.model.error_distributions import ErrorSources
-from assembly.model.random_errors import frames_named
-from assembly.robots import load_robot
-from assembly.statistics.linear_response import LinearResponse, linear_response
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.model.error_distributions import ErrorSources
+from forcefit.assembly.model.random_errors import frames_named
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.statistics.linear_response import LinearResponse, linear_response
 
 FRAMES = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
 PAPER = np.array([2e-2] * 3 + [2e-4] * 3)  # [rad, m]

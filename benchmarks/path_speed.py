@@ -16,18 +16,23 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from assembly.kinematics.posture import POSE, home_posture, place_many, together
-from assembly.linear.energy import solve_assembly
-from assembly.model.robot import BeamLink, Robot
-from assembly.path.idle_motions import with_idle_accelerations
-from assembly.path.inertial_loads import inertial_loads
-from assembly.path.motion import follow_path
-from assembly.path.path_errors import path_errors
-from assembly.path.path_file import PathTable
-from assembly.path.trajectory import Trajectory, profiled
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.robots import load_robot
-from assembly.sweeps.targets import goals_of
+from forcefit.assembly.kinematics.posture import (
+    POSE,
+    home_posture,
+    place_many,
+    together,
+)
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.robot import BeamLink, Robot
+from forcefit.assembly.path.idle_motions import with_idle_accelerations
+from forcefit.assembly.path.inertial_loads import inertial_loads
+from forcefit.assembly.path.motion import follow_path
+from forcefit.assembly.path.path_errors import path_errors
+from forcefit.assembly.path.path_file import PathTable
+from forcefit.assembly.path.trajectory import Trajectory, profiled
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.sweeps.targets import goals_of
 
 POINTS, RUNS, ONE_BY_ONE = 1000, 5, 50
 MOVES = {"irsbot2": ("tx", "tz"), "hexapod": POSE, "delta": ("tx", "ty", "tz")}

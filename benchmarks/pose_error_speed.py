@@ -36,15 +36,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, vstack
 
-from assembly.kinematics.posture import Posture, place_many, together
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.pose_error import ReachableSet, reachable_screws
-from assembly.linear.zone import zone_margin
-from assembly.model.robot import Robot
-from assembly.solvers import conic
-from assembly.solvers.cones import cone_sizes
 from benchmarks.assembly_speed import paper_robot, workspace
+from forcefit.assembly.kinematics.posture import Posture, place_many, together
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.reference.pose_error import ReachableSet, reachable_screws
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.solvers import conic
+from forcefit.assembly.solvers.cones import cone_sizes
 
 SAMPLE = 6  # points of the other solvers
 UNIT = 1e-3  # poses are in mrad and mm for them

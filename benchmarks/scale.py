@@ -24,12 +24,12 @@ BLOCK, ENERGIES = 100_000, 10_000_000
 
 def sweep(draws: int, path: Path) -> int:
     """Sweep so many draws into a file; how many points."""
-    from assembly.model.error_distributions import tolerance_sources
-    from assembly.robots import load_robot
-    from assembly.sweeps.plan import Sweep
-    from assembly.sweeps.quantities import Question
-    from assembly.sweeps.sweep import run_sweep
-    from assembly.sweeps.targets import grid_targets, parse_grid
+    from forcefit.assembly.model.error_distributions import tolerance_sources
+    from forcefit.assembly.robots import load_robot
+    from forcefit.assembly.sweeps.plan import Sweep
+    from forcefit.assembly.sweeps.quantities import Question
+    from forcefit.assembly.sweeps.sweep import run_sweep
+    from forcefit.assembly.sweeps.targets import grid_targets, parse_grid
 
     robot = load_robot("four_bar")
     (drive,) = (frame.name for frame in robot.frames if frame.actuated)
@@ -45,9 +45,9 @@ def sweep(draws: int, path: Path) -> int:
 
 def energies(count: int) -> int:
     """So many least energies at one posture, each with errors of its own."""
-    from assembly.kinematics.posture import place_robot
-    from assembly.linear.energy import solve_assembly
-    from assembly.robots import load_robot
+    from forcefit.assembly.kinematics.posture import place_robot
+    from forcefit.assembly.linear.energy import solve_assembly
+    from forcefit.assembly.robots import load_robot
 
     posture = place_robot(load_robot("irsbot2"), {"tx": 0.1, "tz": -0.5})
     n, done = len(posture.robot.frames), 0

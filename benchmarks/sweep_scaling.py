@@ -24,14 +24,14 @@ import dask
 import numpy as np
 from distributed import Client, LocalCluster
 
-from assembly.model.error_distributions import tolerance_sources
-from assembly.robots import load_robot
-from assembly.sweeps.cluster import _QUIET, cluster_solver
-from assembly.sweeps.plan import Sweep
-from assembly.sweeps.points import solve_points
-from assembly.sweeps.quantities import Question
-from assembly.sweeps.sweep import run_sweep, solve_here
-from assembly.sweeps.targets import grid_targets, parse_grid
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.sweeps.cluster import _QUIET, cluster_solver
+from forcefit.assembly.sweeps.plan import Sweep
+from forcefit.assembly.sweeps.points import solve_points
+from forcefit.assembly.sweeps.quantities import Question
+from forcefit.assembly.sweeps.sweep import run_sweep, solve_here
+from forcefit.assembly.sweeps.targets import grid_targets, parse_grid
 
 TURNS = 5
 

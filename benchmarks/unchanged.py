@@ -75,8 +75,8 @@ def questions(folder: Path) -> dict[str, list[str]]:
 
 def write_robots(folder: Path) -> None:
     """Each built-in robot with one draw of errors, as a robot file."""
-    from assembly.files.robot_file import write_robot
-    from assembly.robots import load_robot
+    from forcefit.assembly.files.robot_file import write_robot
+    from forcefit.assembly.robots import load_robot
 
     folder.mkdir(parents=True, exist_ok=True)
     for name in (*ROBOTS, "arm6"):

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.files.robot_file import write_robot
-from assembly.model.robot import Robot
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput
-from stiffness.screws import rotation_vector
-from validation.campaign.campaign import READING
+from forcefit.stiffness.screws import rotation_vector
+from forcefit.validation.campaign.campaign import READING
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 SOURCES = Path(__file__).parent / "data.toml"

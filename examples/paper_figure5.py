@@ -14,10 +14,15 @@ from pathlib import Path
 import numpy as np
 
 import forcefit as ff
-from assembly.files.robot_file import write_robot
-from assembly.linear.zone import ASSEMBLABLE
-from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_named
-from assembly.robots import load_robot
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.linear.zone import ASSEMBLABLE
+from forcefit.assembly.model.random_errors import (
+    SIGNS,
+    ErrorDraw,
+    draw_errors,
+    frames_named,
+)
+from forcefit.assembly.robots import load_robot
 
 FRAMES = ["elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip"]
 LEAST = (1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6)  # [rad, m] the paper's section IV

@@ -21,27 +21,27 @@ from typing import Any
 import numpy as np
 import scipy.sparse
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.model.error_distributions import read_sources
-from assembly.model.robot import Robot
-from assembly.report.pose_errors import pose_error_of
-from assembly.report.results import exact_of, solution_of
-from assembly.robots import load_robot
-from assembly.statistics.allocated_tolerances import allocation_of
-from assembly.statistics.allocation import allocate
-from assembly.statistics.clearance_positions import CLEARANCE_MODELS
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.importance_table import ImportanceOptions
-from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.summary import summarise
-from assembly.statistics.tolerances import present_errors
-from stiffness.fem.fea import FemOptions, solve_bar
-from stiffness.fem.material import Material
-from stiffness.fem.stress import peak_stress, stress_influence
-from stiffness.fem.two_ends import two_ends
-from stiffness.link import LinkStiffness
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.error_distributions import read_sources
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.report.pose_errors import pose_error_of
+from forcefit.assembly.report.results import exact_of, solution_of
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.statistics.allocated_tolerances import allocation_of
+from forcefit.assembly.statistics.allocation import allocate
+from forcefit.assembly.statistics.clearance_positions import CLEARANCE_MODELS
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.importance_table import ImportanceOptions
+from forcefit.assembly.statistics.monte_carlo import run_draws
+from forcefit.assembly.statistics.summary import summarise
+from forcefit.assembly.statistics.tolerances import present_errors
+from forcefit.stiffness.fem.fea import FemOptions, solve_bar
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.fem.stress import peak_stress, stress_influence
+from forcefit.stiffness.fem.two_ends import two_ends
+from forcefit.stiffness.link import LinkStiffness
 from tests.beam_questions_for_tests import BEAMS
 from tests.built_in_robots_for_tests import CLOSE, LOAD, WORKSPACE
 from tests.effect_questions_for_tests import EFFECTS

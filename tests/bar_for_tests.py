@@ -2,19 +2,19 @@
 
 import numpy as np
 
-from assembly.effects.effect import Unknown
-from assembly.kinematics.posture import place_robot
-from assembly.measurement.predict import with_second_order
-from assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.effects.effect import Unknown
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.measurement.predict import with_second_order
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.claims import parameters_of
+from forcefit.validation.diagnosis.columns import Columns
+from forcefit.validation.diagnosis.derivatives import Derivatives
+from forcefit.validation.diagnosis.fit import fit_machine
+from forcefit.validation.diagnosis.hypotheses import Hypothesis, Slot
+from forcefit.validation.diagnosis.signatures import conditions_of
+from forcefit.validation.diagnosis.unknowns import Acting, Unknowns
 from tests.planar_arm_for_tests import SIGMA
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.claims import parameters_of
-from validation.diagnosis.columns import Columns
-from validation.diagnosis.derivatives import Derivatives
-from validation.diagnosis.fit import fit_machine
-from validation.diagnosis.hypotheses import Hypothesis, Slot
-from validation.diagnosis.signatures import conditions_of
-from validation.diagnosis.unknowns import Acting, Unknowns
 
 LENGTH = 0.8
 

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from stiffness.beam.beam import beam_compliance
-from stiffness.beam.beam_stress import peak_beam_stress, section_stress
-from stiffness.beam.curve import arc_piece, curve_compliance, straight_piece
-from stiffness.beam.curve_file import read_curve
-from stiffness.beam.sections import (
+from forcefit.stiffness.beam.beam import beam_compliance
+from forcefit.stiffness.beam.beam_stress import peak_beam_stress, section_stress
+from forcefit.stiffness.beam.curve import arc_piece, curve_compliance, straight_piece
+from forcefit.stiffness.beam.curve_file import read_curve
+from forcefit.stiffness.beam.sections import (
     box_section,
     i_section,
     rectangular_section,
     round_section,
 )
-from stiffness.surface.beam_surfaces import shape_beam
+from forcefit.stiffness.surface.beam_surfaces import shape_beam
 
 E, NU = 7e10, 0.31
 WRENCHES = np.array([[3, -2, 1, 20, -10, 30], [0.1, 4, -5, -3, 8, 0.2]])

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import solve_assembly
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.linear.energy import solve_assembly
 
 # boxes of platform poses, about those the robots are used in
 WORKSPACE = {

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from assembly.model.robot import Frame, Robot
-from validation.campaign.campaign import Campaign
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.validation.campaign.campaign import Campaign
 
 ARM = """
 name = "arm"

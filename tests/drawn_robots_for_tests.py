@@ -7,12 +7,12 @@ import math
 
 import numpy as np
 
-from assembly.robots.delta import AZIMUTHS, DeltaParameters, drive_angle
-from assembly.robots.five_bar import FiveBarParameters
-from assembly.robots.hexapod import HexapodParameters, points
-from assembly.robots.planar import arm_angle
-from assembly.robots.three_rrr import ThreeRRRParameters
-from stiffness.screws import UNIT_VECTORS, rotation_matrix, transform
+from forcefit.assembly.robots.delta import AZIMUTHS, DeltaParameters, drive_angle
+from forcefit.assembly.robots.five_bar import FiveBarParameters
+from forcefit.assembly.robots.hexapod import HexapodParameters, points
+from forcefit.assembly.robots.planar import arm_angle
+from forcefit.assembly.robots.three_rrr import ThreeRRRParameters
+from forcefit.stiffness.screws import UNIT_VECTORS, rotation_matrix, transform
 
 
 def row(values):

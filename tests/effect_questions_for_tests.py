@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from assembly.effects import LIBRARY, apply_effects
-from assembly.effects.functions import apply_functions
-from assembly.measurement.predict import predict
-from assembly.measurement.settled_clearance import with_clearances_taken_up
-from assembly.measurement.variables import with_history
-from assembly.model.function import Function
-from validation.campaign.campaign_file import read_campaign
-from validation.diagnosis.signatures import conditions_of
+from forcefit.assembly.effects import LIBRARY, apply_effects
+from forcefit.assembly.effects.functions import apply_functions
+from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.measurement.settled_clearance import with_clearances_taken_up
+from forcefit.assembly.measurement.variables import with_history
+from forcefit.assembly.model.function import Function
+from forcefit.validation.campaign.campaign_file import read_campaign
+from forcefit.validation.diagnosis.signatures import conditions_of
 
 CAMPAIGNS = Path(__file__).parent / "campaigns"
 NAMES = ("encoder_offset", "base_compliance_drift")

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from assembly.kinematics.posture import place_robot
-from assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.validation.campaign.campaign import Campaign
 from tests.planar_arm_for_tests import SIGMA
-from validation.campaign.campaign import Campaign
 
 SPRING = np.diag([np.inf, np.inf, 5e4, np.inf, np.inf, np.inf])
 TUBE = BeamLink({"radius": 0.03, "inner_radius": 0.025}, 70e9, 0.33, density=2700.0)

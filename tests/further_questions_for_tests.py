@@ -10,24 +10,24 @@ from typing import Any
 
 import numpy as np
 
-from assembly.effects.places import drives
-from assembly.kinematics.posture import Posture, place_many_joints, place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.linear.nearest_pose import nearest_pose
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.pose_error import reachable_screws
-from assembly.measurement.conditions import ContactLaw, as_declared
-from assembly.measurement.predict import predict, with_finite_motions
-from assembly.measurement.settled_clearance import without_joint_clearances
-from assembly.report.error_body import error_body
-from assembly.robots import load_robot
-from assembly.statistics.stiffness_spread import draw_stiffnesses
-from stiffness.fem.fea import FemOptions, solve_bar
-from stiffness.fem.material import Material
-from stiffness.surface.decimate import coarser_surface
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.patches import triangles_on
-from stiffness.surface.surface import check_surface
+from forcefit.assembly.effects.places import drives
+from forcefit.assembly.kinematics.posture import Posture, place_many_joints, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.nearest_pose import nearest_pose
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.reference.pose_error import reachable_screws
+from forcefit.assembly.measurement.conditions import ContactLaw, as_declared
+from forcefit.assembly.measurement.predict import predict, with_finite_motions
+from forcefit.assembly.measurement.settled_clearance import without_joint_clearances
+from forcefit.assembly.report.error_body import error_body
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.statistics.stiffness_spread import draw_stiffnesses
+from forcefit.stiffness.fem.fea import FemOptions, solve_bar
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.surface.decimate import coarser_surface
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.patches import triangles_on
+from forcefit.stiffness.surface.surface import check_surface
 from tests.built_in_robots_for_tests import LOAD, WORKSPACE
 from tests.solids_for_tests import cylinder
 

@@ -1,8 +1,8 @@
 """A build file of a library, and the stiffness of its bars in closed form."""
 
-from stiffness.beam.beam import beam_compliance
-from stiffness.beam.sections import round_section
-from stiffness.link import inverted
+from forcefit.stiffness.beam.beam import beam_compliance
+from forcefit.stiffness.beam.sections import round_section
+from forcefit.stiffness.link import inverted
 
 GRID = {"length": (0.2, 0.3, 0.45), "radius": (0.01, 0.02, 0.04)}
 MATERIAL = {"young": (6e10,), "poisson": (0.3,)}

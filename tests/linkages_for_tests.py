@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from assembly.model.robot import Frame, Robot
+from forcefit.assembly.model.robot import Frame, Robot
 
 
 def frame(name, parent="base", at=(0, 0, 0), turn=(0, 0, 0), **more):

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import BeamLink, Frame, Robot
-from validation.multibody.simulation import (
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.validation.multibody.simulation import (
     simulate_assembly,
 )
 

@@ -18,27 +18,29 @@ def _lever(change):
     """The adjoint's block [p_j - p]x R, changed."""
 
     def mutate(monkeypatch):
-        import assembly.kinematics.posture
+        import forcefit.assembly.kinematics.posture
 
-        right = assembly.kinematics.posture.screw_map
+        right = forcefit.assembly.kinematics.posture.screw_map
 
         def wrong(offset, rotation=None):
             A = right(offset, rotation).copy()
             A[..., 3:, :3] = change(A[..., 3:, :3])
             return A
 
-        monkeypatch.setattr(assembly.kinematics.posture, "screw_map", wrong)
+        monkeypatch.setattr(forcefit.assembly.kinematics.posture, "screw_map", wrong)
 
     return mutate
 
 
 def _signs(change):
     def mutate(monkeypatch):
-        import assembly.linear.closure
+        import forcefit.assembly.linear.closure
 
-        right = assembly.linear.closure.closure_signs
+        right = forcefit.assembly.linear.closure.closure_signs
         monkeypatch.setattr(
-            assembly.linear.closure, "closure_signs", lambda robot: change(right(robot))
+            forcefit.assembly.linear.closure,
+            "closure_signs",
+            lambda robot: change(right(robot)),
         )
 
     return mutate
@@ -48,9 +50,9 @@ def _beam(row, column, factor):
     """One entry of K_E^-1 of every beam, in section axes."""
 
     def mutate(monkeypatch):
-        import stiffness.beam.beam
+        import forcefit.stiffness.beam.beam
 
-        right = stiffness.beam.beam._compliance_in_section_axes
+        right = forcefit.stiffness.beam.beam._compliance_in_section_axes
 
         def wrong(*args):
             C = right(*args)
@@ -58,15 +60,17 @@ def _beam(row, column, factor):
             C[column, row] = C[row, column]
             return C
 
-        monkeypatch.setattr(stiffness.beam.beam, "_compliance_in_section_axes", wrong)
+        monkeypatch.setattr(
+            forcefit.stiffness.beam.beam, "_compliance_in_section_axes", wrong
+        )
 
     return mutate
 
 
 def _shifted_errors(monkeypatch):
     """Eq. (14) as printed: errors read at the parent frame instead of the frame."""
-    from assembly.kinematics.posture import Posture
-    from stiffness.screws import screw_map
+    from forcefit.assembly.kinematics.posture import Posture
+    from forcefit.stiffness.screws import screw_map
 
     def wrong(self):
         T = np.concatenate([np.eye(4)[None], self.transforms])[self.robot.parents + 1]
@@ -76,11 +80,11 @@ def _shifted_errors(monkeypatch):
 
 
 def _no_rotation(monkeypatch):
-    import assembly.kinematics.posture
+    import forcefit.assembly.kinematics.posture
 
-    right = assembly.kinematics.posture.screw_map
+    right = forcefit.assembly.kinematics.posture.screw_map
     monkeypatch.setattr(
-        assembly.kinematics.posture,
+        forcefit.assembly.kinematics.posture,
         "screw_map",
         lambda offset, rotation=None: right(offset),
     )
@@ -94,14 +98,18 @@ MUTATIONS = {
     "eq. (14) as printed": _shifted_errors,
     "second chain added, not subtracted": _signs(np.abs),
     "second chain counted twice": _signs(lambda s: np.where(s < 0, 2 * s, s)),
-    "links twice as soft": _scaled("assembly.linear.closure", "link_compliances", 2.0),
+    "links twice as soft": _scaled(
+        "forcefit.assembly.linear.closure", "link_compliances", 2.0
+    ),
     "links half a per cent stiff": _scaled(
-        "assembly.linear.closure", "link_compliances", 0.995
+        "forcefit.assembly.linear.closure", "link_compliances", 0.995
     ),
     "joints twice as soft": _scaled(
-        "assembly.linear.closure", "spring_compliances", 2.0
+        "forcefit.assembly.linear.closure", "spring_compliances", 2.0
     ),
-    "joints rigid": _scaled("assembly.linear.closure", "spring_compliances", 1e-9),
+    "joints rigid": _scaled(
+        "forcefit.assembly.linear.closure", "spring_compliances", 1e-9
+    ),
 }
 
 BEAM_MUTATIONS = {

@@ -7,8 +7,8 @@ that a diagnosis uses.
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from forcefit.validation.campaign.campaign_file import read_campaign
 from tests.campaigns_for_tests import write_campaign
-from validation.campaign.campaign_file import read_campaign
 
 L1, L2, RADIUS, E = 0.6, 0.45, 0.03, 70e9
 AREA, I = np.pi * RADIUS**2, np.pi * RADIUS**4 / 4

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from assembly.files.robot_file import write_robot
-from assembly.model.robot import Robot
-from validation.campaign.campaign import Campaign
-from validation.campaign.campaign_file import read_campaign
-from validation.synthetic.design import CampaignDesign
-from validation.synthetic.generator import Noise, Synthetic, generate_campaign
-from validation.synthetic.machine import Hidden, nominal_pose, with_point
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.model.robot import Robot
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.campaign.campaign_file import read_campaign
+from forcefit.validation.synthetic.design import CampaignDesign
+from forcefit.validation.synthetic.generator import Noise, Synthetic, generate_campaign
+from forcefit.validation.synthetic.machine import Hidden, nominal_pose, with_point
 
 TARGETS = {
     "A": np.array([0.08, 0.0, 0.02]),

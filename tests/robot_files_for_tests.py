@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from assembly.files.robot_file import read_robot
+from forcefit.assembly.files.robot_file import read_robot
 from forcefit.inputs.table import BadInput
 
 FOUR_BAR = """

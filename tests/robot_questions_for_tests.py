@@ -9,28 +9,35 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.nominal import motion_screws, size_of
-from assembly.kinematics.pieces import cut_beams
-from assembly.kinematics.posture import place_many, place_many_joints, place_robot
-from assembly.kinematics.singularity import find_singularities
-from assembly.linear.certificate import bound_screw
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.pose_error import ASSUMPTIONS
-from assembly.linear.zone import zone_margin
-from assembly.model.error_distributions import tolerance_sources
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
-from assembly.robots import load_robot
-from assembly.statistics.allocated_tolerances import allocation_of, allocation_text
-from assembly.statistics.allocation import allocate
-from assembly.statistics.clearance_positions import CLEARANCE_MODELS
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.linear_response import LinearResponse, linear_response
-from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.posture_margins import PostureMargins, prepare_margins
-from assembly.statistics.scenes import drawn_robot, margin_map, tightest_robot
-from assembly.statistics.summary import summarise, summary_text
-from assembly.statistics.tolerances import present_errors, present_text
+from forcefit.assembly.kinematics.nominal import motion_screws, size_of
+from forcefit.assembly.kinematics.pieces import cut_beams
+from forcefit.assembly.kinematics.posture import (
+    place_many,
+    place_many_joints,
+    place_robot,
+)
+from forcefit.assembly.kinematics.singularity import find_singularities
+from forcefit.assembly.linear.certificate import bound_screw
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.reference.pose_error import ASSUMPTIONS
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.statistics.allocated_tolerances import (
+    allocation_of,
+    allocation_text,
+)
+from forcefit.assembly.statistics.allocation import allocate
+from forcefit.assembly.statistics.clearance_positions import CLEARANCE_MODELS
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.linear_response import LinearResponse, linear_response
+from forcefit.assembly.statistics.monte_carlo import run_draws
+from forcefit.assembly.statistics.posture_margins import PostureMargins, prepare_margins
+from forcefit.assembly.statistics.scenes import drawn_robot, margin_map, tightest_robot
+from forcefit.assembly.statistics.summary import summarise, summary_text
+from forcefit.assembly.statistics.tolerances import present_errors, present_text
 from tests.built_in_robots_for_tests import CLOSE, LOAD, WORKSPACE
 from tests.robots_for_tests import random_robot, small_clearance
 from tests.tolerances_for_tests import plan_for

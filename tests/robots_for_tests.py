@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from assembly.kinematics.posture import Posture, place_many
-from assembly.linear.energy import solve_assembly
-from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
-from assembly.robots.irsbot2 import NAMES, irsbot2
-from stiffness.screws import rotation_matrix, rotation_vector, transform
+from forcefit.assembly.kinematics.posture import Posture, place_many
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.robots.irsbot2 import NAMES, irsbot2
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform
 
 NUMBERS = json.loads((Path(__file__).parent / "irsbot2_numbers.json").read_text())
 

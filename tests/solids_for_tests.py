@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import Delaunay
 
-from stiffness.fem.elements import lame
-from stiffness.mesh.solid import Solid, boundary_faces
-from stiffness.surface.filled_solids import FilledSolids
-from stiffness.surface.primitives import Cone, Plane
-from stiffness.surface.surface import check_surface
+from forcefit.stiffness.fem.elements import lame
+from forcefit.stiffness.mesh.solid import Solid, boundary_faces
+from forcefit.stiffness.surface.filled_solids import FilledSolids
+from forcefit.stiffness.surface.primitives import Cone, Plane
+from forcefit.stiffness.surface.surface import check_surface
 
 Z = np.array([0.0, 0.0, 1.0])
 

@@ -16,8 +16,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assembly.files.robot_file import read_robot
-from assembly.kinematics.posture import place_many, place_robot
 from examples import campaign_folder, ipa_ur10
 from examples.campaign_folder import DATA, base_pose, data_folder
 from examples.hangprinter.convert import ANCHORS, LINES, cable_robot
@@ -28,10 +26,12 @@ from examples.ipa_ur10.convert import convert as convert_ipa
 from examples.serial_robots.convert import convert as convert_serial
 from examples.serial_robots.convert import find as find_serial
 from examples.voron.convert import convert as convert_voron
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.kinematics.posture import place_many, place_robot
 from forcefit.inputs.table import BadInput
-from stiffness.screws import rotation_vector, transform
-from validation.campaign.campaign_file import read_campaign
-from validation.correction.compensation import compensate
+from forcefit.stiffness.screws import rotation_vector, transform
+from forcefit.validation.campaign.campaign_file import read_campaign
+from forcefit.validation.correction.compensation import compensate
 
 
 def needs(name):

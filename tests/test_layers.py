@@ -24,63 +24,63 @@ FOR_MANY = (
 # a file, the import added to it, and how import-linter reports it, by contract
 BROKEN = {
     "the four packages": [
-        ("stiffness/link.py", "import assembly.model.robot",
-         "stiffness.link -> assembly.model.robot"),
+        ("stiffness/link.py", "import forcefit.assembly.model.robot",
+         "forcefit.stiffness.link -> forcefit.assembly.model.robot"),
         ("stiffness/fem/quality.py", "def f():\n import forcefit.commands.app",
-         "stiffness.fem.quality -> forcefit.commands.app"),
-        ("assembly/linear/zone.py", "from validation.study import report",
-         "assembly.linear.zone -> validation.study.report"),
+         "forcefit.stiffness.fem.quality -> forcefit.commands.app"),
+        ("assembly/linear/zone.py", "from forcefit.validation.study import report",
+         "forcefit.assembly.linear.zone -> forcefit.validation.study.report"),
     ],
     "layers of forcefit": [
         ("forcefit/inputs/errors.py", "from forcefit.page import page",
          "forcefit.inputs.errors -> forcefit.page.page"),
     ],
     "layers of stiffness": [
-        ("stiffness/screws.py", "if x:\n from stiffness import link",
-         "stiffness.screws -> stiffness.link"),
+        ("stiffness/screws.py", "if x:\n from forcefit.stiffness import link",
+         "forcefit.stiffness.screws -> forcefit.stiffness.link"),
     ],
     "layers of assembly": [
-        ("assembly/model/frame.py", "from assembly.linear.zone import x",
-         "assembly.model.frame -> assembly.linear.zone"),
+        ("assembly/model/frame.py", "from forcefit.assembly.linear.zone import x",
+         "forcefit.assembly.model.frame -> forcefit.assembly.linear.zone"),
         ("assembly/lost/__init__.py", "", "- assembly.lost"),
     ],
     "layers of validation": [
-        ("validation/campaign/checks.py", "import validation.study.study",
-         "validation.campaign.checks -> validation.study.study"),
+        ("validation/campaign/checks.py", "import forcefit.validation.study.study",
+         "forcefit.validation.campaign.checks -> forcefit.validation.study.study"),
     ],
     "no cycles": [
-        ("assembly/exchange/mjcf_joint.py", "from assembly.exchange import mjcf",
-         "No cycles are allowed in assembly.exchange"),
-        ("stiffness/fem/elements.py", "def f():\n from stiffness.fem import fea",
-         "No cycles are allowed in stiffness.fem"),
+        ("assembly/exchange/mjcf_joint.py", "from forcefit.assembly.exchange import mjcf",
+         "No cycles are allowed in forcefit.assembly.exchange"),
+        ("stiffness/fem/elements.py", "def f():\n from forcefit.stiffness.fem import fea",
+         "No cycles are allowed in forcefit.stiffness.fem"),
     ],
     "the reduction does not need its results": [
-        ("assembly/linear/reference/reduction.py", "import assembly.linear.assembled",
-         "assembly.linear.reference.reduction -> assembly.linear.assembled"),
+        ("assembly/linear/reference/reduction.py", "import forcefit.assembly.linear.assembled",
+         "forcefit.assembly.linear.reference.reduction -> forcefit.assembly.linear.assembled"),
     ],
     "the second opinion shares none of the first one's mechanics": [
-        ("validation/multibody/simulation.py", "import assembly.linear.energy",
-         "validation.multibody.simulation -> assembly.linear.energy"),
-        ("validation/multibody/motion.py", "from assembly.files import robot_file",
-         "validation.multibody.motion -> assembly.files.robot_file"),
-        ("validation/synthetic/rest.py", "from assembly.linear import zone",
-         "validation.synthetic.rest -> assembly.linear.zone"),
+        ("validation/multibody/simulation.py", "import forcefit.assembly.linear.energy",
+         "forcefit.validation.multibody.simulation -> forcefit.assembly.linear.energy"),
+        ("validation/multibody/motion.py", "from forcefit.assembly.files import robot_file",
+         "forcefit.validation.multibody.motion -> forcefit.assembly.files.robot_file"),
+        ("validation/synthetic/rest.py", "from forcefit.assembly.linear import zone",
+         "forcefit.validation.synthetic.rest -> forcefit.assembly.linear.zone"),
     ],
     "assembly solves no links": [
-        ("assembly/linear/load.py", "def f():\n from stiffness.fem.fea import x",
-         "assembly.linear.load -> stiffness.fem.fea"),
-        ("assembly/sweeps/plan.py", "from stiffness.surface.surface import x",
-         "assembly.sweeps.plan -> stiffness.surface.surface"),
+        ("assembly/linear/load.py", "def f():\n from forcefit.stiffness.fem.fea import x",
+         "forcefit.assembly.linear.load -> forcefit.stiffness.fem.fea"),
+        ("assembly/sweeps/plan.py", "from forcefit.stiffness.surface.surface import x",
+         "forcefit.assembly.sweeps.plan -> forcefit.stiffness.surface.surface"),
     ],
     "each heavy package has its owners": [
         ("assembly/linear/rounding.py", "import typer",
-         "assembly.linear.rounding -> typer"),
+         "forcefit.assembly.linear.rounding -> typer"),
         ("assembly/model/links.py", "import xarray as xr",
-         "assembly.model.links -> xarray"),
+         "forcefit.assembly.model.links -> xarray"),
         ("assembly/linear/closure.py", "def f():\n from clarabel import y",
-         "assembly.linear.closure -> clarabel"),
+         "forcefit.assembly.linear.closure -> clarabel"),
         ("validation/study/headline.py", "if x:\n import cvxpy",
-         "validation.study.headline -> cvxpy"),
+         "forcefit.validation.study.headline -> cvxpy"),
     ],
 }  # fmt: skip
 
@@ -132,7 +132,7 @@ def test_every_forbidden_import_is_reported(tmp_path):
     for name, cases in BROKEN.items():
         for _, _, reported in cases:
             assert reported in sections[name]
-    assert "stiffness.beam.beam -> clarabel" not in report
+    assert "forcefit.stiffness.beam.beam -> clarabel" not in report
 
 
 @pytest.mark.parametrize("folder", PACKAGES)

@@ -9,8 +9,8 @@ platform keeps two freedoms of turning, there and wherever it stands above the c
 
 import numpy as np
 
-from assembly.model.robot import BeamLink, Clearance, Frame, Robot
-from stiffness.screws import rotation_vector
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot
+from forcefit.stiffness.screws import rotation_vector
 
 BASE, PLATFORM, HEIGHT = 0.24, 0.08, 0.45  # [m] radii, and height of the platform
 LENGTH = float(np.hypot(BASE - PLATFORM, HEIGHT))  # [m] of a leg at home

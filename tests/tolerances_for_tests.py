@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from assembly.model.error_distributions import tolerance_sources
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
-from assembly.statistics.requirement import Plan
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.statistics.requirement import Plan
 
 PLAY = 1e-4  # [m] radial clearance
 ARM = 0.4  # [m] from the pin of the arm to its tip

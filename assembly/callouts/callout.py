@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.callouts.fits import parse_size
-from assembly.callouts.general_tolerances import (
+from forcefit.assembly.callouts.fits import parse_size
+from forcefit.assembly.callouts.general_tolerances import (
     linear_tolerance,
     parse_general,
     perpendicularity_tolerance,
 )
-from assembly.callouts.zone import Zone, intersection
-from assembly.callouts.zones_of_features import (
+from forcefit.assembly.callouts.zone import Zone, intersection
+from forcefit.assembly.callouts.zones_of_features import (
     axis_orientation,
     axis_position,
     axis_position_along,
@@ -79,7 +79,7 @@ class Callout:
             first size.
         length: [m] distance from datum A and its tolerance to each side, or None.
         general: general tolerance, such as ``"ISO 2768-mK"``, or empty.
-        distribution: see :meth:`assembly.callouts.zone.Zone.draw`.
+        distribution: see :meth:`forcefit.assembly.callouts.zone.Zone.draw`.
         cp: capability of a normal distribution.
         at: (3,) [m] the middle of the feature, in the frame's axes.
     """

@@ -20,8 +20,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.callouts.largest_product import largest_product
-from assembly.callouts.unit_balls import VOLUMES, ball_variance, in_balls
+from forcefit.assembly.callouts.largest_product import largest_product
+from forcefit.assembly.callouts.unit_balls import VOLUMES, ball_variance, in_balls
 
 DISTRIBUTIONS = ("uniform", "normal", "truncated")
 _SAMPLE = 1 << 17  # draws for the covariance of a zone that is cut

@@ -8,7 +8,7 @@ an axis at height z is e(z) = (TX + z RY, TY - z RX).
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.callouts.zone import Zone
+from forcefit.assembly.callouts.zone import Zone
 
 _SIGNS = ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
 

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.callouts.callout import Callout, Datum
-from assembly.callouts.fits import FittedEnd
-from assembly.drawing.drawing import Drawing, DrawnCallout, DrawnJoint
-from assembly.drawing.parts import parts_of
-from assembly.drawing.tree import Step
-from assembly.model.placed_frames import PlacedFrame, own_motion
+from forcefit.assembly.callouts.callout import Callout, Datum
+from forcefit.assembly.callouts.fits import FittedEnd
+from forcefit.assembly.drawing.drawing import Drawing, DrawnCallout, DrawnJoint
+from forcefit.assembly.drawing.parts import parts_of
+from forcefit.assembly.drawing.tree import Step
+from forcefit.assembly.model.placed_frames import PlacedFrame, own_motion
 
 _ROUNDING = 1e-12
 # what a joint of each type holds as a datum; the others are axes

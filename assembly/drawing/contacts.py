@@ -27,9 +27,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.callouts.fits import FittedEnd
-from assembly.model.robot import Clearance
-from stiffness.screws import transform
+from forcefit.assembly.callouts.fits import FittedEnd
+from forcefit.assembly.model.robot import Clearance
+from forcefit.stiffness.screws import transform
 
 
 @dataclass(frozen=True, eq=False)

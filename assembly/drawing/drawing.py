@@ -9,10 +9,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.callouts.callout import Callout
-from assembly.callouts.fits import FittedEnd
-from assembly.drawing.contacts import Contact
-from assembly.model.robot import BeamLink, Clearance, Link, LockedAt, MeshLink
+from forcefit.assembly.callouts.callout import Callout
+from forcefit.assembly.callouts.fits import FittedEnd
+from forcefit.assembly.drawing.contacts import Contact
+from forcefit.assembly.model.robot import BeamLink, Clearance, Link, LockedAt, MeshLink
 
 # freedoms of each type: rows of the screw [RX RY RZ TX TY TZ] in the joint's axes; of a
 # universal joint its two turns have axes of their own

@@ -9,20 +9,20 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.drawing.drawing import (
+from forcefit.assembly.drawing.drawing import (
     Drawing,
     DrawnBody,
     DrawnJoint,
     JointNumbers,
 )
-from assembly.drawing.joint_types import FoundJoint, found_joints, has_mass
-from assembly.drawing.links import beam_start, drawn_link
-from assembly.drawing.parts import joint_axes, parts_of
-from assembly.drawing.rigid_bodies import RigidBodies, rigid_bodies
-from assembly.kinematics.nominal import size_of
-from assembly.kinematics.posture import Posture, home_posture
-from assembly.model.inertia import joined_bodies
-from assembly.model.robot import (
+from forcefit.assembly.drawing.joint_types import FoundJoint, found_joints, has_mass
+from forcefit.assembly.drawing.links import beam_start, drawn_link
+from forcefit.assembly.drawing.parts import joint_axes, parts_of
+from forcefit.assembly.drawing.rigid_bodies import RigidBodies, rigid_bodies
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.kinematics.posture import Posture, home_posture
+from forcefit.assembly.model.inertia import joined_bodies
+from forcefit.assembly.model.robot import (
     BASE,
     Frame,
     LibraryLink,
@@ -30,7 +30,7 @@ from assembly.model.robot import (
 )
 from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import rounded
-from stiffness.screws import rotation_vector, transform
+from forcefit.stiffness.screws import rotation_vector, transform
 
 _SAME = 1e-12  # [lengths, rad] error below which points and axes are the same
 # fields of a frame that a drawing holds

@@ -11,15 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.drawing.callouts import frame_callouts, frame_fits
-from assembly.drawing.drawing import Drawing, DrawnBody, DrawnJoint
-from assembly.drawing.links import link_at_tip
-from assembly.drawing.parts import joint_axes, parts_of
-from assembly.drawing.tree import ROOT, Edge, Node, Step, steps_of
-from assembly.model.placed_frames import PlacedFrame, place_frames
-from assembly.model.robot import BASE, Frame, Robot
+from forcefit.assembly.drawing.callouts import frame_callouts, frame_fits
+from forcefit.assembly.drawing.drawing import Drawing, DrawnBody, DrawnJoint
+from forcefit.assembly.drawing.links import link_at_tip
+from forcefit.assembly.drawing.parts import joint_axes, parts_of
+from forcefit.assembly.drawing.tree import ROOT, Edge, Node, Step, steps_of
+from forcefit.assembly.model.placed_frames import PlacedFrame, place_frames
+from forcefit.assembly.model.robot import BASE, Frame, Robot
 from forcefit.inputs.table import BadInput, quoted
-from stiffness.screws import transform
+from forcefit.stiffness.screws import transform
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,12 +13,17 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.drawing.drawing import DrawnBody, DrawnJoint, JointNumbers, perpendicular
-from assembly.drawing.parts import parts_of
-from assembly.drawing.rigid_bodies import RigidBodies, connects
-from assembly.kinematics.nominal import size_of
-from assembly.kinematics.posture import Posture
-from assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.drawing.drawing import (
+    DrawnBody,
+    DrawnJoint,
+    JointNumbers,
+    perpendicular,
+)
+from forcefit.assembly.drawing.parts import parts_of
+from forcefit.assembly.drawing.rigid_bodies import RigidBodies, connects
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.inputs.table import BadInput, quoted
 
 _SAME = 1e-12  # [lengths, sine] error below which points and directions are the same

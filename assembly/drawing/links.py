@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.drawing.drawing import DrawnBody, turned_link
-from assembly.model.frame import between_origins
-from assembly.model.robot import (
+from forcefit.assembly.drawing.drawing import DrawnBody, turned_link
+from forcefit.assembly.model.frame import between_origins
+from forcefit.assembly.model.robot import (
     BeamLink,
     Frame,
     LibraryLink,
@@ -17,8 +17,8 @@ from assembly.model.robot import (
     beam_axis,
 )
 from forcefit.inputs.table import BadInput, quoted
-from stiffness.beam.beam import section_axes
-from stiffness.screws import screw_map
+from forcefit.stiffness.beam.beam import section_axes
+from forcefit.stiffness.screws import screw_map
 
 _SAME_POINT = 1e-9  # [m] two points nearer than this are one
 _SAME_AXES = 1e-12  # difference below which two sets of axes are the same

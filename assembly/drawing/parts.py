@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.drawing.contacts import Contact
-from assembly.drawing.drawing import FREE_ROWS, DrawnJoint, JointNumbers
-from stiffness.screws import transform
+from forcefit.assembly.drawing.contacts import Contact
+from forcefit.assembly.drawing.drawing import FREE_ROWS, DrawnJoint, JointNumbers
+from forcefit.stiffness.screws import transform
 
 _FLIP = np.diag([1.0, -1.0, -1.0])  # half a turn about x
 _FLIP_SCREW = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])

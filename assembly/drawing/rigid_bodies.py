@@ -6,7 +6,7 @@ with an error, a clearance or a spring, connect two of them; so do links.
 
 from dataclasses import dataclass
 
-from assembly.model.robot import Frame, Robot
+from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.inputs.table import BadInput, quoted
 
 

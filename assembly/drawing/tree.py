@@ -9,8 +9,8 @@ import heapq
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from assembly.drawing.drawing import Drawing, DrawnBody, DrawnJoint
-from assembly.model.robot import BASE
+from forcefit.assembly.drawing.drawing import Drawing, DrawnBody, DrawnJoint
+from forcefit.assembly.model.robot import BASE
 from forcefit.inputs.table import BadInput, quoted
 
 Node = tuple[str, bool]

@@ -7,28 +7,28 @@ it; the foundation adds a frame, so it comes last.
 
 from collections.abc import Mapping
 
-from assembly.effects.base_compliance import BASE_COMPLIANCE
-from assembly.effects.body_mass import BODY_MASS
-from assembly.effects.contact_stiffening import CONTACT_STIFFENING
-from assembly.effects.delayed_expansion import DELAYED_EXPANSION
-from assembly.effects.device_scale import DEVICE_SCALE
-from assembly.effects.drift import DRIFT
-from assembly.effects.drive_compliance import DRIVE_COMPLIANCE
-from assembly.effects.effect import Effect, Values
-from assembly.effects.encoder_eccentricity import ENCODER_ECCENTRICITY
-from assembly.effects.encoder_offset import ENCODER_OFFSET
-from assembly.effects.friction_hysteresis import FRICTION_HYSTERESIS
-from assembly.effects.functions import apply_functions, in_session_alone
-from assembly.effects.geometric_stiffening import GEOMETRIC_STIFFENING
-from assembly.effects.joint_clearance import JOINT_CLEARANCE
-from assembly.effects.link_length import LINK_LENGTH
-from assembly.effects.load_gain import LOAD_GAIN
-from assembly.effects.modulus_scale import MODULUS_SCALE
-from assembly.effects.registration import REGISTRATION
-from assembly.effects.self_weight import SELF_WEIGHT
-from assembly.effects.thermal_expansion import THERMAL_EXPANSION
-from assembly.measurement.conditions import Conditions
-from assembly.model.robot import Robot
+from forcefit.assembly.effects.base_compliance import BASE_COMPLIANCE
+from forcefit.assembly.effects.body_mass import BODY_MASS
+from forcefit.assembly.effects.contact_stiffening import CONTACT_STIFFENING
+from forcefit.assembly.effects.delayed_expansion import DELAYED_EXPANSION
+from forcefit.assembly.effects.device_scale import DEVICE_SCALE
+from forcefit.assembly.effects.drift import DRIFT
+from forcefit.assembly.effects.drive_compliance import DRIVE_COMPLIANCE
+from forcefit.assembly.effects.effect import Effect, Values
+from forcefit.assembly.effects.encoder_eccentricity import ENCODER_ECCENTRICITY
+from forcefit.assembly.effects.encoder_offset import ENCODER_OFFSET
+from forcefit.assembly.effects.friction_hysteresis import FRICTION_HYSTERESIS
+from forcefit.assembly.effects.functions import apply_functions, in_session_alone
+from forcefit.assembly.effects.geometric_stiffening import GEOMETRIC_STIFFENING
+from forcefit.assembly.effects.joint_clearance import JOINT_CLEARANCE
+from forcefit.assembly.effects.link_length import LINK_LENGTH
+from forcefit.assembly.effects.load_gain import LOAD_GAIN
+from forcefit.assembly.effects.modulus_scale import MODULUS_SCALE
+from forcefit.assembly.effects.registration import REGISTRATION
+from forcefit.assembly.effects.self_weight import SELF_WEIGHT
+from forcefit.assembly.effects.thermal_expansion import THERMAL_EXPANSION
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.model.robot import Robot
 
 LIBRARY: dict[str, Effect] = {
     effect.name: effect

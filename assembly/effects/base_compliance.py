@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from assembly.effects.effect import RIGID, Effect, Unknown, Values
-from assembly.measurement.conditions import Conditions
-from assembly.model.robot import BASE, Frame, Robot
-from stiffness.screws import SCREW
+from forcefit.assembly.effects.effect import RIGID, Effect, Unknown, Values
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.model.robot import BASE, Frame, Robot
+from forcefit.stiffness.screws import SCREW
 
 FOUNDATION = "foundation"
 _AXES = tuple(axis.lower() for axis in SCREW)

@@ -11,10 +11,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.effect import Effect, Unknown, Values, at
-from assembly.effects.places import with_frame
-from assembly.measurement.conditions import Conditions
-from assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.effects.effect import Effect, Unknown, Values, at
+from forcefit.assembly.effects.places import with_frame
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
 
 _MOMENT = ("moment.x", "moment.y", "moment.z")
 _LEAST = 1e-9  # [kg] smallest mass for which a centre is defined

@@ -11,9 +11,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from assembly.effects.effect import RIGID, Values
-from assembly.effects.registration import BASE
-from stiffness.screws import rotation_matrix, rotation_vector
+from forcefit.assembly.effects.effect import RIGID, Values
+from forcefit.assembly.effects.registration import BASE
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 
 Effects = Mapping[str, Values]
 

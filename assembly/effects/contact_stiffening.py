@@ -6,10 +6,10 @@ Sources:
 
 from dataclasses import replace
 
-from assembly.effects.effect import RIGID, Effect, Unknown, Values
-from assembly.effects.places import drives, own_unit
-from assembly.measurement.conditions import Conditions, ContactLaw
-from assembly.model.robot import Robot
+from forcefit.assembly.effects.effect import RIGID, Effect, Unknown, Values
+from forcefit.assembly.effects.places import drives, own_unit
+from forcefit.assembly.measurement.conditions import Conditions, ContactLaw
+from forcefit.assembly.model.robot import Robot
 
 
 def _apply(conditions: Conditions, values: Values) -> Conditions:

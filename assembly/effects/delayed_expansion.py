@@ -8,17 +8,17 @@ temperature of the sensor; later it follows the sensor with a time constant.
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.effect import Effect, Unknown, Values, at
-from assembly.effects.places import (
+from forcefit.assembly.effects.effect import Effect, Unknown, Values, at
+from forcefit.assembly.effects.places import (
     bodies,
     body_axis,
     growing,
     lengthening,
     with_screws,
 )
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.variables import past
-from assembly.model.robot import Robot
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.variables import past
+from forcefit.assembly.model.robot import Robot
 
 _SENSOR, _LATE = "cov.temperature", "time_constant"
 # time constants in the search, relative to the campaign's duration

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from assembly.effects.effect import Effect, Unknown, Values
-from assembly.measurement.conditions import Conditions
-from stiffness.screws import rotation_matrix
+from forcefit.assembly.effects.effect import Effect, Unknown, Values
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.stiffness.screws import rotation_matrix
 
 
 def _apply(conditions: Conditions, values: Values) -> Conditions:

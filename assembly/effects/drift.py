@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from assembly.effects.effect import Effect, Unknown, Values
-from assembly.measurement.conditions import Conditions
-from assembly.model.robot import Robot
-from stiffness.screws import SCREW
+from forcefit.assembly.effects.effect import Effect, Unknown, Values
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.model.robot import Robot
+from forcefit.stiffness.screws import SCREW
 
 _AMPLITUDE = tuple(f"amplitude.{axis.lower()}" for axis in SCREW)
 

@@ -3,11 +3,11 @@
 from dataclasses import replace
 from functools import partial
 
-from assembly.effects.effect import RIGID, Effect, Unknown, Values
-from assembly.effects.places import drives, own_unit, with_frame
-from assembly.measurement.conditions import Conditions
-from assembly.model.links import in_series
-from assembly.model.robot import Frame, Robot
+from forcefit.assembly.effects.effect import RIGID, Effect, Unknown, Values
+from forcefit.assembly.effects.places import drives, own_unit, with_frame
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.model.links import in_series
+from forcefit.assembly.model.robot import Frame, Robot
 
 
 def _softer(frame: Frame, stiffness: float) -> Frame:

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from assembly.measurement.conditions import Conditions
-from assembly.model.robot import Robot
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.model.robot import Robot
 
 Values = Mapping[str, float]
 RIGID = 1e-12  # [rad/(N m), m/N] fitted compliance below which a part counts as rigid

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from assembly.effects.effect import Effect, Unknown, Values
-from assembly.effects.places import turning_drives, with_screws
-from assembly.measurement.conditions import Conditions
-from assembly.model.links import own_screw
-from assembly.model.robot import Robot
+from forcefit.assembly.effects.effect import Effect, Unknown, Values
+from forcefit.assembly.effects.places import turning_drives, with_screws
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.model.links import own_screw
+from forcefit.assembly.model.robot import Robot
 
 
 def _apply(conditions: Conditions, values: Values) -> Conditions:

@@ -1,9 +1,9 @@
 """Encoder offset: the actual coordinate of a drive is the command plus a constant."""
 
-from assembly.effects.effect import Effect, Unknown, Values
-from assembly.effects.places import drives, own_unit, with_screws
-from assembly.measurement.conditions import Conditions
-from assembly.model.links import own_screw
+from forcefit.assembly.effects.effect import Effect, Unknown, Values
+from forcefit.assembly.effects.places import drives, own_unit, with_screws
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.model.links import own_screw
 
 
 def _apply(conditions: Conditions, values: Values) -> Conditions:

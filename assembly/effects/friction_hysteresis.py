@@ -1,10 +1,10 @@
 """Coulomb friction at an elastic joint: torque -tau x direction of approach."""
 
-from assembly.effects.effect import Effect, Unknown, Values
-from assembly.effects.places import own_unit, with_screws
-from assembly.measurement.conditions import Conditions
-from assembly.model.links import joint_compliances
-from assembly.model.robot import Frame, Robot
+from forcefit.assembly.effects.effect import Effect, Unknown, Values
+from forcefit.assembly.effects.places import own_unit, with_screws
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.model.links import joint_compliances
+from forcefit.assembly.model.robot import Frame, Robot
 
 
 def elastic_joints(robot: Robot) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 A function changes the stress-free screws at a frame, the base, the reading or the load.
 A function that depends on a wrench, as every compliance does, makes its place
 compliant.  It is solved together with the equilibrium
-(:mod:`assembly.measurement.yields`).
+(:mod:`forcefit.assembly.measurement.yields`).
 """
 
 from collections.abc import Iterable, Sequence
@@ -13,16 +13,16 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.base_compliance import on_foundation
-from assembly.effects.forms import FORMS, shape_names
-from assembly.effects.formula import evaluate, parse_formula
-from assembly.effects.places import with_screws
-from assembly.measurement.conditions import Conditions, Yield
-from assembly.measurement.variables import LOADS, past, variable
-from assembly.model.function import Function
-from assembly.model.robot import BASE, Robot
+from forcefit.assembly.effects.base_compliance import on_foundation
+from forcefit.assembly.effects.forms import FORMS, shape_names
+from forcefit.assembly.effects.formula import evaluate, parse_formula
+from forcefit.assembly.effects.places import with_screws
+from forcefit.assembly.measurement.conditions import Conditions, Yield
+from forcefit.assembly.measurement.variables import LOADS, past, variable
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.robot import BASE, Robot
 from forcefit.inputs.errors import BadInput
-from stiffness.screws import SCREW
+from forcefit.stiffness.screws import SCREW
 
 AXES = tuple(axis.lower() for axis in SCREW)
 FORMULA = "formula"

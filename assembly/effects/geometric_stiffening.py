@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from assembly.effects.effect import Effect
+from forcefit.assembly.effects.effect import Effect
 
 GEOMETRIC_STIFFENING = Effect(
     name="geometric_stiffening",

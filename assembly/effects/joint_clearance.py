@@ -3,10 +3,10 @@
 from dataclasses import replace
 from functools import partial
 
-from assembly.effects.effect import Effect, Unknown, Values
-from assembly.effects.places import with_frame
-from assembly.measurement.conditions import Conditions
-from assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.effects.effect import Effect, Unknown, Values
+from forcefit.assembly.effects.places import with_frame
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
 
 _KINDS = ("radial", "axial", "tilt")
 _NONE_BELOW = 1e-9  # [m, rad] smaller clearances count as zero

@@ -1,8 +1,8 @@
 """Length error of a body, along its beam or the line between its joints."""
 
-from assembly.effects.effect import Effect, Unknown, Values
-from assembly.effects.places import bodies, growing, lengthening, with_screws
-from assembly.measurement.conditions import Conditions
+from forcefit.assembly.effects.effect import Effect, Unknown, Values
+from forcefit.assembly.effects.places import bodies, growing, lengthening, with_screws
+from forcefit.assembly.measurement.conditions import Conditions
 
 
 def _apply(conditions: Conditions, values: Values) -> Conditions:

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from assembly.effects.effect import Effect, Unknown, Values
-from assembly.measurement.conditions import Conditions
-from assembly.model.robot import Robot
-from stiffness.screws import WRENCH
+from forcefit.assembly.effects.effect import Effect, Unknown, Values
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.model.robot import Robot
+from forcefit.stiffness.screws import WRENCH
 
 _OFFSET = tuple(f"offset.{axis.lower()}" for axis in WRENCH)
 

@@ -3,10 +3,10 @@
 from dataclasses import replace
 from functools import partial
 
-from assembly.effects.effect import Effect, Unknown, Values
-from assembly.effects.places import with_frame
-from assembly.measurement.conditions import Conditions
-from assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
+from forcefit.assembly.effects.effect import Effect, Unknown, Values
+from forcefit.assembly.effects.places import with_frame
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
 
 
 def links(robot: Robot) -> tuple[str, ...]:
@@ -18,7 +18,7 @@ def links(robot: Robot) -> tuple[str, ...]:
 def _scaled(frame: Frame, factor: float) -> Frame:
     link = frame.link
     if isinstance(link, MeshLink):
-        from stiffness.fem.part_text import scaled_part
+        from forcefit.stiffness.fem.part_text import scaled_part
 
         parts = tuple(scaled_part(text, factor) for text in link.parts)
         link = replace(link, young=link.young * factor, parts=parts)

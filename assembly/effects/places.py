@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.measurement.conditions import Conditions
-from assembly.model.frame import between_origins
-from assembly.model.robot import BeamLink, Frame, Robot, beam_axis
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.model.frame import between_origins
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot, beam_axis
 
 _LEAST = 1e-6  # [m] smallest length of a body between two origins
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.effects import LIBRARY, apply_known
-from assembly.effects.functions import covariates_of
-from assembly.kinematics.posture import Posture
-from assembly.measurement.conditions import COVARIATES, Conditions, as_declared
-from assembly.measurement.predict import assemble_row, read
-from assembly.model.robot import Robot
+from forcefit.assembly.effects import LIBRARY, apply_known
+from forcefit.assembly.effects.functions import covariates_of
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.measurement.conditions import COVARIATES, Conditions, as_declared
+from forcefit.assembly.measurement.predict import assemble_row, read
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, nearest, quoted
 from forcefit.results.display import html_table, short_repr
 

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from assembly.effects.effect import Effect, Unknown, Values
-from assembly.measurement.conditions import Conditions
+from forcefit.assembly.effects.effect import Effect, Unknown, Values
+from forcefit.assembly.measurement.conditions import Conditions
 
 _AXES = ("g.x", "g.y", "g.z")
 

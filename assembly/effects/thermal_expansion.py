@@ -3,15 +3,15 @@
 The length changes along its beam, or along the line between its joints.
 """
 
-from assembly.effects.effect import Effect, Unknown, Values
-from assembly.effects.places import (
+from forcefit.assembly.effects.effect import Effect, Unknown, Values
+from forcefit.assembly.effects.places import (
     bodies,
     body_axis,
     growing,
     lengthening,
     with_screws,
 )
-from assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.conditions import Conditions
 
 
 def _apply(conditions: Conditions, values: Values) -> Conditions:

@@ -1,10 +1,20 @@
 """Units of functions: of their variables, their results and their parameters."""
 
-from assembly.effects.forms import FORMS, column_indices, shape_names
-from assembly.effects.formula import Unit, parameter_units, parse_formula, unit_text
-from assembly.effects.functions import CLOCKS, FORMULA, parameters_of, variable_names
-from assembly.model.function import Function
-from assembly.model.robot import Robot
+from forcefit.assembly.effects.forms import FORMS, column_indices, shape_names
+from forcefit.assembly.effects.formula import (
+    Unit,
+    parameter_units,
+    parse_formula,
+    unit_text,
+)
+from forcefit.assembly.effects.functions import (
+    CLOCKS,
+    FORMULA,
+    parameters_of,
+    variable_names,
+)
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.robot import Robot
 
 _COVARIATES: dict[str, Unit] = {"temperature": {"K": 1}, "time": {"s": 1}}
 _ANGLE: Unit = {}  # rad counts as a number

@@ -6,7 +6,7 @@ A step of the exact equilibrium needs the change v of the clearances u that mini
 
     where S has directions of negative curvature: normal to the active constraint
     boundaries, which is harmless, and sometimes elsewhere.  Far from the solution S is
-    made convex, and :mod:`assembly.solvers.conic` solves the problem.  Near the
+    made convex, and :mod:`forcefit.assembly.solvers.conic` solves the problem.  Near the
     solution Newton's method on the active boundaries is exact to rounding, while the
     conic solver stops at half of the digits.
 
@@ -30,9 +30,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.solvers.cones import cone_sizes
-from assembly.solvers.conic import minimise_energy
-from assembly.solvers.method import Method
+from forcefit.assembly.solvers.cones import cone_sizes
+from forcefit.assembly.solvers.conic import minimise_energy
+from forcefit.assembly.solvers.method import Method
 
 AT_BOUNDARY = 1e-5  # [-] distance from size 1 within which a cone may be active
 _STEPS = 15  # largest number of Newton steps on the active boundaries
@@ -110,7 +110,7 @@ def clearance_step(
     Args:
         problem: the quadratic problem.
         near: whether the solution is near enough for Newton's method.
-        method: method of :func:`assembly.solvers.conic.minimise_energy`.
+        method: method of :func:`forcefit.assembly.solvers.conic.minimise_energy`.
 
     Returns:
         The change (nu,) and the multipliers (p,) of ``rows``; None if no clearances

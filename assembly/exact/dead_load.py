@@ -12,13 +12,13 @@ symbol  code           shape       meaning
 ======  =============  ==========  ==================================================
 G       ``bodies`` ..  (n, 3, 4)   load on the body that reaches to each frame, before
         its joint, and on all that its joint carries
-w       ``load``       (6,)        on the platform, see :mod:`assembly.exact.exact`
+w       ``load``       (6,)        on the platform, see :mod:`forcefit.assembly.exact.exact`
 M       --             (3, 3)      sum of the points times their forces
 ======  =============  ==========  ==================================================
 
 The force of a drive works on the own components of its joint's unknowns, f . q.
 
-Linearised, these are the loads of :mod:`assembly.linear.load`.
+Linearised, these are the loads of :mod:`forcefit.assembly.linear.load`.
 """
 
 from dataclasses import dataclass, field
@@ -27,13 +27,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.exact.finite_robot import LINK, nominally_carried
-from assembly.exact.placement import Placement
-from assembly.kinematics.posture import Posture
-from assembly.linear.load import drive_loads
-from assembly.model.robot import BeamLink, beam_axis
-from stiffness.beam.sections import declared_section
-from stiffness.screws import rotation_matrix, skew, transform
+from forcefit.assembly.exact.finite_robot import LINK, nominally_carried
+from forcefit.assembly.exact.placement import Placement
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.load import drive_loads
+from forcefit.assembly.model.robot import BeamLink, beam_axis
+from forcefit.stiffness.beam.sections import declared_section
+from forcefit.stiffness.screws import rotation_matrix, skew, transform
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +198,7 @@ def curvature_of(place: Placement, multipliers: NDArray, loads: DeadLoads) -> ND
 
     Returns:
         (N, N) symmetric matrix, as exact as
-        :meth:`assembly.exact.placement.Placement.curvature`.
+        :meth:`forcefit.assembly.exact.placement.Placement.curvature`.
     """
     H = place.curvature(multipliers, loads.load)
     if not loads.beyond_platform:

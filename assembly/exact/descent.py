@@ -7,7 +7,7 @@ Near a placement x the closures are linearised and the Lagrangian
 is expanded to second order, with its true Hessian.  The curvature of the closures times
 the wrenches that they carry exceeds compliant springs; without this term Gauss-Newton
 steps stall.  Springs and free motions are eliminated, and
-:mod:`assembly.exact.contact_qp` solves the problem in the clearances.  A restoration
+:mod:`forcefit.assembly.exact.contact_qp` solves the problem in the clearances.  A restoration
 (retraction) brings the step back onto the closures.  The step is accepted if it reduces
 the energy plus a penalty on the residual.  Otherwise a proximal term damps it, as in
 the method of Levenberg and Marquardt, measured in radians and reference lengths of
@@ -34,19 +34,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, svd
 
-from assembly.exact.contact_qp import ClearanceProblem, clearance_step
-from assembly.exact.dead_load import (
+from forcefit.assembly.exact.contact_qp import ClearanceProblem, clearance_step
+from forcefit.assembly.exact.dead_load import (
     DeadLoads,
     curvature_of,
     largest_wrench,
     work_gradient,
     work_of,
 )
-from assembly.exact.placement import Placement, place
-from assembly.kinematics.ranks import ROWS_RANK, rank_tolerance
-from assembly.solvers.cones import into_cones
-from assembly.solvers.conic import SolverFailed
-from assembly.solvers.method import Method
+from forcefit.assembly.exact.placement import Placement, place
+from forcefit.assembly.kinematics.ranks import ROWS_RANK, rank_tolerance
+from forcefit.assembly.solvers.cones import into_cones
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.solvers.method import Method
 from forcefit.results.display import numbers
 
 CLOSED = 1e-12  # [rad, reference lengths] largest residual of a solution
@@ -224,7 +224,7 @@ def advance(
         penalty: [N m] factor on the norm of the scaled residual, above the multipliers.
         damping: [J/rad^2] damping of the last step.
         near: whether Newton's method is tried for the clearances.
-        method: method of :func:`assembly.exact.contact_qp.clearance_step`.
+        method: method of :func:`forcefit.assembly.exact.contact_qp.clearance_step`.
 
     Returns:
         The step.

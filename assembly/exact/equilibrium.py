@@ -1,17 +1,21 @@
 """Properties of an equilibrium: imbalance, stability, active clearances.
 
 All are computed from the expansion at the equilibrium,
-:func:`assembly.exact.descent.expand`.
+:func:`forcefit.assembly.exact.descent.expand`.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from assembly.exact.contact_qp import AT_BOUNDARY, boundary_normals, cone_multipliers
-from assembly.exact.dead_load import load_magnitudes
-from assembly.exact.descent import Expansion
-from assembly.solvers.cones import cone_sizes
+from forcefit.assembly.exact.contact_qp import (
+    AT_BOUNDARY,
+    boundary_normals,
+    cone_multipliers,
+)
+from forcefit.assembly.exact.dead_load import load_magnitudes
+from forcefit.assembly.exact.descent import Expansion
+from forcefit.assembly.solvers.cones import cone_sizes
 
 _ANGLE_ROUNDING = 1e-5  # relative to a small residual: rounding error of an angle
 

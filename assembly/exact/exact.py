@@ -1,14 +1,14 @@
 r"""The forced assembly at least energy with finite motions: closures hold on SE(3).
 
 Springs, clearance cones and geometric errors are those of the linear virtual-joint
-model (:mod:`assembly.linear.energy`).  Only the closures differ, because finite motions
-are composed as in :mod:`assembly.exact.finite_robot`.  The springs' energy minus the
+model (:mod:`forcefit.assembly.linear.energy`).  Only the closures differ, because finite motions
+are composed as in :mod:`forcefit.assembly.exact.finite_robot`.  The springs' energy minus the
 work of the loads is minimised,
 
     minimise  |y|^2 / 2 - w . x_p(y, u, q) - W(y, u, q)
     subject to  r(y, u, q) = 0,   |u_k| <= 1 for each cone k,
 
-by the steps of :mod:`assembly.exact.descent`, from the linear solution.
+by the steps of :mod:`forcefit.assembly.exact.descent`, from the linear solution.
 
 ======  ====================  ========  ==============================================
 symbol  code                  shape     meaning
@@ -31,14 +31,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.exact.dead_load import (
+from forcefit.assembly.exact.dead_load import (
     DeadLoads,
     dead_loads,
     distributed_at_tips,
     work_of,
     wrenches_on_frames,
 )
-from assembly.exact.descent import (
+from forcefit.assembly.exact.descent import (
     CLOSED,
     LONGEST_STEP,
     Expansion,
@@ -49,30 +49,30 @@ from assembly.exact.descent import (
     potential,
     problem_name,
 )
-from assembly.exact.equilibrium import imbalance, least_curvature
-from assembly.exact.finite_robot import CLEARANCE, LINK, SPRING, FiniteRobot
-from assembly.exact.placement import Placement, place
-from assembly.kinematics.closure_rates import closure_signs
-from assembly.kinematics.pieces import CutRobot, cut_beams
-from assembly.kinematics.posture import Posture
-from assembly.kinematics.se3 import inverse, logarithm
-from assembly.linear.assembled import Assembly
-from assembly.linear.closure import VirtualJoints, virtual_joints
-from assembly.linear.energy import solve_assembly
-from assembly.linear.rounding import differs_from_zero
-from assembly.model.clearance import (
+from forcefit.assembly.exact.equilibrium import imbalance, least_curvature
+from forcefit.assembly.exact.finite_robot import CLEARANCE, LINK, SPRING, FiniteRobot
+from forcefit.assembly.exact.placement import Placement, place
+from forcefit.assembly.kinematics.closure_rates import closure_signs
+from forcefit.assembly.kinematics.pieces import CutRobot, cut_beams
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.kinematics.se3 import inverse, logarithm
+from forcefit.assembly.linear.assembled import Assembly
+from forcefit.assembly.linear.closure import VirtualJoints, virtual_joints
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.rounding import differs_from_zero
+from forcefit.assembly.model.clearance import (
     clearance_bounds,
     clearance_components,
     clearance_excess,
     has_bounded_motion,
 )
-from assembly.model.given_load import Load, given_load
-from assembly.model.links import own_screws
-from assembly.solvers.cones import into_cones
-from assembly.solvers.method import Method, check_method
+from forcefit.assembly.model.given_load import Load, given_load
+from forcefit.assembly.model.links import own_screws
+from forcefit.assembly.solvers.cones import into_cones
+from forcefit.assembly.solvers.method import Method, check_method
 from forcefit.results.display import Figures, html_table, short_repr
 from forcefit.results.text import forced_lines
-from stiffness.screws import rotation_matrix, screw_map, transform
+from forcefit.stiffness.screws import rotation_matrix, screw_map, transform
 
 if TYPE_CHECKING:
     import pandas
@@ -147,14 +147,14 @@ class ExactAssembly:
         }
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return frames, closures and platform; see :mod:`assembly.model.tables`."""
-        from assembly.model.tables import assembly_dataset
+        """Return frames, closures and platform; see :mod:`forcefit.assembly.model.tables`."""
+        from forcefit.assembly.model.tables import assembly_dataset
 
         return assembly_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
         """Return a row for each frame, columns (variable, component)."""
-        from assembly.model.tables import frame_table
+        from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "frame")
 
@@ -324,7 +324,7 @@ def solve_exact(
         start: the linear solution for this posture and these loads, if known.
         bodies: (n, 6) [N m, N] dead loads on the bodies of all frames, each at its
             frame's origin, base axes; moments are couples of dead forces.
-        gravity: (3,) [m/s^2] base axes; see :mod:`assembly.exact.dead_load` for links.
+        gravity: (3,) [m/s^2] base axes; see :mod:`forcefit.assembly.exact.dead_load` for links.
         point: (3,) [m] point of the platform, in its axes; the force moves with it.
         near: equilibrium of the same posture under another load, used as the start.
         progress: function called with the number of steps and the largest number.

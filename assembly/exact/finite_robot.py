@@ -15,14 +15,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.closure_rates import closure_signs
-from assembly.kinematics.nominal import size_of
-from assembly.kinematics.posture import Posture
-from assembly.kinematics.se3 import exponential, inverse
-from assembly.linear.closure import VirtualJoints
-from assembly.model.links import own_screws
-from assembly.model.robot import Robot
-from stiffness.screws import rotation_matrix, transform
+from forcefit.assembly.kinematics.closure_rates import closure_signs
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.kinematics.se3 import exponential, inverse
+from forcefit.assembly.linear.closure import VirtualJoints
+from forcefit.assembly.model.links import own_screws
+from forcefit.assembly.model.robot import Robot
+from forcefit.stiffness.screws import rotation_matrix, transform
 
 # the motions at a frame, in this order
 LINK, CLEARANCE, SPRING, OWN = range(4)

@@ -26,8 +26,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exact.finite_robot import OWN, FiniteRobot, along_own
-from assembly.kinematics.se3 import (
+from forcefit.assembly.exact.finite_robot import OWN, FiniteRobot, along_own
+from forcefit.assembly.kinematics.se3 import (
     bracket_form,
     exponential,
     inverse,
@@ -36,7 +36,7 @@ from assembly.kinematics.se3 import (
     second_form,
     turn_jacobian,
 )
-from stiffness.screws import rotation_vector, screw_map, skew
+from forcefit.stiffness.screws import rotation_vector, screw_map, skew
 
 
 @dataclass(frozen=True, eq=False)

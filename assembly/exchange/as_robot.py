@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.balls import balls_at_rest
-from assembly.exchange.mechanism import (
+from forcefit.assembly.exchange.balls import balls_at_rest
+from forcefit.assembly.exchange.mechanism import (
     HERE,
     Body,
     Joint,
@@ -23,16 +23,16 @@ from assembly.exchange.mechanism import (
     body_poses,
     chain,
 )
-from assembly.exchange.orientation import onto
-from assembly.exchange.rigid_bodies import (
+from forcefit.assembly.exchange.orientation import onto
+from forcefit.assembly.exchange.rigid_bodies import (
     lumped_body,
     mass_keys,
     with_possible_moments,
 )
-from assembly.exchange.springs import other_springs, springs_at_rest
-from assembly.model.robot import BASE, Frame, Robot
+from forcefit.assembly.exchange.springs import other_springs, springs_at_rest
+from forcefit.assembly.model.robot import BASE, Frame, Robot
 from forcefit.inputs.errors import BadInput
-from stiffness.screws import rotation_vector, transform
+from forcefit.stiffness.screws import rotation_vector, transform
 
 Places = Mapping[str, tuple[str, NDArray]]
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from assembly.exchange.mechanism import Joint, motion
+from forcefit.assembly.exchange.mechanism import Joint, motion
 
 
 def balls_at_rest(joints: tuple[Joint, ...]) -> tuple[Joint, ...]:

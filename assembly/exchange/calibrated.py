@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from assembly.effects import apply_effects
-from assembly.exchange.xml_file import counted
-from assembly.kinematics.posture import Posture
-from assembly.measurement.conditions import as_declared
-from assembly.model.robot import BeamLink, MatrixLink, Robot
-from stiffness.screws import rotation_matrix, rotation_vector, transform
+from forcefit.assembly.effects import apply_effects
+from forcefit.assembly.exchange.xml_file import counted
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.model.robot import BeamLink, MatrixLink, Robot
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform
 
 # effects that do not depend on pose, temperature and load
 CONSTANT = ("encoder_offset", "link_length")

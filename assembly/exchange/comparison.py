@@ -15,13 +15,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from assembly.exchange.mechanism import Mechanism
-from assembly.model.inertia import MassProperties
+from forcefit.assembly.exchange.mechanism import Mechanism
+from forcefit.assembly.model.inertia import MassProperties
 
 AGREED = 1e-9  # [rad, m, kg over the largest] accepted difference
 POSTURES = 20
 _LONGEST = 60.0  # [s] longest time of the other program
-_WORKER = "from assembly.exchange.mujoco_reading import main; main()"
+_WORKER = "from forcefit.assembly.exchange.mujoco_reading import main; main()"
 
 
 @dataclass(frozen=True, eq=False)

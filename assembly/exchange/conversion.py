@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from assembly.exchange.comparison import Comparison
-from assembly.model.robot import Robot
+from forcefit.assembly.exchange.comparison import Comparison
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.errors import quoted
 
 

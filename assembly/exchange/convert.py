@@ -16,36 +16,36 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from assembly.drawing.drawing_of_robot import drawing_of_robot
-from assembly.exchange.as_robot import RobotAndMechanism, mechanism_of_robot
-from assembly.exchange.calibrated import not_rigid, with_calibration
-from assembly.exchange.comparison import compare
-from assembly.exchange.conversion import Conversion
-from assembly.exchange.fidelity import (
+from forcefit.assembly.drawing.drawing_of_robot import drawing_of_robot
+from forcefit.assembly.exchange.as_robot import RobotAndMechanism, mechanism_of_robot
+from forcefit.assembly.exchange.calibrated import not_rigid, with_calibration
+from forcefit.assembly.exchange.comparison import compare
+from forcefit.assembly.exchange.conversion import Conversion
+from forcefit.assembly.exchange.fidelity import (
     FAITHFUL,
     drawn_difference,
     largest_difference,
 )
-from assembly.exchange.foreign import READERS, robot_of_file
-from assembly.exchange.home_pose import CLOSED, loop_residual, nearest_closed
-from assembly.exchange.loops_file import LoopsFile, loops_text, read_loops
-from assembly.exchange.mechanism import Mechanism
-from assembly.exchange.mjcf import read_mjcf
-from assembly.exchange.mjcf_writing import mjcf_text
-from assembly.exchange.overlay import lay_over
-from assembly.exchange.urdf import read_urdf
-from assembly.exchange.urdf_writing import XML_MARK, loops_of, urdf_text
-from assembly.files.drawing_writing import drawing_text
-from assembly.files.robot_file import (
+from forcefit.assembly.exchange.foreign import READERS, robot_of_file
+from forcefit.assembly.exchange.home_pose import CLOSED, loop_residual, nearest_closed
+from forcefit.assembly.exchange.loops_file import LoopsFile, loops_text, read_loops
+from forcefit.assembly.exchange.mechanism import Mechanism
+from forcefit.assembly.exchange.mjcf import read_mjcf
+from forcefit.assembly.exchange.mjcf_writing import mjcf_text
+from forcefit.assembly.exchange.overlay import lay_over
+from forcefit.assembly.exchange.urdf import read_urdf
+from forcefit.assembly.exchange.urdf_writing import XML_MARK, loops_of, urdf_text
+from forcefit.assembly.files.drawing_writing import drawing_text
+from forcefit.assembly.files.robot_file import (
     Closing,
     read_robot,
     robot_of,
     robot_table,
     write_robot,
 )
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import Robot
-from assembly.robots import load_robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.robots import load_robot
 from forcefit.inputs.errors import BadInput, quoted
 from forcefit.inputs.table import Table
 from forcefit.inputs.writing import ROBOT, Kind, check_writable, write_text
@@ -83,7 +83,7 @@ def convert(
             unless every loop is declared 6d and they cannot close: then all loops
             become points, and the result reports it.
         close: for a robot file or built-in robot, as
-            :func:`assembly.kinematics.closing.closing_of`; none if absent.
+            :func:`forcefit.assembly.kinematics.closing.closing_of`; none if absent.
         version: format of a robot file that is written: 1 for frames and closures, 2
             for bodies and joints.
 

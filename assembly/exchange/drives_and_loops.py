@@ -3,16 +3,16 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from assembly.exchange.coupling import Coupling
-from assembly.exchange.loops_file import LoopsFile, unknown_name
-from assembly.exchange.mechanism import (
+from forcefit.assembly.exchange.coupling import Coupling
+from forcefit.assembly.exchange.loops_file import LoopsFile, unknown_name
+from forcefit.assembly.exchange.mechanism import (
     Joint,
     Loop,
     Mechanism,
     ball,
     chain,
 )
-from assembly.exchange.xml_file import counted
+from forcefit.assembly.exchange.xml_file import counted
 from forcefit.inputs.errors import BadInput, quoted
 
 

@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.as_robot import RobotAndMechanism
-from assembly.exchange.mechanism import body_poses
-from assembly.exchange.tree import place_frames
-from assembly.kinematics.nominal import KINDS
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import BASE, Robot
+from forcefit.assembly.exchange.as_robot import RobotAndMechanism
+from forcefit.assembly.exchange.mechanism import body_poses
+from forcefit.assembly.exchange.tree import place_frames
+from forcefit.assembly.kinematics.nominal import KINDS
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import BASE, Robot
 from forcefit.inputs.errors import BadInput
 
 FAITHFUL = 1e-12  # [rad, lengths] largest difference of a body's pose

@@ -6,29 +6,29 @@ from pathlib import Path
 
 from numpy.typing import NDArray
 
-from assembly.exchange.as_robot import (
+from forcefit.assembly.exchange.as_robot import (
     RobotAndMechanism,
     points_as_joints,
     robot_of_mechanism,
 )
-from assembly.exchange.comparison import Comparison, compare
-from assembly.exchange.conversion import Conversion
-from assembly.exchange.home_pose import close_loops, loop_residual
-from assembly.exchange.loops_file import (
+from forcefit.assembly.exchange.comparison import Comparison, compare
+from forcefit.assembly.exchange.conversion import Conversion
+from forcefit.assembly.exchange.home_pose import close_loops, loop_residual
+from forcefit.assembly.exchange.loops_file import (
     LoopsFile,
     find_loops_file,
     read_loops,
     with_points,
 )
-from assembly.exchange.mechanism import Mechanism
-from assembly.exchange.mjcf import read_mjcf
-from assembly.exchange.overlay import lay_over
-from assembly.exchange.sdf import read_sdf
-from assembly.exchange.urdf import read_urdf
-from assembly.exchange.xml_file import counted
-from assembly.files.robot_file import MOST_FRAMES, robot_of, robot_table
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import Robot
+from forcefit.assembly.exchange.mechanism import Mechanism
+from forcefit.assembly.exchange.mjcf import read_mjcf
+from forcefit.assembly.exchange.overlay import lay_over
+from forcefit.assembly.exchange.sdf import read_sdf
+from forcefit.assembly.exchange.urdf import read_urdf
+from forcefit.assembly.exchange.xml_file import counted
+from forcefit.assembly.files.robot_file import MOST_FRAMES, robot_of, robot_table
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.table import Table, read_toml
 

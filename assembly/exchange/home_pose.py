@@ -7,15 +7,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.coupling import Coupling
-from assembly.exchange.mechanism import (
+from forcefit.assembly.exchange.coupling import Coupling
+from forcefit.assembly.exchange.mechanism import (
     Mechanism,
 )
-from assembly.exchange.orientation import onto
-from assembly.exchange.tree import place_frames
-from assembly.model.robot import JOINTS
+from forcefit.assembly.exchange.orientation import onto
+from forcefit.assembly.exchange.tree import place_frames
+from forcefit.assembly.model.robot import JOINTS
 from forcefit.inputs.errors import BadInput, quoted
-from stiffness.screws import rotation_vector, skew, transform
+from forcefit.stiffness.screws import rotation_vector, skew, transform
 
 CLOSED = 1e-10  # [rad, m] largest mismatch of a closed loop
 _SCREWED_TIGHT = 1e-14  # scaled residual below which only rounding remains

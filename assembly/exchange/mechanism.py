@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.coupling import Coupling
+from forcefit.assembly.exchange.coupling import Coupling
 from forcefit.inputs.table import BadInput, nearest, quoted
-from stiffness.screws import UNIT_VECTORS, rotation_matrix, transform
+from forcefit.stiffness.screws import UNIT_VECTORS, rotation_matrix, transform
 
 WORLD = "world"  # name of the fixed link
 HERE = np.eye(4)

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.coupling import leaders_first
-from assembly.exchange.drives_and_loops import with_loops
-from assembly.exchange.loops_file import LoopsFile
-from assembly.exchange.mechanism import (
+from forcefit.assembly.exchange.coupling import leaders_first
+from forcefit.assembly.exchange.drives_and_loops import with_loops
+from forcefit.assembly.exchange.loops_file import LoopsFile
+from forcefit.assembly.exchange.mechanism import (
     WORLD,
     Body,
     Joint,
@@ -24,12 +24,17 @@ from assembly.exchange.mechanism import (
     body_poses,
     parents_first,
 )
-from assembly.exchange.mjcf_expansion import SEQUENCE, UNIT, expanded
-from assembly.exchange.mjcf_joint import at_key, one_freedom, several_freedoms
-from assembly.exchange.mjcf_mass import MassRules, body_of, shape_mass, written_mass
-from assembly.exchange.mjcf_orientation import Angles, orientation, site_pose
-from assembly.exchange.mjcf_ties import LOADED, Ties
-from assembly.exchange.xml_file import Node, counted, placed, read_xml
+from forcefit.assembly.exchange.mjcf_expansion import SEQUENCE, UNIT, expanded
+from forcefit.assembly.exchange.mjcf_joint import at_key, one_freedom, several_freedoms
+from forcefit.assembly.exchange.mjcf_mass import (
+    MassRules,
+    body_of,
+    shape_mass,
+    written_mass,
+)
+from forcefit.assembly.exchange.mjcf_orientation import Angles, orientation, site_pose
+from forcefit.assembly.exchange.mjcf_ties import LOADED, Ties
+from forcefit.assembly.exchange.xml_file import Node, counted, placed, read_xml
 from forcefit.inputs.errors import nearest, quoted
 
 _ZERO = np.zeros(3)

@@ -19,9 +19,9 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from assembly.exchange.mjcf_orientation import Angles
-from assembly.exchange.orientation import from_euler, to_quaternion
-from assembly.exchange.xml_file import Node, placed, read_xml
+from forcefit.assembly.exchange.mjcf_orientation import Angles
+from forcefit.assembly.exchange.orientation import from_euler, to_quaternion
+from forcefit.assembly.exchange.xml_file import Node, placed, read_xml
 from forcefit.inputs.errors import BadInput, quoted
 
 _DEEPEST = 10  # largest depth of nested files

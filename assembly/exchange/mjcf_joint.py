@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.mechanism import HERE, Joint, ball, motion, slides
-from assembly.exchange.mjcf_orientation import Angles
-from assembly.exchange.orientation import from_quaternion
-from assembly.exchange.xml_file import Node, placed
+from forcefit.assembly.exchange.mechanism import HERE, Joint, ball, motion, slides
+from forcefit.assembly.exchange.mjcf_orientation import Angles
+from forcefit.assembly.exchange.orientation import from_quaternion
+from forcefit.assembly.exchange.xml_file import Node, placed
 from forcefit.inputs.errors import quoted
 
 _ZERO = np.zeros(3)

@@ -15,11 +15,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.mechanism import WORLD, Body
-from assembly.exchange.mjcf_orientation import Angles, orientation
-from assembly.exchange.shapes import area, moments, shell_moments, volume
-from assembly.exchange.xml_file import Node
-from assembly.model.inertia import MassProperties, inertia_matrix, joined_bodies
+from forcefit.assembly.exchange.mechanism import WORLD, Body
+from forcefit.assembly.exchange.mjcf_orientation import Angles, orientation
+from forcefit.assembly.exchange.shapes import area, moments, shell_moments, volume
+from forcefit.assembly.exchange.xml_file import Node
+from forcefit.assembly.model.inertia import (
+    MassProperties,
+    inertia_matrix,
+    joined_bodies,
+)
 
 _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
 # [kg, kg m^2] smaller bounds only allow bodies without mass to move

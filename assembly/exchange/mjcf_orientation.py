@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.orientation import from_euler, from_quaternion, onto
-from assembly.exchange.xml_file import Node, placed
-from stiffness.screws import rotation_matrix
+from forcefit.assembly.exchange.orientation import from_euler, from_quaternion, onto
+from forcefit.assembly.exchange.xml_file import Node, placed
+from forcefit.stiffness.screws import rotation_matrix
 
 
 @dataclass(frozen=True)

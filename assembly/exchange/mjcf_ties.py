@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.coupling import Coupling
-from assembly.exchange.mechanism import (
+from forcefit.assembly.exchange.coupling import Coupling
+from forcefit.assembly.exchange.mechanism import (
     WORLD,
     Loop,
 )
-from assembly.exchange.orientation import from_quaternion
-from assembly.exchange.xml_file import Node, placed
+from forcefit.assembly.exchange.orientation import from_quaternion
+from forcefit.assembly.exchange.xml_file import Node, placed
 from forcefit.inputs.errors import nearest, quoted
-from stiffness.screws import transform
+from forcefit.stiffness.screws import transform
 
 LOADED = ", not converted, though it may carry load"
 _DRIVEN_BY = ("joint", "jointinparent")

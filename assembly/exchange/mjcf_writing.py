@@ -4,9 +4,9 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from assembly.exchange.mechanism import Joint, Mechanism
-from assembly.exchange.orientation import to_quaternion
-from assembly.exchange.urdf_writing import XML_MARK, numbers
+from forcefit.assembly.exchange.mechanism import Joint, Mechanism
+from forcefit.assembly.exchange.orientation import to_quaternion
+from forcefit.assembly.exchange.urdf_writing import XML_MARK, numbers
 
 _SMALLEST_INERTIA = 1e-9  # [kg m^2]
 _KINDS = {"revolute": "hinge", "prismatic": "slide"}

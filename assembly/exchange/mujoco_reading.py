@@ -14,13 +14,13 @@ from warnings import catch_warnings, simplefilter
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.comparison import POSTURES, Comparison
-from assembly.exchange.mechanism import Mechanism, body_poses
-from assembly.exchange.orientation import to_quaternion
-from assembly.exchange.xml_file import read_xml
-from assembly.model.inertia import inertia_matrix
+from forcefit.assembly.exchange.comparison import POSTURES, Comparison
+from forcefit.assembly.exchange.mechanism import Mechanism, body_poses
+from forcefit.assembly.exchange.orientation import to_quaternion
+from forcefit.assembly.exchange.xml_file import read_xml
+from forcefit.assembly.model.inertia import inertia_matrix
 from forcefit.inputs.errors import one_line
-from stiffness.screws import rotation_vector
+from forcefit.stiffness.screws import rotation_vector
 
 # [kg] largest mass that MuJoCo gives a body without mass, to move it
 _LIGHTEST = 1.01e-6
@@ -57,7 +57,7 @@ def compare_here(mechanism: Mechanism, path: Path) -> Comparison:
 
 
 def main() -> None:
-    """Compare files of :mod:`assembly.exchange.comparison` in a separate process."""
+    """Compare files of :mod:`forcefit.assembly.exchange.comparison` in a separate process."""
     given, made = Path(sys.argv[1]), Path(sys.argv[2])
     with given.open("rb") as file:
         mechanism, path = pickle.load(file)

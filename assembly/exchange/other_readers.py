@@ -5,14 +5,14 @@ A distribution names a function for the ending of its files::
     [project.entry-points."forcefit.readers"]
     cad = "their_package.robots:read"   # of files that end in .cad
 
-``read(path)`` returns a :class:`assembly.model.robot.Robot`; its ``BadInput`` is the
+``read(path)`` returns a :class:`forcefit.assembly.model.robot.Robot`; its ``BadInput`` is the
 message for the user.
 """
 
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
-from assembly.model.robot import Robot
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.errors import BadInput
 
 GROUP = "forcefit.readers"

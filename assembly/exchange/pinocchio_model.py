@@ -14,8 +14,8 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
 
-from assembly.exchange.mujoco_model import words
-from assembly.exchange.orientation import to_quaternion
+from forcefit.assembly.exchange.mujoco_model import words
+from forcefit.assembly.exchange.orientation import to_quaternion
 from forcefit.inputs.errors import BadInput, quoted
 
 _SEVERAL = {"JointModelSpherical": "ball", "JointModelFreeFlyer": "free"}

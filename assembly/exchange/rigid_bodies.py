@@ -5,16 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from assembly.exchange.mechanism import Body, Mechanism
-from assembly.exchange.xml_file import counted
-from assembly.model.inertia import (
+from forcefit.assembly.exchange.mechanism import Body, Mechanism
+from forcefit.assembly.exchange.xml_file import counted
+from forcefit.assembly.model.inertia import (
     MassProperties,
     inertia_fault,
     joined_bodies,
     point_inertia,
 )
-from assembly.model.robot import BASE, BeamLink, Frame, Robot, beam_axis
-from stiffness.beam.sections import declared_section
+from forcefit.assembly.model.robot import BASE, BeamLink, Frame, Robot, beam_axis
+from forcefit.stiffness.beam.sections import declared_section
 
 
 def mass_keys(body: Body) -> dict[str, Any]:

@@ -7,13 +7,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Union
 
-from assembly.exchange.other_readers import has_reader, read_by_other
-from assembly.files.robot_file import Closing
-from assembly.files.robot_file import write_robot as write_robot_file
-from assembly.files.solved_links import solve_links
-from assembly.model.robot import Robot
-from assembly.robots import load_robot as load_declared
-from assembly.steps.bolted import bolt_joints
+from forcefit.assembly.exchange.other_readers import has_reader, read_by_other
+from forcefit.assembly.files.robot_file import Closing
+from forcefit.assembly.files.robot_file import write_robot as write_robot_file
+from forcefit.assembly.files.solved_links import solve_links
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.robots import load_robot as load_declared
+from forcefit.assembly.steps.bolted import bolt_joints
 from forcefit.inputs.errors import BadInput, describe
 from forcefit.inputs.table import read_bytes
 
@@ -43,7 +43,7 @@ def load_robot(
             actuators and the key ``home`` are read; or a ``pinocchio.Model``, a tree
             whose joints of one freedom are all drives.
         close: function that makes the closures of a declared robot hold, as
-            :mod:`assembly.kinematics.closing` does; none if absent.
+            :mod:`forcefit.assembly.kinematics.closing` does; none if absent.
         links: whether links given by a mesh or a library are solved or read now, which
             solvers need.  Without them a robot can be placed, written and converted,
             and its assembly zone can be computed.  A robot with joints that are bolted
@@ -97,7 +97,7 @@ def _is_of_other(path: Path) -> bool:
 
 def _robot_of_foreign(path: Path, title: str, close: Closing | None) -> Robot:
     """Return the robot of another program's file; remarks begin with its title."""
-    from assembly.exchange.foreign import robot_of_file
+    from forcefit.assembly.exchange.foreign import robot_of_file
 
     conversion = robot_of_file(path, ask=False)[0]
     said = [*(f"taken: {line}" for line in conversion.taken)]
@@ -113,8 +113,8 @@ def _robot_of_foreign(path: Path, title: str, close: Closing | None) -> Robot:
 
 def _robot_of_model(model: object, close: Closing | None) -> Robot:
     """Return the robot of a model in memory."""
-    from assembly.exchange.mujoco_model import is_mujoco, mjcf_of_model
-    from assembly.exchange.pinocchio_model import (
+    from forcefit.assembly.exchange.mujoco_model import is_mujoco, mjcf_of_model
+    from forcefit.assembly.exchange.pinocchio_model import (
         ASSUMED,
         is_pinocchio,
         mjcf_of_pinocchio,
@@ -155,7 +155,7 @@ def write_robot(robot: Robot, path: str | Path) -> None:
     if path.suffix.lower() == ".toml":
         write_robot_file(robot, path)
         return
-    from assembly.exchange.convert import check_target, write_converted
+    from forcefit.assembly.exchange.convert import check_target, write_converted
 
     check_target(path)
     write_converted(robot, path)

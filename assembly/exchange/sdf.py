@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from assembly.exchange.coupling import leaders_first
-from assembly.exchange.drives_and_loops import with_loops
-from assembly.exchange.loops_file import LoopsFile
-from assembly.exchange.mechanism import (
+from forcefit.assembly.exchange.coupling import leaders_first
+from forcefit.assembly.exchange.drives_and_loops import with_loops
+from forcefit.assembly.exchange.loops_file import LoopsFile
+from forcefit.assembly.exchange.mechanism import (
     WORLD,
     Body,
     Joint,
@@ -20,16 +20,20 @@ from assembly.exchange.mechanism import (
     Mechanism,
     parents_first,
 )
-from assembly.exchange.sdf_frames import (
+from forcefit.assembly.exchange.sdf_frames import (
     FRAMES,
     MODEL,
     Frames,
     frames_of,
 )
-from assembly.exchange.sdf_joint import joint_couplings, joint_ends, joint_parts
-from assembly.exchange.sdf_mass import link_body
-from assembly.exchange.ties import may_tie, refuse_ties
-from assembly.exchange.xml_file import Node, counted, read_xml
+from forcefit.assembly.exchange.sdf_joint import (
+    joint_couplings,
+    joint_ends,
+    joint_parts,
+)
+from forcefit.assembly.exchange.sdf_mass import link_body
+from forcefit.assembly.exchange.ties import may_tie, refuse_ties
+from forcefit.assembly.exchange.xml_file import Node, counted, read_xml
 from forcefit.inputs.errors import BadInput
 
 _HELD = {"joint": ("pose", "parent", "child", "axis", "axis2"),

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.mechanism import WORLD
-from assembly.exchange.orientation import from_quaternion, from_roll_pitch_yaw
-from assembly.exchange.xml_file import Node, placed, read_xml
+from forcefit.assembly.exchange.mechanism import WORLD
+from forcefit.assembly.exchange.orientation import from_quaternion, from_roll_pitch_yaw
+from forcefit.assembly.exchange.xml_file import Node, placed, read_xml
 from forcefit.inputs.errors import BadInput, nearest, quoted
 
 MODEL = "__model__"

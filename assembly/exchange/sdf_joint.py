@@ -11,16 +11,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.coupling import Coupling
-from assembly.exchange.mechanism import (
+from forcefit.assembly.exchange.coupling import Coupling
+from forcefit.assembly.exchange.mechanism import (
     Body,
     Joint,
     ball,
     chain,
 )
-from assembly.exchange.orientation import onto
-from assembly.exchange.sdf_frames import MODEL, Frames, Named, word
-from assembly.exchange.xml_file import Node
+from forcefit.assembly.exchange.orientation import onto
+from forcefit.assembly.exchange.sdf_frames import MODEL, Frames, Named, word
+from forcefit.assembly.exchange.xml_file import Node
 from forcefit.inputs.errors import quoted
 
 _KINDS = ("fixed", "revolute", "continuous", "prismatic", "ball", "universal",

@@ -10,11 +10,15 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.mechanism import Body
-from assembly.exchange.sdf_frames import Frames, Named, own_pose
-from assembly.exchange.shapes import moments, volume
-from assembly.exchange.xml_file import Node
-from assembly.model.inertia import MassProperties, inertia_matrix, joined_bodies
+from forcefit.assembly.exchange.mechanism import Body
+from forcefit.assembly.exchange.sdf_frames import Frames, Named, own_pose
+from forcefit.assembly.exchange.shapes import moments, volume
+from forcefit.assembly.exchange.xml_file import Node
+from forcefit.assembly.model.inertia import (
+    MassProperties,
+    inertia_matrix,
+    joined_bodies,
+)
 
 _DEFAULT_MASS = 1.0  # [kg] the format's default
 _DEFAULT_INERTIA = np.eye(3)  # [kg m^2] likewise

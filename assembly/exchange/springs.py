@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.mechanism import Joint, Mechanism
-from assembly.exchange.xml_file import counted
+from forcefit.assembly.exchange.mechanism import Joint, Mechanism
+from forcefit.assembly.exchange.xml_file import counted
 
 _AT_REST = 1e-9  # [rad or m] largest distance from home
 _OWN = {"revolute": 2, "prismatic": 5}  # index of a joint's own component of a screw

@@ -2,7 +2,7 @@
 
 from collections.abc import Container, Mapping
 
-from assembly.exchange.xml_file import Node
+from forcefit.assembly.exchange.xml_file import Node
 from forcefit.inputs.errors import quoted
 
 # words in names of elements that refer to bodies without constraining or moving them;

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from assembly.exchange.coupling import Coupling, leaders_first
-from assembly.exchange.drives_and_loops import with_loops
-from assembly.exchange.loops_file import LoopsFile
-from assembly.exchange.mechanism import (
+from forcefit.assembly.exchange.coupling import Coupling, leaders_first
+from forcefit.assembly.exchange.drives_and_loops import with_loops
+from forcefit.assembly.exchange.loops_file import LoopsFile
+from forcefit.assembly.exchange.mechanism import (
     HERE,
     Body,
     Joint,
@@ -22,11 +22,11 @@ from assembly.exchange.mechanism import (
     chain,
     parents_first,
 )
-from assembly.exchange.ties import may_tie, refuse_ties
-from assembly.exchange.urdf_joint import joint_freedoms, pose_of
-from assembly.exchange.urdf_loops import with_closing_joints
-from assembly.exchange.xml_file import Node, counted, read_xml
-from assembly.model.inertia import inertia_matrix
+from forcefit.assembly.exchange.ties import may_tie, refuse_ties
+from forcefit.assembly.exchange.urdf_joint import joint_freedoms, pose_of
+from forcefit.assembly.exchange.urdf_loops import with_closing_joints
+from forcefit.assembly.exchange.xml_file import Node, counted, read_xml
+from forcefit.assembly.model.inertia import inertia_matrix
 from forcefit.inputs.errors import BadInput, quoted
 
 _CONVERTED = ("link", "joint", "material", "transmission", "loop_joint")

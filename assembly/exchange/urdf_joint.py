@@ -9,9 +9,13 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.mechanism import ball, slides
-from assembly.exchange.orientation import from_quaternion, from_roll_pitch_yaw, onto
-from assembly.exchange.xml_file import Node, placed
+from forcefit.assembly.exchange.mechanism import ball, slides
+from forcefit.assembly.exchange.orientation import (
+    from_quaternion,
+    from_roll_pitch_yaw,
+    onto,
+)
+from forcefit.assembly.exchange.xml_file import Node, placed
 
 _ONE_FREEDOM = {"revolute": "revolute", "continuous": "revolute",
                 "prismatic": "prismatic", "fixed": "fixed"}  # fmt: skip

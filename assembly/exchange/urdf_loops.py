@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.mechanism import (
+from forcefit.assembly.exchange.mechanism import (
     HERE,
     WORLD,
     Body,
@@ -22,10 +22,10 @@ from assembly.exchange.mechanism import (
     body_poses,
     chain,
 )
-from assembly.exchange.sdf_frames import MODEL, Frames, Named
-from assembly.exchange.sdf_joint import joint_ends, joint_parts
-from assembly.exchange.urdf_joint import joint_freedoms, pose_of
-from assembly.exchange.xml_file import Node
+from forcefit.assembly.exchange.sdf_frames import MODEL, Frames, Named
+from forcefit.assembly.exchange.sdf_joint import joint_ends, joint_parts
+from forcefit.assembly.exchange.urdf_joint import joint_freedoms, pose_of
+from forcefit.assembly.exchange.xml_file import Node
 from forcefit.inputs.errors import nearest, quoted
 
 Closing = tuple[str, list[Joint], list[Body], Loop]

@@ -4,9 +4,9 @@ from xml.sax.saxutils import quoteattr
 
 from numpy.typing import NDArray
 
-from assembly.exchange.loops_file import LoopsFile
-from assembly.exchange.mechanism import Body, Joint, Mechanism
-from assembly.exchange.orientation import to_roll_pitch_yaw
+from forcefit.assembly.exchange.loops_file import LoopsFile
+from forcefit.assembly.exchange.mechanism import Body, Joint, Mechanism
+from forcefit.assembly.exchange.orientation import to_roll_pitch_yaw
 
 XML_MARK = "<!-- Written by forcefit. -->"
 

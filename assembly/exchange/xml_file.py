@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.largest import LARGEST_LENGTH
+from forcefit.assembly.model.largest import LARGEST_LENGTH
 from forcefit.inputs.errors import BadInput, describe, nearest, one_line, quoted
 from forcefit.inputs.table import read_text
-from stiffness.screws import transform
+from forcefit.stiffness.screws import transform
 
 _DEEPEST = 200  # largest depth of nested elements
 # comments, which may contain "--" in some files, and declarations in a wrong place

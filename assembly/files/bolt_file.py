@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from assembly.kinematics.posture import POSE
-from assembly.model.frame import LEFT
-from assembly.model.largest import LARGEST_LENGTH
-from assembly.model.robot import Clearance, LockedAt
+from forcefit.assembly.kinematics.posture import POSE
+from forcefit.assembly.model.frame import LEFT
+from forcefit.assembly.model.largest import LARGEST_LENGTH
+from forcefit.assembly.model.robot import Clearance, LockedAt
 from forcefit.inputs.table import Table, describe
 
 _EXPECTED = (

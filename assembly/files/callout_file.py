@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from assembly.callouts.callout import (
+from forcefit.assembly.callouts.callout import (
     HELD,
     LOCATIONS,
     ORIENTATIONS,
@@ -18,14 +18,14 @@ from assembly.callouts.callout import (
     Callout,
     Datum,
 )
-from assembly.callouts.fits import parse_size
-from assembly.callouts.general_tolerances import parse_general
-from assembly.callouts.written_tolerances import parse_length, parse_width
-from assembly.callouts.zone import DISTRIBUTIONS
-from assembly.drawing.drawing import DrawnBody, DrawnCallout, DrawnJoint
-from assembly.files.drawn_body import Copy
-from assembly.model.largest import LARGEST_LENGTH
-from assembly.model.robot import BASE
+from forcefit.assembly.callouts.fits import parse_size
+from forcefit.assembly.callouts.general_tolerances import parse_general
+from forcefit.assembly.callouts.written_tolerances import parse_length, parse_width
+from forcefit.assembly.callouts.zone import DISTRIBUTIONS
+from forcefit.assembly.drawing.drawing import DrawnBody, DrawnCallout, DrawnJoint
+from forcefit.assembly.files.drawn_body import Copy
+from forcefit.assembly.model.largest import LARGEST_LENGTH
+from forcefit.assembly.model.robot import BASE
 from forcefit.inputs.table import BadInput, Table, describe, nearest, quoted
 
 Parsed = TypeVar("Parsed")

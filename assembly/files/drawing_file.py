@@ -8,13 +8,13 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from assembly.drawing.drawing import (
+from forcefit.assembly.drawing.drawing import (
     Drawing,
     DrawnJoint,
     turned_joint,
 )
-from assembly.files.callout_file import read_drawn_callouts
-from assembly.files.drawn_body import (
+from forcefit.assembly.files.callout_file import read_drawn_callouts
+from forcefit.assembly.files.drawn_body import (
     LONGEST_NAME,
     Copy,
     link_remarks,
@@ -22,12 +22,12 @@ from assembly.files.drawn_body import (
     read_bodies,
     with_ends,
 )
-from assembly.files.drawn_joint import read_drawn_joint
-from assembly.files.written_units import without_units
-from assembly.model.largest import LARGEST_LENGTH
-from assembly.model.robot import BASE
+from forcefit.assembly.files.drawn_joint import read_drawn_joint
+from forcefit.assembly.files.written_units import without_units
+from forcefit.assembly.model.largest import LARGEST_LENGTH
+from forcefit.assembly.model.robot import BASE
 from forcefit.inputs.table import Table, describe, nearest, quoted
-from stiffness.screws import rotation_matrix, transform
+from forcefit.stiffness.screws import rotation_matrix, transform
 
 MOST_COPIES = 200  # of a leg
 

@@ -9,14 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.drawing.drawing import Drawing, DrawnBody, DrawnJoint, JointNumbers
-from assembly.files.effect_file import effect_tables
-from assembly.files.joint_file import joint_table
-from assembly.files.link_file import link_table
-from assembly.files.robot_file import root_table
-from assembly.files.toml_text import file_text
-from assembly.model.inertia import six_moments
-from assembly.model.robot import Robot
+from forcefit.assembly.drawing.drawing import (
+    Drawing,
+    DrawnBody,
+    DrawnJoint,
+    JointNumbers,
+)
+from forcefit.assembly.files.effect_file import effect_tables
+from forcefit.assembly.files.joint_file import joint_table
+from forcefit.assembly.files.link_file import link_table
+from forcefit.assembly.files.robot_file import root_table
+from forcefit.assembly.files.toml_text import file_text
+from forcefit.assembly.model.inertia import six_moments
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput
 
 _ROUNDING = 1e-15  # relative: smaller parts of points and directions are written as 0

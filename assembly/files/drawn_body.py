@@ -6,16 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.drawing.drawing import DrawnBody, DrawnJoint, turned_body
-from assembly.drawing.parts import joint_axes
-from assembly.files.drawn_link import Curve, curve_link, read_drawn_link
-from assembly.files.inertia_file import read_inertia
-from assembly.files.written_units import without_units
-from assembly.model.inertia import joined_bodies
-from assembly.model.largest import LARGEST_LENGTH
-from assembly.model.robot import BASE
+from forcefit.assembly.drawing.drawing import DrawnBody, DrawnJoint, turned_body
+from forcefit.assembly.drawing.parts import joint_axes
+from forcefit.assembly.files.drawn_link import Curve, curve_link, read_drawn_link
+from forcefit.assembly.files.inertia_file import read_inertia
+from forcefit.assembly.files.written_units import without_units
+from forcefit.assembly.model.inertia import joined_bodies
+from forcefit.assembly.model.largest import LARGEST_LENGTH
+from forcefit.assembly.model.robot import BASE
 from forcefit.inputs.table import Table, nearest, quoted
-from stiffness.screws import transform
+from forcefit.stiffness.screws import transform
 
 LONGEST_NAME = 200  # characters
 

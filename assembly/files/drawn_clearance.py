@@ -1,6 +1,6 @@
 """Clearance of a joint of a robot file of ``format = 2``: bounds, or contacts."""
 
-from assembly.drawing.contacts import (
+from forcefit.assembly.drawing.contacts import (
     Contact,
     bearings,
     fitted,
@@ -8,12 +8,12 @@ from assembly.drawing.contacts import (
     largest_roll,
     pad,
 )
-from assembly.drawing.drawing import FREE_ROWS
-from assembly.files.joint_file import fit_of, read_bounds
-from assembly.files.written_units import without_units
-from assembly.model.clearance import BOUNDS, CONES
-from assembly.model.largest import LARGEST_LENGTH
-from assembly.model.robot import Clearance
+from forcefit.assembly.drawing.drawing import FREE_ROWS
+from forcefit.assembly.files.joint_file import fit_of, read_bounds
+from forcefit.assembly.files.written_units import without_units
+from forcefit.assembly.model.clearance import BOUNDS, CONES
+from forcefit.assembly.model.largest import LARGEST_LENGTH
+from forcefit.assembly.model.robot import Clearance
 from forcefit.inputs.table import Table, describe, quoted
 
 _LEAST_LENGTH = 1e-9  # [m] a shorter contact would allow tilts of many turns

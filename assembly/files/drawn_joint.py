@@ -5,12 +5,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.drawing.drawing import FREE_ROWS, DrawnJoint, JointNumbers, perpendicular
-from assembly.files.bolt_file import read_locked_at
-from assembly.files.drawn_clearance import read_drawn_clearance
-from assembly.files.joint_file import read_fit, read_joint_stiffness, read_pitch
-from assembly.files.written_units import SCREW, without_units
-from assembly.model.largest import LARGEST, LARGEST_LENGTH
+from forcefit.assembly.drawing.drawing import (
+    FREE_ROWS,
+    DrawnJoint,
+    JointNumbers,
+    perpendicular,
+)
+from forcefit.assembly.files.bolt_file import read_locked_at
+from forcefit.assembly.files.drawn_clearance import read_drawn_clearance
+from forcefit.assembly.files.joint_file import (
+    read_fit,
+    read_joint_stiffness,
+    read_pitch,
+)
+from forcefit.assembly.files.written_units import SCREW, without_units
+from forcefit.assembly.model.largest import LARGEST, LARGEST_LENGTH
 from forcefit.inputs.table import Table
 
 ONE_FREEDOM = ("revolute", "prismatic", "helical")

@@ -6,13 +6,13 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.files.link_file import read_link
-from assembly.files.written_units import without_units
-from assembly.model.largest import LARGEST
-from assembly.model.robot import Link, MatrixLink
+from forcefit.assembly.files.link_file import read_link
+from forcefit.assembly.files.written_units import without_units
+from forcefit.assembly.model.largest import LARGEST
+from forcefit.assembly.model.robot import Link, MatrixLink
 from forcefit.inputs.table import BadInput, Table, describe, nearest, quoted
-from stiffness.beam.curve import curve_compliance, curve_mass
-from stiffness.beam.curve_file import read_pieces
+from forcefit.stiffness.beam.curve import curve_compliance, curve_mass
+from forcefit.stiffness.beam.curve_file import read_pieces
 
 _LENGTHS = ("radius", "inner_radius", "width", "height", "length", "wall", "web",
             "flange")  # fmt: skip

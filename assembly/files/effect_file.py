@@ -5,10 +5,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from assembly.effects import LIBRARY
-from assembly.effects.effect import Values, at
-from assembly.files.function_file import FUNCTION, function_table, read_function
-from assembly.model.robot import Robot
+from forcefit.assembly.effects import LIBRARY
+from forcefit.assembly.effects.effect import Values, at
+from forcefit.assembly.files.function_file import (
+    FUNCTION,
+    function_table,
+    read_function,
+)
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import Table, nearest, quoted
 
 

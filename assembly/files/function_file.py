@@ -6,24 +6,24 @@ from typing import Any
 
 import numpy as np
 
-from assembly.effects.forms import FORMS, column_indices, shape_names
-from assembly.effects.formula import names_in, parameter_units, parse_formula
-from assembly.effects.functions import (
+from forcefit.assembly.effects.forms import FORMS, column_indices, shape_names
+from forcefit.assembly.effects.formula import names_in, parameter_units, parse_formula
+from forcefit.assembly.effects.functions import (
     FORMULA,
     columns_of,
     components_of,
     parameters_of,
     variable_names,
 )
-from assembly.effects.units import (
+from forcefit.assembly.effects.units import (
     result_unit,
     turning_variables,
     variable_unit,
     whole_unit,
 )
-from assembly.measurement.variables import FORCE, LOADS
-from assembly.model.function import KINDS, PLACES, Function
-from assembly.model.robot import BASE, Robot
+from forcefit.assembly.measurement.variables import FORCE, LOADS
+from forcefit.assembly.model.function import KINDS, PLACES, Function
+from forcefit.assembly.model.robot import BASE, Robot
 from forcefit.inputs.table import BadInput, Table, nearest, quoted
 
 FUNCTION = "function"

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.inertia import inertia_fault, inertia_matrix
+from forcefit.assembly.model.inertia import inertia_fault, inertia_matrix
 from forcefit.inputs.table import Table
 
 _LARGEST = 1e40  # [kg m^2] as of masses

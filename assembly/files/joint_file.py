@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.callouts.fits import Fit, FittedEnd, clearance_fit
-from assembly.files.bolt_file import bolt_table
-from assembly.model.frame import ONE_OF_BALL, SLIDING_BALL
-from assembly.model.largest import LARGEST, LARGEST_LENGTH
-from assembly.model.robot import LOCKED, NO_SPIN, Clearance, LockedAt
+from forcefit.assembly.callouts.fits import Fit, FittedEnd, clearance_fit
+from forcefit.assembly.files.bolt_file import bolt_table
+from forcefit.assembly.model.frame import ONE_OF_BALL, SLIDING_BALL
+from forcefit.assembly.model.largest import LARGEST, LARGEST_LENGTH
+from forcefit.assembly.model.robot import LOCKED, NO_SPIN, Clearance, LockedAt
 from forcefit.inputs.number_arrays import find_fault, number_array
 from forcefit.inputs.table import BadInput, Table
 

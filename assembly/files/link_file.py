@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from assembly.files.joint_file import definite
-from assembly.model.largest import LARGEST, LARGEST_LENGTH
-from assembly.model.robot import (
+from forcefit.assembly.files.joint_file import definite
+from forcefit.assembly.model.largest import LARGEST, LARGEST_LENGTH
+from forcefit.assembly.model.robot import (
     BeamLink,
     LibraryLink,
     Link,
@@ -16,7 +16,7 @@ from assembly.model.robot import (
 )
 from forcefit.inputs.table import Table, describe, quoted
 from forcefit.inputs.writing import path_from
-from stiffness.surface.surface import UNITS
+from forcefit.stiffness.surface.surface import UNITS
 
 _SMALLEST_LENGTH = 1e-12  # [m] shorter than any machine's
 _MOST_PIECES = 100  # most pieces of a beam; with 8 the error is 1e-4 of a quarter turn
@@ -124,7 +124,7 @@ def _section(beam: Table) -> dict[str, float]:
 
 def _mesh_link(link: Table, frame: Table) -> MeshLink:
     """Return ``mesh = { surface, base, tip, ... }`` and its material."""
-    from stiffness.fem.part_text import read_parts
+    from forcefit.stiffness.fem.part_text import read_parts
 
     mesh = link.table("mesh")
     ends = {key: _interface(mesh, key) for key in ("base", "tip")}
@@ -156,7 +156,7 @@ def _mesh_link(link: Table, frame: Table) -> MeshLink:
 
 def _interface(mesh: Table, key: str) -> Any:
     """Return interface of a mesh with a joint, as written; its syntax is checked."""
-    from stiffness.surface.interface import parse_interface
+    from forcefit.stiffness.surface.interface import parse_interface
 
     value = mesh.require(key, 'an interface such as "z=0.452"')
     if isinstance(value, dict):

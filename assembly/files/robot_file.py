@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.callouts.fits import FittedEnd, parse_fit
-from assembly.drawing.frames import robot_of_drawing
-from assembly.files.bolt_file import read_locked_at
-from assembly.files.callout_file import callout_table, read_frame_callouts
-from assembly.files.drawing_file import is_drawing, read_drawing
-from assembly.files.effect_file import effect_tables, with_effects
-from assembly.files.inertia_file import read_inertia
-from assembly.files.joint_file import (
+from forcefit.assembly.callouts.fits import FittedEnd, parse_fit
+from forcefit.assembly.drawing.frames import robot_of_drawing
+from forcefit.assembly.files.bolt_file import read_locked_at
+from forcefit.assembly.files.callout_file import callout_table, read_frame_callouts
+from forcefit.assembly.files.drawing_file import is_drawing, read_drawing
+from forcefit.assembly.files.effect_file import effect_tables, with_effects
+from forcefit.assembly.files.inertia_file import read_inertia
+from forcefit.assembly.files.joint_file import (
     joint_table,
     read_clearance,
     read_fit,
@@ -24,15 +24,15 @@ from assembly.files.joint_file import (
     read_joint_stiffness,
     read_pitch,
 )
-from assembly.files.link_file import link_table, read_link
-from assembly.files.toml_text import file_text
-from assembly.kinematics.callout_maps import place_callouts
-from assembly.kinematics.posture import home_posture
-from assembly.model.frame import FORCE_CONTROL
-from assembly.model.inertia import six_moments
-from assembly.model.largest import LARGEST, LARGEST_LENGTH
-from assembly.model.link_span import with_spans
-from assembly.model.robot import (
+from forcefit.assembly.files.link_file import link_table, read_link
+from forcefit.assembly.files.toml_text import file_text
+from forcefit.assembly.kinematics.callout_maps import place_callouts
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.frame import FORCE_CONTROL
+from forcefit.assembly.model.inertia import six_moments
+from forcefit.assembly.model.largest import LARGEST, LARGEST_LENGTH
+from forcefit.assembly.model.link_span import with_spans
+from forcefit.assembly.model.robot import (
     BASE,
     JOINTS,
     Frame,
@@ -53,7 +53,7 @@ from forcefit.inputs.writing import (
     path_from,
     write_text,
 )
-from stiffness.screws import rotation_matrix, rotation_vector
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 
 Closing = Callable[[Robot], Robot]
 _LONGEST_NAME = 200  # largest number of characters
@@ -70,7 +70,7 @@ def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
 
     Returns:
         The robot; its nominal closures hold in its home pose.  Meshes and libraries of
-        its links are not read: see :func:`assembly.files.solved_links.solve_links`.
+        its links are not read: see :func:`forcefit.assembly.files.solved_links.solve_links`.
 
     Raises:
         BadInput: the file breaks a rule of the format, or a closure does not hold.

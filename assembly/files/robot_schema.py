@@ -1,15 +1,15 @@
 """What a robot file holds, for editors: the keys that its reader knows."""
 
-from assembly.callouts.callout import HELD, LOCATIONS, ORIENTATIONS, SHAPES
-from assembly.callouts.zone import DISTRIBUTIONS
-from assembly.drawing.drawing import FREE_ROWS
-from assembly.effects import LIBRARY
-from assembly.effects.forms import FORMS
-from assembly.effects.functions import FORMULA
-from assembly.files.function_file import FUNCTION
-from assembly.model.frame import LEFT
-from assembly.model.function import KINDS
-from assembly.model.robot import JOINTS
+from forcefit.assembly.callouts.callout import HELD, LOCATIONS, ORIENTATIONS, SHAPES
+from forcefit.assembly.callouts.zone import DISTRIBUTIONS
+from forcefit.assembly.drawing.drawing import FREE_ROWS
+from forcefit.assembly.effects import LIBRARY
+from forcefit.assembly.effects.forms import FORMS
+from forcefit.assembly.effects.functions import FORMULA
+from forcefit.assembly.files.function_file import FUNCTION
+from forcefit.assembly.model.frame import LEFT
+from forcefit.assembly.model.function import KINDS
+from forcefit.assembly.model.robot import JOINTS
 from forcefit.results.quantities import count, flag, number, text
 from forcefit.results.records import (
     Anything,
@@ -20,7 +20,7 @@ from forcefit.results.records import (
     Words,
     record,
 )
-from stiffness.surface.surface import UNITS
+from forcefit.stiffness.surface.surface import UNITS
 
 _DIRECTION = number("direction", "1", "axis")
 _POINT = number("point", "m", "axis")

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.files.stored_solutions import solution_key, stored_solution
-from assembly.model.frame import between_origins
-from assembly.model.link_kinds import MeshSolution
-from assembly.model.mesh_link import mesh_turn
-from assembly.model.robot import Frame, LibraryLink, Link, MeshLink, Robot
+from forcefit.assembly.files.stored_solutions import solution_key, stored_solution
+from forcefit.assembly.model.frame import between_origins
+from forcefit.assembly.model.link_kinds import MeshSolution
+from forcefit.assembly.model.mesh_link import mesh_turn
+from forcefit.assembly.model.robot import Frame, LibraryLink, Link, MeshLink, Robot
 from forcefit.inputs.table import BadInput, quoted
-from stiffness.beam.beam import section_axes
+from forcefit.stiffness.beam.beam import section_axes
 
 if TYPE_CHECKING:
-    from stiffness.fem.fea import FemOptions, MeshedLink
+    from forcefit.stiffness.fem.fea import FemOptions, MeshedLink
 
 _LOG = logging.getLogger("forcefit.links")
 _CACHE = logging.getLogger("forcefit.cache")
@@ -97,7 +97,7 @@ def solved_link(frame: Frame, accuracy: float = 0.005) -> Link:
 
 def _from_library(link: LibraryLink) -> LibraryLink:
     """Return the link with its entry's compliance."""
-    from stiffness.report.library import read_compliance
+    from forcefit.stiffness.report.library import read_compliance
 
     C = read_compliance(link.library, link.key)
     C.setflags(write=False)
@@ -106,8 +106,8 @@ def _from_library(link: LibraryLink) -> LibraryLink:
 
 def _solution(frame: Frame, link: MeshLink, accuracy: float) -> MeshSolution:
     """Return the finite-element solution of a mesh link, cached in this process."""
-    from stiffness.fem.fea import FemOptions
-    from stiffness.surface.surface_files import named_solid
+    from forcefit.stiffness.fem.fea import FemOptions
+    from forcefit.stiffness.surface.surface_files import named_solid
 
     digest = _digest(named_solid(link.surface)[0])
     options = FemOptions(accuracy, link.interface)
@@ -127,12 +127,12 @@ def _solve(
     frame: Frame, link: MeshLink, digest: str, options: "FemOptions"
 ) -> MeshSolution:
     """Mesh a link's surface and solve it by finite elements."""
-    from stiffness.fem.fea import interface_center, solve_link
-    from stiffness.fem.material import Material
-    from stiffness.fem.part_text import parse_part
-    from stiffness.fem.two_ends import two_ends
-    from stiffness.surface.interface import parse_interface
-    from stiffness.surface.surface import read_surface
+    from forcefit.stiffness.fem.fea import interface_center, solve_link
+    from forcefit.stiffness.fem.material import Material
+    from forcefit.stiffness.fem.part_text import parse_part
+    from forcefit.stiffness.fem.two_ends import two_ends
+    from forcefit.stiffness.surface.interface import parse_interface
+    from forcefit.stiffness.surface.surface import read_surface
 
     surface = read_surface(link.surface, link.unit)
     ends = parse_interface(link.base, "base"), parse_interface(link.tip, "tip")

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from assembly.files.written_units import without_units
-from assembly.model.largest import LARGEST, LARGEST_LENGTH
-from assembly.model.robot import Robot
-from assembly.steps.plan import (
+from forcefit.assembly.files.written_units import without_units
+from forcefit.assembly.model.largest import LARGEST, LARGEST_LENGTH
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.steps.plan import (
     Adjust,
     Fix,
     Join,
@@ -31,7 +31,7 @@ from forcefit.results.records import (
     Words,
     record,
 )
-from stiffness.screws import SCREW, WRENCH
+from forcefit.stiffness.screws import SCREW, WRENCH
 
 KINDS = ("fix", "join", "clamp", "preload", "release", "measure", "adjust")
 _COMPONENTS = tuple(name.lower() for name in SCREW)

@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import assembly.files
+import forcefit.assembly.files
 import forcefit.inputs
-import stiffness
-from assembly.model.link_kinds import MeshLink, MeshSolution
+import forcefit.stiffness
+from forcefit.assembly.model.link_kinds import MeshLink, MeshSolution
 from forcefit.inputs.cache_folder import cache_folder
 from forcefit.inputs.locking import locked_file
 from forcefit.inputs.program import sources_hash
@@ -44,13 +44,13 @@ def solution_key(link: MeshLink, digest: str, options: object) -> str:
         link: to be solved.  The path of its surface and the orientation of its mesh are
             left out, because a solution is in the mesh's axes.
         digest: SHA-256 of the surface file.
-        options: :class:`stiffness.fem.fea.FemOptions` of the solution.
+        options: :class:`forcefit.stiffness.fem.fea.FemOptions` of the solution.
 
     Returns:
         A digest of the link, the options and the program; links with the same key have
         equal solutions.
     """
-    from stiffness.surface.surface_files import named_solid
+    from forcefit.stiffness.surface.surface_files import named_solid
 
     file, solid = named_solid(link.surface)
     name = Path(f"{file.suffix.lower()}#{solid}")  # the suffix determines the reader
@@ -62,7 +62,9 @@ def solution_key(link: MeshLink, digest: str, options: object) -> str:
 @cache
 def _program() -> str:
     """Return the SHA-256 of the code that reads surfaces and solves links."""
-    return sources_hash((forcefit.inputs, stiffness, assembly.files), _LIBRARIES)
+    return sources_hash(
+        (forcefit.inputs, forcefit.stiffness, forcefit.assembly.files), _LIBRARIES
+    )
 
 
 def stored_solution(key: str, solve: Callable[[], MeshSolution]) -> MeshSolution:
@@ -182,14 +184,14 @@ def _decoded(value: Any, arrays: Mapping[str, NDArray]) -> Any:
 @cache
 def _kinds() -> dict[str, Any]:
     """Return the classes of which a solution consists."""
-    from stiffness.fem.adaptive_step import Level
-    from stiffness.fem.condensation import Condensed
-    from stiffness.fem.elements import Elements
-    from stiffness.fem.fea import MeshedLink
-    from stiffness.link import LinkStiffness
-    from stiffness.mesh.solid import Solid
-    from stiffness.surface.facets import Facets
-    from stiffness.surface.primitives import Cone, Plane, Sphere, Torus
+    from forcefit.stiffness.fem.adaptive_step import Level
+    from forcefit.stiffness.fem.condensation import Condensed
+    from forcefit.stiffness.fem.elements import Elements
+    from forcefit.stiffness.fem.fea import MeshedLink
+    from forcefit.stiffness.link import LinkStiffness
+    from forcefit.stiffness.mesh.solid import Solid
+    from forcefit.stiffness.surface.facets import Facets
+    from forcefit.stiffness.surface.primitives import Cone, Plane, Sphere, Torus
 
     kinds = (MeshSolution, MeshedLink, LinkStiffness, Level, Solid, Elements, Condensed,
              Plane, Cone, Sphere, Torus, Facets)  # fmt: skip

@@ -10,9 +10,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.nominal import size_of
-from assembly.model.robot import Robot
-from stiffness.screws import rotation_matrix
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.model.robot import Robot
+from forcefit.stiffness.screws import rotation_matrix
 
 _SAME = 1e-9  # [lengths, cosine] error below which points, or right angles, are exact
 

@@ -15,7 +15,7 @@ from graphlib import CycleError, TopologicalSorter
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.callouts.callout import (
+from forcefit.assembly.callouts.callout import (
     HELD,
     Callout,
     Datum,
@@ -23,12 +23,12 @@ from assembly.callouts.callout import (
     check_orientation,
     zone_of,
 )
-from assembly.callouts.zone import Zone
-from assembly.kinematics.posture import Posture
-from assembly.model.placed_frames import own_motion
-from assembly.model.robot import Robot
+from forcefit.assembly.callouts.zone import Zone
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.model.placed_frames import own_motion
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, quoted
-from stiffness.screws import screw_map, transform
+from forcefit.stiffness.screws import screw_map, transform
 
 _RANK = 1e-9  # singular values below it are rounding
 

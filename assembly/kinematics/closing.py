@@ -12,13 +12,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.closure_rates import closure_matrices, redundant_drives
-from assembly.kinematics.nominal import Target, follow, mobile
-from assembly.kinematics.posture import joint_target
-from assembly.model.links import own_screw
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.closure_rates import (
+    closure_matrices,
+    redundant_drives,
+)
+from forcefit.assembly.kinematics.nominal import Target, follow, mobile
+from forcefit.assembly.kinematics.posture import joint_target
+from forcefit.assembly.model.links import own_screw
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, nearest
-from stiffness.screws import rotation_matrix, rotation_vector, transform
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform
 
 _OPEN = 1e-9  # [rad, m] largest mismatch of closures that hold
 _SMALL = 0.1  # [rad, m] largest error that counts as a small motion

@@ -5,8 +5,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.nominal import mobile, motion_screws, size_of
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.nominal import mobile, motion_screws, size_of
+from forcefit.assembly.model.robot import Robot
 
 # relative size below which a singular value of closures counts as zero: closures hold
 # to 1e-10, and near a singularity a posture is known only to a root of that

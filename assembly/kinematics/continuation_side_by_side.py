@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kernels.choice import kernels
-from assembly.kinematics.track import Track
+from forcefit.assembly.kernels.choice import kernels
+from forcefit.assembly.kinematics.track import Track
 
 
 def tree_of(fields: dict[str, Any]) -> Any:

@@ -11,11 +11,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.closure_rates import SINGULAR, locked_closures
-from assembly.kinematics.nominal import Target, follow
-from assembly.kinematics.posture import Posture, home_posture, pose_components
-from assembly.kinematics.singular_posture import rank_near
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.closure_rates import SINGULAR, locked_closures
+from forcefit.assembly.kinematics.nominal import Target, follow
+from forcefit.assembly.kinematics.posture import Posture, home_posture, pose_components
+from forcefit.assembly.kinematics.singular_posture import rank_near
+from forcefit.assembly.model.robot import Robot
 
 _ALIKE = 0.3  # product of the cosines between two bases that one step may connect
 _STEPS = (

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.ball_joints import with_balls
-from assembly.kinematics.closure_rates import closure_signs
-from assembly.kinematics.near_postures import near_postures
-from assembly.kinematics.nominal import mobile, motion_screws, size_of
-from assembly.kinematics.posture import Posture
-from assembly.kinematics.ranks import MISMATCH_FACTOR, rank_of
+from forcefit.assembly.kinematics.ball_joints import with_balls
+from forcefit.assembly.kinematics.closure_rates import closure_signs
+from forcefit.assembly.kinematics.near_postures import near_postures
+from forcefit.assembly.kinematics.nominal import mobile, motion_screws, size_of
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.kinematics.ranks import MISMATCH_FACTOR, rank_of
 
 # relative size of singular values that count as zero: those of files rounded at 6
 # digits, and of singular postures, which closures to 1e-10 determine to its root

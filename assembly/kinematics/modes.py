@@ -11,9 +11,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.nominal import Target, follow
-from assembly.kinematics.track import Track
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.nominal import Target, follow
+from forcefit.assembly.kinematics.track import Track
+from forcefit.assembly.model.robot import Robot
 
 _CLOSED = 1e-8  # [rad, m] largest error of closures and pose in a mode
 # components [tx ty tz rx ry rz] that are kept, in the order in which they are tried

@@ -8,10 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.closure_rates import SINGULAR, closure_matrices
-from assembly.kinematics.nominal import Target, follow, mobile, size_of
-from assembly.kinematics.track import Track
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.closure_rates import SINGULAR, closure_matrices
+from forcefit.assembly.kinematics.nominal import Target, follow, mobile, size_of
+from forcefit.assembly.kinematics.track import Track
+from forcefit.assembly.model.robot import Robot
 
 _CORRECTIONS = 3  # more of them: near a singularity they converge slowly
 _ROUNDING = 1e-13  # [rad, m] closure error that is rounding

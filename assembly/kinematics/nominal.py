@@ -3,7 +3,7 @@
 Many targets are followed together, each along its straight line from the home pose.
 Steps are damped Gauss-Newton of least norm.  So coordinates that closures and target
 leave undetermined do not change, and overconstrained robots are no special case.  The
-loops are compiled: :mod:`assembly.kinematics.continuation_side_by_side`.
+loops are compiled: :mod:`forcefit.assembly.kinematics.continuation_side_by_side`.
 """
 
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.continuation_side_by_side import (
+from forcefit.assembly.kinematics.continuation_side_by_side import (
     follow_side_by_side,
     tree_of,
 )
-from assembly.kinematics.track import Track
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.track import Track
+from forcefit.assembly.model.robot import Robot
 
 # number of each joint type in C++: a helical joint is revolute with a lead
 KINDS = {"fixed": 0, "revolute": 1, "prismatic": 2, "helical": 1}

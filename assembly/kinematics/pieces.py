@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.model.robot import BeamLink, Frame, Robot, beam_axis
-from stiffness.screws import rotation_matrix
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot, beam_axis
+from forcefit.stiffness.screws import rotation_matrix
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,13 +22,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.closure_rates import redundant_drives
-from assembly.kinematics.modes import follow_in_mode
-from assembly.kinematics.nominal import NOT_CLOSED, Target, follow, size_of
-from assembly.kinematics.singular_posture import is_singular
-from assembly.kinematics.track import Track
-from assembly.model.largest import LARGEST_LENGTH
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.closure_rates import redundant_drives
+from forcefit.assembly.kinematics.modes import follow_in_mode
+from forcefit.assembly.kinematics.nominal import NOT_CLOSED, Target, follow, size_of
+from forcefit.assembly.kinematics.singular_posture import is_singular
+from forcefit.assembly.kinematics.track import Track
+from forcefit.assembly.model.largest import LARGEST_LENGTH
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, nearest
 from forcefit.results.display import (
     Figures,
@@ -38,7 +38,7 @@ from forcefit.results.display import (
     short_repr,
     show,
 )
-from stiffness.screws import rotation_matrix, rotation_vector, screw_map
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector, screw_map
 
 POSE = ("tx", "ty", "tz", "rx", "ry", "rz")
 _HOME_TOLERANCE = 1e-6  # [rad, m] accepted mismatch at home, for rounded robot files

@@ -23,7 +23,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffness.screws import rotation_vector, skew, transform
+from forcefit.stiffness.screws import rotation_vector, skew, transform
 
 _SERIES = 9  # terms of the Stumpff series: 1e-17 at angle 1
 _STUMPFF = np.array([

@@ -15,10 +15,10 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.closure_rates import locked_closures, locked_ranks
-from assembly.kinematics.near_postures import near_postures
-from assembly.kinematics.nominal import Target, follow
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.closure_rates import locked_closures, locked_ranks
+from forcefit.assembly.kinematics.near_postures import near_postures
+from forcefit.assembly.kinematics.nominal import Target, follow
+from forcefit.assembly.model.robot import Robot
 
 _ASIDE = 0.02  # [rad or lengths] distance of nearby postures
 _NEIGHBOURS = 6  # number of nearby postures; one off the singularity suffices

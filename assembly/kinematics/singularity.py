@@ -29,13 +29,13 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.closure_rates import SINGULAR, closure_matrices
-from assembly.kinematics.nominal import Target, follow, mobile, size_of
-from assembly.kinematics.posture import home_posture
-from assembly.kinematics.ranks import rank_of
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.closure_rates import SINGULAR, closure_matrices
+from forcefit.assembly.kinematics.nominal import Target, follow, mobile, size_of
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.kinematics.ranks import rank_of
+from forcefit.assembly.model.robot import Robot
 from forcefit.results.display import html_table, largest_row, short_repr
-from stiffness.screws import SCREW
+from forcefit.stiffness.screws import SCREW
 
 KINDS = ("serial", "parallel", "closure")
 _RANK = 1e-9  # relative size below which a singular value counts as zero

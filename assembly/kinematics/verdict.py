@@ -3,18 +3,18 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.closure_rates import locked_ranks
-from assembly.kinematics.crossing import beyond_singularity, home_rank
-from assembly.kinematics.nominal import Target, size_of
-from assembly.kinematics.posture import (
+from forcefit.assembly.kinematics.closure_rates import locked_ranks
+from forcefit.assembly.kinematics.crossing import beyond_singularity, home_rank
+from forcefit.assembly.kinematics.nominal import Target, size_of
+from forcefit.assembly.kinematics.posture import (
     Posture,
     home_is_singular,
     home_posture,
     pose_components,
 )
-from assembly.kinematics.singular_posture import is_singular
-from assembly.model.robot import Robot
-from assembly.model.statuses import BEYOND_LIMITS, BEYOND_SINGULARITY, SINGULAR
+from forcefit.assembly.kinematics.singular_posture import is_singular
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.model.statuses import BEYOND_LIMITS, BEYOND_SINGULARITY, SINGULAR
 
 SINGULAR_WORDS = "singular posture: the first-order analysis is inconclusive"
 _FAR_SIDE = "not connected to home without passing a singularity"

@@ -23,27 +23,31 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.closure_rates import closure_signs
-from assembly.kinematics.posture import Posture
-from assembly.linear.load import (
+from forcefit.assembly.kinematics.closure_rates import closure_signs
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.load import (
     FrameLoads,
     loads_on_frames,
     weights,
     with_distributed,
     wrenches_at_starts,
 )
-from assembly.linear.reference.reduction import reduce_problem
-from assembly.linear.rounding import ROUNDING, closure_rounding, differs_from_zero
-from assembly.linear.solution import Solution
-from assembly.model.clearance import (
+from forcefit.assembly.linear.reference.reduction import reduce_problem
+from forcefit.assembly.linear.rounding import (
+    ROUNDING,
+    closure_rounding,
+    differs_from_zero,
+)
+from forcefit.assembly.linear.solution import Solution
+from forcefit.assembly.model.clearance import (
     clearance_bounds,
     clearance_components,
     clearance_excess,
 )
-from assembly.model.point_results import N, plain
-from assembly.model.statuses import OK
-from assembly.solvers.cones import cone_sizes, cone_sums
-from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
+from forcefit.assembly.model.point_results import N, plain
+from forcefit.assembly.model.statuses import OK
+from forcefit.assembly.solvers.cones import cone_sizes, cone_sums
+from forcefit.assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
 from forcefit.results.display import (
     Figures,
     largest,
@@ -66,7 +70,7 @@ class Assembly(Solution[N]):
     """A manipulator assembled at least energy; or many points, with a leading axis.
 
     Of many points ``[i]`` is one; without a solution it raises the reason.  The fields
-    are those of :class:`~assembly.linear.solution.Solution`.
+    are those of :class:`~forcefit.assembly.linear.solution.Solution`.
     """
 
     summary, plot = short_repr, show
@@ -92,14 +96,14 @@ class Assembly(Solution[N]):
         }
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set; see :mod:`assembly.model.tables`."""
-        from assembly.model.tables import assembly_dataset
+        """Return a data set; see :mod:`forcefit.assembly.model.tables`."""
+        from forcefit.assembly.model.tables import assembly_dataset
 
         return super().to_xarray() if self.of_many else assembly_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
         """Return a row for each frame, or each point, columns (variable, component)."""
-        from assembly.model.tables import frame_table
+        from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point" if self.of_many else "frame")
 

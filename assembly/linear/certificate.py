@@ -20,17 +20,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.assembled import Assembly
-from assembly.linear.closure import VirtualJoints
-from assembly.linear.reference.pose_error import (
+from forcefit.assembly.linear.assembled import Assembly
+from forcefit.assembly.linear.closure import VirtualJoints
+from forcefit.assembly.linear.reference.pose_error import (
     MovingCones,
     ReachableSet,
     clearances_in,
     within_bounds,
 )
-from assembly.linear.rounding import SPREAD, stiffness_spread
-from assembly.solvers.cones import cone_sizes
-from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE, SolverFailed
+from forcefit.assembly.linear.rounding import SPREAD, stiffness_spread
+from forcefit.assembly.solvers.cones import cone_sizes
+from forcefit.assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE, SolverFailed
 
 LARGEST_RESIDUAL = 1e-9  # [rad, reference lengths] accepted residual of a closure
 LARGEST_EXCESS = 1e-9  # [-] accepted excess of a clearance over its cone

@@ -24,22 +24,22 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.closure_rates import closure_signs
-from assembly.kinematics.nominal import size_of
-from assembly.kinematics.posture import Posture
-from assembly.model.clearance import (
+from forcefit.assembly.kinematics.closure_rates import closure_signs
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.model.clearance import (
     CONES,
     clearance_bounds,
     scales_with_margin,
 )
-from assembly.model.largest import LARGEST_LENGTH
-from assembly.model.links import (
+from forcefit.assembly.model.largest import LARGEST_LENGTH
+from forcefit.assembly.model.links import (
     compliance_factor,
     link_compliances,
     motion_map,
     spring_compliances,
 )
-from assembly.model.robot import Robot
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import html_table, short_repr
 
@@ -273,7 +273,7 @@ def checked_size(robot: Robot) -> float:
         robot: any robot.
 
     Returns:
-        The result of :func:`assembly.kinematics.nominal.size_of`.
+        The result of :func:`forcefit.assembly.kinematics.nominal.size_of`.
 
     Raises:
         BadInput: a geometric error is beyond 1e6 rad or m.

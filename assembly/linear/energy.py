@@ -1,8 +1,8 @@
 """The least energy that closes a manipulator, problem (22), at one point or at many.
 
-The compiled method (:mod:`assembly.linear.lanes`) computes all steps from the frames'
+The compiled method (:mod:`forcefit.assembly.linear.lanes`) computes all steps from the frames'
 poses to the certificate, with and without loads.  The reference
-(:mod:`assembly.linear.reference`) solves points that it does not cover or certify; the
+(:mod:`forcefit.assembly.linear.reference`) solves points that it does not cover or certify; the
 answer's ``method`` says so.
 """
 
@@ -13,33 +13,38 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.posture import Posture, together
-from assembly.linear.assembled import Assembly, all_loads
-from assembly.linear.certificate import unproved
-from assembly.linear.closure import (
+from forcefit.assembly.kinematics.posture import Posture, together
+from forcefit.assembly.linear.assembled import Assembly, all_loads
+from forcefit.assembly.linear.certificate import unproved
+from forcefit.assembly.linear.closure import (
     VirtualJoints,
     checked_size,
     linearise,
     virtual_joints,
 )
-from assembly.linear.lanes import assemble_side_by_side
-from assembly.linear.load import FrameLoads, driven, no_loads
-from assembly.linear.reference.energy import CannotAssemble, least_energy
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.linear.robot_structure import Structure, structure_of
-from assembly.linear.rounding import (
+from forcefit.assembly.linear.lanes import assemble_side_by_side
+from forcefit.assembly.linear.load import FrameLoads, driven, no_loads
+from forcefit.assembly.linear.reference.energy import CannotAssemble, least_energy
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.linear.robot_structure import Structure, structure_of
+from forcefit.assembly.linear.rounding import (
     SPREAD,
     closure_rounding,
     drop_zeros,
     stiffness_spread,
 )
-from assembly.linear.solution import with_known
-from assembly.model.given_load import Load, given_load
-from assembly.model.largest import LARGEST_LENGTH
-from assembly.model.robot import Robot
-from assembly.model.statuses import CANNOT_ASSEMBLE, NO_EQUILIBRIUM, OK, SOLVER_FAILED
-from assembly.solvers.conic import SolverFailed
-from assembly.solvers.method import Method, check_method, log_reference
+from forcefit.assembly.linear.solution import with_known
+from forcefit.assembly.model.given_load import Load, given_load
+from forcefit.assembly.model.largest import LARGEST_LENGTH
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.model.statuses import (
+    CANNOT_ASSEMBLE,
+    NO_EQUILIBRIUM,
+    OK,
+    SOLVER_FAILED,
+)
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.solvers.method import Method, check_method, log_reference
 
 __all__ = ["Assembly", "CannotAssemble", "solve_assembly"]
 
@@ -111,7 +116,7 @@ def solve_assembly(
             all frames carry, each at its frame's origin, base axes.
 
     Returns:
-        The assembled manipulator; :func:`assembly.linear.certificate.unproved` says
+        The assembled manipulator; :func:`forcefit.assembly.linear.certificate.unproved` says
         where the certificate falls short even so.  For many postures or sets of errors,
         one object with all points; a point without a solution raises nothing and has
         its reason in ``reason``.
@@ -147,7 +152,7 @@ def with_free_own_axes(assembly: Assembly) -> Assembly:
 
     Returns:
         The same points under the same loads, see ``own_axes_free`` of
-        :func:`assembly.linear.closure.virtual_joints`.
+        :func:`forcefit.assembly.linear.closure.virtual_joints`.
     """
     posture, load, loads = assembly.posture, assembly.load, assembly.frame_loads
     return _solve_many(posture, assembly.errors, load, loads, True, "compiled")

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kernels.choice import kernels
-from assembly.linear.robot_structure import Structure
+from forcefit.assembly.kernels.choice import kernels
+from forcefit.assembly.linear.robot_structure import Structure
 
 # outcomes of (21), (27) and K_C: proved, or for the reference
 COMPILED, REFERENCE = range(2)

@@ -24,11 +24,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.posture import Content, Posture, content_of
-from assembly.model.largest import LARGEST_LENGTH
-from assembly.model.robot import BeamLink, MeshLink, Robot, beam_axis
+from forcefit.assembly.kinematics.posture import Content, Posture, content_of
+from forcefit.assembly.model.largest import LARGEST_LENGTH
+from forcefit.assembly.model.robot import BeamLink, MeshLink, Robot, beam_axis
 from forcefit.inputs.table import BadInput, quoted
-from stiffness.beam.sections import declared_section
+from forcefit.stiffness.beam.sections import declared_section
 
 _LARGEST_LOAD = (
     1e60  # [N m, N] weights of the largest masses at the largest gravity included

@@ -7,14 +7,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.linear.assembled import Assembly
-from assembly.linear.energy import with_free_own_axes
-from assembly.linear.lanes import COMPILED, REFERENCE, bounds_side_by_side
-from assembly.linear.reference.pose_error import ASSUMPTIONS
-from assembly.linear.robot_structure import Structure, structure_of
-from assembly.model.robot import Robot
-from assembly.model.statuses import OK
-from assembly.solvers.method import Method, check_method
+from forcefit.assembly.linear.assembled import Assembly
+from forcefit.assembly.linear.energy import with_free_own_axes
+from forcefit.assembly.linear.lanes import COMPILED, REFERENCE, bounds_side_by_side
+from forcefit.assembly.linear.reference.pose_error import ASSUMPTIONS
+from forcefit.assembly.linear.robot_structure import Structure, structure_of
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.model.statuses import OK
+from forcefit.assembly.solvers.method import Method, check_method
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Asked:
     """Required bounds of the largest pose error.
 
     Attributes:
-        assumption: see the head of :mod:`assembly.linear.pose_error`.
+        assumption: see the head of :mod:`forcefit.assembly.linear.pose_error`.
         energy_budget: eta of ``budget``.
         tolerance_rotation: [rad] required difference of upper and lower bound.
         tolerance_translation: [m] the same for the translation.

@@ -1,7 +1,7 @@
 """Of all assemblies of least energy, the one whose platform is nearest to nominal.
 
 Springs and loaded clearances are the same in all of them
-(:mod:`assembly.linear.reference.pose_error`, ``frozen``).  Unloaded clearances may be
+(:mod:`forcefit.assembly.linear.reference.pose_error`, ``frozen``).  Unloaded clearances may be
 anywhere in their cones as long as the closures hold.  The nearest pose is another
 second-order cone programme,
 
@@ -20,24 +20,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.ranks import (
+from forcefit.assembly.kinematics.ranks import (
     RANK,
     ROWS_RANK,
     noise_of,
     rank_of,
     rank_tolerance,
 )
-from assembly.linear.assembled import Assembly
-from assembly.linear.certificate import LARGEST_EXCESS, unproved
-from assembly.linear.closure import virtual_joints
-from assembly.linear.reference.energy import solve_with
-from assembly.linear.reference.pose_error import loaded_cones
-from assembly.linear.reference.reduction import complement
-from assembly.model.clearance import has_bounded_motion
-from assembly.solvers.cones import into_cones
-from assembly.solvers.conic import minimise_energy
-from assembly.solvers.method import Method
-from stiffness.screws import skew
+from forcefit.assembly.linear.assembled import Assembly
+from forcefit.assembly.linear.certificate import LARGEST_EXCESS, unproved
+from forcefit.assembly.linear.closure import virtual_joints
+from forcefit.assembly.linear.reference.energy import solve_with
+from forcefit.assembly.linear.reference.pose_error import loaded_cones
+from forcefit.assembly.linear.reference.reduction import complement
+from forcefit.assembly.model.clearance import has_bounded_motion
+from forcefit.assembly.solvers.cones import into_cones
+from forcefit.assembly.solvers.conic import minimise_energy
+from forcefit.assembly.solvers.method import Method
+from forcefit.stiffness.screws import skew
 
 _STILL = 1e-11  # [rad, m] a pose that moves less counts as fixed
 
@@ -53,7 +53,7 @@ def nearest_pose(
         assembly: assembly of least energy.
         offset: (3,) [m] from the platform's origin to the point whose deviation is
             minimised, base axes.
-        method: method of :func:`assembly.solvers.conic.minimise_energy`.
+        method: method of :func:`forcefit.assembly.solvers.conic.minimise_energy`.
 
     Returns:
         The assembly, its deviation (rotation vector [rad] and shift of the point [m])

@@ -14,14 +14,14 @@ Passive joints keep within the bounds of their own motion.  Rotation and transla
 bounded separately: a tool on a bearing turns freely, and its point still has a largest
 error.
 
-The set of platform screws (:mod:`assembly.linear.reference.pose_error`) is convex.
-With ``"compiled"``, :func:`assembly.solvers.one_problem.farthest` brackets its farthest
+The set of platform screws (:mod:`forcefit.assembly.linear.reference.pose_error`) is convex.
+With ``"compiled"``, :func:`forcefit.assembly.solvers.one_problem.farthest` brackets its farthest
 screw and calls Clarabel for single supports in doubt.  With ``"reference"``,
-:func:`assembly.solvers.outer_cuts.farthest` does so in numpy, and Clarabel computes
+:func:`forcefit.assembly.solvers.outer_cuts.farthest` does so in numpy, and Clarabel computes
 every support.
 
 The first two assumptions are compiled from end to end
-(:mod:`assembly.linear.moving_clearances`) and take some tenths of a millisecond a
+(:mod:`forcefit.assembly.linear.moving_clearances`) and take some tenths of a millisecond a
 point.  For ``budget``, and for points that this does not cover, the set is set up in
 numpy, point by point.
 """
@@ -34,18 +34,18 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.linear.assembled import Assembly
-from assembly.linear.certificate import unproved
-from assembly.linear.energy import failure_status
-from assembly.linear.moving_clearances import Asked, compiled_bounds
-from assembly.linear.reference.energy import CannotAssemble
-from assembly.linear.reference.pose_error import reachable_screws
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.linear.robot_structure import structure_of
-from assembly.model.point_results import Numbers, PointResults
-from assembly.model.statuses import OK, SOLVER_FAILED
-from assembly.solvers.conic import SolverFailed
-from assembly.solvers.method import Method
+from forcefit.assembly.linear.assembled import Assembly
+from forcefit.assembly.linear.certificate import unproved
+from forcefit.assembly.linear.energy import failure_status
+from forcefit.assembly.linear.moving_clearances import Asked, compiled_bounds
+from forcefit.assembly.linear.reference.energy import CannotAssemble
+from forcefit.assembly.linear.reference.pose_error import reachable_screws
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.linear.robot_structure import structure_of
+from forcefit.assembly.model.point_results import Numbers, PointResults
+from forcefit.assembly.model.statuses import OK, SOLVER_FAILED
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.solvers.method import Method
 from forcefit.inputs.renamed import renamed_keywords, warn_renamed
 from forcefit.results.display import Figures, bracket, short_repr
 

@@ -7,15 +7,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.nominal import size_of
-from assembly.linear.closure import (
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.linear.closure import (
     VirtualJoints,
     closure_signs,
     virtual_joints,
 )
-from assembly.model.clearance import clearance_bounds, component_bounds
-from assembly.model.robot import Robot
-from assembly.solvers.cones import cone_starts
+from forcefit.assembly.model.clearance import clearance_bounds, component_bounds
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.solvers.cones import cone_starts
 
 
 class Structure(NamedTuple):
@@ -76,7 +76,7 @@ def structure_of(
 
     Args:
         robot: any robot.
-        springs: as for :func:`assembly.linear.closure.virtual_joints`.
+        springs: as for :func:`forcefit.assembly.linear.closure.virtual_joints`.
         own_axes_free: as for the same function.
         bounded_motion: as for the same function.
 

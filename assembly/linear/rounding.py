@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.linear.closure import VirtualJoints, in_reference_lengths
+from forcefit.assembly.linear.closure import VirtualJoints, in_reference_lengths
 
 ROUNDING = 8 * float(np.finfo(float).eps)  # relative, of sums of some tens of terms
 SPREAD = 1e13  # ratio of stiffnesses: rounding of the stiffest is 1e-3 of the softest

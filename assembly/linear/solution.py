@@ -1,6 +1,6 @@
 """The numbers of a least energy, of one point or of many, and their selection.
 
-:class:`assembly.linear.assembled.Assembly` adds the quantities computed from them.
+:class:`forcefit.assembly.linear.assembled.Assembly` adds the quantities computed from them.
 """
 
 from collections.abc import Mapping
@@ -10,11 +10,11 @@ from typing import Any, ClassVar, Generic, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import Posture, together
-from assembly.linear.closure import Linearisation, VirtualJoints
-from assembly.linear.load import FrameLoads
-from assembly.model.point_results import N, PointResults, plain
-from assembly.model.statuses import OK
+from forcefit.assembly.kinematics.posture import Posture, together
+from forcefit.assembly.linear.closure import Linearisation, VirtualJoints
+from forcefit.assembly.linear.load import FrameLoads
+from forcefit.assembly.model.point_results import N, PointResults, plain
+from forcefit.assembly.model.statuses import OK
 
 _VECTORS = ("elastic", "clearances", "motions", "multipliers")
 # values that may be known in addition to the fields: properties, parts of a certificate

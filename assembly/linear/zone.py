@@ -15,14 +15,14 @@ from typing import Any, ClassVar, Generic, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.posture import Posture, together
-from assembly.linear.closure import checked_size
-from assembly.linear.lanes import COMPILED, REFERENCE, margins_side_by_side
-from assembly.linear.reference.zone import least_margin
-from assembly.linear.robot_structure import structure_of
-from assembly.model.point_results import N, PointResults
-from assembly.solvers.conic import SolverFailed
-from assembly.solvers.method import Method, check_method, log_reference
+from forcefit.assembly.kinematics.posture import Posture, together
+from forcefit.assembly.linear.closure import checked_size
+from forcefit.assembly.linear.lanes import COMPILED, REFERENCE, margins_side_by_side
+from forcefit.assembly.linear.reference.zone import least_margin
+from forcefit.assembly.linear.robot_structure import structure_of
+from forcefit.assembly.model.point_results import N, PointResults
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.solvers.method import Method, check_method, log_reference
 from forcefit.results.display import Figures
 
 MARGIN_GAP = 1e-8  # accepted distance of a margin above its bound, relative ..

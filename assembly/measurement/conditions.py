@@ -1,8 +1,8 @@
 """Conditions of measurements of a robot, past or planned.
 
-An *effect* (:mod:`assembly.effects`) is a property that the model of a robot lacks.  It
+An *effect* (:mod:`forcefit.assembly.effects`) is a property that the model of a robot lacks.  It
 changes one or more of the fields below and nothing else.  So any number of effects can
-be combined, and :func:`assembly.measurement.predict.predict` does not depend on the
+be combined, and :func:`forcefit.assembly.measurement.predict.predict` does not depend on the
 effects.
 
 ======  ====================  =========  =============================================
@@ -21,9 +21,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.measurement.history import History
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.measurement.history import History
+from forcefit.assembly.model.robot import Robot
 from forcefit.results.display import html_table, short_repr
 
 COVARIATES = ("temperature", "time", "approach")
@@ -95,7 +95,7 @@ class Conditions:
         yields: compliant places with laws.
         exact: whether finite motions are used instead of the linear model.
         second_order: (R, 6) [rad, m] exact minus linear platform screw without load;
-            see :func:`assembly.measurement.predict.with_second_order`.
+            see :func:`forcefit.assembly.measurement.predict.with_second_order`.
         rest: (R, n, 6) rest positions of the clearances relative to their bounds; None
             if they follow from the least energy.
         base: (6,) or (R, 6) [rad, m] rotation and translation of the measuring frame,

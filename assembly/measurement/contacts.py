@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exact.exact import ExactAssembly
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import Assembly
-from assembly.measurement.conditions import Conditions, ContactLaw
-from assembly.model.links import in_series, own_screw
+from forcefit.assembly.exact.exact import ExactAssembly
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import Assembly
+from forcefit.assembly.measurement.conditions import Conditions, ContactLaw
+from forcefit.assembly.model.links import in_series, own_screw
 
 ITERATIONS = 100  # largest number of iterations
 CONVERGED = 1e-11  # relative change of a contact's deflection at convergence

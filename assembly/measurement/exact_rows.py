@@ -1,14 +1,14 @@
 r"""The exact equilibrium of a robot without clearances, for many rows together.
 
-The equations are those of :mod:`assembly.exact.exact`: closures hold on SE(3), every
+The equations are those of :mod:`forcefit.assembly.exact.exact`: closures hold on SE(3), every
 body and spring deforms by its compliance times its wrench, and free motions carry no
 load.  All rows are iterated together with the inverse of the linear model at the
-nominal posture (:mod:`assembly.measurement.without_clearance`).  The first iterate is
+nominal posture (:mod:`forcefit.assembly.measurement.without_clearance`).  The first iterate is
 the linear solution.  Each further iteration reduces the error by a factor of the size
 of the motions (a chord method).  Rows that do not converge are solved by
-:func:`assembly.exact.exact.solve_exact`.
+:func:`forcefit.assembly.exact.exact.solve_exact`.
 
-The rows and the iterate are defined in :mod:`assembly.measurement.row_state`.
+The rows and the iterate are defined in :mod:`forcefit.assembly.measurement.row_state`.
 
 Sources:
     Ortega, Rheinboldt, Iterative Solution of Nonlinear Equations in Several Variables,
@@ -20,12 +20,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.pieces import cut_beams
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.row_state import Rows, RowState
-from assembly.measurement.without_clearance import flexibility
-from assembly.model.links import own_screws
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.pieces import cut_beams
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.row_state import Rows, RowState
+from forcefit.assembly.measurement.without_clearance import flexibility
+from forcefit.assembly.model.links import own_screws
+from forcefit.assembly.model.robot import Robot
 
 _MOST_ITERATIONS = 60  # largest number of iterations; 5 to 12 are usual
 # [rad, reference lengths] largest change of a screw in the last iteration

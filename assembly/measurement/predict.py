@@ -1,10 +1,10 @@
 """Predicted readings: deviation of the platform under the conditions of each row.
 
 Robots without clearances are solved together by
-:mod:`assembly.measurement.without_clearance`, with finite motions by
-:mod:`assembly.measurement.exact_rows`.  Rows with clearances, or with closures of
-ambiguous numerical rank, are solved one by one by :mod:`assembly.linear.energy` and
-:mod:`assembly.exact.exact`.
+:mod:`forcefit.assembly.measurement.without_clearance`, with finite motions by
+:mod:`forcefit.assembly.measurement.exact_rows`.  Rows with clearances, or with closures of
+ambiguous numerical rank, are solved one by one by :mod:`forcefit.assembly.linear.energy` and
+:mod:`forcefit.assembly.exact.exact`.
 
 Sources:
     Public format, campaigns: rotation vector of R_actual R_nominal^T and difference of
@@ -16,14 +16,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exact.exact import ExactAssembly, solve_exact
-from assembly.linear.closure import virtual_joints
-from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
-from assembly.linear.load import loads_with_weight
-from assembly.linear.nearest_pose import nearest_pose
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.contacts import (
+from forcefit.assembly.exact.exact import ExactAssembly, solve_exact
+from forcefit.assembly.linear.closure import virtual_joints
+from forcefit.assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
+from forcefit.assembly.linear.load import loads_with_weight
+from forcefit.assembly.linear.nearest_pose import nearest_pose
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.contacts import (
     CONVERGED,
     ITERATIONS,
     contact_columns,
@@ -32,21 +32,21 @@ from assembly.measurement.contacts import (
     softened,
     wrenches_through,
 )
-from assembly.measurement.exact_rows import solve_rows
-from assembly.measurement.settled_clearance import (
+from forcefit.assembly.measurement.exact_rows import solve_rows
+from forcefit.assembly.measurement.settled_clearance import (
     fractions,
     with_clearances_at_rest,
     with_clearances_taken_up,
     without_joint_clearances,
 )
-from assembly.measurement.without_clearance import (
+from forcefit.assembly.measurement.without_clearance import (
     at_postures,
     flexibility,
     responses_to,
 )
-from assembly.measurement.yields import Yields, settle_yields, with_springs
-from assembly.solvers.conic import SolverFailed
-from stiffness.screws import rotation_matrix, rotation_vector
+from forcefit.assembly.measurement.yields import Yields, settle_yields, with_springs
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 
 # largest number of configurations that are corrected to second order one by one
 _MOST_ONE_BY_ONE = 40

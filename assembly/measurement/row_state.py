@@ -17,30 +17,30 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exact.dead_load import (
+from forcefit.assembly.exact.dead_load import (
     DeadLoads,
     dead_loads_of_rows,
     drive_wrenches,
     resultants,
 )
-from assembly.exact.finite_robot import along_own
-from assembly.kinematics.closure_rates import closure_signs
-from assembly.kinematics.nominal import size_of
-from assembly.kinematics.se3 import (
+from forcefit.assembly.exact.finite_robot import along_own
+from forcefit.assembly.kinematics.closure_rates import closure_signs
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.kinematics.se3 import (
     exponential,
     inverse,
     left_jacobian,
     logarithm,
     turn_jacobian,
 )
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.without_clearance import (
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.without_clearance import (
     Flexibility,
     at_postures,
     pseudo_inverse,
 )
-from assembly.model.links import own_screw
-from stiffness.screws import rotation_matrix, rotation_vector, transform
+from forcefit.assembly.model.links import own_screw
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform
 
 _LINEAR_BELOW = 1e-9  # [rad or m] deflection below which the law of a contact is linear
 

@@ -11,17 +11,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.load import loads_with_weight
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.without_clearance import flexibility
-from assembly.model.clearance import (
+from forcefit.assembly.linear.load import loads_with_weight
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.without_clearance import flexibility
+from forcefit.assembly.model.clearance import (
     CONES,
     clearance_bounds,
     clearance_components,
     component_bounds,
     scales_with_margin,
 )
-from assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
 
 # relative to the largest wrench of the same kind; smaller wrenches count as zero
 _UNLOADED = 1e-9

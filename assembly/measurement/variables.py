@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.measurement.conditions import COVARIATES, Conditions
-from assembly.measurement.history import History, in_order
-from stiffness.screws import WRENCH
+from forcefit.assembly.measurement.conditions import COVARIATES, Conditions
+from forcefit.assembly.measurement.history import History, in_order
+from forcefit.stiffness.screws import WRENCH
 
 FORCE = "load.force"  # magnitude of the force
 LOADS = tuple(name.lower() for name in WRENCH)

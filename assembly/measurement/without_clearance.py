@@ -26,17 +26,21 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.nominal import size_of
-from assembly.kinematics.posture import Content, Posture, Unchanged, content_of
-from assembly.kinematics.ranks import RANK
-from assembly.linear.closure import (
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.kinematics.posture import Content, Posture, Unchanged, content_of
+from forcefit.assembly.kinematics.ranks import RANK
+from forcefit.assembly.linear.closure import (
     closure_signs,
     in_reference_lengths,
     virtual_joints,
 )
-from assembly.linear.load import FrameLoads
-from assembly.model.clearance import clearance_bounds, component_bounds
-from assembly.model.links import joint_compliances, link_compliances, own_screws
+from forcefit.assembly.linear.load import FrameLoads
+from forcefit.assembly.model.clearance import clearance_bounds, component_bounds
+from forcefit.assembly.model.links import (
+    joint_compliances,
+    link_compliances,
+    own_screws,
+)
 
 # relative size below which an eigenvalue is rounding; between this and RANK the rank is
 # ambiguous

@@ -22,9 +22,9 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.measurement.conditions import Conditions
-from assembly.model.links import in_series
-from assembly.solvers.conic import SolverFailed
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.model.links import in_series
+from forcefit.assembly.solvers.conic import SolverFailed
 
 T = TypeVar("T")
 _STEP = 1e-6  # relative to a wrench: step for the derivative of a law

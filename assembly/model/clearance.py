@@ -16,7 +16,7 @@ the bound in the file.  So a joint's own motion needs no separate treatment.
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
 
 # components of the screw that each bound limits
 CONES = ((0, 1), (2,), (3, 4), (5,), (3, 4, 5))
@@ -63,7 +63,7 @@ def bound_name(columns: NDArray) -> str:
 
     Args:
         columns: (6n, 1 to 3) columns of the cone, see
-            :class:`assembly.linear.closure.VirtualJoints`.
+            :class:`forcefit.assembly.linear.closure.VirtualJoints`.
 
     Returns:
         One of :data:`BOUNDS`.

@@ -25,11 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from assembly.model.random_errors import SIGNS, frames_named
-from assembly.model.robot import Robot
+from forcefit.assembly.model.random_errors import SIGNS, frames_named
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from forcefit.results.display import html_table, short_repr
-from stiffness.screws import SCREW
+from forcefit.stiffness.screws import SCREW
 
 KINDS = ("uniform", "normal", "truncated")
 _LARGEST = 1e3  # [rad, m] larger than any error

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from assembly.model.frame import Frame
-from assembly.model.robot import Robot
+from forcefit.assembly.model.frame import Frame
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, nearest, quoted
 
 

@@ -14,12 +14,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.model.equal_data import EqualData
-from assembly.model.inertia import inertia_fault, six_moments
-from assembly.model.link_kinds import BeamLink, Link
+from forcefit.assembly.model.equal_data import EqualData
+from forcefit.assembly.model.inertia import inertia_fault, six_moments
+from forcefit.assembly.model.link_kinds import BeamLink, Link
 from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import Figures, brief, html_table, short_repr
-from stiffness.screws import rotation_matrix
+from forcefit.stiffness.screws import rotation_matrix
 
 JOINTS = ("fixed", "revolute", "prismatic", "helical")
 BASE = "base"
@@ -79,7 +79,7 @@ class LockedAt:
         left: where the fitter leaves drawn machines: ``"least"``, the least sum of
             squares among the positions of least energy, or ``"uniform"``, any of them.
         screw: (6,) [rad, m] clearance that is locked in; it is part of the geometric
-            error.  Computed by :func:`assembly.steps.bolted.bolt_joints`.
+            error.  Computed by :func:`forcefit.assembly.steps.bolted.bolt_joints`.
     """
 
     clearance: Clearance
@@ -244,7 +244,7 @@ class Frame(EqualData):
         """Index of the joint's own component of a screw: RZ, or TZ if prismatic.
 
         RZ of a helical joint is its whole motion, the translation included
-        (:func:`assembly.model.links.motion_map`).
+        (:func:`forcefit.assembly.model.links.motion_map`).
         """
         return 5 if self.joint == "prismatic" else 2
 

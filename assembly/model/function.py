@@ -1,6 +1,6 @@
 """A general effect: a small screw, or a compliance, as a function of variables.
 
-:mod:`assembly.effects.forms` defines its numbers; :mod:`assembly.effects.functions`
+:mod:`forcefit.assembly.effects.forms` defines its numbers; :mod:`forcefit.assembly.effects.functions`
 applies it.
 """
 
@@ -20,7 +20,7 @@ class Function:
         components: ``rx`` .. ``tz`` of the screw there, in its axes; ``mx`` .. ``fz``
             where ``where`` is ``"load"``.
         variables: one or two, such as ``q.drive``, ``load.fz``, ``cov.temperature``.
-        form: a name of :data:`assembly.effects.forms.FORMS`, or ``"formula"``.
+        form: a name of :data:`forcefit.assembly.effects.forms.FORMS`, or ``"formula"``.
         parameters: numbers by name, in the units that follow from the variables and
             the kind; with several components a name may begin with one of them.
         kind: ``"screw"`` [rad, m], or ``"compliance"`` [rad/(N m), m/N]: times the

@@ -5,11 +5,11 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.model.largest import LARGEST
+from forcefit.assembly.model.largest import LARGEST
 from forcefit.inputs.assignments import check_components
 from forcefit.inputs.errors import BadInput, describe
 from forcefit.inputs.number_arrays import find_fault
-from stiffness.screws import WRENCH
+from forcefit.stiffness.screws import WRENCH
 
 Load = ArrayLike | Mapping[str, ArrayLike]
 COMPONENTS = tuple(name.lower() for name in WRENCH)

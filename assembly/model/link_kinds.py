@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from assembly.model.equal_data import EqualData
+from forcefit.assembly.model.equal_data import EqualData
 
 if TYPE_CHECKING:
-    from stiffness.fem.fea import MeshedLink
+    from forcefit.stiffness.fem.fea import MeshedLink
 
 
 @dataclass(frozen=True)
@@ -98,9 +98,9 @@ class MeshLink:
             origin to the frame's.
         interface: ``"rigid"`` or ``"distributing"``.
         parts: parts of another material, as read by
-            :func:`stiffness.fem.part_text.parse_part`.
+            :func:`forcefit.stiffness.fem.part_text.parse_part`.
         solution: solution of its finite elements, None until
-            :func:`assembly.files.solved_links.solve_links`; it is not pickled.
+            :func:`forcefit.assembly.files.solved_links.solve_links`; it is not pickled.
     """
 
     surface: Path
@@ -133,7 +133,7 @@ class LibraryLink:
         library: the library's path.
         key: the entry's key.
         compliance: (6, 6) [rad/(N m) .. m/N] of the entry, at the frame in its axes;
-            None until :func:`assembly.files.solved_links.solve_links`.
+            None until :func:`forcefit.assembly.files.solved_links.solve_links`.
     """
 
     library: Path

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.links import own_screw
-from assembly.model.robot import BeamLink, Frame, Link, MeshLink, Robot
+from forcefit.assembly.model.links import own_screw
+from forcefit.assembly.model.robot import BeamLink, Frame, Link, MeshLink, Robot
 from forcefit.inputs.table import BadInput, quoted
-from stiffness.beam.beam import section_axes
-from stiffness.screws import rotation_matrix
+from forcefit.stiffness.beam.beam import section_axes
+from forcefit.stiffness.screws import rotation_matrix
 
 _SAME_POINT = 1e-9  # [m] two origins nearer than this coincide
 

@@ -2,8 +2,8 @@
 
 A link is held at its base and loaded by its frame's wrench at the tip; a beam with a
 density is also loaded by its own weight.  The formulas for beams are in
-:mod:`stiffness.beam.beam_stress`.  Links given by a surface use the stress of unit
-wrenches by finite elements (:mod:`stiffness.fem.stress`), without the points nearer
+:mod:`forcefit.stiffness.beam.beam_stress`.  Links given by a surface use the stress of unit
+wrenches by finite elements (:mod:`forcefit.stiffness.fem.stress`), without the points nearer
 than an interface's radius to a clamped, singular edge.  The stress of a link given by
 its stiffness alone is unknown.
 """
@@ -15,10 +15,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.model.mesh_link import mesh_solution, mesh_turn
-from assembly.model.robot import BeamLink, Frame, MeshLink, Robot, beam_axis
-from stiffness.beam.beam import section_axes
-from stiffness.beam.beam_stress import peak_beam_stress
+from forcefit.assembly.model.mesh_link import mesh_solution, mesh_turn
+from forcefit.assembly.model.robot import BeamLink, Frame, MeshLink, Robot, beam_axis
+from forcefit.stiffness.beam.beam import section_axes
+from forcefit.stiffness.beam.beam_stress import peak_beam_stress
 
 WEIGHTLESS = np.zeros(6)  # [N m, N]
 _CHUNK = 64  # number of wrenches together: 64 x 20000 nodes x 6 numbers are 61 MB
@@ -83,9 +83,9 @@ def peak_stresses(
     Args:
         robot: robot of n frames.
         wrenches: (..., n, 6) [N m, N] of every link's spring, at its frame in its axes,
-            as :attr:`assembly.linear.assembled.Assembly.wrenches`.
+            as :attr:`forcefit.assembly.linear.assembled.Assembly.wrenches`.
         at_tips: (..., n, 6) [N m, N] part of the wrenches due to the links' own weight,
-            as :attr:`assembly.linear.load.FrameLoads.at_tips`.
+            as :attr:`forcefit.assembly.linear.load.FrameLoads.at_tips`.
 
     Returns:
         (..., links) [Pa] in the order of :func:`stressed_links`.
@@ -126,7 +126,7 @@ def _of_beam(frame: Frame) -> Callable[..., NDArray]:
 
 def _of_mesh(frame: Frame, row: int) -> LinkStress:
     """Return the peak stress of a link given by its surface."""
-    from stiffness.fem.stress import stress_influence, von_mises
+    from forcefit.stiffness.fem.stress import stress_influence, von_mises
 
     solved = mesh_solution(frame).solved
     influence = stress_influence(solved)

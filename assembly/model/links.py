@@ -5,8 +5,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.mesh_link import mesh_link_stiffness, refuse_unsolved
-from assembly.model.robot import (
+from forcefit.assembly.model.mesh_link import mesh_link_stiffness, refuse_unsolved
+from forcefit.assembly.model.robot import (
     BeamLink,
     Frame,
     LibraryLink,
@@ -15,8 +15,8 @@ from assembly.model.robot import (
     Robot,
     beam_axis,
 )
-from stiffness.beam.beam import beam_compliance
-from stiffness.beam.sections import declared_section
+from forcefit.stiffness.beam.beam import beam_compliance
+from forcefit.stiffness.beam.sections import declared_section
 
 
 def link_compliances(robot: Robot) -> NDArray:

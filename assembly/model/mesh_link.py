@@ -1,6 +1,6 @@
 """The stored finite-element solution of a mesh link, in its frame's axes.
 
-:func:`assembly.files.solved_links.solve_links` solves them when a robot is loaded.
+:func:`forcefit.assembly.files.solved_links.solve_links` solves them when a robot is loaded.
 """
 
 from dataclasses import replace
@@ -9,19 +9,19 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.frame import between_origins
-from assembly.model.link_kinds import MeshSolution
-from assembly.model.robot import Frame, LibraryLink, MeshLink
+from forcefit.assembly.model.frame import between_origins
+from forcefit.assembly.model.link_kinds import MeshSolution
+from forcefit.assembly.model.robot import Frame, LibraryLink, MeshLink
 from forcefit.inputs.table import BadInput, quoted
-from stiffness.link import LinkStiffness, turn_link
-from stiffness.screws import rotation_matrix
+from forcefit.stiffness.link import LinkStiffness, turn_link
+from forcefit.stiffness.screws import rotation_matrix
 
 
 def mesh_solution(frame: Frame) -> MeshSolution:
     """Return the finite-element solution of a frame's mesh link.
 
     Args:
-        frame: one with a :class:`assembly.model.robot.MeshLink`.
+        frame: one with a :class:`forcefit.assembly.model.robot.MeshLink`.
 
     Returns:
         The solution; for the link's own modulus multiply its stiffness by
@@ -41,7 +41,7 @@ def refuse_unsolved(frame: Frame) -> NoReturn:
     kind = "library" if isinstance(frame.link, LibraryLink) else "mesh"
     raise BadInput(
         f"frame {quoted(frame.name)}.link.{kind}: found no stiffness, expected a robot "
-        "of load_robot, or of assembly.files.solved_links.solve_links"
+        "of load_robot, or of forcefit.assembly.files.solved_links.solve_links"
     )
 
 
@@ -54,7 +54,7 @@ def mesh_link_stiffness(frame: Frame) -> LinkStiffness:
     """Return the stiffness of a frame's mesh link by finite elements, in its axes.
 
     Args:
-        frame: one with a :class:`assembly.model.robot.MeshLink`.
+        frame: one with a :class:`forcefit.assembly.model.robot.MeshLink`.
 
     Returns:
         The link, read at the tip interface's centre, which is the frame's origin.
@@ -75,7 +75,7 @@ def mesh_link_mass(frame: Frame) -> tuple[NDArray, NDArray]:
     """Return the consistent mass of a frame's mesh link, by finite elements.
 
     Args:
-        frame: one with a :class:`assembly.model.robot.MeshLink` that has a density.
+        frame: one with a :class:`forcefit.assembly.model.robot.MeshLink` that has a density.
 
     Returns:
         (12, 12) [kg m^2 .. kg] for screws of base and tip, each read at its end, in the
@@ -95,7 +95,7 @@ def mesh_turn(frame: Frame, mesh_span: NDArray) -> NDArray:
     """Return the rotation from a frame's mesh's axes to the frame's.
 
     Args:
-        frame: one with a :class:`assembly.model.robot.MeshLink`.
+        frame: one with a :class:`forcefit.assembly.model.robot.MeshLink`.
         mesh_span: (3,) [m] from base to tip in the mesh's axes.
 
     Returns:

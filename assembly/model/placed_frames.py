@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.frame import BASE, Frame
-from stiffness.screws import rotation_matrix, rotation_vector, transform
+from forcefit.assembly.model.frame import BASE, Frame
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform
 
 PlacedFrame = tuple[Frame, NDArray]  # a frame and its (4, 4) home pose
 

@@ -25,7 +25,7 @@ class PointResults:
         AXES: the fields that have this axis, and their number of axes for one point; an
             array with no more axes holds for all points.
         VARIABLES: the array of each variable of the table of many points, by the names
-            of :mod:`assembly.model.tables`.
+            of :mod:`forcefit.assembly.model.tables`.
     """
 
     AXES: ClassVar[Mapping[str, int]]
@@ -60,15 +60,15 @@ class PointResults:
         return (self[i] for i in range(len(self)))
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set over ``point``; see :mod:`assembly.model.tables`."""
-        from assembly.model.tables import points_dataset
+        """Return a data set over ``point``; see :mod:`forcefit.assembly.model.tables`."""
+        from forcefit.assembly.model.tables import points_dataset
 
         arrays = {name: getattr(self, own) for name, own in self.VARIABLES.items()}
         return points_dataset(arrays)
 
     def to_pandas(self) -> "pandas.DataFrame":
         """Return a row for each point, columns (variable, component)."""
-        from assembly.model.tables import frame_table
+        from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point")
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import Robot
+from forcefit.assembly.model.robot import Robot
 
 SIGNS = ("literal", "signed")
 

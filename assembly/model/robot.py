@@ -1,6 +1,6 @@
 """A manipulator as data: a tree of frames, and the closures that hold it together.
 
-:mod:`assembly.model.frame` defines a frame, :mod:`assembly.model.link_kinds` a link.
+:mod:`forcefit.assembly.model.frame` defines a frame, :mod:`forcefit.assembly.model.link_kinds` a link.
 Their names may be imported from here.
 """
 
@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.callouts.callout import Callout
-from assembly.callouts.fits import FittedEnd
-from assembly.model.equal_data import EqualData
-from assembly.model.frame import (
+from forcefit.assembly.callouts.callout import Callout
+from forcefit.assembly.callouts.fits import FittedEnd
+from forcefit.assembly.model.equal_data import EqualData
+from forcefit.assembly.model.frame import (
     BASE,
     JOINTS,
     LOCKED,
@@ -26,8 +26,8 @@ from assembly.model.frame import (
     beam_axis,
     locked,
 )
-from assembly.model.function import Function
-from assembly.model.link_kinds import (
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.link_kinds import (
     BeamLink,
     LibraryLink,
     Link,
@@ -36,7 +36,7 @@ from assembly.model.link_kinds import (
 )
 from forcefit.inputs.table import BadInput, nearest, quoted
 from forcefit.results.display import Figures, html_table, largest, short_repr, show
-from stiffness.screws import rotation_matrix, transform
+from forcefit.stiffness.screws import rotation_matrix, transform
 
 __all__ = [
     "BASE", "JOINTS", "LOCKED", "NO_SPIN", "BeamLink", "Clearance", "Frame",
@@ -59,7 +59,7 @@ class Robot(EqualData):
         closures: pairs of frames that must coincide once assembled.
         description: one line.
         effects: parameters of the known effects of the machine, by name; see
-            :mod:`assembly.effects`.
+            :mod:`forcefit.assembly.effects`.
         session_effects: effects of one session alone, by session.
         functions: known general effects of the machine.
         learned_range: least and largest value of each variable in the data from which

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import Robot
+from forcefit.assembly.model.robot import Robot
 from forcefit.results.quantities import LABELS, QUANTITIES
 
 if TYPE_CHECKING:

@@ -31,12 +31,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.links import link_compliance
-from assembly.model.robot import BeamLink, Frame, beam_axis
-from assembly.path.motion import Motion
-from stiffness.beam.beam import section_axes
-from stiffness.beam.beam_stress import peak_beam_stress, section_stress
-from stiffness.beam.sections import declared_section
+from forcefit.assembly.model.links import link_compliance
+from forcefit.assembly.model.robot import BeamLink, Frame, beam_axis
+from forcefit.assembly.path.motion import Motion
+from forcefit.stiffness.beam.beam import section_axes
+from forcefit.stiffness.beam.beam_stress import peak_beam_stress, section_stress
+from forcefit.stiffness.beam.sections import declared_section
 
 _ALONG = 33  # sections; a parabola between two loses 1e-3
 _FEW = 34  # fibres by which the section of largest stress is found

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assembly.kinematics.nominal import mobile
-from assembly.kinematics.posture import POSE, pose_components
-from assembly.model.link_stress import stressed_links
-from assembly.path.path_errors import PathErrors
-from assembly.sweeps.identity import program_hash, robot_hash
+from forcefit.assembly.kinematics.nominal import mobile
+from forcefit.assembly.kinematics.posture import POSE, pose_components
+from forcefit.assembly.model.link_stress import stressed_links
+from forcefit.assembly.path.path_errors import PathErrors
+from forcefit.assembly.sweeps.identity import program_hash, robot_hash
 from forcefit.results.quantities import LABELS, QUANTITIES
 
 if TYPE_CHECKING:

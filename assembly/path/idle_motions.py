@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.nominal import motion_screws, size_of
-from assembly.path.inertial_loads import InertialLoads, inertial_loads
-from assembly.path.motion import Motion, carries_matrix, idle_rates
+from forcefit.assembly.kinematics.nominal import motion_screws, size_of
+from forcefit.assembly.path.inertial_loads import InertialLoads, inertial_loads
+from forcefit.assembly.path.motion import Motion, carries_matrix, idle_rates
 
 _MASSLESS = 1e-12  # of the largest inertia: below it an idle motion has none
 _ROUNDING = 1e-20  # of the whole mass on the longest arm: 1e-10 of an arm, squared

@@ -5,8 +5,8 @@ A rigid body of mass m, centre c and moments of inertia I, at its frame's origin
     F = m (g - a_c),        M = c x F - (I alpha + omega x I omega)
 
 The inertia of a beam with a density acts along it, that of a link given by a mesh by
-its consistent mass matrix (:mod:`assembly.path.beam_inertia`,
-:mod:`assembly.path.mesh_inertia`): its part at the link's start acts on the part that
+its consistent mass matrix (:mod:`forcefit.assembly.path.beam_inertia`,
+:mod:`forcefit.assembly.path.mesh_inertia`): its part at the link's start acts on the part that
 carries the link.  A wrench at the tip instead would deflect a beam up to 1.5 times too
 much.
 """
@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.model.robot import MeshLink
-from assembly.path.beam_inertia import BeamLoad, beam_load
-from assembly.path.mesh_inertia import mesh_end_wrenches
-from assembly.path.motion import Motion
+from forcefit.assembly.model.robot import MeshLink
+from forcefit.assembly.path.beam_inertia import BeamLoad, beam_load
+from forcefit.assembly.path.mesh_inertia import mesh_end_wrenches
+from forcefit.assembly.path.motion import Motion
 
 
 @dataclass(frozen=True, eq=False)

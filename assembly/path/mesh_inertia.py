@@ -9,9 +9,9 @@ shared by both ends.
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.mesh_link import mesh_link_mass
-from assembly.path.motion import Motion
-from stiffness.screws import skew
+from forcefit.assembly.model.mesh_link import mesh_link_mass
+from forcefit.assembly.path.motion import Motion
+from forcefit.stiffness.screws import skew
 
 
 def mesh_end_wrenches(

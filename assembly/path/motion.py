@@ -29,13 +29,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.nominal import mobile, motion_screws, size_of
-from assembly.kinematics.posture import POSE, Posture, pose_components
-from assembly.kinematics.se3 import bracket, stumpff, turn_jacobian
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.nominal import mobile, motion_screws, size_of
+from forcefit.assembly.kinematics.posture import POSE, Posture, pose_components
+from forcefit.assembly.kinematics.se3 import bracket, stumpff, turn_jacobian
+from forcefit.assembly.model.robot import Robot
 
 # relative size below which a singular value of closures and path counts as zero, as in
-# assembly.kinematics.closure_rates
+# forcefit.assembly.kinematics.closure_rates
 _SINGULAR = 1e-6
 _NOISE = 30.0  # the same for each unit of the closures' nominal error
 _PRESCRIBED = 1e-4  # largest relative error of a prescribed velocity

@@ -12,23 +12,23 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.nominal import Target
-from assembly.kinematics.posture import together
-from assembly.kinematics.verdict import verdicts
-from assembly.linear.energy import Assembly, solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.model.link_stress import stressed_links
-from assembly.model.links import own_screw
-from assembly.model.robot import Robot
-from assembly.model.statuses import OK, SINGULAR
-from assembly.path.beam_inertia import beam_stress
-from assembly.path.idle_motions import with_idle_accelerations
-from assembly.path.inertial_loads import InertialLoads, inertial_loads
-from assembly.path.motion import Motion, NotFollowed, follow_path
-from assembly.path.placing import check_path_robot, first_frequency, placed
-from assembly.path.trajectory import Trajectory
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.sweeps.targets import goals_of, of_joints
+from forcefit.assembly.kinematics.nominal import Target
+from forcefit.assembly.kinematics.posture import together
+from forcefit.assembly.kinematics.verdict import verdicts
+from forcefit.assembly.linear.energy import Assembly, solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.model.link_stress import stressed_links
+from forcefit.assembly.model.links import own_screw
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.model.statuses import OK, SINGULAR
+from forcefit.assembly.path.beam_inertia import beam_stress
+from forcefit.assembly.path.idle_motions import with_idle_accelerations
+from forcefit.assembly.path.inertial_loads import InertialLoads, inertial_loads
+from forcefit.assembly.path.motion import Motion, NotFollowed, follow_path
+from forcefit.assembly.path.placing import check_path_robot, first_frequency, placed
+from forcefit.assembly.path.trajectory import Trajectory
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput, nearest
 from forcefit.results.display import Figures, html_table, largest, short_repr
 
@@ -126,8 +126,8 @@ def path_errors(
 
     Args:
         robot: robot with masses.
-        trajectory: of :func:`assembly.path.trajectory.timed` or
-            :func:`~assembly.path.trajectory.profiled`.
+        trajectory: of :func:`forcefit.assembly.path.trajectory.timed` or
+            :func:`~forcefit.assembly.path.trajectory.profiled`.
         load: (6,) [N m, N] constant load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes; none if absent.
         assumption: of bounds of the pose error, problem (27): ``"frozen"`` or

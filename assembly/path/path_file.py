@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import Robot
-from assembly.sweeps.targets import read_targets
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.sweeps.targets import read_targets
 from forcefit.inputs.errors import LARGEST
 from forcefit.inputs.table import BadInput, quoted
 

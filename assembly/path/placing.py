@@ -3,13 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import Posture, place_many, place_many_joints
-from assembly.model.robot import Robot
-from assembly.path.path_file import PathTable
-from assembly.path.trajectory import Trajectory
-from assembly.platform_stiffness.vibration import check_masses, natural_modes
-from assembly.solvers.conic import SolverFailed
-from assembly.sweeps.targets import goals_of, of_joints
+from forcefit.assembly.kinematics.posture import Posture, place_many, place_many_joints
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.path.path_file import PathTable
+from forcefit.assembly.path.trajectory import Trajectory
+from forcefit.assembly.platform_stiffness.vibration import check_masses, natural_modes
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput
 
 _FREQUENCIES = 5  # postures at which the first natural frequency is computed

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.statuses import OK
-from assembly.path.path_errors import PathErrors
-from assembly.path.summary import LARGEST, LAWS, LEAST_PERIODS, sizes
+from forcefit.assembly.model.statuses import OK
+from forcefit.assembly.path.path_errors import PathErrors
+from forcefit.assembly.path.summary import LARGEST, LAWS, LEAST_PERIODS, sizes
 from forcefit.inputs.errors import plot_label
 from forcefit.page.charts import BLUE, GREY, RED, Axis, chart, grid
 from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
 from forcefit.page.tables import Value, table
-from stiffness.screws import SCREW
+from forcefit.stiffness.screws import SCREW
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -70,7 +70,7 @@ def path_page(
     """Return the page of a path.
 
     Args:
-        summary: of :func:`assembly.path.summary.path_summary`.
+        summary: of :func:`forcefit.assembly.path.summary.path_summary`.
         errors: the errors along the path.
         provenance: command and files.
 

@@ -6,17 +6,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from assembly.exchange.robot_files import load_robot
-from assembly.kinematics.nominal import size_of
-from assembly.model.robot import Robot
-from assembly.path.path_errors import (
+from forcefit.assembly.exchange.robot_files import load_robot
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.path.path_errors import (
     PathErrors,
     Progress,
     path_errors,
 )
-from assembly.path.path_file import PathTable, check_path, read_path
-from assembly.path.placing import check_path_robot, check_rows
-from assembly.path.trajectory import Trajectory, profiled, timed
+from forcefit.assembly.path.path_file import PathTable, check_path, read_path
+from forcefit.assembly.path.placing import check_path_robot, check_rows
+from forcefit.assembly.path.trajectory import Trajectory, profiled, timed
 from forcefit.inputs.errors import checked
 from forcefit.inputs.table import BadInput, nearest
 
@@ -29,7 +29,7 @@ class PathTimes:
     """How a path runs in time.
 
     Attributes:
-        profile: from rest to rest, a name of :data:`assembly.path.profiles.PROFILES`;
+        profile: from rest to rest, a name of :data:`forcefit.assembly.path.profiles.PROFILES`;
             None where times are given.
         duration: [s] of the profile.
         speed: [m/s, or rad/s or m/s of drives] its largest speed.
@@ -63,7 +63,7 @@ def errors_along_path(
     Args:
         robot: a robot with masses, a robot file, or a built-in name.
         path: rows of poses or joint coordinates, or the CSV file of them, with a column
-            ``time`` or without; see :func:`assembly.path.path_file.read_path`.
+            ``time`` or without; see :func:`forcefit.assembly.path.path_file.read_path`.
         times: how the path runs in time; as its times if absent.
         load: (6,) [N m, N] constant load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes; none if absent.

@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.closure import virtual_joints
-from assembly.model.link_stress import stressed_links
-from assembly.model.statuses import OK
-from assembly.path.path_errors import PathErrors
+from forcefit.assembly.linear.closure import virtual_joints
+from forcefit.assembly.model.link_stress import stressed_links
+from forcefit.assembly.model.statuses import OK
+from forcefit.assembly.path.path_errors import PathErrors
 from forcefit.results.display import largest_row, listing
 from forcefit.results.text import in_unit, lines_of, table_lines
 from forcefit.results.units import FACTORS

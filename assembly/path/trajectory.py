@@ -4,7 +4,7 @@ Given times are interpolated by a quintic spline through the rows, continuous up
 fourth derivative.  With ends at rest, speed and acceleration are zero there; two rows
 are then the quintic profile.  A path without times is a natural cubic spline through
 its rows over the length of its chords, a straight line for two rows.  A profile of
-:mod:`assembly.path.profiles` runs along it.  Both interpolate positions, rotation
+:mod:`forcefit.assembly.path.profiles` runs along it.  Both interpolate positions, rotation
 vectors or joint coordinates, component by component.
 """
 
@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.path.path_file import PathTable
-from assembly.path.profiles import JUMPING, PROFILES
+from forcefit.assembly.path.path_file import PathTable
+from forcefit.assembly.path.profiles import JUMPING, PROFILES
 from forcefit.inputs.table import BadInput, nearest
 
 MOST_POINTS = 20_000  # ten seconds and 600 MB for a hexapod
@@ -96,7 +96,7 @@ def profiled(
     Args:
         table: path; times are not used.
         points: number of instants, equally spaced.
-        profile: of :data:`assembly.path.profiles.PROFILES`.
+        profile: of :data:`forcefit.assembly.path.profiles.PROFILES`.
         size: [m] that counts as 1 rad in the length of a chord.
         duration: [s] of the motion.
         speed: [m/s, or rad/s of drives] instead, the largest of the platform's origin

@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
-from assembly.exact.contact_qp import boundary_normals
-from assembly.linear.assembled import Assembly
-from assembly.linear.closure import Linearisation, VirtualJoints
-from assembly.linear.load import FrameLoads
-from assembly.solvers.cones import cone_sizes
+from forcefit.assembly.exact.contact_qp import boundary_normals
+from forcefit.assembly.linear.assembled import Assembly
+from forcefit.assembly.linear.closure import Linearisation, VirtualJoints
+from forcefit.assembly.linear.load import FrameLoads
+from forcefit.assembly.solvers.cones import cone_sizes
 
 AT_BOUND = 1e-6  # [-] distance within which a clearance counts as at its bound
 _NEAR_BOUND = 1e-3  # [-] distance within which it may be pressed, see ``contacts``

@@ -28,26 +28,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.exact.dead_load import dead_loads, work_gradient
-from assembly.exact.descent import Expansion, NotConverged, energy_of, expand
-from assembly.exact.equilibrium import curvature_modes
-from assembly.exact.exact import ExactAssembly, solve_exact
-from assembly.exact.placement import place
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import solve_assembly
-from assembly.platform_stiffness.deflection import (
+from forcefit.assembly.exact.dead_load import dead_loads, work_gradient
+from forcefit.assembly.exact.descent import Expansion, NotConverged, energy_of, expand
+from forcefit.assembly.exact.equilibrium import curvature_modes
+from forcefit.assembly.exact.exact import ExactAssembly, solve_exact
+from forcefit.assembly.exact.placement import place
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.platform_stiffness.deflection import (
     DeflectionCurve,
     Event,
     Progress,
     mode_text,
 )
-from assembly.platform_stiffness.exact_tangent import (
+from forcefit.assembly.platform_stiffness.exact_tangent import (
     FLAT,
     part_owners,
     platform_moves,
 )
-from assembly.platform_stiffness.matrices import Part
-from assembly.solvers.method import Method, check_method
+from forcefit.assembly.platform_stiffness.matrices import Part
+from forcefit.assembly.solvers.method import Method, check_method
 
 _STEPS = 400  # largest number of steps of a path
 _CORRECTIONS = 8  # largest number of corrections of a step

@@ -19,25 +19,25 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.exact.equilibrium import active_clearances
-from assembly.exact.exact import ExactAssembly, solve_exact
-from assembly.kinematics.posture import Posture
-from assembly.linear.closure import VirtualJoints
-from assembly.linear.energy import Assembly, solve_assembly
-from assembly.linear.load import driven
-from assembly.linear.nearest_pose import nearest_pose
-from assembly.model.clearance import bound_name
-from assembly.model.given_load import Load, one_load
-from assembly.platform_stiffness.active_set import contacts
-from assembly.platform_stiffness.exact_tangent import exact_tangent
-from assembly.platform_stiffness.linear_tangent import in_contact
-from assembly.platform_stiffness.matrices import (
+from forcefit.assembly.exact.equilibrium import active_clearances
+from forcefit.assembly.exact.exact import ExactAssembly, solve_exact
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.closure import VirtualJoints
+from forcefit.assembly.linear.energy import Assembly, solve_assembly
+from forcefit.assembly.linear.load import driven
+from forcefit.assembly.linear.nearest_pose import nearest_pose
+from forcefit.assembly.model.clearance import bound_name
+from forcefit.assembly.model.given_load import Load, one_load
+from forcefit.assembly.platform_stiffness.active_set import contacts
+from forcefit.assembly.platform_stiffness.exact_tangent import exact_tangent
+from forcefit.assembly.platform_stiffness.linear_tangent import in_contact
+from forcefit.assembly.platform_stiffness.matrices import (
     Part,
     PlatformStiffness,
     numbers_of,
 )
-from assembly.solvers.conic import SolverFailed
-from assembly.solvers.method import Method, check_method
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.solvers.method import Method, check_method
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.renamed import renamed_keywords
 from forcefit.results.display import html_table, largest_row, numbers, short_repr
@@ -146,8 +146,8 @@ def deflection_curve(
         state: ``"contact"``, by problem (22); ``"exact"``, with finite motions.
         progress: function called at each load with the steps taken there and their
             largest number.
-        method: method of :func:`assembly.linear.energy.solve_assembly` or
-            :func:`assembly.exact.exact.solve_exact`.
+        method: method of :func:`forcefit.assembly.linear.energy.solve_assembly` or
+            :func:`forcefit.assembly.exact.exact.solve_exact`.
 
     Returns:
         The curve with its kinks and critical loads.

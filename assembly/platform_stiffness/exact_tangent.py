@@ -22,12 +22,12 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exact.descent import Expansion
-from assembly.exact.equilibrium import curvature_modes, tangent_space
-from assembly.exact.exact import ExactAssembly
-from assembly.kinematics.se3 import turn_jacobian
-from assembly.platform_stiffness.linear_tangent import Side, owners
-from assembly.platform_stiffness.matrices import (
+from forcefit.assembly.exact.descent import Expansion
+from forcefit.assembly.exact.equilibrium import curvature_modes, tangent_space
+from forcefit.assembly.exact.exact import ExactAssembly
+from forcefit.assembly.kinematics.se3 import turn_jacobian
+from forcefit.assembly.platform_stiffness.linear_tangent import Side, owners
+from forcefit.assembly.platform_stiffness.matrices import (
     Part,
     PlatformStiffness,
     unit_screws,

@@ -23,18 +23,26 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.closure import (
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.closure import (
     Linearisation,
     VirtualJoints,
     in_reference_lengths,
     linearise,
     virtual_joints,
 )
-from assembly.linear.energy import Assembly
-from assembly.platform_stiffness.active_set import bound_forces, contacts, settle
-from assembly.platform_stiffness.matrices import Part, PlatformStiffness, unit_screws
-from assembly.solvers.method import Method
+from forcefit.assembly.linear.energy import Assembly
+from forcefit.assembly.platform_stiffness.active_set import (
+    bound_forces,
+    contacts,
+    settle,
+)
+from forcefit.assembly.platform_stiffness.matrices import (
+    Part,
+    PlatformStiffness,
+    unit_screws,
+)
+from forcefit.assembly.solvers.method import Method
 
 Side = Literal["holding", "letting go"]
 _RANK = 1e-10  # relative size below which a singular value counts as zero

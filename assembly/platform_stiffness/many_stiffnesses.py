@@ -7,15 +7,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.nominal import size_of
-from assembly.kinematics.posture import Posture
-from assembly.linear.lanes import COMPILED, compliances_side_by_side
-from assembly.linear.robot_structure import structure_of
-from assembly.platform_stiffness.linear_tangent import owners, without_clearance
-from assembly.platform_stiffness.matrices import Part, PlatformStiffness
-from assembly.solvers.method import Method, log_reference
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.lanes import COMPILED, compliances_side_by_side
+from forcefit.assembly.linear.robot_structure import structure_of
+from forcefit.assembly.platform_stiffness.linear_tangent import (
+    owners,
+    without_clearance,
+)
+from forcefit.assembly.platform_stiffness.matrices import Part, PlatformStiffness
+from forcefit.assembly.solvers.method import Method, log_reference
 from forcefit.results.display import html_table, short_repr
-from stiffness.screws import screw_map
+from forcefit.stiffness.screws import screw_map
 
 _RANK = 1e-10  # relative size below which a compliance's root counts as rigid
 

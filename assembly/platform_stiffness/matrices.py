@@ -33,12 +33,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import null_space
 
-from assembly.kinematics.posture import Posture
-from assembly.solvers.method import Method
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.solvers.method import Method
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.number_arrays import find_fault
 from forcefit.results.display import Figures, html_table, numbers, short_repr, show
-from stiffness.screws import screw_map
+from forcefit.stiffness.screws import screw_map
 
 _RANK = 1e-10  # relative size below which a motion counts as zero
 _UNTOUCHED = 1e-9  # component of a unit screw below which it counts as zero

@@ -5,23 +5,23 @@ from typing import Literal, cast, get_args, overload
 
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import Posture, together
-from assembly.linear.energy import solve_assembly
-from assembly.model.given_load import Load, one_load
-from assembly.platform_stiffness.exact_tangent import exact_tangent
-from assembly.platform_stiffness.linear_tangent import (
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import Posture, together
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.given_load import Load, one_load
+from forcefit.assembly.platform_stiffness.exact_tangent import exact_tangent
+from forcefit.assembly.platform_stiffness.linear_tangent import (
     Side,
     in_contact,
     without_clearance,
 )
-from assembly.platform_stiffness.many_stiffnesses import (
+from forcefit.assembly.platform_stiffness.many_stiffnesses import (
     Stiffnesses,
     many_of_each,
     many_without_clearance,
 )
-from assembly.platform_stiffness.matrices import PlatformStiffness, numbers_of
-from assembly.solvers.method import Method, check_method
+from forcefit.assembly.platform_stiffness.matrices import PlatformStiffness, numbers_of
+from forcefit.assembly.solvers.method import Method, check_method
 from forcefit.inputs.renamed import current_value
 
 State = Literal["nominal", "contact", "exact"]
@@ -73,15 +73,15 @@ def platform_stiffness(
             force: ``"holding"`` or ``"letting go"``.
         method: ``"compiled"``, with the reference where that does not suffice; or
             ``"reference"``, numpy and Clarabel alone.  In the state ``"contact"`` it is
-            the method of :func:`assembly.linear.energy.solve_assembly`, in ``"exact"``
-            that of :func:`assembly.exact.exact.solve_exact`.  The classical model of
+            the method of :func:`forcefit.assembly.linear.energy.solve_assembly`, in ``"exact"``
+            that of :func:`forcefit.assembly.exact.exact.solve_exact`.  The classical model of
             one posture always uses numpy, and its ``method`` says so; many postures are
             compiled, in parallel.
 
     Returns:
         Stiffness, compliance, free motions and shares at that point, base axes; for
         many postures, or a :class:`Posture` of many, one
-        :class:`~assembly.platform_stiffness.many_stiffnesses.Stiffnesses`.
+        :class:`~forcefit.assembly.platform_stiffness.many_stiffnesses.Stiffnesses`.
 
     Raises:
         CannotAssemble: the errors cannot be closed.

@@ -29,19 +29,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.exact.contact_qp import boundary_normals
-from assembly.exact.dead_load import dead_loads
-from assembly.exact.descent import Expansion, expand
-from assembly.exact.equilibrium import active_clearances
-from assembly.exact.exact import ExactAssembly, solve_exact
-from assembly.exact.finite_robot import FiniteRobot
-from assembly.exact.placement import place
-from assembly.kinematics.pieces import cut_beams
-from assembly.kinematics.posture import Posture
-from assembly.linear.assembled import Assembly, all_loads
-from assembly.linear.closure import VirtualJoints, linearise, virtual_joints
-from assembly.linear.energy import solve_assembly
-from assembly.platform_stiffness.active_set import (
+from forcefit.assembly.exact.contact_qp import boundary_normals
+from forcefit.assembly.exact.dead_load import dead_loads
+from forcefit.assembly.exact.descent import Expansion, expand
+from forcefit.assembly.exact.equilibrium import active_clearances
+from forcefit.assembly.exact.exact import ExactAssembly, solve_exact
+from forcefit.assembly.exact.finite_robot import FiniteRobot
+from forcefit.assembly.exact.placement import place
+from forcefit.assembly.kinematics.pieces import cut_beams
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.assembled import Assembly, all_loads
+from forcefit.assembly.linear.closure import VirtualJoints, linearise, virtual_joints
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.platform_stiffness.active_set import (
     bound_forces,
     bounded_unknowns,
     closure_rows,
@@ -53,14 +53,14 @@ from assembly.platform_stiffness.active_set import (
     unknowns,
     work_of_loads,
 )
-from assembly.platform_stiffness.exact_tangent import exact_tangent
-from assembly.platform_stiffness.linear_tangent import (
+from forcefit.assembly.platform_stiffness.exact_tangent import exact_tangent
+from forcefit.assembly.platform_stiffness.linear_tangent import (
     Side,
     active_tangent,
     without_clearance,
 )
-from assembly.platform_stiffness.matrices import PlatformStiffness, numbers_of
-from assembly.platform_stiffness.platform_stiffness import State
+from forcefit.assembly.platform_stiffness.matrices import PlatformStiffness, numbers_of
+from forcefit.assembly.platform_stiffness.platform_stiffness import State
 
 
 @dataclass(frozen=True)

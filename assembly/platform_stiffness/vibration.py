@@ -1,7 +1,7 @@
 r"""Natural frequencies and modes at a posture, drives held.
 
 The stiffness is the tangent of the equilibrium, Z'HZ of
-:mod:`assembly.platform_stiffness.exact_tangent`.  The mass is that of all moving
+:mod:`forcefit.assembly.platform_stiffness.exact_tangent`.  The mass is that of all moving
 bodies: masses and moments of inertia of frames as of rigid bodies, and beams with a
 density by their consistent mass, with a cubic motion between their clamped ends and the
 rotary inertia of their sections.
@@ -24,22 +24,25 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.exact.equilibrium import tangent_space
-from assembly.exact.exact import ExactAssembly, solve_exact
-from assembly.exact.finite_robot import LINK
-from assembly.kinematics.posture import Posture
-from assembly.model.given_load import Load
-from assembly.model.mesh_link import mesh_link_mass
-from assembly.model.robot import BeamLink, Frame, MeshLink, Robot, beam_axis
-from assembly.platform_stiffness.exact_tangent import part_owners, platform_moves
-from assembly.platform_stiffness.matrices import Part
-from assembly.solvers.method import Method
+from forcefit.assembly.exact.equilibrium import tangent_space
+from forcefit.assembly.exact.exact import ExactAssembly, solve_exact
+from forcefit.assembly.exact.finite_robot import LINK
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.model.given_load import Load
+from forcefit.assembly.model.mesh_link import mesh_link_mass
+from forcefit.assembly.model.robot import BeamLink, Frame, MeshLink, Robot, beam_axis
+from forcefit.assembly.platform_stiffness.exact_tangent import (
+    part_owners,
+    platform_moves,
+)
+from forcefit.assembly.platform_stiffness.matrices import Part
+from forcefit.assembly.solvers.method import Method
 from forcefit.inputs.renamed import renamed_keywords
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
-from stiffness.beam.beam import section_axes
-from stiffness.beam.sections import declared_section
-from stiffness.screws import screw_map
+from forcefit.stiffness.beam.beam import section_axes
+from forcefit.stiffness.beam.sections import declared_section
+from forcefit.stiffness.screws import screw_map
 
 _NULL = 1e-12  # relative to the largest eigenvalue: below it neither mass nor stiffness
 _ROUNDING = 1e-14  # of the largest entry of the mass matrix: rounding of its entries
@@ -89,7 +92,7 @@ def natural_modes(
         gravity: (3,) [m/s^2], only in the state ``"exact"``.
         state: ``"nominal"``, of the nominal robot with clearances held at zero;
             ``"exact"``, around the equilibrium with errors, clearances and loads.
-        method: method of :func:`assembly.exact.exact.solve_exact`.
+        method: method of :func:`forcefit.assembly.exact.exact.solve_exact`.
 
     Returns:
         The modes.

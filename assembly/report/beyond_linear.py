@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from assembly.exact.exact import ExactAssembly
+from forcefit.assembly.exact.exact import ExactAssembly
 
 # relative difference from the linear model, of the platform's motion and of the energy
 # or potential; it is smaller even for links that rotate by 0.1 rad

@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import CannotAssemble, failure_status
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.platform_stiffness.arc_length import follow_load
-from assembly.platform_stiffness.deflection import (
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import CannotAssemble, failure_status
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.platform_stiffness.arc_length import follow_load
+from forcefit.assembly.platform_stiffness.deflection import (
     DeflectionCurve,
     Progress,
     deflection_curve,
 )
-from assembly.solvers.conic import SolverFailed
+from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.inputs.errors import plot_label
 from forcefit.results.display import listing, rounded
 from forcefit.results.text import lines_of, table_lines
-from stiffness.screws import SCREW, WRENCH
+from forcefit.stiffness.screws import SCREW, WRENCH
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from assembly.linear.energy import Assembly
-from assembly.linear.reference.pose_error import ReachableSet, reachable_screws
+from forcefit.assembly.linear.energy import Assembly
+from forcefit.assembly.linear.reference.pose_error import ReachableSet, reachable_screws
 from forcefit.inputs.errors import BadInput, nearest, quoted
 from forcefit.results.display import html_table, short_repr
 
@@ -83,7 +83,7 @@ def error_body(reachable: ReachableSet, part: str, count: int = 200) -> ErrorBod
 
     Args:
         reachable: result of
-            :func:`assembly.linear.reference.pose_error.reachable_screws`.
+            :func:`forcefit.assembly.linear.reference.pose_error.reachable_screws`.
         part: ``"rotation"`` or ``"translation"``.
         count: number of directions, evenly distributed.
 

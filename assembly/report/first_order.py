@@ -5,14 +5,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from assembly.exact.exact import ExactAssembly, solve_exact
-from assembly.kinematics.posture import Posture
-from assembly.kinematics.singular_posture import is_singular
-from assembly.kinematics.verdict import SINGULAR_WORDS, limits_passed
-from assembly.linear.energy import Assembly, CannotAssemble, failure_status
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.statuses import BEYOND_LIMITS, SINGULAR
-from assembly.solvers.conic import SolverFailed
+from forcefit.assembly.exact.exact import ExactAssembly, solve_exact
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.kinematics.singular_posture import is_singular
+from forcefit.assembly.kinematics.verdict import SINGULAR_WORDS, limits_passed
+from forcefit.assembly.linear.energy import Assembly, CannotAssemble, failure_status
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.statuses import BEYOND_LIMITS, SINGULAR
+from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.results.display import rounded, screw_text
 
 # relative change of the energy by finite motions from which on first order is invalid

@@ -3,15 +3,15 @@
 from itertools import takewhile
 from typing import Any
 
-from assembly.steps.influence import (
+from forcefit.assembly.steps.influence import (
     Influence,
     depends_on_state,
     influences,
     why_order_matters,
 )
-from assembly.steps.machine import Machine
-from assembly.steps.plan import Join, Plan
-from assembly.steps.state import State
+from forcefit.assembly.steps.machine import Machine
+from forcefit.assembly.steps.plan import Join, Plan
+from forcefit.assembly.steps.state import State
 
 
 def influences_among_joins(

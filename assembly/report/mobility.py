@@ -6,10 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from assembly.kinematics.mobility import mobility, mobility_near, platform_screws
-from assembly.kinematics.nominal import size_of
-from assembly.kinematics.posture import Posture
-from assembly.kinematics.pure_motions import PureMotion, pure_motions
+from forcefit.assembly.kinematics.mobility import (
+    mobility,
+    mobility_near,
+    platform_screws,
+)
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.kinematics.pure_motions import PureMotion, pure_motions
 from forcefit.results.display import listing
 from forcefit.results.text import lines_of
 
@@ -61,7 +65,7 @@ def mobility_of(posture: Posture) -> dict[str, Any]:
         posture: of the robot.
 
     Returns:
-        The counts of :class:`assembly.kinematics.mobility.Mobility`, the platform's
+        The counts of :class:`forcefit.assembly.kinematics.mobility.Mobility`, the platform's
         motions, and whether there are more freedoms than at postures nearby; then the
         counts there, where motions lead away from the posture.
     """
@@ -113,7 +117,7 @@ def motion_words(motions: Sequence[PureMotion]) -> str:
     """Return motions of a body in words.
 
     Args:
-        motions: of :func:`assembly.kinematics.pure_motions.pure_motions`.
+        motions: of :func:`forcefit.assembly.kinematics.pure_motions.pure_motions`.
 
     Returns:
         Such as "translates along z and turns about x, y through (0, 0, 0.4) m".

@@ -5,25 +5,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import CannotAssemble, failure_status, solve_assembly
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.statuses import FREE_MOTION, UNSTABLE
-from assembly.platform_stiffness.active_set import contacts
-from assembly.platform_stiffness.exact_tangent import exact_tangent
-from assembly.platform_stiffness.linear_tangent import (
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import (
+    CannotAssemble,
+    failure_status,
+    solve_assembly,
+)
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.statuses import FREE_MOTION, UNSTABLE
+from forcefit.assembly.platform_stiffness.active_set import contacts
+from forcefit.assembly.platform_stiffness.exact_tangent import exact_tangent
+from forcefit.assembly.platform_stiffness.linear_tangent import (
     Side,
     in_contact,
     without_clearance,
 )
-from assembly.platform_stiffness.matrices import PlatformStiffness
-from assembly.platform_stiffness.platform_stiffness import State
-from assembly.report.beyond_linear import far_from_linear
-from assembly.solvers.conic import SolverFailed
+from forcefit.assembly.platform_stiffness.matrices import PlatformStiffness
+from forcefit.assembly.platform_stiffness.platform_stiffness import State
+from forcefit.assembly.report.beyond_linear import far_from_linear
+from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.results.display import listing, numbers, rounded
 from forcefit.results.text import lines_of, table_lines, value_text
-from stiffness.screws import SCREW, WRENCH
+from forcefit.stiffness.screws import SCREW, WRENCH
 
 DIRECTIONS = tuple(name.lower() for name in SCREW)
 # words for the two sides of a change of contact

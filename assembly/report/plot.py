@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import Assembly
-from assembly.report.error_body import ErrorBody, possible_errors
-from stiffness.screws import rotation_matrix, screw_map
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import Assembly
+from forcefit.assembly.report.error_body import ErrorBody, possible_errors
+from forcefit.stiffness.screws import rotation_matrix, screw_map
 
 _SHORT = 1e-9  # [m] length below which a body is not drawn
 

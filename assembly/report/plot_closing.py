@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.energy import Assembly
-from assembly.report.plot import (
+from forcefit.assembly.linear.energy import Assembly
+from forcefit.assembly.report.plot import (
     DisplacedBodies,
     add_bodies,
     displaced_bodies,

@@ -6,20 +6,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import (
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import (
     Assembly,
     CannotAssemble,
     failure_status,
     solve_assembly,
 )
-from assembly.linear.load import driven
-from assembly.linear.pose_error import PoseError, bound_pose_error
-from assembly.linear.reference.pose_error import ASSUMPTIONS, reachable_screws
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.report.first_order import singular_status
-from assembly.report.results import proof_status
-from assembly.solvers.conic import SolverFailed
+from forcefit.assembly.linear.load import driven
+from forcefit.assembly.linear.pose_error import PoseError, bound_pose_error
+from forcefit.assembly.linear.reference.pose_error import ASSUMPTIONS, reachable_screws
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.report.first_order import singular_status
+from forcefit.assembly.report.results import proof_status
+from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import listing
 from forcefit.results.text import lines_of, value_text
@@ -44,7 +44,7 @@ def pose_error_of(
         direction: (6,) direction along which the largest error is bounded too.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
-        options: options of :func:`assembly.linear.pose_error.bound_pose_error`.
+        options: options of :func:`forcefit.assembly.linear.pose_error.bound_pose_error`.
 
     Returns:
         The keys of the public format; ``status`` as in :func:`solution_of`.

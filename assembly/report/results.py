@@ -6,32 +6,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from assembly.exact.exact import ExactAssembly, solve_exact
-from assembly.kinematics.posture import Posture
-from assembly.kinematics.verdict import posture_remarks
-from assembly.linear.certificate import (
+from forcefit.assembly.exact.exact import ExactAssembly, solve_exact
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.kinematics.verdict import posture_remarks
+from forcefit.assembly.linear.certificate import (
     ScrewBound,
     bound_screw,
     unproved,
     unproved_screw,
 )
-from assembly.linear.energy import (
+from forcefit.assembly.linear.energy import (
     Assembly,
     CannotAssemble,
     failure_status,
     solve_assembly,
 )
-from assembly.linear.load import massless
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.linear.zone import zone_margin
-from assembly.model.statuses import NOT_PROVED, UNSTABLE
-from assembly.platform_stiffness.exact_tangent import exact_tangent
-from assembly.report.beyond_linear import far_from_linear
-from assembly.report.first_order import first_order_status, linearisation_of
-from assembly.report.mobility import mobility_lines, mobility_of
-from assembly.report.wrench_table import wrench_lines
-from assembly.solvers.conic import SolverFailed
+from forcefit.assembly.linear.load import massless
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.statuses import NOT_PROVED, UNSTABLE
+from forcefit.assembly.platform_stiffness.exact_tangent import exact_tangent
+from forcefit.assembly.report.beyond_linear import far_from_linear
+from forcefit.assembly.report.first_order import first_order_status, linearisation_of
+from forcefit.assembly.report.mobility import mobility_lines, mobility_of
+from forcefit.assembly.report.wrench_table import wrench_lines
+from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.results.display import listing
 from forcefit.results.text import lines_of, value_text
 
@@ -202,7 +202,7 @@ def exact_of(
         posture: posture of the robot.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
-        progress: argument of :func:`assembly.exact.exact.solve_exact`.
+        progress: argument of :func:`forcefit.assembly.exact.exact.solve_exact`.
 
     Returns:
         The keys of ``assembly solve`` for finite motions; ``status`` has the same

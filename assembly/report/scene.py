@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import Assembly
-from assembly.model.robot import Robot
-from assembly.report.error_body import ErrorBody
-from assembly.report.plot import (
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import Assembly
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.report.error_body import ErrorBody
+from forcefit.assembly.report.plot import (
     DisplacedBodies,
     body_starts,
     displaced_bodies,
@@ -18,7 +18,7 @@ from assembly.report.plot import (
 )
 from forcefit.page.charts import scene
 from forcefit.results.units import shown_in
-from stiffness.screws import skew
+from forcefit.stiffness.screws import skew
 
 # number of points along a body, which is sufficient for the cubic of a bent beam
 _SAMPLES = 9

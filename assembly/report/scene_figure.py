@@ -20,7 +20,7 @@ def scene_figure(spec: Mapping[str, Any], title: str) -> "Figure":
     """Return a robot in three dimensions, nominal or nominal and forced.
 
     Args:
-        spec: numbers of :mod:`assembly.report.scene`, SI.
+        spec: numbers of :mod:`forcefit.assembly.report.scene`, SI.
         title: above the axes.
 
     Returns:

@@ -5,7 +5,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assembly.report.platform_stiffness import DIRECTIONS, largest_rows, share_rows
+from forcefit.assembly.report.platform_stiffness import (
+    DIRECTIONS,
+    largest_rows,
+    share_rows,
+)
 from forcefit.inputs.errors import plot_label
 from forcefit.page.charts import Axis, chart, label
 
@@ -17,7 +21,7 @@ def plot_shares(results: Mapping[str, Any], figure: "Figure | None" = None) -> "
     """Return a bar chart of the parts' shares in the compliance along each direction.
 
     Args:
-        results: of :func:`assembly.report.platform_stiffness.stiffness_of`.
+        results: of :func:`forcefit.assembly.report.platform_stiffness.stiffness_of`.
         figure: an empty one in which it is drawn; else a new one.
 
     Returns:
@@ -43,7 +47,7 @@ def share_chart(shares: Mapping[str, Any], caption: str) -> str:
     """Return a chart of the largest shares for a page, a bar for each direction.
 
     Args:
-        shares: of :func:`assembly.report.platform_stiffness.stiffness_values`.
+        shares: of :func:`forcefit.assembly.report.platform_stiffness.stiffness_values`.
         caption: below it.
 
     Returns:

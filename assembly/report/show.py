@@ -2,15 +2,15 @@
 
 from typing import TYPE_CHECKING, Any
 
-from assembly.kinematics.posture import Posture, home_posture
-from assembly.linear.energy import Assembly
-from assembly.model.robot import Robot
-from assembly.platform_stiffness.matrices import PlatformStiffness
-from assembly.report.error_body import possible_errors
-from assembly.report.platform_stiffness import stiffness_values
-from assembly.report.scene import forced_scene, nominal_scene
-from assembly.report.scene_figure import scene_figure
-from assembly.report.share_pictures import plot_shares, share_chart
+from forcefit.assembly.kinematics.posture import Posture, home_posture
+from forcefit.assembly.linear.energy import Assembly
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.platform_stiffness.matrices import PlatformStiffness
+from forcefit.assembly.report.error_body import possible_errors
+from forcefit.assembly.report.platform_stiffness import stiffness_values
+from forcefit.assembly.report.scene import forced_scene, nominal_scene
+from forcefit.assembly.report.scene_figure import scene_figure
+from forcefit.assembly.report.share_pictures import plot_shares, share_chart
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.packages import naming_packages
 from forcefit.page.charts import scene

@@ -6,24 +6,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import failure_status
-from assembly.linear.reference.energy import CannotAssemble
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.statuses import OK
-from assembly.report.influences import (
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import failure_status
+from forcefit.assembly.linear.reference.energy import CannotAssemble
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.statuses import OK
+from forcefit.assembly.report.influences import (
     about_influences,
     about_order,
     influence_values,
     influences_among_joins,
 )
-from assembly.solvers.conic import SolverFailed
-from assembly.steps.influence import Influence
-from assembly.steps.machine import Machine, machine_at
-from assembly.steps.plan import Adjust, Fix, Join, Plan, Preload, Release, Step
-from assembly.steps.run import StepResult, carry_out
-from assembly.steps.search import BestOrder
-from assembly.steps.state import State, first_state
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.steps.influence import Influence
+from forcefit.assembly.steps.machine import Machine, machine_at
+from forcefit.assembly.steps.plan import Adjust, Fix, Join, Plan, Preload, Release, Step
+from forcefit.assembly.steps.run import StepResult, carry_out
+from forcefit.assembly.steps.search import BestOrder
+from forcefit.assembly.steps.state import State, first_state
 from forcefit.inputs.errors import quoted
 from forcefit.results.display import listing, numbers
 from forcefit.results.text import lines_of

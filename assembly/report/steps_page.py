@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from assembly.linear.assembled import Assembly
-from assembly.linear.closure import linearise
-from assembly.linear.load import no_loads
-from assembly.report.plot import displaced_bodies
-from assembly.report.scene import robot_scene
-from assembly.steps.machine import Machine
-from assembly.steps.state import State
+from forcefit.assembly.linear.assembled import Assembly
+from forcefit.assembly.linear.closure import linearise
+from forcefit.assembly.linear.load import no_loads
+from forcefit.assembly.report.plot import displaced_bodies
+from forcefit.assembly.report.scene import robot_scene
+from forcefit.assembly.steps.machine import Machine
+from forcefit.assembly.steps.state import State
 from forcefit.page.charts import BLUE, RED, Axis, chart, grid
 from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
@@ -33,7 +33,7 @@ def steps_page(
     """Return the page of a plan that was carried out.
 
     Args:
-        results: of :func:`assembly.report.steps.steps_of`.
+        results: of :func:`forcefit.assembly.report.steps.steps_of`.
         machine: robot at the pose at which it is assembled.
         states: after each step.
         provenance: command and files.

@@ -5,13 +5,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import CannotAssemble, failure_status
-from assembly.linear.load import driven
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.statuses import FREE_MOTION, UNSTABLE
-from assembly.platform_stiffness.vibration import natural_modes
-from assembly.solvers.conic import SolverFailed
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import CannotAssemble, failure_status
+from forcefit.assembly.linear.load import driven
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.statuses import FREE_MOTION, UNSTABLE
+from forcefit.assembly.platform_stiffness.vibration import natural_modes
+from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.results.display import listing, numbers
 from forcefit.results.text import lines_of
 

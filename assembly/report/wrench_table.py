@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from assembly.linear.assembled import without_rounding
+from forcefit.assembly.linear.assembled import without_rounding
 from forcefit.results.text import table_lines
-from stiffness.screws import WRENCH
+from forcefit.stiffness.screws import WRENCH
 
 _HEAD = tuple(f"{name} [{'N m' if name[0] == 'M' else 'N'}]" for name in WRENCH)
 
@@ -16,7 +16,7 @@ def wrench_lines(frames: Mapping[str, Any], closures: Sequence[Any]) -> list[str
     """Return the wrenches through all frames and closures as text.
 
     Args:
-        frames: wrenches by frame, from :func:`assembly.report.results.solution_of`.
+        frames: wrenches by frame, from :func:`forcefit.assembly.report.results.solution_of`.
         closures: wrenches of the closures from the same function.
 
     Returns:

@@ -7,16 +7,16 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from assembly.files.robot_file import Closing, read_robot
-from assembly.model.robot import Robot
-from assembly.robots.arm6 import arm6
-from assembly.robots.delta import delta
-from assembly.robots.five_bar import five_bar
-from assembly.robots.four_bar import four_bar
-from assembly.robots.hexapod import hexapod
-from assembly.robots.irsbot2 import irsbot2
-from assembly.robots.orthoglide import orthoglide
-from assembly.robots.three_rrr import three_rrr
+from forcefit.assembly.files.robot_file import Closing, read_robot
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.robots.arm6 import arm6
+from forcefit.assembly.robots.delta import delta
+from forcefit.assembly.robots.five_bar import five_bar
+from forcefit.assembly.robots.four_bar import four_bar
+from forcefit.assembly.robots.hexapod import hexapod
+from forcefit.assembly.robots.irsbot2 import irsbot2
+from forcefit.assembly.robots.orthoglide import orthoglide
+from forcefit.assembly.robots.three_rrr import three_rrr
 from forcefit.inputs.table import BadInput, nearest
 
 BUILT_IN: dict[str, Callable[[], Robot]] = {
@@ -37,11 +37,11 @@ def load_robot(name: str | Path, close: Closing | None = None) -> Robot:
     Args:
         name: name such as ``"irsbot2"``, or the path of a robot file.
         close: function that makes the closures of the declared robot hold, from
-            :mod:`assembly.kinematics.closing`; by default they are not changed.
+            :mod:`forcefit.assembly.kinematics.closing`; by default they are not changed.
 
     Returns:
         The robot.  Meshes and libraries of its links are read only by
-        :func:`assembly.exchange.robot_files.load_robot`.
+        :func:`forcefit.assembly.exchange.robot_files.load_robot`.
 
     Raises:
         BadInput: the name is neither a built-in name nor a file, or the file violates a

@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import BeamLink, Clearance, Frame, Robot
-from assembly.robots.placing import drive_stiffness
-from stiffness.screws import rotation_matrix, rotation_vector, transform
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot
+from forcefit.assembly.robots.placing import drive_stiffness
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform
 
 # d, a [m], alpha [rad], mass [kg], stiffness of the drive [N m/rad]
 JOINTS = (

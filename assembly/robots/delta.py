@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.placed_frames import PlacedFrame, place_frames
-from assembly.model.robot import BeamLink, Clearance, Frame, Robot
-from assembly.robots.placing import at, ball_joint, drive_stiffness
+from forcefit.assembly.model.placed_frames import PlacedFrame, place_frames
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot
+from forcefit.assembly.robots.placing import at, ball_joint, drive_stiffness
 from forcefit.inputs.table import BadInput
 
 AZIMUTHS = (-math.pi / 2, math.pi / 6, 5 * math.pi / 6)  # [rad] directions of the legs

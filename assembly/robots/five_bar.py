@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assembly.model.placed_frames import PlacedFrame, place_frames
-from assembly.model.robot import BeamLink, Clearance, Frame, Robot
-from assembly.robots.placing import pin
-from assembly.robots.planar import PlanarLeg, arm_angle, in_plane, two_arms
+from forcefit.assembly.model.placed_frames import PlacedFrame, place_frames
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot
+from forcefit.assembly.robots.placing import pin
+from forcefit.assembly.robots.planar import PlanarLeg, arm_angle, in_plane, two_arms
 
 
 @dataclass(frozen=True)

@@ -21,10 +21,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.placed_frames import PlacedFrame, place_frames
-from assembly.model.robot import BASE, BeamLink, Clearance, Frame, Robot
-from assembly.robots.placing import drive_stiffness, pin
-from assembly.robots.planar import direction, in_plane
+from forcefit.assembly.model.placed_frames import PlacedFrame, place_frames
+from forcefit.assembly.model.robot import BASE, BeamLink, Clearance, Frame, Robot
+from forcefit.assembly.robots.placing import drive_stiffness, pin
+from forcefit.assembly.robots.planar import direction, in_plane
 
 
 @dataclass(frozen=True)

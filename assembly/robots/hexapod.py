@@ -16,9 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.placed_frames import PlacedFrame, place_frames
-from assembly.model.robot import BeamLink, Clearance, Frame, Robot
-from assembly.robots.placing import at, ball_joint, cardan_joint, drive_stiffness
+from forcefit.assembly.model.placed_frames import PlacedFrame, place_frames
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot
+from forcefit.assembly.robots.placing import (
+    at,
+    ball_joint,
+    cardan_joint,
+    drive_stiffness,
+)
 
 BASE_POINTS = (
     (-0.0970, 0.0910), (0.0970, 0.0910), (0.1276, 0.0390),

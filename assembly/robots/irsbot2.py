@@ -31,9 +31,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import BeamLink, Clearance, Frame, Robot
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from forcefit.inputs.table import BadInput
-from stiffness.screws import rotation_vector, transform
+from forcefit.stiffness.screws import rotation_vector, transform
 
 NAMES = (
     "drive", "elbow", "idler", "idler_end",

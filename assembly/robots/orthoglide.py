@@ -24,9 +24,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.placed_frames import PlacedFrame, place_frames
-from assembly.model.robot import BeamLink, Clearance, Frame, Robot
-from assembly.robots.placing import at, drive_stiffness, pin
+from forcefit.assembly.model.placed_frames import PlacedFrame, place_frames
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot
+from forcefit.assembly.robots.placing import at, drive_stiffness, pin
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ freedom are coincident revolute joints: two for a cardan joint, three for a ball
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.model.placed_frames import PlacedFrame
-from assembly.model.robot import Clearance, Frame, Link
-from stiffness.screws import transform
+from forcefit.assembly.model.placed_frames import PlacedFrame
+from forcefit.assembly.model.robot import Clearance, Frame, Link
+from forcefit.stiffness.screws import transform
 
 
 def at(

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.model.placed_frames import PlacedFrame
-from assembly.model.robot import BeamLink, Clearance, Frame
-from assembly.robots.placing import at, drive_stiffness, pin
+from forcefit.assembly.model.placed_frames import PlacedFrame
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame
+from forcefit.assembly.robots.placing import at, drive_stiffness, pin
 from forcefit.inputs.table import BadInput
 
 

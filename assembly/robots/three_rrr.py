@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.placed_frames import PlacedFrame, place_frames
-from assembly.model.robot import BeamLink, Clearance, Frame, Robot
-from assembly.robots.placing import pin
-from assembly.robots.planar import (
+from forcefit.assembly.model.placed_frames import PlacedFrame, place_frames
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot
+from forcefit.assembly.robots.placing import pin
+from forcefit.assembly.robots.planar import (
     PlanarLeg,
     arm_angle,
     direction,

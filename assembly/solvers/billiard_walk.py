@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kernels.choice import kernels
+from forcefit.assembly.kernels.choice import kernels
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,9 +3,9 @@
 There are two problems: the least energy of a reduced problem (22), and the least factor
 on the clearances of problem (21).  Both are scaled here to size 1.  Clarabel solves the
 second problem.  With ``"reference"``, Clarabel also solves the first problem, and
-:mod:`assembly.solvers.pressed_cones` refines each solution.  With ``"compiled"``, the
+:mod:`forcefit.assembly.solvers.pressed_cones` refines each solution.  With ``"compiled"``, the
 compiled interior-point method solves it, or Clarabel if in doubt, and Newton's method
-on the dual (:mod:`assembly.solvers.one_problem`) refines each solution.  The certified
+on the dual (:mod:`forcefit.assembly.solvers.one_problem`) refines each solution.  The certified
 gap, which does not depend on the solvers, decides which solution is kept.
 
 Sources:
@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, hstack, vstack
 
-from assembly.solvers import one_problem
-from assembly.solvers.cones import cone_sizes, cone_starts, into_cones
-from assembly.solvers.method import Method
-from assembly.solvers.pressed_cones import refine
+from forcefit.assembly.solvers import one_problem
+from forcefit.assembly.solvers.cones import cone_sizes, cone_starts, into_cones
+from forcefit.assembly.solvers.method import Method
+from forcefit.assembly.solvers.pressed_cones import refine
 
 _TOLERANCE = 1e-13
 # Clarabel's default static regularisation, 1e-8, stops 3 of 12 points of the paper's

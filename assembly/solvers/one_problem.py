@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kernels.choice import kernels
+from forcefit.assembly.kernels.choice import kernels
 
 Problem = tuple[NDArray, NDArray, NDArray, NDArray, NDArray]
 # function of a direction that returns the certified height, the (6,) screw that attains

@@ -13,7 +13,7 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.solvers.one_problem import Support
+from forcefit.assembly.solvers.one_problem import Support
 
 _MOST = 400  # largest number of support functions
 # distance of every cut from the body, so that a flat body has corners too: relative to

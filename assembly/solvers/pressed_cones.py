@@ -1,4 +1,4 @@
-r"""Refinement of a minimum of :func:`assembly.solvers.conic.minimise_energy` in numpy.
+r"""Refinement of a minimum of :func:`forcefit.assembly.solvers.conic.minimise_energy` in numpy.
 
 A cone solver ends at a gap.  When it is known which cones are in contact with their
 bounds, with forces f, the minimum satisfies equations that Newton's method solves to
@@ -15,7 +15,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.solvers.cones import cone_sizes
+from forcefit.assembly.solvers.cones import cone_sizes
 
 _STEPS = 4  # largest number of Newton steps; two are usual
 _SETTLED = 1e-12  # [-] size of the clearances' last step at convergence

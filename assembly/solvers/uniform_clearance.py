@@ -48,7 +48,7 @@ def sample_uniform_position(
     Returns:
         Whether the chains mixed; u is unchanged if the set has empty interior.
     """
-    from assembly.solvers.billiard_walk import Positions
+    from forcefit.assembly.solvers.billiard_walk import Positions
 
     if Z.shape[1] == 0:
         return True

@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.error_distributions import KINDS
-from assembly.statistics.callout_sources import CalloutSources
-from assembly.statistics.clearance_positions import clearance_means, contact_length_of
-from assembly.statistics.quantities import UNITS
-from assembly.statistics.requirement import Plan
-from assembly.sweeps.identity import robot_hash
+from forcefit.assembly.model.error_distributions import KINDS
+from forcefit.assembly.statistics.callout_sources import CalloutSources
+from forcefit.assembly.statistics.clearance_positions import (
+    clearance_means,
+    contact_length_of,
+)
+from forcefit.assembly.statistics.quantities import UNITS
+from forcefit.assembly.statistics.requirement import Plan
+from forcefit.assembly.sweeps.identity import robot_hash
 from forcefit.results.display import html_table, short_repr
 from forcefit.results.text import in_unit
 

@@ -2,9 +2,9 @@
 
 Tolerances t_g, one for each class of errors, have a cost ``c_g / t_g`` (or ``-c_g log
 t_g``).  Limits of margin and energy are convex:
-:mod:`assembly.statistics.cutting_planes` finds the least cost and proves it for a yield
+:mod:`forcefit.assembly.statistics.cutting_planes` finds the least cost and proves it for a yield
 of 1.  A yield below 1, and limits of wrenches, stress and pose errors, are not convex;
-:mod:`assembly.statistics.least_cost` continues to a local minimum.  Finally, all
+:mod:`forcefit.assembly.statistics.least_cost` continues to a local minimum.  Finally, all
 tolerances are multiplied by one factor until independent draws, or the worst corners,
 just meet every limit, and new draws verify them.
 """
@@ -16,20 +16,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.statistics.allocated_tolerances import Allocation
-from assembly.statistics.callout_sources import CalloutSources
-from assembly.statistics.cutting_planes import cut_planes
-from assembly.statistics.least_cost import least_cost
-from assembly.statistics.replay import Replay
-from assembly.statistics.requirement import SCALING, TRAINING, Plan, Requirement
-from assembly.statistics.scaling import (
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.statistics.allocated_tolerances import Allocation
+from forcefit.assembly.statistics.callout_sources import CalloutSources
+from forcefit.assembly.statistics.cutting_planes import cut_planes
+from forcefit.assembly.statistics.least_cost import least_cost
+from forcefit.assembly.statistics.replay import Replay
+from forcefit.assembly.statistics.requirement import (
+    SCALING,
+    TRAINING,
+    Plan,
+    Requirement,
+)
+from forcefit.assembly.statistics.scaling import (
     draw_samples,
     scale_uniformly,
     with_worst_corners,
 )
-from assembly.statistics.verification import prove_worst, verify
-from assembly.statistics.worst_case_widths import allot_worst_case
+from forcefit.assembly.statistics.verification import prove_worst, verify
+from forcefit.assembly.statistics.worst_case_widths import allot_worst_case
 
 # multiple of the number of training draws; many are possible for a single factor
 _SCALING_DRAWS = 4

@@ -3,7 +3,7 @@
 Those bounds are left out of the prepared posture, because clearances can reach hardly
 any of them.  Draws in which one may be reached are computed one by one.  In these, the
 set of platform screws of problem (27), ``frozen``, has every relevant bound as a cone
-(:mod:`assembly.linear.reference.pose_error`).
+(:mod:`forcefit.assembly.linear.reference.pose_error`).
 """
 
 from dataclasses import replace
@@ -11,13 +11,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.ranks import UNBOUNDED, rank_tolerance
-from assembly.linear.energy import Assembly
-from assembly.linear.reference.energy import CannotAssemble
-from assembly.linear.reference.pose_error import reachable_screws
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.solvers.conic import SolverFailed
-from assembly.statistics.linear_response import LinearResponse
+from forcefit.assembly.kinematics.ranks import UNBOUNDED, rank_tolerance
+from forcefit.assembly.linear.energy import Assembly
+from forcefit.assembly.linear.reference.energy import CannotAssemble
+from forcefit.assembly.linear.reference.pose_error import reachable_screws
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.statistics.linear_response import LinearResponse
 
 # assumption of (27): every spring has its deformation in the solution of (22)
 ASSUMPTION = "frozen"
@@ -76,7 +76,7 @@ def bounded_position(
         (6,) [rad, m] screw, NaN if the draw has no solution or the solver fails; and
         whether the walk mixed.  Motions without any bound have their smallest size.
     """
-    from assembly.solvers.uniform_clearance import sample_uniform_position
+    from forcefit.assembly.solvers.uniform_clearance import sample_uniform_position
 
     try:
         reachable = reachable_screws(draws[i], ASSUMPTION)

@@ -2,7 +2,7 @@
 
 A callout is drawn as a whole: shift and tilt of a bore in a position zone depend on
 each other.  The numbers of a draw depend on its number and the seed only, as those of
-:mod:`assembly.model.error_distributions`.
+:mod:`forcefit.assembly.model.error_distributions`.
 """
 
 from collections.abc import Callable
@@ -12,13 +12,13 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.callouts.fits import Fit, FittedEnd, parse_fit
-from assembly.callouts.zone import DISTRIBUTIONS
-from assembly.kinematics.callout_maps import PlacedCallout, place_callouts
-from assembly.kinematics.posture import home_posture
-from assembly.model.error_distributions import ErrorSources
-from assembly.model.robot import Clearance, Frame, Robot
-from assembly.statistics.ranking import group_of, kind_of
+from forcefit.assembly.callouts.fits import Fit, FittedEnd, parse_fit
+from forcefit.assembly.callouts.zone import DISTRIBUTIONS
+from forcefit.assembly.kinematics.callout_maps import PlacedCallout, place_callouts
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.error_distributions import ErrorSources
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.statistics.ranking import group_of, kind_of
 from forcefit.inputs.table import BadInput
 
 _SAMPLE = 1 << 14  # draws of a fit for its variance

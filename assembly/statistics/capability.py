@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import chi2, nct, norm
 
-from assembly.statistics.estimates import quantile
+from forcefit.assembly.statistics.estimates import quantile
 
 _TAIL = 0.99865  # share below three standard deviations of a normal distribution
 

@@ -6,7 +6,7 @@ models are
 
 ======== =====================================================================
 worst    any position; the largest pose errors are used, see
-         :mod:`assembly.statistics.worst_clearance`
+         :mod:`forcefit.assembly.statistics.worst_clearance`
 uniform  uniformly distributed over the set (billiard walk)
 contact  displaced by a wrench of random direction on the platform until in contact
 least    the position in the solution of (22), one of many possible ones
@@ -23,12 +23,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.nominal import size_of
-from assembly.linear.energy import Assembly
-from assembly.model.robot import Robot
-from assembly.solvers.conic import minimise_energy
-from assembly.statistics.bounded_motion import bounded_position, draws_at_bounds
-from assembly.statistics.linear_response import LinearResponse
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.linear.energy import Assembly
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.solvers.conic import minimise_energy
+from forcefit.assembly.statistics.bounded_motion import (
+    bounded_position,
+    draws_at_bounds,
+)
+from forcefit.assembly.statistics.linear_response import LinearResponse
 
 # values of the option --clearance and their meaning
 CLEARANCE_MODELS = {
@@ -59,7 +62,7 @@ def position_clearances(
     Returns:
         (k, 6) [rad, m] screws, NaN where a draw has no solution; and (k,) bool, False
         where the walks of the uniform model had not mixed at their greatest length, see
-        :func:`assembly.solvers.uniform_clearance.sample_uniform_position`.
+        :func:`forcefit.assembly.solvers.uniform_clearance.sample_uniform_position`.
 
     Raises:
         ValueError: ``clearance`` is not a valid model.
@@ -137,7 +140,7 @@ def _at_random(
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
     """Return clearances distributed uniformly over their set; whether walks mixed."""
-    from assembly.solvers.uniform_clearance import sample_uniform_position
+    from forcefit.assembly.solvers.uniform_clearance import sample_uniform_position
 
     free = ~loaded
     rows = clearance_constraints(prepared, loaded)[:, free]
@@ -157,7 +160,7 @@ def _at_contact(
     prepared: LinearResponse, loaded: NDArray, clearances: NDArray, wrenches: NDArray
 ) -> NDArray:
     """Move clearances along wrenches (k, 6) on the platform until in contact."""
-    from assembly.statistics.contact_positions import move_to_contact
+    from forcefit.assembly.statistics.contact_positions import move_to_contact
 
     rows, free = clearance_constraints(prepared, loaded), ~loaded
     directions = wrenches @ prepared.screws[:, : clearances.shape[1]]

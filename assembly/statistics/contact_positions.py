@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.solvers.one_problem import farthest_points
+from forcefit.assembly.solvers.one_problem import farthest_points
 
 _PRECISION = 1e-9  # relative precision of a position's component along its direction
 

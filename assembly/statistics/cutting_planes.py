@@ -21,8 +21,8 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.statistics.requirement import TRAINING, Plan, Requirement
-from assembly.statistics.worst_case import CORNERS, random_corners
+from forcefit.assembly.statistics.requirement import TRAINING, Plan, Requirement
+from forcefit.assembly.statistics.worst_case import CORNERS, random_corners
 from forcefit.inputs.table import BadInput
 
 _TOLERANCE = 1e-3  # relative to a limit: largest violation that is accepted at the end

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.callouts.zone import Zone
-from assembly.kinematics.callout_maps import PlacedCallout
-from assembly.model.error_distributions import KINDS, ErrorSources
-from assembly.statistics.callout_sources import CalloutSources, Sources
-from assembly.statistics.linear_response import LinearResponse
+from forcefit.assembly.callouts.zone import Zone
+from forcefit.assembly.kinematics.callout_maps import PlacedCallout
+from forcefit.assembly.model.error_distributions import KINDS, ErrorSources
+from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
+from forcefit.assembly.statistics.linear_response import LinearResponse
 from forcefit.inputs.table import BadInput
 
 _ROUNDING = 1e-9  # a row relative to the largest: smaller ones are rounding

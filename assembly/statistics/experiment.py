@@ -7,26 +7,26 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.assembled import without_rounding
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.linear.zone import MARGINS
-from assembly.model.error_distributions import draw_generator
-from assembly.model.given_load import Load, one_load
-from assembly.model.link_stress import peak_stresses, stressed_links
-from assembly.statistics.callout_sources import CalloutSources, Sources
-from assembly.statistics.clearance_positions import (
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.assembled import without_rounding
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.linear.zone import MARGINS
+from forcefit.assembly.model.error_distributions import draw_generator
+from forcefit.assembly.model.given_load import Load, one_load
+from forcefit.assembly.model.link_stress import peak_stresses, stressed_links
+from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
+from forcefit.assembly.statistics.clearance_positions import (
     CLEARANCE_MODELS,
     CLEARANCE_STREAM,
     contact_length_of,
     position_clearances,
 )
-from assembly.statistics.linear_response import LinearResponse, linear_response
-from assembly.statistics.posture_margins import PostureMargins, prepare_margins
-from assembly.statistics.quantities import POSE_ERRORS
-from assembly.statistics.stiffness_spread import draw_stiffnesses
-from assembly.statistics.worst_clearance import PRECISION, bound_worst_errors
-from assembly.steps.bolted import CannotBolt, bolt_generators, bolted_errors
+from forcefit.assembly.statistics.linear_response import LinearResponse, linear_response
+from forcefit.assembly.statistics.posture_margins import PostureMargins, prepare_margins
+from forcefit.assembly.statistics.quantities import POSE_ERRORS
+from forcefit.assembly.statistics.stiffness_spread import draw_stiffnesses
+from forcefit.assembly.statistics.worst_clearance import PRECISION, bound_worst_errors
+from forcefit.assembly.steps.bolted import CannotBolt, bolt_generators, bolted_errors
 from forcefit.inputs.renamed import renamed_fields, warn_renamed
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
@@ -45,14 +45,14 @@ class Experiment:
         sources: distributions of the errors.
         seed: seed of all draws.
         clearance: one of
-            :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
+            :data:`forcefit.assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
         margins: whether the zone margins are computed.
         stress: whether the stress of the links is computed.
         load: (6,) [N m, N] on the platform at its origin, base axes, or by component,
             ``{"fz": -50}``; none if absent.
         gravity: (3,) [m/s^2] base axes; none if absent.
         stiffness: state in which the platform's stiffness is computed, one of
-            :data:`assembly.sweeps.point_stiffness.STATES` except the nominal one; empty
+            :data:`forcefit.assembly.sweeps.point_stiffness.STATES` except the nominal one; empty
             if it is not computed.
         precision: [rad, m] required difference between upper and lower bound of the
             largest pose errors in the worst clearance model; inf if not needed.

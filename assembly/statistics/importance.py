@@ -20,14 +20,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.error_distributions import ErrorSources
-from assembly.statistics.callout_sources import CalloutSources, Sources
-from assembly.statistics.ranking import group_of
+from forcefit.assembly.model.error_distributions import ErrorSources
+from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
+from forcefit.assembly.statistics.ranking import group_of
 
 STREAMS = (
     2,
     3,
-)  # number of a stream of random numbers, see assembly.model.error_distributions
+)  # number of a stream of random numbers, see forcefit.assembly.model.error_distributions
 # largest share of discarded draws, because the errors of the others are dependent
 MOST_FAILED = 0.05
 _RESAMPLES = 200

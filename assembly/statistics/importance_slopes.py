@@ -2,7 +2,7 @@
 
 A quotient of sampled deviations is not a derivative, because it has the noise of the
 sample.  As long as the same clearances are active, the solution of (22) is linear in
-the errors, and its slopes are known exactly (:mod:`assembly.statistics.sensitivity`).
+the errors, and its slopes are known exactly (:mod:`forcefit.assembly.statistics.sensitivity`).
 The gain of a group is the root mean square of the slopes, over the group's errors
 weighted by variance, and over some draws.
 """
@@ -10,12 +10,12 @@ weighted by variance, and over some draws.
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.energy import Assembly
-from assembly.statistics.callout_sources import Sources
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.importance import SaltelliDesign
-from assembly.statistics.linear_response import LinearResponse
-from assembly.statistics.sensitivity import solution_slopes
+from forcefit.assembly.linear.energy import Assembly
+from forcefit.assembly.statistics.callout_sources import Sources
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.importance import SaltelliDesign
+from forcefit.assembly.statistics.linear_response import LinearResponse
+from forcefit.assembly.statistics.sensitivity import solution_slopes
 
 DRAWS = 32  # number of draws over which the slopes are averaged
 

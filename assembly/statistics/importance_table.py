@@ -3,11 +3,11 @@
 Two values are given in addition to the shares of the variance.  The *part* of a group
 is the standard deviation of the platform's screw due to the group, from the same
 sample. The *gain* is an exact derivative, micrometres of the platform for each
-micrometre of error, see :mod:`assembly.statistics.importance_slopes`.  Both are norms
+micrometre of error, see :mod:`forcefit.assembly.statistics.importance_slopes`.  Both are norms
 of the platform's vector, so a platform that follows an error has a gain of 1.
 
 Shares are estimates.  Groups with overlapping intervals are not distinguished and share
-their possible ranks, see :mod:`assembly.statistics.ranking`.
+their possible ranks, see :mod:`forcefit.assembly.statistics.ranking`.
 """
 
 from collections.abc import Mapping
@@ -17,16 +17,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.importance import (
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.importance import (
     MOST_FAILED,
     STREAMS,
     SaltelliDesign,
     sobol_indices,
     source_groups,
 )
-from assembly.statistics.importance_slopes import error_units, platform_gains
-from assembly.statistics.ranking import (
+from forcefit.assembly.statistics.importance_slopes import error_units, platform_gains
+from forcefit.assembly.statistics.ranking import (
     NOT_DISTINGUISHED,
     leaders,
     named_together,
@@ -49,7 +49,7 @@ class ImportanceOptions:
     Attributes:
         draws: number of base draws; (groups + 2) times as many are solved.
         by: kind of the groups, see
-            :func:`assembly.statistics.importance.source_groups`.
+            :func:`forcefit.assembly.statistics.importance.source_groups`.
         level: level of confidence of the intervals.
     """
 

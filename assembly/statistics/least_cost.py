@@ -22,9 +22,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.statistics.cutting_planes import cheapest_within
-from assembly.statistics.requirement import Plan, Requirement
-from assembly.statistics.scaling import Samples, scale_uniformly, with_worst_corners
+from forcefit.assembly.statistics.cutting_planes import cheapest_within
+from forcefit.assembly.statistics.requirement import Plan, Requirement
+from forcefit.assembly.statistics.scaling import (
+    Samples,
+    scale_uniformly,
+    with_worst_corners,
+)
 
 _COARSE = 1e-3  # relative to the limits: precision of intermediate costs
 # relative to the cost: smallest reduction by a step that continues the iteration

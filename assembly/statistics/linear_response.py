@@ -1,7 +1,7 @@
 """Linear response of springs, closures and platform to clearances and errors.
 
 It belongs to one posture and is the same for all draws of the errors;
-:func:`assembly.linear.energy.solve_assembly` solves the draws.
+:func:`forcefit.assembly.linear.energy.solve_assembly` solves the draws.
 """
 
 from dataclasses import dataclass
@@ -9,29 +9,29 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.kinematics.ranks import RANK
-from assembly.linear.closure import (
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.kinematics.ranks import RANK
+from forcefit.assembly.linear.closure import (
     VirtualJoints,
     closure_signs,
     linearise,
     virtual_joints,
 )
-from assembly.linear.energy import Assembly, solve_assembly
-from assembly.linear.load import FrameLoads, loads_with_weight
-from assembly.linear.reference.reduction import (
+from forcefit.assembly.linear.energy import Assembly, solve_assembly
+from forcefit.assembly.linear.load import FrameLoads, loads_with_weight
+from forcefit.assembly.linear.reference.reduction import (
     FreeMotion,
     Reduction,
     complement,
     reduce_problem,
     spring_deformations,
 )
-from assembly.model.clearance import (
+from forcefit.assembly.model.clearance import (
     clearance_bounds,
     component_bounds,
     has_bounded_motion,
 )
-from assembly.solvers.cones import cone_starts
+from forcefit.assembly.solvers.cones import cone_starts
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,24 +18,24 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from assembly.kinematics.posture import POSE
-from assembly.statistics.clearance_positions import clearance_means
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.importance_table import (
+from forcefit.assembly.kinematics.posture import POSE
+from forcefit.assembly.statistics.clearance_positions import clearance_means
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.importance_table import (
     ImportanceOptions,
     importance_dataset,
     importance_design,
     importance_rows,
 )
-from assembly.statistics.perfect_parts import stored_perfect_parts
-from assembly.statistics.quantities import POSE_ERRORS
-from assembly.sweeps.dataset import save_dataset
-from assembly.sweeps.identity import program_hash, robot_hash
-from assembly.sweeps.journal import open_journal
-from assembly.sweeps.sweep import journal_path
+from forcefit.assembly.statistics.perfect_parts import stored_perfect_parts
+from forcefit.assembly.statistics.quantities import POSE_ERRORS
+from forcefit.assembly.sweeps.dataset import save_dataset
+from forcefit.assembly.sweeps.identity import program_hash, robot_hash
+from forcefit.assembly.sweeps.journal import open_journal
+from forcefit.assembly.sweeps.sweep import journal_path
 from forcefit.inputs.packages import need
 from forcefit.results.quantities import QUANTITIES, count
-from stiffness.screws import SCREW, WRENCH
+from forcefit.stiffness.screws import SCREW, WRENCH
 
 if TYPE_CHECKING:
     import xarray
@@ -65,7 +65,7 @@ def run_draws(
         progress: called with the number of finished draws and the number of all draws.
         importance: options for the importance of errors; None if it is not computed.
         held: context that keeps the journal until it is closed, as in
-            :func:`assembly.sweeps.sweep.run_sweep`.
+            :func:`forcefit.assembly.sweeps.sweep.run_sweep`.
 
     Returns:
         Data set over ``draw``, with the importance if requested; the file has the same

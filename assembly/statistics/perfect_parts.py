@@ -13,12 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.clearance import bound_name
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.linear_response import LinearResponse
-from assembly.statistics.quantities import POSE_ERRORS, UNITS
-from assembly.statistics.ranking import kind_of
-from assembly.statistics.worst_clearance import bound_worst_errors, worst_error_slopes
+from forcefit.assembly.model.clearance import bound_name
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.linear_response import LinearResponse
+from forcefit.assembly.statistics.quantities import POSE_ERRORS, UNITS
+from forcefit.assembly.statistics.ranking import kind_of
+from forcefit.assembly.statistics.worst_clearance import (
+    bound_worst_errors,
+    worst_error_slopes,
+)
 
 # number of positions of a random clearance model from which the median is taken
 _DRAWS = 200

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assembly.statistics.clearance_positions import clearance_means
-from assembly.statistics.estimates import most_probable, quantile
-from assembly.statistics.quantities import POSE_ERRORS
-from assembly.sweeps.panels import named_panels, quantity
+from forcefit.assembly.statistics.clearance_positions import clearance_means
+from forcefit.assembly.statistics.estimates import most_probable, quantile
+from forcefit.assembly.statistics.quantities import POSE_ERRORS
+from forcefit.assembly.sweeps.panels import named_panels, quantity
 from forcefit.inputs.errors import BadInput, plot_label
 from forcefit.results.quantities import QUANTITIES
 from forcefit.results.units import FACTORS
@@ -39,7 +39,7 @@ def figure_of_draws(
         kind: ``"histogram"``, ``"tornado"`` or ``"allocation"``; by default it depends
             on the data.
         quantities: quantities of a histogram, by the names in
-            :mod:`assembly.sweeps.panels`.
+            :mod:`forcefit.assembly.sweeps.panels`.
 
     Returns:
         The figure; None for another kind of data set.
@@ -67,8 +67,8 @@ def histogram_figure(
     """Return histograms with medians, 95 % quantiles and most probable values.
 
     Args:
-        data: result of :func:`assembly.statistics.monte_carlo.run_draws`.
-        quantities: quantities to show, by the names in :mod:`assembly.sweeps.panels`;
+        data: result of :func:`forcefit.assembly.statistics.monte_carlo.run_draws`.
+        quantities: quantities to show, by the names in :mod:`forcefit.assembly.sweeps.panels`;
             by default those with a limit.
 
     Returns:
@@ -187,7 +187,7 @@ def allocation_figure(data: "xarray.Dataset") -> "Figure":
 
     Args:
         data: data of
-            :func:`assembly.statistics.allocated_tolerances.tolerance_dataset`.
+            :func:`forcefit.assembly.statistics.allocated_tolerances.tolerance_dataset`.
 
     Returns:
         A figure.  Wide bars are tolerances of least cost; narrow bars, where different,

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import svd
 
-from assembly.kinematics.posture import Posture
-from assembly.kinematics.ranks import RANK
-from assembly.linear.closure import linearise, virtual_joints
-from assembly.linear.reference.reduction import complement, reduce_problem
-from assembly.linear.zone import Compliant, Zone, zone_margin
-from assembly.solvers.cones import cone_starts
-from assembly.statistics.linear_response import checked_errors
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.kinematics.ranks import RANK
+from forcefit.assembly.linear.closure import linearise, virtual_joints
+from forcefit.assembly.linear.reference.reduction import complement, reduce_problem
+from forcefit.assembly.linear.zone import Compliant, Zone, zone_margin
+from forcefit.assembly.solvers.cones import cone_starts
+from forcefit.assembly.statistics.linear_response import checked_errors
 
 # [rad, reference lengths] smallest error that certainly no motion can close
 _CLEARLY_INFEASIBLE = 1e-10
@@ -33,7 +33,7 @@ class PostureMargins:
         B: (p, nu) orthonormal rows of the equations for the clearances u, B u = K e.
         K: (p, 6n) map from the errors e to the right side of these equations.
         infeasible: (.., 6n) map from the errors to their infeasible component.
-        compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
+        compliant: ``"rigid"`` or ``"free"``, see :mod:`forcefit.assembly.linear.zone`.
     """
 
     posture: Posture
@@ -87,7 +87,7 @@ def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureM
 
     Args:
         posture: the robot's configuration.
-        compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
+        compliant: ``"rigid"`` or ``"free"``, see :mod:`forcefit.assembly.linear.zone`.
 
     Returns:
         The prepared posture.

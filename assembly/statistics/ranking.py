@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.screws import SCREW
+from forcefit.stiffness.screws import SCREW
 
 NOT_DISTINGUISHED = (
     "rank: the ranks that the intervals allow; errors with a rank in common are not "

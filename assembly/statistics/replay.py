@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.sweeps.journal import Journal, open_journal
-from assembly.sweeps.sweep import journal_path
+from forcefit.assembly.sweeps.journal import Journal, open_journal
+from forcefit.assembly.sweeps.sweep import journal_path
 
 RECORD = np.dtype("u1")
 _DIGEST = 32

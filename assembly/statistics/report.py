@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.statistics.plot import NAMES
-from assembly.statistics.quantities import POSE_ERRORS, UNITS
-from assembly.statistics.ranking import NOT_DISTINGUISHED, rank_text
-from assembly.statistics.summary import WORDS
-from assembly.statistics.tightening import ranked, tightening_tiles
-from assembly.statistics.worst_pose_report import worst_section
+from forcefit.assembly.statistics.plot import NAMES
+from forcefit.assembly.statistics.quantities import POSE_ERRORS, UNITS
+from forcefit.assembly.statistics.ranking import NOT_DISTINGUISHED, rank_text
+from forcefit.assembly.statistics.summary import WORDS
+from forcefit.assembly.statistics.tightening import ranked, tightening_tiles
+from forcefit.assembly.statistics.worst_pose_report import worst_section
 from forcefit.page.charts import BLUE, GREY, RED, Axis, bars, chart, grid
 from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
@@ -36,11 +36,11 @@ def draws_page(
     """Return the page of an experiment.
 
     Args:
-        summary: result of :func:`assembly.statistics.summary.summarise`, with
+        summary: result of :func:`forcefit.assembly.statistics.summary.summarise`, with
             ``robot``.
         data: the draws.
         provenance: the command and the files.
-        robot: HTML from :func:`assembly.statistics.scenes.drawn_robot`.
+        robot: HTML from :func:`forcefit.assembly.statistics.scenes.drawn_robot`.
 
     Returns:
         HTML, which needs no other file.

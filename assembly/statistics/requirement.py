@@ -7,16 +7,16 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.zone import MARGINS
-from assembly.model.error_distributions import ErrorSources
-from assembly.statistics.callout_sources import Sources
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.posture_margins import prepare_margins
-from assembly.statistics.quantities import POSE_ERRORS, UNITS
-from assembly.statistics.replay import Replay
-from assembly.statistics.responses import respond
-from assembly.statistics.worst_case import Corner, worst_corner
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.zone import MARGINS
+from forcefit.assembly.model.error_distributions import ErrorSources
+from forcefit.assembly.statistics.callout_sources import Sources
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.posture_margins import prepare_margins
+from forcefit.assembly.statistics.quantities import POSE_ERRORS, UNITS
+from forcefit.assembly.statistics.replay import Replay
+from forcefit.assembly.statistics.responses import respond
+from forcefit.assembly.statistics.worst_case import Corner, worst_corner
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
 
@@ -49,9 +49,9 @@ class Plan:
         draws: number of training draws at every posture.
         seed: seed of all draws.
         clearance: for limits of pose errors, one of
-            :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
+            :data:`forcefit.assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
         contact_length: [m] length of the contact model, see
-            :class:`assembly.statistics.experiment.Experiment`.
+            :class:`forcefit.assembly.statistics.experiment.Experiment`.
     """
 
     sources: Sources

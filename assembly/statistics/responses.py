@@ -3,19 +3,22 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.energy import Assembly
-from assembly.model.error_distributions import draw_generator
-from assembly.model.link_stress import WEIGHTLESS, LinkStress, stressed_links
-from assembly.statistics.callout_sources import Sources
-from assembly.statistics.clearance_positions import (
+from forcefit.assembly.linear.energy import Assembly
+from forcefit.assembly.model.error_distributions import draw_generator
+from forcefit.assembly.model.link_stress import WEIGHTLESS, LinkStress, stressed_links
+from forcefit.assembly.statistics.callout_sources import Sources
+from forcefit.assembly.statistics.clearance_positions import (
     CLEARANCE_STREAM,
     position_clearances,
 )
-from assembly.statistics.linear_response import LinearResponse
-from assembly.statistics.posture_margins import PostureMargins
-from assembly.statistics.quantities import POSE_ERRORS
-from assembly.statistics.sensitivity import solution_slopes
-from assembly.statistics.worst_clearance import bound_worst_errors, worst_error_slopes
+from forcefit.assembly.statistics.linear_response import LinearResponse
+from forcefit.assembly.statistics.posture_margins import PostureMargins
+from forcefit.assembly.statistics.quantities import POSE_ERRORS
+from forcefit.assembly.statistics.sensitivity import solution_slopes
+from forcefit.assembly.statistics.worst_clearance import (
+    bound_worst_errors,
+    worst_error_slopes,
+)
 
 _STEP = 1e-6  # relative to a wrench: step for differences of the stress formula
 _PRECISION = 1e-9  # [rad or m] required precision of the largest pose errors
@@ -37,11 +40,11 @@ def respond(
         key: name of the quantity, for a posture prepared for energies: energy [J],
             force [N], moment [N m], stress [Pa], rotation [rad] or translation [m].
         clearance: for a pose error, one of
-            :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.  In the
+            :data:`forcefit.assembly.statistics.clearance_positions.CLEARANCE_MODELS`.  In the
             worst model, value and slopes are those of the largest error found.  For
             uniform and contact positions the slopes are those of the solution of (22).
         contact_length: [m] length of the contact model, see
-            :class:`assembly.statistics.experiment.Experiment`.
+            :class:`forcefit.assembly.statistics.experiment.Experiment`.
 
     Returns:
         (k,) values and (k, m) slopes; NaN without a solution.

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.statistics.estimates import proportion
-from assembly.statistics.requirement import Requirement
-from assembly.statistics.worst_case import CORNERS, random_corners
+from forcefit.assembly.statistics.estimates import proportion
+from forcefit.assembly.statistics.requirement import Requirement
+from forcefit.assembly.statistics.worst_case import CORNERS, random_corners
 from forcefit.inputs.table import BadInput
 
 _FINE = 1e-4  # relative to the limits: precision of the largest utilisation

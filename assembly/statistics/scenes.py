@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.model.statuses import OUT_OF_REACH
-from assembly.report.scene import robot_scene
-from assembly.solvers.conic import SolverFailed
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.plot import NAMES
-from assembly.steps.bolted import bolt_generators, bolt_joints
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.model.statuses import OUT_OF_REACH
+from forcefit.assembly.report.scene import robot_scene
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.plot import NAMES
+from forcefit.assembly.steps.bolted import bolt_generators, bolt_joints
 from forcefit.page.charts import Axis, Layer, value_map
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def tightest_robot(postures: Sequence[Posture], present: Mapping[str, Any]) -> s
 
     Args:
         postures: the assessed postures.
-        present: result of :func:`assembly.statistics.tolerances.present_errors`.
+        present: result of :func:`forcefit.assembly.statistics.tolerances.present_errors`.
 
     Returns:
         HTML of a scene with the assembled robot; empty if it cannot be assembled.
@@ -93,7 +93,7 @@ def margin_map(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
 
     Args:
         postures: the assessed postures.
-        present: result of :func:`assembly.statistics.tolerances.present_errors`.
+        present: result of :func:`forcefit.assembly.statistics.tolerances.present_errors`.
 
     Returns:
         HTML of a map; empty if the grid has no axis or more than two.

@@ -20,9 +20,9 @@ gives the slopes by any number of errors (adjoint method).
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.energy import Assembly
-from assembly.solvers.conic import GAP_WITHOUT_CLEARANCE
-from assembly.statistics.linear_response import LinearResponse
+from forcefit.assembly.linear.energy import Assembly
+from forcefit.assembly.solvers.conic import GAP_WITHOUT_CLEARANCE
+from forcefit.assembly.statistics.linear_response import LinearResponse
 
 # relative to the largest force on any cone; smaller forces count as zero
 _ACTIVE = 1e-7

@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.platform_stiffness.exact_tangent import exact_tangent
-from assembly.platform_stiffness.linear_tangent import in_contact
-from assembly.solvers.conic import SolverFailed
-from assembly.statistics.estimates import mean, proportion, quantile
-from assembly.sweeps.point_stiffness import STATES
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.platform_stiffness.exact_tangent import exact_tangent
+from forcefit.assembly.platform_stiffness.linear_tangent import in_contact
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.statistics.estimates import mean, proportion, quantile
+from forcefit.assembly.sweeps.point_stiffness import STATES
 from forcefit.results.display import numbers
-from stiffness.screws import WRENCH
+from forcefit.stiffness.screws import WRENCH
 
 _NAMED = 5  # largest number of free motions that are reported, most frequent first
 _ALIKE = 2  # number of decimals in which the motions of two draws are compared

@@ -12,20 +12,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.zone import ASSEMBLABLE
-from assembly.statistics.capability import capability_text, draws_capability
-from assembly.statistics.clearance_positions import clearance_means
-from assembly.statistics.estimates import (
+from forcefit.assembly.linear.zone import ASSEMBLABLE
+from forcefit.assembly.statistics.capability import capability_text, draws_capability
+from forcefit.assembly.statistics.clearance_positions import clearance_means
+from forcefit.assembly.statistics.estimates import (
     bracketed,
     mean,
     most_probable,
     proportion,
     quantile,
 )
-from assembly.statistics.importance_table import importance_report, importance_text
-from assembly.statistics.perfect_parts import limits_broken, perfect_text
-from assembly.statistics.quantities import POSE_ERRORS, UNITS
-from assembly.statistics.stiffness_spread import (
+from forcefit.assembly.statistics.importance_table import (
+    importance_report,
+    importance_text,
+)
+from forcefit.assembly.statistics.perfect_parts import limits_broken, perfect_text
+from forcefit.assembly.statistics.quantities import POSE_ERRORS, UNITS
+from forcefit.assembly.statistics.stiffness_spread import (
     stiffness_report,
     stiffness_spread_text,
 )
@@ -51,7 +54,7 @@ def summarise(
     level: float = 0.95,
     capable: bool = False,
 ) -> dict[str, Any]:
-    """Return a summary of draws from :func:`assembly.statistics.monte_carlo.run_draws`.
+    """Return a summary of draws from :func:`forcefit.assembly.statistics.monte_carlo.run_draws`.
 
     Args:
         data: the draws.
@@ -257,7 +260,7 @@ def summary_text(summary: Mapping[str, Any]) -> str:
     if "importance" in summary:
         lines.append(importance_text(summary["importance"]))
     if "worst_case" in summary:
-        from assembly.statistics.worst_pose_report import worst_text
+        from forcefit.assembly.statistics.worst_pose_report import worst_text
 
         lines.append(worst_text(summary["worst_case"]))
     return "\n".join(lines)

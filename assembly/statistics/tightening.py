@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from assembly.statistics.quantities import POSE_ERRORS
-from assembly.statistics.ranking import leaders, named_together
+from forcefit.assembly.statistics.quantities import POSE_ERRORS
+from forcefit.assembly.statistics.ranking import leaders, named_together
 from forcefit.page.page import Tile
 from forcefit.page.tables import Value
 
@@ -17,7 +17,7 @@ def ranked(summary: Mapping[str, Any], key: str) -> list[tuple[str, list[float]]
     """Return the total shares of a quantity's variance by error, largest first.
 
     Args:
-        summary: result of :func:`assembly.statistics.summary.summarise`.
+        summary: result of :func:`forcefit.assembly.statistics.summary.summarise`.
         key: name of the quantity.
 
     Returns:
@@ -35,7 +35,7 @@ def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
     """Return tiles: values for perfect parts, the main contributor, what to tighten.
 
     Args:
-        summary: result of :func:`assembly.statistics.summary.summarise`.
+        summary: result of :func:`forcefit.assembly.statistics.summary.summarise`.
 
     Returns:
         The tiles; without importance there are no tiles on errors.

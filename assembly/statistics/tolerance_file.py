@@ -10,18 +10,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from assembly.kinematics.callout_maps import place_callouts
-from assembly.kinematics.posture import home_posture
-from assembly.model.error_distributions import KINDS, ErrorSources
-from assembly.model.random_errors import frames_named
-from assembly.model.robot import Robot
-from assembly.statistics.callout_sources import CalloutSources, Sources
-from assembly.statistics.quantities import POSE_ERRORS, UNITS, limit_names
-from assembly.statistics.ranking import kind_of
-from assembly.statistics.requirement import COSTS, Plan
-from assembly.steps.bolted import refuse_bolted
+from forcefit.assembly.kinematics.callout_maps import place_callouts
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.error_distributions import KINDS, ErrorSources
+from forcefit.assembly.model.random_errors import frames_named
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
+from forcefit.assembly.statistics.quantities import POSE_ERRORS, UNITS, limit_names
+from forcefit.assembly.statistics.ranking import kind_of
+from forcefit.assembly.statistics.requirement import COSTS, Plan
+from forcefit.assembly.steps.bolted import refuse_bolted
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
-from stiffness.screws import SCREW
+from forcefit.stiffness.screws import SCREW
 
 # [rad, m] largest accepted tolerances, up to which screws are small
 _LOOSEST = (0.1, 0.01)

@@ -8,21 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from assembly.kinematics.nominal import Target
-from assembly.kinematics.posture import Posture, place_many
-from assembly.kinematics.verdict import SINGULAR_WORDS, verdicts
-from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.zone import Compliant
-from assembly.model.robot import Robot
-from assembly.model.statuses import OUT_OF_REACH, SINGULAR
-from assembly.solvers.conic import SolverFailed
-from assembly.statistics.posture_margins import prepare_margins
-from assembly.statistics.requirement import Plan
-from assembly.statistics.sensitivity import energy_slopes
-from assembly.sweeps.identity import program_hash, robot_hash
-from assembly.sweeps.targets import goals_of, grid_targets, parse_grid
+from forcefit.assembly.kinematics.nominal import Target
+from forcefit.assembly.kinematics.posture import Posture, place_many
+from forcefit.assembly.kinematics.verdict import SINGULAR_WORDS, verdicts
+from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.linear.zone import Compliant
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.model.statuses import OUT_OF_REACH, SINGULAR
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.statistics.posture_margins import prepare_margins
+from forcefit.assembly.statistics.requirement import Plan
+from forcefit.assembly.statistics.sensitivity import energy_slopes
+from forcefit.assembly.sweeps.identity import program_hash, robot_hash
+from forcefit.assembly.sweeps.targets import goals_of, grid_targets, parse_grid
 from forcefit.inputs.table import BadInput
-from stiffness.screws import SCREW
+from forcefit.stiffness.screws import SCREW
 
 
 def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int]]:
@@ -34,7 +34,7 @@ def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int
 
     Returns:
         The postures, and the number of omitted postures by status: out of reach, or a
-        status of :func:`assembly.kinematics.verdict.verdicts`.
+        status of :func:`forcefit.assembly.kinematics.verdict.verdicts`.
 
     Raises:
         BadInput: the grid is invalid, or none of its postures can be reached.

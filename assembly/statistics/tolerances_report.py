@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from assembly.statistics.clearance_positions import clearance_means
-from assembly.statistics.plot import NAMES
-from assembly.statistics.quantities import UNITS
+from forcefit.assembly.statistics.clearance_positions import clearance_means
+from forcefit.assembly.statistics.plot import NAMES
+from forcefit.assembly.statistics.quantities import UNITS
 from forcefit.page.charts import Axis, bars, grid
 from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
@@ -39,7 +39,7 @@ def tolerances_page(
         results: results with ``present``, ``allocation`` or both, the number of
             ``postures`` and their ``grid``.
         provenance: the command and the files.
-        pictures: HTML from :mod:`assembly.statistics.scenes`, with the present errors.
+        pictures: HTML from :mod:`forcefit.assembly.statistics.scenes`, with the present errors.
 
     Returns:
         HTML, which needs no other file.

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.statistics.estimates import bracketed
-from assembly.statistics.requirement import FRESH, Requirement
-from assembly.statistics.scaling import Samples, scale_uniformly
-from assembly.statistics.worst_case import (
+from forcefit.assembly.statistics.estimates import bracketed
+from forcefit.assembly.statistics.requirement import FRESH, Requirement
+from forcefit.assembly.statistics.scaling import Samples, scale_uniformly
+from forcefit.assembly.statistics.worst_case import (
     CORNERS,
     bound_energy,
     bound_margin,

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.error_distributions import ErrorSources
-from assembly.statistics.linear_response import LinearResponse
-from assembly.statistics.posture_margins import PostureMargins
-from assembly.statistics.responses import respond
+from forcefit.assembly.model.error_distributions import ErrorSources
+from forcefit.assembly.statistics.linear_response import LinearResponse
+from forcefit.assembly.statistics.posture_margins import PostureMargins
+from forcefit.assembly.statistics.responses import respond
 
 CORNERS = 24  # number of random corners from which the search starts
 # largest number of steps from corner to corner; three are usually sufficient
@@ -57,7 +57,7 @@ def worst_corner(
         sources: m sources of errors; their distributions are not used.
         tolerances: (m,) [rad or m] half widths of the tolerances.
         corners: (k, m) signs at the start of each search.
-        key: the quantity, see :func:`assembly.statistics.responses.respond`.
+        key: the quantity, see :func:`forcefit.assembly.statistics.responses.respond`.
         clearance: clearance model, see the same function.
         contact_length: [m] contact length, see the same function.
 

@@ -5,7 +5,7 @@ The worst pose error is the largest sum of support functions over directions n,
 nothing is over-constrained, or parts are elastic and without clearance.  It is convex
 in the tolerances t.  For each direction ``sum_g t_g s_g(n) <= limit - c(n)`` holds for
 all tolerances that meet the limit, so the programme of such planes proves the least
-cost, see :mod:`assembly.statistics.cutting_planes`.
+cost, see :mod:`forcefit.assembly.statistics.cutting_planes`.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,17 +15,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.statistics.allocated_tolerances import Allocation
-from assembly.statistics.callout_sources import CalloutSources, sources_of
-from assembly.statistics.cutting_planes import cheapest_within
-from assembly.statistics.error_sets import ErrorSets, error_sets, zones_of_errors
-from assembly.statistics.linear_response import linear_response
-from assembly.statistics.quantities import POSE_ERRORS, UNITS
-from assembly.statistics.replay import Replay
-from assembly.statistics.requirement import Plan, Requirement
-from assembly.statistics.verification import verify
-from assembly.statistics.worst_pose import farthest_screw
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.statistics.allocated_tolerances import Allocation
+from forcefit.assembly.statistics.callout_sources import CalloutSources, sources_of
+from forcefit.assembly.statistics.cutting_planes import cheapest_within
+from forcefit.assembly.statistics.error_sets import (
+    ErrorSets,
+    error_sets,
+    zones_of_errors,
+)
+from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.quantities import POSE_ERRORS, UNITS
+from forcefit.assembly.statistics.replay import Replay
+from forcefit.assembly.statistics.requirement import Plan, Requirement
+from forcefit.assembly.statistics.verification import verify
+from forcefit.assembly.statistics.worst_pose import farthest_screw
 from forcefit.inputs.table import BadInput
 
 _TOLERANCE = 1e-3  # relative to a limit: largest violation before the last scaling

@@ -15,18 +15,18 @@ free.
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.energy import Assembly, CannotAssemble
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.solvers.conic import SolverFailed
-from assembly.solvers.one_problem import farthest_points
-from assembly.statistics.clearance_positions import (
+from forcefit.assembly.linear.energy import Assembly, CannotAssemble
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.solvers.one_problem import farthest_points
+from forcefit.assembly.statistics.clearance_positions import (
     clearance_constraints,
     free_starts,
     loaded_clearances,
 )
-from assembly.statistics.linear_response import LinearResponse
-from assembly.statistics.quantities import POSE_ERRORS
+from forcefit.assembly.statistics.linear_response import LinearResponse
+from forcefit.assembly.statistics.quantities import POSE_ERRORS
 
 ASSUMPTION = "frozen"
 PRECISION = (1e-6, 1e-6)  # [rad, m] required difference of upper and lower bounds

@@ -15,7 +15,7 @@ with clearances is none: it is bracketed by climbing from corner to corner and b
 bound.
 
 Sources:
-    Hoffman (1981), see :mod:`assembly.solvers.outer_cuts`.
+    Hoffman (1981), see :mod:`forcefit.assembly.solvers.outer_cuts`.
 """
 
 from collections.abc import Callable
@@ -24,14 +24,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.callouts.largest_product import largest_product
-from assembly.solvers.outer_cuts import farthest
-from assembly.statistics.callout_sources import CalloutSources, Sources
-from assembly.statistics.error_sets import ErrorSets, error_sets, zones_of_errors
-from assembly.statistics.linear_response import LinearResponse, linear_response
-from assembly.statistics.quantities import POSE_ERRORS
-from assembly.statistics.responses import respond
-from assembly.steps.bolted import refuse_bolted
+from forcefit.assembly.callouts.largest_product import largest_product
+from forcefit.assembly.solvers.outer_cuts import farthest
+from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
+from forcefit.assembly.statistics.error_sets import (
+    ErrorSets,
+    error_sets,
+    zones_of_errors,
+)
+from forcefit.assembly.statistics.linear_response import LinearResponse, linear_response
+from forcefit.assembly.statistics.quantities import POSE_ERRORS
+from forcefit.assembly.statistics.responses import respond
+from forcefit.assembly.steps.bolted import refuse_bolted
 from forcefit.inputs.table import BadInput
 
 _TOLERANCE = 3e-4  # relative to the sum of the supports along x, y and z

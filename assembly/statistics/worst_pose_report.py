@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
-from assembly.statistics.callout_sources import Sources
-from assembly.statistics.linear_response import LinearResponse
-from assembly.statistics.quantities import POSE_ERRORS, UNITS
-from assembly.statistics.worst_pose import MEANINGS, worst_pose
+from forcefit.assembly.statistics.callout_sources import Sources
+from forcefit.assembly.statistics.linear_response import LinearResponse
+from forcefit.assembly.statistics.quantities import POSE_ERRORS, UNITS
+from forcefit.assembly.statistics.worst_pose import MEANINGS, worst_pose
 from forcefit.page.page import paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 
@@ -20,7 +20,7 @@ def worst_results(
 
     Args:
         prepared: a posture without loads.
-        sources: see :func:`assembly.statistics.worst_pose.worst_pose`.
+        sources: see :func:`forcefit.assembly.statistics.worst_pose.worst_pose`.
         seed: of the corners from which an equilibrium climbs.
 
     Returns:

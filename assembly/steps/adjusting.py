@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.ranks import RANK
-from assembly.steps.machine import Machine
-from assembly.steps.plan import Adjust, rows_of
-from assembly.steps.state import (
+from forcefit.assembly.kinematics.ranks import RANK
+from forcefit.assembly.steps.machine import Machine
+from forcefit.assembly.steps.plan import Adjust, rows_of
+from forcefit.assembly.steps.state import (
     State,
     closed_rows,
     reading_of,

@@ -15,15 +15,15 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import Posture, place_robot
-from assembly.linear.reference.energy import CannotAssemble
-from assembly.model.error_distributions import draw_generator
-from assembly.model.robot import Frame, LockedAt, Robot
-from assembly.solvers.conic import SolverFailed
-from assembly.steps.left_anywhere import positions_left_anywhere
-from assembly.steps.machine import Machine, machine_at
-from assembly.steps.plan import Plan
-from assembly.steps.state import first_state
+from forcefit.assembly.kinematics.posture import Posture, place_robot
+from forcefit.assembly.linear.reference.energy import CannotAssemble
+from forcefit.assembly.model.error_distributions import draw_generator
+from forcefit.assembly.model.robot import Frame, LockedAt, Robot
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.steps.left_anywhere import positions_left_anywhere
+from forcefit.assembly.steps.machine import Machine, machine_at
+from forcefit.assembly.steps.plan import Plan
+from forcefit.assembly.steps.state import first_state
 from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import numbers
 

@@ -1,14 +1,14 @@
 """The least energy of a partly assembled robot, for many sets of errors at once.
 
 The small screws of all frames are s = e + E y + U u + F q: errors, springs, clearances
-and free motions (:mod:`assembly.linear.closure`).  A step of assembly holds rows
+and free motions (:mod:`forcefit.assembly.linear.closure`).  A step of assembly holds rows
 
     R s + L y_f = b
 
 of the closures joined so far and of the fixtures, where y_f are the springs of the
 fixtures.  The equilibrium minimises y.y / 2 less the work of the loads.  Its
 multipliers are the wrenches of the rows.  The elimination is that of
-:mod:`assembly.linear.reference.reduction`.
+:mod:`forcefit.assembly.linear.reference.reduction`.
 
 Where the energy leaves clearances and free motions undetermined, they stay as close as
 possible to where the last step left them (least sum of squares, clearances in units of
@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import svd
 
-from assembly.kinematics.ranks import RANK, ROWS_RANK, noise_of, rank_of
-from assembly.linear.reference.energy import CannotAssemble
-from assembly.linear.reference.reduction import FreeMotion, complement
-from assembly.solvers.conic import SolverFailed, minimise_energy
+from forcefit.assembly.kinematics.ranks import RANK, ROWS_RANK, noise_of, rank_of
+from forcefit.assembly.linear.reference.energy import CannotAssemble
+from forcefit.assembly.linear.reference.reduction import FreeMotion, complement
+from forcefit.assembly.solvers.conic import SolverFailed, minimise_energy
 
 _OPEN = 1e-12  # [rad, reference lengths] closure error that counts as rounding
 _ROUNDING = 1e-14  # share of the largest right side that counts as rounding

@@ -25,9 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
-from assembly.steps.machine import Machine
-from assembly.steps.plan import Adjust, Fix, Join, Plan, Step, rows_of
-from assembly.steps.state import State
+from forcefit.assembly.steps.machine import Machine
+from forcefit.assembly.steps.plan import Adjust, Fix, Join, Plan, Step, rows_of
+from forcefit.assembly.steps.state import State
 
 _ZERO = 1e-9  # share of the own coefficients below which an influence is rounding
 _FREE = 1e-11  # share of the largest stiffness below which a motion is free

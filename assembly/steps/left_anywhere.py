@@ -2,7 +2,7 @@
 
 At least energy, clearances that carry load are at their bounds.  The others may move
 without strain; their positions are a convex set, in which all are equally likely
-(:mod:`assembly.solvers.uniform_clearance`).
+(:mod:`forcefit.assembly.solvers.uniform_clearance`).
 """
 
 from collections.abc import Sequence
@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
-from assembly.solvers.uniform_clearance import sample_uniform_position
-from assembly.steps.machine import Machine
-from assembly.steps.state import State
+from forcefit.assembly.solvers.uniform_clearance import sample_uniform_position
+from forcefit.assembly.steps.machine import Machine
+from forcefit.assembly.steps.state import State
 
 _SAME = 1e-10  # relative size below which a singular value counts as zero
 _LOADED = 1e-9  # share of the energy above which the force of a clearance loads it

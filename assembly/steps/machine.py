@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.closure_rates import closure_signs
-from assembly.kinematics.posture import Posture
-from assembly.kinematics.ranks import RANK, rank_tolerance
-from assembly.linear.closure import (
+from forcefit.assembly.kinematics.closure_rates import closure_signs
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.kinematics.ranks import RANK, rank_tolerance
+from forcefit.assembly.linear.closure import (
     VirtualJoints,
     checked_size,
     in_reference_lengths,
     virtual_joints,
 )
-from assembly.linear.load import FrameLoads
-from assembly.steps.equilibrium import Equilibrium, Movable
+from forcefit.assembly.linear.load import FrameLoads
+from forcefit.assembly.steps.equilibrium import Equilibrium, Movable
 
 Part = tuple[str, str] | str
 

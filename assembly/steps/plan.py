@@ -12,9 +12,9 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import Robot
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, nearest, quoted
-from stiffness.screws import SCREW
+from forcefit.stiffness.screws import SCREW
 
 Closure = tuple[str, str]
 GRAVITY = "gravity"  # name of the weights among the loads of steps

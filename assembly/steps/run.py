@@ -18,12 +18,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.assembled import without_rounding
-from assembly.linear.load import loads_on_frames
-from assembly.steps.adjusting import adjustment_of, with_adjustment
-from assembly.steps.machine import Machine, machine_at
-from assembly.steps.plan import (
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.assembled import without_rounding
+from forcefit.assembly.linear.load import loads_on_frames
+from forcefit.assembly.steps.adjusting import adjustment_of, with_adjustment
+from forcefit.assembly.steps.machine import Machine, machine_at
+from forcefit.assembly.steps.plan import (
     GRAVITY,
     Fix,
     Join,
@@ -35,7 +35,7 @@ from assembly.steps.plan import (
     check_plan,
     rows_of,
 )
-from assembly.steps.state import (
+from forcefit.assembly.steps.state import (
     State,
     closed_rows,
     first_state,

@@ -19,13 +19,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.reference.energy import CannotAssemble
-from assembly.steps.influence import depends_on_state
-from assembly.steps.machine import Machine, machine_at
-from assembly.steps.plan import Join, Plan, Step, check_plan
-from assembly.steps.run import StepResult, carry_out
-from assembly.steps.state import State, closed_rows, first_state, settle
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.reference.energy import CannotAssemble
+from forcefit.assembly.steps.influence import depends_on_state
+from forcefit.assembly.steps.machine import Machine, machine_at
+from forcefit.assembly.steps.plan import Join, Plan, Step, check_plan
+from forcefit.assembly.steps.run import StepResult, carry_out
+from forcefit.assembly.steps.state import State, closed_rows, first_state, settle
 from forcefit.inputs.table import BadInput, quoted
 
 Objective = Literal["force", "energy", "error"]

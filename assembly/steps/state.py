@@ -5,15 +5,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.linear.load import FrameLoads, loads_on_frames, weights
-from assembly.steps.equilibrium import (
+from forcefit.assembly.linear.load import FrameLoads, loads_on_frames, weights
+from forcefit.assembly.steps.equilibrium import (
     Equilibrium,
     Held,
     equilibrium,
     without_idle_weight,
 )
-from assembly.steps.machine import Machine, Part
-from assembly.steps.plan import (
+from forcefit.assembly.steps.machine import Machine, Part
+from forcefit.assembly.steps.plan import (
     GRAVITY,
     Fix,
     Measure,

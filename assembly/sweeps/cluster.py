@@ -21,12 +21,12 @@ from functools import lru_cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from assembly.files.solved_links import solve_links
-from assembly.sweeps.identity import program_hash, question_hash
-from assembly.sweeps.plan import Sweep
-from assembly.sweeps.points import Points, SolvedPoints, solve_points
-from assembly.sweeps.quantities import Question
-from assembly.sweeps.sweep import Solver
+from forcefit.assembly.files.solved_links import solve_links
+from forcefit.assembly.sweeps.identity import program_hash, question_hash
+from forcefit.assembly.sweeps.plan import Sweep
+from forcefit.assembly.sweeps.points import Points, SolvedPoints, solve_points
+from forcefit.assembly.sweeps.quantities import Question
+from forcefit.assembly.sweeps.sweep import Solver
 from forcefit.inputs.table import BadInput
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def cluster_solver(
     scheduler: str | None = None,
     report: Callable[[str], None] = lambda text: None,
 ) -> Solver:
-    """Return a solver for :func:`assembly.sweeps.sweep.run_sweep` on a cluster.
+    """Return a solver for :func:`forcefit.assembly.sweeps.sweep.run_sweep` on a cluster.
 
     Args:
         workers: number of processes of a cluster that is started here, or

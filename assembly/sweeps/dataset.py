@@ -12,9 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.statuses import OF_POINTS
-from assembly.sweeps.netcdf import check_heaps, forgive_damaged_files, netcdf_file
-from assembly.sweeps.quantities import TEXTS, variables
+from forcefit.assembly.model.statuses import OF_POINTS
+from forcefit.assembly.sweeps.netcdf import (
+    check_heaps,
+    forgive_damaged_files,
+    netcdf_file,
+)
+from forcefit.assembly.sweeps.quantities import TEXTS, variables
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import NETCDF, check_writable
 from forcefit.results.quantities import QUANTITIES
@@ -22,7 +26,7 @@ from forcefit.results.quantities import QUANTITIES
 if TYPE_CHECKING:
     import xarray
 
-    from assembly.sweeps.plan import Sweep
+    from forcefit.assembly.sweeps.plan import Sweep
 
 Texts = dict[str, dict[int, str]]
 # kinds of files that commands write, and the attribute that identifies each kind

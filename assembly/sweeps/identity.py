@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
-import assembly
+import forcefit.assembly
 import forcefit.inputs
-import stiffness
-from assembly.files.robot_file import robot_table
-from assembly.kernels.choice import kernels
-from assembly.model.links import link_compliance
-from assembly.model.mesh_link import mesh_solution
-from assembly.model.robot import LibraryLink, MeshLink, Robot
-from assembly.sweeps.parameters import Design
+import forcefit.stiffness
+from forcefit.assembly.files.robot_file import robot_table
+from forcefit.assembly.kernels.choice import kernels
+from forcefit.assembly.model.links import link_compliance
+from forcefit.assembly.model.mesh_link import mesh_solution
+from forcefit.assembly.model.robot import LibraryLink, MeshLink, Robot
+from forcefit.assembly.sweeps.parameters import Design
 from forcefit.inputs.program import sources_hash
 
 # libraries on which the results depend; another version may round differently
@@ -30,7 +30,7 @@ _LIBRARIES = ("numpy", "scipy", "clarabel")
 @cache
 def program_hash() -> str:
     """Return SHA-256 of the program's sources and of the versions of its libraries."""
-    packages = forcefit.inputs, stiffness, assembly
+    packages = forcefit.inputs, forcefit.stiffness, forcefit.assembly
     own = sources_hash(packages, _LIBRARIES)
     return hashlib.sha256((own + kernels.sources).encode()).hexdigest()
 

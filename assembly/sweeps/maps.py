@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.statuses import OK
-from assembly.sweeps.panels import Panel, named_panels, quantity, usual_panels
+from forcefit.assembly.model.statuses import OK
+from forcefit.assembly.sweeps.panels import Panel, named_panels, quantity, usual_panels
 from forcefit.inputs.errors import plot_label
 from forcefit.inputs.table import BadInput, nearest, quoted
 
@@ -31,7 +31,7 @@ def figure_of(
         data: data of a sweep, as saved.
         at: values on other axes by name; the nearest points are shown.  If no draw is
             selected, the median of the draws is shown.
-        quantities: quantities to show, by the names in :mod:`assembly.sweeps.panels`;
+        quantities: quantities to show, by the names in :mod:`forcefit.assembly.sweeps.panels`;
             by default those of the paper's figure 5.
 
     Returns:

@@ -2,7 +2,7 @@
 
 A quantity is a variable of the data set, with its component if it has several:
 ``energy``, ``stiffness.FX``, ``wrench.leg1.link_a.FZ``.  These are the column names of
-:func:`assembly.sweeps.point_table.point_table`.  ``rotation`` and ``translation`` are
+:func:`forcefit.assembly.sweeps.point_table.point_table`.  ``rotation`` and ``translation`` are
 the magnitudes of the platform's pose error.
 """
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from assembly.model.tables import component_unit
+from forcefit.assembly.model.tables import component_unit
 from forcefit.inputs.errors import plot_label
 from forcefit.inputs.table import BadInput, nearest, quoted
 

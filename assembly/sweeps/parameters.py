@@ -15,11 +15,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from assembly.files.drawing_file import is_drawing
-from assembly.files.robot_file import declared_robot, robot_of, robot_table
-from assembly.files.solved_links import solve_links
-from assembly.model.robot import Robot
-from assembly.steps.bolted import bolt_joints
+from forcefit.assembly.files.drawing_file import is_drawing
+from forcefit.assembly.files.robot_file import declared_robot, robot_of, robot_table
+from forcefit.assembly.files.solved_links import solve_links
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.steps.bolted import bolt_joints
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 
 _AXES = {3: ("x", "y", "z"), 6: ("rx", "ry", "rz", "tx", "ty", "tz")}
@@ -158,8 +158,8 @@ def load_design(name: str | Path) -> Design:
     Raises:
         BadInput: the name is neither a built-in name nor a file.
     """
-    from assembly.exchange.robot_files import is_robot_file, load_robot
-    from assembly.robots import BUILT_IN
+    from forcefit.assembly.exchange.robot_files import is_robot_file, load_robot
+    from forcefit.assembly.robots import BUILT_IN
 
     # an invalid file is refused before numbers are changed
     robot = load_robot(name, links=False)

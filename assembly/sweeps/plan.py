@@ -9,11 +9,11 @@ from importlib.metadata import version
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.sweeps.identity import program_hash, question_hash, robot_hash
-from assembly.sweeps.parameters import unit_of
-from assembly.sweeps.points import Points
-from assembly.sweeps.quantities import Question, record_type
-from assembly.sweeps.targets import LARGEST_GRID, Targets, unit_of_target
+from forcefit.assembly.sweeps.identity import program_hash, question_hash, robot_hash
+from forcefit.assembly.sweeps.parameters import unit_of
+from forcefit.assembly.sweeps.points import Points
+from forcefit.assembly.sweeps.quantities import Question, record_type
+from forcefit.assembly.sweeps.targets import LARGEST_GRID, Targets, unit_of_target
 from forcefit.inputs.errors import BadInput
 from forcefit.results.display import html_table, short_repr
 

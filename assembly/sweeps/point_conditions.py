@@ -10,21 +10,21 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import apply_known
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import (
+from forcefit.assembly.effects import apply_known
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import (
     Assembly,
     CannotAssemble,
     solve_assembly,
     together_at,
 )
-from assembly.linear.load import driven
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.measurement.conditions import Conditions, as_declared
-from assembly.measurement.predict import assemble_row
-from assembly.model.robot import Robot
-from assembly.solvers.conic import SolverFailed
-from assembly.sweeps.quantities import Question
+from forcefit.assembly.linear.load import driven
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.measurement.conditions import Conditions, as_declared
+from forcefit.assembly.measurement.predict import assemble_row
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.sweeps.quantities import Question
 
 
 def point_conditions(

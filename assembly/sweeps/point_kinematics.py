@@ -10,13 +10,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.nominal import Target, mobile
-from assembly.kinematics.posture import Posture
-from assembly.kinematics.singularity import KINDS, find_singularities
-from assembly.kinematics.verdict import verdicts
-from assembly.model.robot import Robot
-from assembly.sweeps.quantities import Question
-from assembly.sweeps.targets import of_joints
+from forcefit.assembly.kinematics.nominal import Target, mobile
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.kinematics.singularity import KINDS, find_singularities
+from forcefit.assembly.kinematics.verdict import verdicts
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.sweeps.quantities import Question
+from forcefit.assembly.sweeps.targets import of_joints
 
 # distance from a singularity below which a posture is examined more closely
 _NEAR = 1e-4
@@ -39,7 +39,7 @@ def note_geometry(
 
     Returns:
         Status and reason of each posture, as in
-        :func:`assembly.kinematics.verdict.verdicts`.
+        :func:`forcefit.assembly.kinematics.verdict.verdicts`.
     """
     if not postures:
         return []

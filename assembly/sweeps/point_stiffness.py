@@ -12,19 +12,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exact.exact import ExactAssembly
-from assembly.kinematics.posture import Posture
-from assembly.linear.closure import virtual_joints
-from assembly.linear.energy import CannotAssemble
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import assemble_row
-from assembly.model.robot import Robot
-from assembly.platform_stiffness.exact_tangent import exact_tangent
-from assembly.platform_stiffness.linear_tangent import in_contact, owners
-from assembly.platform_stiffness.matrices import Part, PlatformStiffness
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.solvers.conic import SolverFailed
+from forcefit.assembly.exact.exact import ExactAssembly
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.closure import virtual_joints
+from forcefit.assembly.linear.energy import CannotAssemble
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.predict import assemble_row
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.platform_stiffness.exact_tangent import exact_tangent
+from forcefit.assembly.platform_stiffness.linear_tangent import in_contact, owners
+from forcefit.assembly.platform_stiffness.matrices import Part, PlatformStiffness
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.solvers.conic import SolverFailed
 
 STATES = {
     "nominal": "clearances held at zero",

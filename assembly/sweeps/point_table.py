@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from assembly.model.tables import component_unit, frame_table
-from assembly.sweeps.dataset import open_dataset
+from forcefit.assembly.model.tables import component_unit, frame_table
+from forcefit.assembly.sweeps.dataset import open_dataset
 from forcefit.inputs.errors import BadInput, nearest, quoted
 from forcefit.inputs.writing import TABLE, check_writable, whole_file
 

@@ -12,16 +12,16 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exact.exact import ExactAssembly
-from assembly.kinematics.posture import Posture, place_many, place_many_joints
-from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
-from assembly.linear.pose_error import PoseError, bound_pose_error
-from assembly.linear.zone import MARGINS, zone_margin
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import assemble_row, read
-from assembly.model.link_stress import peak_stresses, stressed_links
-from assembly.model.robot import Robot
-from assembly.model.statuses import (
+from forcefit.assembly.exact.exact import ExactAssembly
+from forcefit.assembly.kinematics.posture import Posture, place_many, place_many_joints
+from forcefit.assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
+from forcefit.assembly.linear.pose_error import PoseError, bound_pose_error
+from forcefit.assembly.linear.zone import MARGINS, zone_margin
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.predict import assemble_row, read
+from forcefit.assembly.model.link_stress import peak_stresses, stressed_links
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.model.statuses import (
     BEYOND_SINGULARITY,
     INVALID_ROBOT,
     OF_POINTS,
@@ -30,28 +30,28 @@ from assembly.model.statuses import (
     SINGULAR,
     SOLVER_FAILED,
 )
-from assembly.platform_stiffness.vibration import natural_modes
-from assembly.report.first_order import MOST_ENERGY, off_by
-from assembly.solvers.conic import SolverFailed
-from assembly.steps.bolted import bolt_generators, bolted_errors
-from assembly.sweeps.point_conditions import (
+from forcefit.assembly.platform_stiffness.vibration import natural_modes
+from forcefit.assembly.report.first_order import MOST_ENERGY, off_by
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.steps.bolted import bolt_generators, bolted_errors
+from forcefit.assembly.sweeps.point_conditions import (
     assemble_rows,
     is_loaded,
     point_conditions,
 )
-from assembly.sweeps.point_kinematics import note_geometry
-from assembly.sweeps.point_stiffness import (
+from forcefit.assembly.sweeps.point_kinematics import note_geometry
+from forcefit.assembly.sweeps.point_stiffness import (
     nominal_stiffnesses,
     tangent_stiffnesses,
 )
-from assembly.sweeps.quantities import (
+from forcefit.assembly.sweeps.quantities import (
     TEXTS,
     Question,
     computed,
     record_of,
     record_type,
 )
-from assembly.sweeps.targets import goals_of, of_joints
+from forcefit.assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput
 
 _PAGE = 256  # number of draws generated together

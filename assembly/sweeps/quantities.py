@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from assembly.kinematics.singularity import KINDS
-from assembly.model.link_stress import stressed_names
-from assembly.model.robot import Robot
-from assembly.sweeps.parameters import Design
-from assembly.sweeps.point_stiffness import STATES, stiffness_parts
+from forcefit.assembly.kinematics.singularity import KINDS
+from forcefit.assembly.model.link_stress import stressed_names
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.sweeps.parameters import Design
+from forcefit.assembly.sweeps.point_stiffness import STATES, stiffness_parts
 from forcefit.results.display import html_table, short_repr
 from forcefit.results.quantities import LABELS, QUANTITIES, Quantity
 
 if TYPE_CHECKING:
-    from assembly.model.error_distributions import ErrorSources
+    from forcefit.assembly.model.error_distributions import ErrorSources
 
 TEXTS = ("reason", "near_singularity")
 ERRORS = ("rotation_error", "translation_error")
@@ -34,7 +34,7 @@ class Question:
     design: design parameters of the robot, if some vary.
         design: design parameters of the robot, if some vary; otherwise None.
         varied: paths of the varied parameters.
-        components: components of the postures, see :mod:`assembly.sweeps.targets`.
+        components: components of the postures, see :mod:`forcefit.assembly.sweeps.targets`.
         sources: sources of drawn errors; None if the robot's own errors are used.
         seed: seed of the draws.
         assumption: assumption of problem (27); None if its bounds are not computed.
@@ -46,7 +46,7 @@ class Question:
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         under: covariates on which the robot's effects depend.
-        stiffness: state of K_C, in :data:`assembly.sweeps.point_stiffness.STATES`, if
+        stiffness: state of K_C, in :data:`forcefit.assembly.sweeps.point_stiffness.STATES`, if
             K_C and the shares of its parts are computed; otherwise empty.
         frequencies: number of natural frequencies, from the same K_C and declared
             masses.

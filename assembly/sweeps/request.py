@@ -9,22 +9,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.robot_effects import check_covariates
-from assembly.exchange.robot_files import load_robot
-from assembly.kinematics.closing import closing_of
-from assembly.kinematics.posture import home_posture
-from assembly.linear.reference.pose_error import ASSUMPTIONS
-from assembly.model.link_stress import stressed_names
-from assembly.model.robot import Robot
-from assembly.model.statuses import OK, OUT_OF_REACH
-from assembly.platform_stiffness.vibration import check_masses
-from assembly.sweeps.parameters import Design, load_design
-from assembly.sweeps.plan import Sweep
-from assembly.sweeps.point_conditions import is_loaded, point_conditions
-from assembly.sweeps.point_stiffness import STATES
-from assembly.sweeps.quantities import Question
-from assembly.sweeps.selection import select
-from assembly.sweeps.targets import (
+from forcefit.assembly.effects.robot_effects import check_covariates
+from forcefit.assembly.exchange.robot_files import load_robot
+from forcefit.assembly.kinematics.closing import closing_of
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.reference.pose_error import ASSUMPTIONS
+from forcefit.assembly.model.link_stress import stressed_names
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.model.statuses import OK, OUT_OF_REACH
+from forcefit.assembly.platform_stiffness.vibration import check_masses
+from forcefit.assembly.sweeps.parameters import Design, load_design
+from forcefit.assembly.sweeps.plan import Sweep
+from forcefit.assembly.sweeps.point_conditions import is_loaded, point_conditions
+from forcefit.assembly.sweeps.point_stiffness import STATES
+from forcefit.assembly.sweeps.quantities import Question
+from forcefit.assembly.sweeps.selection import select
+from forcefit.assembly.sweeps.targets import (
     Targets,
     grid_targets,
     of_joints,
@@ -33,20 +33,20 @@ from assembly.sweeps.targets import (
     read_targets,
 )
 from forcefit.inputs.table import BadInput, nearest
-from stiffness.screws import WRENCH
+from forcefit.stiffness.screws import WRENCH
 
 if TYPE_CHECKING:
     import xarray
 
-    from assembly.model.error_distributions import ErrorSources
-    from assembly.sweeps.netcdf import Stored, StoredDataset
+    from forcefit.assembly.model.error_distributions import ErrorSources
+    from forcefit.assembly.sweeps.netcdf import Stored, StoredDataset
 
 _MODES = 100  # largest accepted number of natural frequencies
 
 
 @dataclass(frozen=True)
 class SweepOptions:
-    """The options of :func:`assembly.sweeps.robot_sweep.sweep`, with the same names."""
+    """The options of :func:`forcefit.assembly.sweeps.robot_sweep.sweep`, with the same names."""
 
     grid: str | None = None
     poses: Path | str | None = None
@@ -177,7 +177,7 @@ def _sources(
         )
     if options.errors is None:
         return None
-    from assembly.model.error_distributions import read_sources
+    from forcefit.assembly.model.error_distributions import read_sources
 
     closing = options.rest is not None or options.mismatch is not None
     fixed = machine.declared_errors if closing else None

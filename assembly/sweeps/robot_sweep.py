@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from assembly.model.given_load import Load, one_load
-from assembly.model.robot import Robot
-from assembly.sweeps.dataset import open_dataset
-from assembly.sweeps.request import SweepOptions, ask_sweep
-from assembly.sweeps.selection import BY_CLEARANCE, DEFAULT, FINITE
-from assembly.sweeps.sweep import (
+from forcefit.assembly.model.given_load import Load, one_load
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.sweeps.dataset import open_dataset
+from forcefit.assembly.sweeps.request import SweepOptions, ask_sweep
+from forcefit.assembly.sweeps.selection import BY_CLEARANCE, DEFAULT, FINITE
+from forcefit.assembly.sweeps.sweep import (
     Progress,
     Solver,
     run_sweep,
@@ -84,7 +84,7 @@ def sweep(
             file, byte for byte.
         progress: function called with the number of finished points and of all points.
         solve: function that solves blocks of points; with a file, other processes may
-            solve them, see :mod:`assembly.sweeps.cluster`.
+            solve them, see :mod:`forcefit.assembly.sweeps.cluster`.
 
     Returns:
         The data set over the axes, with units; it is in memory, even with a file.

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from assembly.sweeps.quantities import (
+from forcefit.assembly.sweeps.quantities import (
     BY_CLEARANCE,
     ERRORS,
     FINITE,
@@ -82,7 +82,7 @@ def _for(question: Question, kept: dict[str, Variable]) -> Question:
 
 def quantities_text() -> str:
     """Return every data variable of sweeps: name, unit, meaning and needed option."""
-    from assembly.robots import BUILT_IN
+    from forcefit.assembly.robots import BUILT_IN
 
     robot = BUILT_IN["four_bar"]()
     frame = robot.frames[0].name

@@ -5,10 +5,13 @@ from dataclasses import replace
 
 from numpy.typing import NDArray
 
-from assembly.effects.robot_effects import AppliedEffects, apply_robot_effects
-from assembly.kinematics.posture import place_robot
-from assembly.platform_stiffness.tangent_slopes import TangentState, compliance_slope
-from assembly.sweeps.parameters import Design
+from forcefit.assembly.effects.robot_effects import AppliedEffects, apply_robot_effects
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.platform_stiffness.tangent_slopes import (
+    TangentState,
+    compliance_slope,
+)
+from forcefit.assembly.sweeps.parameters import Design
 from forcefit.inputs.table import BadInput
 
 # step relative to the number, or to 1 if it is zero; the derivative's error is 1e-8

@@ -16,14 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from assembly.linear.zone import ASSEMBLABLE
-from assembly.model.robot import Robot
-from assembly.sweeps.dataset import sweep_dataset, write_sweep
-from assembly.sweeps.journal import open_journal
-from assembly.sweeps.plan import Sweep
-from assembly.sweeps.points import SolvedPoints, solve_points
-from assembly.sweeps.quantities import TEXTS, Question, record_type
-from assembly.sweeps.targets import grid_targets
+from forcefit.assembly.linear.zone import ASSEMBLABLE
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.sweeps.dataset import sweep_dataset, write_sweep
+from forcefit.assembly.sweeps.journal import open_journal
+from forcefit.assembly.sweeps.plan import Sweep
+from forcefit.assembly.sweeps.points import SolvedPoints, solve_points
+from forcefit.assembly.sweeps.quantities import TEXTS, Question, record_type
+from forcefit.assembly.sweeps.targets import grid_targets
 
 if TYPE_CHECKING:
     import xarray
@@ -83,7 +83,7 @@ def run_sweep(
         progress: called at the start and after each block with the number of points in
             the journal and of all points.
         solve: function that solves blocks: :func:`solve_here`, or
-            :mod:`assembly.sweeps.cluster`.
+            :mod:`forcefit.assembly.sweeps.cluster`.
         held: context that keeps the journal until it is closed, while further results
             are computed from the file; after an interruption no block is solved again.
 

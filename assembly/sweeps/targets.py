@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import POSE
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.posture import POSE
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, nearest, quoted, read_rows
 
 # largest number of points; a larger grid is probably due to a wrong step
@@ -58,7 +58,7 @@ class Targets:
 
 
 def goals_of(names: Sequence[str], robot: Robot, rows: NDArray) -> NDArray:
-    """Return poses or coordinates in the form of :mod:`assembly.kinematics.posture`.
+    """Return poses or coordinates in the form of :mod:`forcefit.assembly.kinematics.posture`.
 
     Args:
         names: names of the components, all of one kind.

@@ -23,26 +23,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import Robot
-from assembly.robots import load_robot
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
-from validation.campaign.campaign_file import read_campaign, read_commands
-from validation.correction.compensation import compensate
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.saving import corrected
-from validation.multibody.simulation import SimulationFailed, without_clearance
-from validation.synthetic.again import distances
-from validation.synthetic.design import CampaignDesign, CampaignPlan, plan_campaign
-from validation.synthetic.draws import NotApplicable
-from validation.synthetic.effects import LIBRARY
-from validation.synthetic.generator import (
+from forcefit.validation.campaign.campaign_file import read_campaign, read_commands
+from forcefit.validation.correction.compensation import compensate
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.saving import corrected
+from forcefit.validation.multibody.simulation import SimulationFailed, without_clearance
+from forcefit.validation.synthetic.again import distances
+from forcefit.validation.synthetic.design import (
+    CampaignDesign,
+    CampaignPlan,
+    plan_campaign,
+)
+from forcefit.validation.synthetic.draws import NotApplicable
+from forcefit.validation.synthetic.effects import LIBRARY
+from forcefit.validation.synthetic.generator import (
     Noise,
     Synthetic,
     generate_campaign,
     write_campaign,
 )
-from validation.synthetic.machine import acts_on_machine
-from validation.synthetic.outside import OUTSIDE
+from forcefit.validation.synthetic.machine import acts_on_machine
+from forcefit.validation.synthetic.outside import OUTSIDE
 
 ROBOTS = ("arm6", "hexapod", "delta")
 STRENGTH = 5.0

@@ -10,12 +10,12 @@ import time
 import numpy as np
 from crosscheck_robots import drawn, hexapod, papers_robot, three_rrr
 
-from assembly.kinematics.posture import Posture, home_posture, place_robot
-from assembly.linear.energy import solve_assembly
+from forcefit.assembly.kinematics.posture import Posture, home_posture, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.inputs.table import BadInput
-from validation.crosscheck.clearance_metric import FLOOR_ENERGY
-from validation.crosscheck.pair import exact_solution
-from validation.multibody.simulation import (
+from forcefit.validation.crosscheck.clearance_metric import FLOOR_ENERGY
+from forcefit.validation.crosscheck.pair import exact_solution
+from forcefit.validation.multibody.simulation import (
     SimulationFailed,
     SimulationModel,
     simulate_assembly,

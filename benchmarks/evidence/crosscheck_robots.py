@@ -7,8 +7,8 @@ planar 3-RRR, which in space is overconstrained six-fold.
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from assembly.model.robot import BeamLink, Clearance, Frame, Robot
-from assembly.robots import load_robot
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot
+from forcefit.assembly.robots import load_robot
 
 PLAY = Clearance(radial=2e-5, axial=2e-5, tilt=5e-4)
 

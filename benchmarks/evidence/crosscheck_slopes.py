@@ -11,8 +11,8 @@ import time
 import numpy as np
 from crosscheck_robots import drawn, hexapod, papers_robot, three_rrr
 
-from assembly.kinematics.posture import Posture, home_posture, place_robot
-from validation.crosscheck.crosscheck import crosscheck
+from forcefit.assembly.kinematics.posture import Posture, home_posture, place_robot
+from forcefit.validation.crosscheck.crosscheck import crosscheck
 
 POSES = [
     *[(0.0, -0.5), (0.2, -0.45), (-0.2, -0.45), (0.4, -0.45), (-0.4, -0.35)],

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from crosscheck_robots import papers_robot
 
-from assembly.files.solved_links import solve_links
-from assembly.kinematics.posture import place_robot
-from assembly.model.robot import MeshLink
-from validation.crosscheck.crosscheck import crosscheck
+from forcefit.assembly.files.solved_links import solve_links
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.model.robot import MeshLink
+from forcefit.validation.crosscheck.crosscheck import crosscheck
 
 SURFACE = Path(__file__).parents[2] / "meshes" / "distal_plain.stl"
 

@@ -20,21 +20,21 @@ from crosscheck_robots import drawn, hexapod, papers_robot
 from validity_figures import pose_figure, validity_figure
 from validity_models import bush_margin, halves_cost, with_bars
 
-from assembly.files.solved_links import solved_link
-from assembly.kinematics.posture import Posture, place_robot
-from assembly.linear.zone import zone_margin
-from assembly.model.links import link_compliance
-from assembly.model.robot import BeamLink, MeshLink, Robot
-from assembly.solvers.conic import SolverFailed
-from validation.assumptions.solid_links import solid_links
-from validation.assumptions.validity import (
+from forcefit.assembly.files.solved_links import solved_link
+from forcefit.assembly.kinematics.posture import Posture, place_robot
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.links import link_compliance
+from forcefit.assembly.model.robot import BeamLink, MeshLink, Robot
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.validation.assumptions.solid_links import solid_links
+from forcefit.validation.assumptions.validity import (
     Cost,
     bush_cost,
     closure_cost,
     link_cost,
     spread_cost,
 )
-from validation.multibody.simulation import without_clearance
+from forcefit.validation.multibody.simulation import without_clearance
 
 FORKS = Path(__file__).parents[2] / "meshes" / "distal_forks.stl"
 REFERENCES = Path(__file__).with_name("stiffness_references.json")

@@ -6,8 +6,8 @@
 Case k is drawn from seed k: a robot (``random_robots``), a design, and what is hidden:
 one public effect at 2, 5 or 9 times the noise, two, none, one that no library has, or
 one that the design cannot tell from another.  The data come from the simulation's side
-(``validation.synthetic.generator``); what else would explain them as well is worked out
-there too (``validation.synthetic.equivalents``).  FOLDER keeps campaigns, truths and
+(``forcefit.validation.synthetic.generator``); what else would explain them as well is worked out
+there too (``forcefit.validation.synthetic.equivalents``).  FOLDER keeps campaigns, truths and
 answers, so that a run can be stopped and taken up again.
 
 What counts as right is in ``diagnosis_score.py``.
@@ -28,29 +28,29 @@ from diagnosis_score import VERDICTS, score
 from numpy.typing import NDArray
 from random_robots import draw_robot
 
-from assembly.files.robot_file import read_robot
+from forcefit.assembly.files.robot_file import read_robot
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import plain, write_json
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.prediction import residual_of
-from validation.diagnosis.results import table
-from validation.diagnosis.saving import save
-from validation.diagnosis.sequence import errors_of
-from validation.multibody.simulation import SimulationFailed
-from validation.synthetic.design import CampaignDesign, varied_for
-from validation.synthetic.draws import SLIDING, NotApplicable, draw_effect
-from validation.synthetic.effects import LIBRARY, Parameters
-from validation.synthetic.equivalents import SAME, Alternative, alternatives
-from validation.synthetic.generator import (
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.diagnosis import Diagnosis
+from forcefit.validation.diagnosis.prediction import residual_of
+from forcefit.validation.diagnosis.results import table
+from forcefit.validation.diagnosis.saving import save
+from forcefit.validation.diagnosis.sequence import errors_of
+from forcefit.validation.multibody.simulation import SimulationFailed
+from forcefit.validation.synthetic.design import CampaignDesign, varied_for
+from forcefit.validation.synthetic.draws import SLIDING, NotApplicable, draw_effect
+from forcefit.validation.synthetic.effects import LIBRARY, Parameters
+from forcefit.validation.synthetic.equivalents import SAME, Alternative, alternatives
+from forcefit.validation.synthetic.generator import (
     Noise,
     Synthetic,
     generate_campaign,
     write_campaign,
 )
-from validation.synthetic.machine import Hidden, simulate_readings
-from validation.synthetic.outside import OUTSIDE
-from validation.synthetic.truth import truth_of
+from forcefit.validation.synthetic.machine import Hidden, simulate_readings
+from forcefit.validation.synthetic.outside import OUTSIDE
+from forcefit.validation.synthetic.truth import truth_of
 
 MIX = {"single": 0.52, "none": 0.12, "pair": 0.16, "outside": 0.12, "confounded": 0.08}
 STRENGTHS = (2.0, 5.0, 9.0)
@@ -209,8 +209,8 @@ def make(
 
 def answer(folder: Path, seed: int) -> None:
     """Diagnose a case and write the answer, unless it is there."""
-    from validation.campaign.campaign_file import read_campaign
-    from validation.diagnosis.diagnose import diagnose
+    from forcefit.validation.campaign.campaign_file import read_campaign
+    from forcefit.validation.diagnosis.diagnose import diagnose
 
     name = f"c{seed:04d}"
     target = folder / "answers" / f"{name}.json"

@@ -20,16 +20,16 @@ from pathlib import Path
 import numpy as np
 
 from forcefit.inputs.table import BadInput
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.diagnosis import Diagnosis
+from forcefit.validation.diagnosis.results import table
+from forcefit.validation.multibody.simulation import SimulationFailed
+from forcefit.validation.synthetic.design import CampaignDesign
+from forcefit.validation.synthetic.draws import NotApplicable
+from forcefit.validation.synthetic.effects import LIBRARY
+from forcefit.validation.synthetic.generator import Synthetic
+from forcefit.validation.synthetic.outside import OUTSIDE
 from tests.points_for_tests import DEVICE, MACHINE, simulated, write_points
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.results import table
-from validation.multibody.simulation import SimulationFailed
-from validation.synthetic.design import CampaignDesign
-from validation.synthetic.draws import NotApplicable
-from validation.synthetic.effects import LIBRARY
-from validation.synthetic.generator import Synthetic
-from validation.synthetic.outside import OUTSIDE
 
 sys.path.insert(0, str(Path(__file__).parent))
 from random_robots import draw_robot

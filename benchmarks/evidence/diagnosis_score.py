@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from validation.synthetic.outside import OUTSIDE_COVARIATES
+from forcefit.validation.synthetic.outside import OUTSIDE_COVARIATES
 
 WITHIN_90 = 1.645  # [-] standard deviations
 VERDICTS = (

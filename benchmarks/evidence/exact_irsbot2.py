@@ -11,10 +11,10 @@ import time
 
 import numpy as np
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import place_many
-from assembly.linear.energy import solve_assembly
-from assembly.solvers.conic import SolverFailed
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import place_many
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.solvers.conic import SolverFailed
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 COLUMNS = {

@@ -19,17 +19,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY, apply_effects
-from assembly.measurement.predict import predict
-from assembly.model.robot import Robot
-from assembly.robots import load_robot
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.hypotheses import hypotheses
-from validation.diagnosis.signatures import conditions_of, loaded_components
-from validation.inspection.planning import plan_rows, rows_as_campaign
-from validation.multibody.simulation import without_clearance
-from validation.synthetic.design import CampaignDesign, plan_campaign
+from forcefit.assembly.effects import LIBRARY, apply_effects
+from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.robots import load_robot
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.hypotheses import hypotheses
+from forcefit.validation.diagnosis.signatures import conditions_of, loaded_components
+from forcefit.validation.inspection.planning import plan_rows, rows_as_campaign
+from forcefit.validation.multibody.simulation import without_clearance
+from forcefit.validation.synthetic.design import CampaignDesign, plan_campaign
 
 ROBOTS = ("arm6", "five_bar")
 ROWS = (8, 12, 16, 24, 32, 48)

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from assembly.kinematics.posture import Posture, place_many, together
-from assembly.linear.energy import solve_assembly
-from assembly.platform_stiffness.linear_tangent import without_clearance
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.robots import load_robot
+from forcefit.assembly.kinematics.posture import Posture, place_many, together
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.platform_stiffness.linear_tangent import without_clearance
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.robots import load_robot
 
 _RUNS = 9
 # frames of the paper's geometric errors

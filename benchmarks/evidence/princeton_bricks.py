@@ -25,8 +25,6 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
-from assembly.model.links import link_compliance
-from assembly.model.robot import BeamLink, Frame, MatrixLink
 from benchmarks.evidence.princeton_solids import (
     ANGLES,
     HEIGHT,
@@ -39,7 +37,9 @@ from benchmarks.evidence.princeton_solids import (
     off,
     root_link,
 )
-from stiffness.beam.sections import declared_section
+from forcefit.assembly.model.links import link_compliance
+from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink
+from forcefit.stiffness.beam.sections import declared_section
 
 COUNTS = (500, 12, 4)  # of the published solids
 _COARSE = ((120, 2, 1), (250, 6, 2))  # a bent shape is refined from these on

@@ -23,12 +23,12 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import home_posture
-from assembly.model.links import link_compliance
-from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
-from stiffness.screws import screw_map
-from validation.assumptions.solid_links import solid_link
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.links import link_compliance
+from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from forcefit.stiffness.screws import screw_map
+from forcefit.validation.assumptions.solid_links import solid_link
 
 LENGTH, HEIGHT, WIDTH = 0.508, 12.3777e-3, 3.2024e-3  # [m]
 E, NU = 71.7e9, 0.31

@@ -9,20 +9,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import BeamLink, Frame, Robot
-from assembly.robots import delta, five_bar, hexapod, three_rrr
-from assembly.robots.delta import DeltaParameters
-from assembly.robots.five_bar import FiveBarParameters
-from assembly.robots.hexapod import HexapodParameters
-from assembly.robots.placing import drive_stiffness
-from assembly.robots.three_rrr import ThreeRRRParameters
-from validation.multibody.motion import turn_of
-from validation.multibody.simulation import SimulationFailed, without_clearance
-from validation.synthetic.design import CampaignDesign, plan_campaign
-from validation.synthetic.effects import Machine
-from validation.synthetic.machine import simulate_readings
-from validation.synthetic.springs import rest_on_springs
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.robots import delta, five_bar, hexapod, three_rrr
+from forcefit.assembly.robots.delta import DeltaParameters
+from forcefit.assembly.robots.five_bar import FiveBarParameters
+from forcefit.assembly.robots.hexapod import HexapodParameters
+from forcefit.assembly.robots.placing import drive_stiffness
+from forcefit.assembly.robots.three_rrr import ThreeRRRParameters
+from forcefit.validation.multibody.motion import turn_of
+from forcefit.validation.multibody.simulation import SimulationFailed, without_clearance
+from forcefit.validation.synthetic.design import CampaignDesign, plan_campaign
+from forcefit.validation.synthetic.effects import Machine
+from forcefit.validation.synthetic.machine import simulate_readings
+from forcefit.validation.synthetic.springs import rest_on_springs
 
 KINDS = ("arm",) * 5 + ("3rrr",) * 2 + ("five_bar",) * 2 + ("hexapod", "delta")
 _MOST = 1.5e-3  # [rad, m] anywhere within reach

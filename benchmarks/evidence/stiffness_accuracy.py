@@ -18,15 +18,19 @@ from pathlib import Path
 
 import numpy as np
 
-from stiffness.fem.adaptive_step import estimated_error, refine_level, solve_level
-from stiffness.fem.condensation import KINDS
-from stiffness.fem.fea import Budget, first_mesh, interface_center
-from stiffness.fem.material import Material
-from stiffness.link import scaled
-from stiffness.report.compare import entries_that_matter
-from stiffness.screws import SCREW
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.surface import read_surface
+from forcefit.stiffness.fem.adaptive_step import (
+    estimated_error,
+    refine_level,
+    solve_level,
+)
+from forcefit.stiffness.fem.condensation import KINDS
+from forcefit.stiffness.fem.fea import Budget, first_mesh, interface_center
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.link import scaled
+from forcefit.stiffness.report.compare import entries_that_matter
+from forcefit.stiffness.screws import SCREW
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.surface import read_surface
 
 REFERENCES = Path(__file__).with_name("stiffness_references.json")
 MESHES = Path(__file__).parents[2] / "meshes"

@@ -21,13 +21,13 @@ from pathlib import Path
 import numpy as np
 
 from forcefit.inputs.table import BadInput
-from stiffness.fem.fea import solve_link
-from stiffness.fem.material import Material
-from stiffness.fem.part_text import parse_part
-from stiffness.link import scaled
-from stiffness.mesh.fit_to_patches import MeshFailed
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.surface import read_surface
+from forcefit.stiffness.fem.fea import solve_link
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.fem.part_text import parse_part
+from forcefit.stiffness.link import scaled
+from forcefit.stiffness.mesh.fit_to_patches import MeshFailed
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.surface import read_surface
 
 REFERENCES = Path(__file__).with_suffix(".json")
 

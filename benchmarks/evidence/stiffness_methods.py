@@ -13,14 +13,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import Posture, home_posture, place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.platform_stiffness.linear_tangent import without_clearance
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.robots import load_robot
-from validation.assumptions.platform_cost import solid_compliance
-from validation.crosscheck.link_models import link_models
-from validation.multibody.tangent import simulated_tangent
+from forcefit.assembly.kinematics.posture import Posture, home_posture, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.platform_stiffness.linear_tangent import without_clearance
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.robots import load_robot
+from forcefit.validation.assumptions.platform_cost import solid_compliance
+from forcefit.validation.crosscheck.link_models import link_models
+from forcefit.validation.multibody.tangent import simulated_tangent
 
 POSES = {"irsbot2": {"tx": 0.1, "tz": -0.5}, "hexapod": None, "orthoglide": None}
 

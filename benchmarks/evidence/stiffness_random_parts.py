@@ -24,11 +24,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.fem.fea import solve_link
-from stiffness.fem.material import Material
-from stiffness.link import scaled
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.surface import Surface, check_surface
+from forcefit.stiffness.fem.fea import solve_link
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.link import scaled
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.surface import Surface, check_surface
 
 YOUNG = 60e9  # [Pa]; errors do not depend on it
 SEEDS = {"training": 1, "test": 2, "middle": 1142}  # factors are set on the first

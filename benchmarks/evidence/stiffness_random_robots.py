@@ -19,7 +19,7 @@ tangent has no part in the choice.
 
 Under load joints that are locked about some axes and elastic about others are elastic
 about all, 1e8 where they were locked: how such a joint turns far has no one law (see
-``validation.crosscheck.stiffness_check``).  The load moves the platform by 0.03 rad or
+``forcefit.validation.crosscheck.stiffness_check``).  The load moves the platform by 0.03 rad or
 reference lengths, or a tenth, or a hundredth of it where that is too much.  Where the
 two platforms then stand in different equilibria that is said, and nothing is compared.
 """
@@ -32,24 +32,28 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exact.exact import ExactAssembly, solve_exact
-from assembly.kinematics.posture import Posture, home_posture, place_many_joints
-from assembly.kinematics.se3 import turn_jacobian
-from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.robot import Frame, Robot
-from assembly.platform_stiffness.exact_tangent import exact_tangent
-from assembly.platform_stiffness.linear_tangent import without_clearance
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.robots import BUILT_IN, load_robot
-from assembly.solvers.conic import SolverFailed
-from stiffness.screws import rotation_vector
+from forcefit.assembly.exact.exact import ExactAssembly, solve_exact
+from forcefit.assembly.kinematics.posture import (
+    Posture,
+    home_posture,
+    place_many_joints,
+)
+from forcefit.assembly.kinematics.se3 import turn_jacobian
+from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.platform_stiffness.exact_tangent import exact_tangent
+from forcefit.assembly.platform_stiffness.linear_tangent import without_clearance
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.robots import BUILT_IN, load_robot
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.stiffness.screws import rotation_vector
+from forcefit.validation.crosscheck.link_models import link_models
+from forcefit.validation.multibody.extrapolation import steadiest, without_squares
+from forcefit.validation.multibody.exudyn_parts import OutOfTime, SimulationFailed
+from forcefit.validation.multibody.simulation import without_clearance as unplayed
+from forcefit.validation.multibody.tangent import simulated_tangent
 from tests.robots_for_tests import random_robot
-from validation.crosscheck.link_models import link_models
-from validation.multibody.extrapolation import steadiest, without_squares
-from validation.multibody.exudyn_parts import OutOfTime, SimulationFailed
-from validation.multibody.simulation import without_clearance as unplayed
-from validation.multibody.tangent import simulated_tangent
 
 SIZES = (0.1, 0.3, 1.0)
 LEGS = {1: 3, 2: 6, 3: 7}  # joints of each leg, so that loops can move

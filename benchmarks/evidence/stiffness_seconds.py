@@ -21,10 +21,10 @@ import numpy as np
 
 from benchmarks.evidence.stiffness_random_parts import YOUNG, draw_part, surface_of
 from forcefit.inputs.writing import write_json
-from stiffness.fem.fea import FemOptions, solve_link
-from stiffness.fem.material import Material
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.surface import Surface, check_surface
+from forcefit.stiffness.fem.fea import FemOptions, solve_link
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.surface import Surface, check_surface
 
 FEWEST = 10_000  # triangles
 WHO = resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN

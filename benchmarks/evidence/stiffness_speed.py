@@ -63,9 +63,9 @@ def true_error(name, K):
 
 def given(name):
     """A link's surface, interfaces and their centres."""
-    from stiffness.fem.fea import interface_center
-    from stiffness.surface.interface import parse_interface
-    from stiffness.surface.surface import read_surface
+    from forcefit.stiffness.fem.fea import interface_center
+    from forcefit.stiffness.surface.interface import parse_interface
+    from forcefit.stiffness.surface.surface import read_surface
 
     surface = read_surface(HERE.parents[1] / "meshes" / f"{name}.stl")
     faces = [parse_interface(text) for text in INTERFACES[name]]
@@ -75,9 +75,9 @@ def given(name):
 
 def ours(name, accuracy):
     """From the surface to K, and the last mesh again by itself."""
-    from stiffness.fem.condensation import condense
-    from stiffness.fem.fea import Budget, FemOptions, solve_link
-    from stiffness.fem.material import Material
+    from forcefit.stiffness.fem.condensation import condense
+    from forcefit.stiffness.fem.fea import Budget, FemOptions, solve_link
+    from forcefit.stiffness.fem.material import Material
 
     surface, faces, _ = given(name)
     with tempfile.TemporaryDirectory() as folder:
@@ -110,12 +110,12 @@ def ngsolve(name, order, layers, finer):
 
 def quadratic(name, accuracy):
     """Quadratic elements whose true error is as asked, their K and unknowns."""
-    from stiffness.fem.adaptive_step import refine_level, solve_level
-    from stiffness.fem.condensation import condense
-    from stiffness.fem.elements import isoparametric
-    from stiffness.fem.fea import Budget, first_mesh
-    from stiffness.fem.material import Material
-    from stiffness.mesh.edge_grading import ENDS, layered
+    from forcefit.stiffness.fem.adaptive_step import refine_level, solve_level
+    from forcefit.stiffness.fem.condensation import condense
+    from forcefit.stiffness.fem.elements import isoparametric
+    from forcefit.stiffness.fem.fea import Budget, first_mesh
+    from forcefit.stiffness.fem.material import Material
+    from forcefit.stiffness.mesh.edge_grading import ENDS, layered
 
     surface, faces, centers = given(name)
     solid = first_mesh(surface, *faces, Budget())

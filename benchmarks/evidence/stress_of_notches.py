@@ -15,11 +15,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.fem.fea import FemOptions, solve_link
-from stiffness.fem.material import Material
-from stiffness.fem.stress import peak_stress
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.surface import Surface, check_surface
+from forcefit.stiffness.fem.fea import FemOptions, solve_link
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.fem.stress import peak_stress
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.surface import Surface, check_surface
 
 AROUND, ROWS, APART = 48, 8, 0.005  # facets, in a quarter of a fillet; [m] of rings
 COMPONENTS = {"tension": 5, "torsion": 2, "bending": 1}

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.evidence.stress_of_notches import COMPONENTS, Part, surface_of
-from stiffness.fem.fea import FemOptions, solve_link
-from stiffness.fem.material import Material
-from stiffness.fem.stress import stress_influence
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.surface import Surface, check_surface
+from forcefit.stiffness.fem.fea import FemOptions, solve_link
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.fem.stress import stress_influence
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.surface import Surface, check_surface
 
 SEED = 20261126
 # of 1, sqrt(h / r), h / r in C_1 to C_4; Kt is the sum of C_k (2 h / D)^(k - 1):

@@ -12,9 +12,9 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from assembly.callouts.fits import parse_fit
-from assembly.callouts.zone import Zone, intersection
-from assembly.callouts.zones_of_features import (
+from forcefit.assembly.callouts.fits import parse_fit
+from forcefit.assembly.callouts.zone import Zone, intersection
+from forcefit.assembly.callouts.zones_of_features import (
     axis_orientation,
     axis_position,
     offset_rows,

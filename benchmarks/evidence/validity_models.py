@@ -6,17 +6,20 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.closure import linearise, virtual_joints
-from assembly.linear.energy import solve_assembly
-from assembly.linear.load import loads_on_frames, weights
-from assembly.linear.reference.energy import solve_with
-from assembly.linear.reference.zone import margin_with
-from assembly.linear.zone import Compliant
-from assembly.model.robot import BeamLink, Robot, beam_axis
-from validation.assumptions.bushes import bush_joints
-from validation.assumptions.validity import Cost, cost_between
-from validation.crosscheck.spread_weight import energy_between_ends, heavy_beams
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.closure import linearise, virtual_joints
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.load import loads_on_frames, weights
+from forcefit.assembly.linear.reference.energy import solve_with
+from forcefit.assembly.linear.reference.zone import margin_with
+from forcefit.assembly.linear.zone import Compliant
+from forcefit.assembly.model.robot import BeamLink, Robot, beam_axis
+from forcefit.validation.assumptions.bushes import bush_joints
+from forcefit.validation.assumptions.validity import Cost, cost_between
+from forcefit.validation.crosscheck.spread_weight import (
+    energy_between_ends,
+    heavy_beams,
+)
 
 
 def with_bars(robot: Robot, slenderness: float, density: float | None = None) -> Robot:
@@ -47,7 +50,7 @@ def bush_margin(posture: Posture, compliant: Compliant = "rigid") -> float:
     Args:
         posture: where the robot stands.
         compliant: ``"rigid"`` or ``"free"``, as for
-            ``assembly.linear.zone.zone_margin``.
+            ``forcefit.assembly.linear.zone.zone_margin``.
 
     Returns:
         The margin; inf if no factor does.
@@ -68,7 +71,7 @@ def half_weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray
 
     Returns:
         ``bodies`` and ``carried`` (n, 6) [N m, N] of
-        :func:`assembly.linear.load.loads_on_frames`.
+        :func:`forcefit.assembly.linear.load.loads_on_frames`.
     """
     own, carried = weights(posture, gravity)
     for beam in heavy_beams(posture, gravity):

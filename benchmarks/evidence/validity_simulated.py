@@ -10,12 +10,12 @@ from collections.abc import Iterator
 import numpy as np
 from crosscheck_validity import GRAVITY, POSES, free_of_errors, postures
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import solve_assembly
-from validation.assumptions.bushes import solve_bushes
-from validation.crosscheck.spread_weight import energy_between_ends
-from validation.multibody.simulation import SimulationModel, simulate_assembly
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.validation.assumptions.bushes import solve_bushes
+from forcefit.validation.crosscheck.spread_weight import energy_between_ends
+from forcefit.validation.multibody.simulation import SimulationModel, simulate_assembly
 
 ELEMENTS = 8  # of each beam under its weight
 

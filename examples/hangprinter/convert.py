@@ -8,10 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from assembly.model.placed_frames import PlacedFrame, place_frames
-from assembly.model.robot import Frame, Robot
-from assembly.robots.placing import at, ball_joint, cardan_joint, drive_stiffness
 from examples.campaign_folder import from_command_line, write_campaign
+from forcefit.assembly.model.placed_frames import PlacedFrame, place_frames
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.robots.placing import (
+    at,
+    ball_joint,
+    cardan_joint,
+    drive_stiffness,
+)
 
 NAME = "hangprinter"
 FILE = "hp4_force_series2.csv"

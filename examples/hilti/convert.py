@@ -11,9 +11,6 @@ import numpy as np
 import yaml  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from assembly.kinematics.nominal import Target, follow
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import Frame, Robot
 from examples.campaign_folder import (
     base_pose,
     data_folder,
@@ -21,8 +18,11 @@ from examples.campaign_folder import (
     from_command_line,
     write_campaign,
 )
+from forcefit.assembly.kinematics.nominal import Target, follow
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.inputs.table import BadInput
-from stiffness.screws import rotation_matrix, rotation_vector, transform
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform
 
 NAME = "hilti_trailblazer"
 FILES = ("flat", "pallet", "orthogonal_wood")

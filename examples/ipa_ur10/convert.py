@@ -8,10 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from assembly.files.robot_file import read_robot
-from assembly.kinematics.nominal import Target, follow
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import Frame, Robot
 from examples.campaign_folder import (
     base_pose,
     data_folder,
@@ -19,7 +15,11 @@ from examples.campaign_folder import (
     from_command_line,
     write_campaign,
 )
-from stiffness.screws import rotation_vector, transform
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.kinematics.nominal import Target, follow
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.stiffness.screws import rotation_vector, transform
 
 NAME = "ipa_ur10"
 SERIES = {

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from assembly.kinematics.posture import place_many_joints
-from assembly.model.robot import Robot
-from assembly.robots import load_robot
 from examples.campaign_folder import data_folder, write_campaign
+from forcefit.assembly.kinematics.posture import place_many_joints
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
 
 HERE = Path(__file__).parent

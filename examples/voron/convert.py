@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.files.robot_file import read_robot
 from examples.campaign_folder import data_folder, from_command_line, write_campaign
+from forcefit.assembly.files.robot_file import read_robot
 
 NAME = "voron_frame_expansion"
 RUNS = {

@@ -19,7 +19,7 @@ def answer(results: dict[str, Any], text: str, status: str, json: str | None) ->
     Raises:
         typer.Exit: the status is not ok.
     """
-    from assembly.model.statuses import OK
+    from forcefit.assembly.model.statuses import OK
 
     write_json(results, json)
     if json != "-":

@@ -92,9 +92,9 @@ def study(
     Writes report.html (self-contained), results.json and results.nc to the folder that
     the study file names.  Exit status 1 if a check fails.
     """
-    from validation.study.report import results_table, verdict, write_study
-    from validation.study.study import run_study
-    from validation.study.study_file import read_study
+    from forcefit.validation.study.report import results_table, verdict, write_study
+    from forcefit.validation.study.study import run_study
+    from forcefit.validation.study.study_file import read_study
 
     requested = read_study(file, output)
     need("jinja2")

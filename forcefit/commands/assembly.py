@@ -82,9 +82,9 @@ def error(
     json: JsonOption = None,
 ) -> None:
     """Bound the largest pose error, problem (27)."""
-    from assembly.linear.reference.pose_error import ASSUMPTIONS
-    from assembly.model.largest import LARGEST_LENGTH
-    from assembly.report.pose_errors import pose_error_of, pose_error_text
+    from forcefit.assembly.linear.reference.pose_error import ASSUMPTIONS
+    from forcefit.assembly.model.largest import LARGEST_LENGTH
+    from forcefit.assembly.report.pose_errors import pose_error_of, pose_error_text
 
     for name in assumption or ():
         if name not in ASSUMPTIONS:

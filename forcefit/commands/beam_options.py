@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from forcefit.commands.options import parse_assignments
 from forcefit.inputs.errors import BadInput, checked, describe, nearest
-from stiffness.beam.beam import THEORIES, beam_compliance
-from stiffness.beam.sections import Section, check_section, declared_section
-from stiffness.link import LinkStiffness
+from forcefit.stiffness.beam.beam import THEORIES, beam_compliance
+from forcefit.stiffness.beam.sections import Section, check_section, declared_section
+from forcefit.stiffness.link import LinkStiffness
 
 
 @dataclass(frozen=True)

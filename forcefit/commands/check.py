@@ -12,7 +12,7 @@ from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import write_json
 
 if TYPE_CHECKING:
-    from assembly.model.robot import Robot
+    from forcefit.assembly.model.robot import Robot
 
 _KINDS = "robot, study, campaign, tolerance plan or errors"
 
@@ -91,17 +91,17 @@ def _reader(file: Path, robot: str | None) -> tuple[str, Callable[[], object]]:
     if "measurements" in content:
         return _campaign(file)
     if "tolerance" in content:
-        from assembly.statistics.tolerance_file import read_plan
+        from forcefit.assembly.statistics.tolerance_file import read_plan
 
         known = _robot_for(file, robot)
         return "tolerance plan", lambda: read_plan(file, known)
     if isinstance(content.get("errors"), list):
-        from assembly.model.error_distributions import read_sources
+        from forcefit.assembly.model.error_distributions import read_sources
 
         known = _robot_for(file, robot)
         return "errors", lambda: read_sources(file, known)
     if "robot" in content:
-        from validation.study.study_file import read_study
+        from forcefit.validation.study.study_file import read_study
 
         return "study", lambda: read_study(file, links=False)
     if "platform" in content:
@@ -111,15 +111,15 @@ def _reader(file: Path, robot: str | None) -> tuple[str, Callable[[], object]]:
 
 def _campaign(folder: Path) -> tuple[str, Callable[[], object]]:
     """Return kind and reader of a campaign."""
-    from validation.campaign.campaign_file import read_campaign
+    from forcefit.validation.campaign.campaign_file import read_campaign
 
     return "campaign", lambda: read_campaign(folder, links=False)
 
 
 def _robot(name: Path | str) -> "Robot":
     """Return a robot, with links of libraries but without solutions of meshes."""
-    from assembly.exchange.robot_files import load_robot
-    from assembly.model.robot import MeshLink
+    from forcefit.assembly.exchange.robot_files import load_robot
+    from forcefit.assembly.model.robot import MeshLink
 
     robot = load_robot(name, links=False)
     if any(isinstance(frame.link, MeshLink) for frame in robot.frames):

@@ -130,10 +130,10 @@ def _compare_surface(
     curve: Path | None, up: str | None, figure: Path | None, json: str | None,
 ) -> None:  # fmt: skip
     """Compare the finite elements of a surface with a beam."""
-    from stiffness.fem.fea import FemOptions, mesh_link
-    from stiffness.fem.material import Material
-    from stiffness.report.compare import compare_link
-    from stiffness.report.results import comparison_results, comparison_text
+    from forcefit.stiffness.fem.fea import FemOptions, mesh_link
+    from forcefit.stiffness.fem.material import Material
+    from forcefit.stiffness.report.compare import compare_link
+    from forcefit.stiffness.report.results import comparison_results, comparison_text
 
     surface, base, tip, unit, accuracy, interface = mesh
     (E, nu), roll = options.material(), parse_up(up)
@@ -156,7 +156,7 @@ def _compare_surface(
     else:
         comparison = compare_link(bent[0], meshed, *bent[1:])
     if figure is not None:
-        from stiffness.report.plot import plot_comparison
+        from forcefit.stiffness.report.plot import plot_comparison
 
         save_figure(plot_comparison(comparison), figure)
     write_json(comparison_results(comparison), json)
@@ -170,8 +170,8 @@ def _compare_bars(
 ) -> None:  # fmt: skip
     """Compare the finite elements of bars with beams of the same section over L / r."""
     from forcefit.commands.options import parse_sizes
-    from stiffness.report.results import sweep_results, sweep_text
-    from stiffness.report.slenderness import sweep_slenderness
+    from forcefit.stiffness.report.results import sweep_results, sweep_text
+    from forcefit.stiffness.report.slenderness import sweep_slenderness
 
     (E, nu), declared = options.material(), options.declared()
     wanted = parse_sizes("--ratios", ratios, "1")
@@ -185,7 +185,7 @@ def _compare_bars(
             update=partial(update, "lengths"),
         )  # fmt: skip
     if figure is not None:
-        from stiffness.report.plot import plot_slenderness
+        from forcefit.stiffness.report.plot import plot_slenderness
 
         save_figure(plot_slenderness(sweep), figure)
     write_json(sweep_results(sweep), json)

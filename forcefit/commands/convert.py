@@ -62,8 +62,8 @@ def convert(
     listed.  Where MuJoCo is installed, the robot that it reads from the same URDF or
     MJCF is compared too: exit status 1 if they differ.
     """
-    from assembly.exchange.convert import convert as convert_robot
-    from assembly.kinematics.closing import closing_of
+    from forcefit.assembly.exchange.convert import convert as convert_robot
+    from forcefit.assembly.kinematics.closing import closing_of
 
     if version not in (1, 2):
         raise BadInput(f"--format: found {version}, expected 1 or 2")

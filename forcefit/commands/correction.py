@@ -23,8 +23,8 @@ from forcefit.inputs.writing import (
 )
 
 if TYPE_CHECKING:
-    from assembly.model.function import Function
-    from validation.campaign.campaign import Campaign
+    from forcefit.assembly.model.function import Function
+    from forcefit.validation.campaign.campaign import Campaign
 
 CommandsArgument = Annotated[
     Path,
@@ -47,11 +47,11 @@ def predict(
     printed for measured rows.  Exit status 1 if a row has no solution; its cells are
     empty.
     """
-    from assembly.exchange.robot_files import load_robot
+    from forcefit.assembly.exchange.robot_files import load_robot
     from forcefit.results.text import readings_text
-    from validation.campaign.campaign_file import read_commands
-    from validation.correction.prediction import predict as predict_readings
-    from validation.correction.prediction import reading_table
+    from forcefit.validation.campaign.campaign_file import read_commands
+    from forcefit.validation.correction.prediction import predict as predict_readings
+    from forcefit.validation.correction.prediction import reading_table
 
     check_writable(output, TABLE)
     prediction = predict_readings(read_commands(commands, load_robot(robot)))
@@ -135,10 +135,10 @@ def compensate(
     required poses of the nominal robot.  Joint limits are respected and loops stay
     closed. Exit status 1 if a row has no solution; its command is unchanged.
     """
-    from assembly.exchange.robot_files import load_robot
-    from validation.campaign.campaign_file import read_commands
-    from validation.correction import compensation_table as tables
-    from validation.correction.compensation import compensate as correct
+    from forcefit.assembly.exchange.robot_files import load_robot
+    from forcefit.validation.campaign.campaign_file import read_commands
+    from forcefit.validation.correction import compensation_table as tables
+    from forcefit.validation.correction.compensation import compensate as correct
 
     check_writable(output, TABLE)
     if offsets is not None:
@@ -159,7 +159,7 @@ def compensate(
 
 def _warned(commands: "Campaign") -> dict[str, Any]:
     """Warn about variables outside the range of the identification data."""
-    from validation.diagnosis.learned_range import beyond
+    from forcefit.validation.diagnosis.learned_range import beyond
 
     left = beyond(commands.robot, commands)
     for one in left:
@@ -214,11 +214,11 @@ def carry(
     declared robot. Exit status 1 if the set-up rows are not sufficient or the fitted
     robot is worse than the declared one; no robot is written then.
     """
-    from assembly.exchange.robot_files import load_robot
-    from validation.campaign.campaign_file import read_campaign, read_commands
-    from validation.correction import carried_file, carrying, carrying_table
-    from validation.correction.session_unknowns import OF_A_SESSION
-    from validation.correction.setup_rows import setup_rows
+    from forcefit.assembly.exchange.robot_files import load_robot
+    from forcefit.validation.campaign.campaign_file import read_campaign, read_commands
+    from forcefit.validation.correction import carried_file, carrying, carrying_table
+    from forcefit.validation.correction.session_unknowns import OF_A_SESSION
+    from forcefit.validation.correction.setup_rows import setup_rows
 
     if output is not None:
         check_writable(output, ROBOT)
@@ -258,8 +258,8 @@ def explain(
     The curves have confidence bands.  A function with memory is shown as its response
     to a unit step.
     """
-    from assembly.exchange.robot_files import load_robot
-    from validation.correction import curves
+    from forcefit.assembly.exchange.robot_files import load_robot
+    from forcefit.validation.correction import curves
 
     if figure is not None:
         check_writable(figure, PICTURE)

@@ -70,8 +70,8 @@ def deflection(
     The curve shows free motion within clearances, contacts, elastic deformation and
     jumps.
     """
-    from assembly.model.statuses import OK
-    from assembly.report.deflection import (
+    from forcefit.assembly.model.statuses import OK
+    from forcefit.assembly.report.deflection import (
         deflection_of,
         deflection_text,
         plot_deflection,
@@ -118,8 +118,8 @@ def parse_along(text: str) -> tuple[int, list[float]]:
     Raises:
         BadInput: the text has a different form, no change, or more than 10000 values.
     """
-    from assembly.model.largest import LARGEST
-    from stiffness.screws import WRENCH
+    from forcefit.assembly.model.largest import LARGEST
+    from forcefit.stiffness.screws import WRENCH
 
     names = [name.lower() for name in WRENCH]
     name, _, values = (part.strip() for part in text.partition("="))

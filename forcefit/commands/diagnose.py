@@ -13,7 +13,7 @@ from forcefit.inputs.errors import BadInput, nearest, quoted
 from forcefit.inputs.writing import ROBOT, check_writable, write_json
 
 if TYPE_CHECKING:
-    from validation.diagnosis.diagnosis import Diagnosis
+    from forcefit.validation.diagnosis.diagnosis import Diagnosis
 
 
 def diagnose(
@@ -64,10 +64,10 @@ def diagnose(
     are used neither to choose nor to fit a model.  --save writes the robot if it
     predicts these rows better than the declared robot.
     """
-    from validation.campaign.campaign_file import read_campaign
-    from validation.diagnosis import results
-    from validation.diagnosis.diagnose import diagnose as trace
-    from validation.diagnosis.saving import save as save_robot
+    from forcefit.validation.campaign.campaign_file import read_campaign
+    from forcefit.validation.diagnosis import results
+    from forcefit.validation.diagnosis.diagnose import diagnose as trace
+    from forcefit.validation.diagnosis.saving import save as save_robot
 
     if save is not None:
         check_writable(save, ROBOT)
@@ -77,7 +77,7 @@ def diagnose(
         diagnosis = trace(data, finite=finite_motions, odds=odds, update=update)
     tally = None
     if calibrate:
-        from validation.diagnosis.calibration import calibrate as simulate
+        from forcefit.validation.diagnosis.calibration import calibrate as simulate
 
         with progress_bars() as update:
             tally = simulate(
@@ -86,11 +86,11 @@ def diagnose(
             )  # fmt: skip
     write_json(results.table(diagnosis, tally), json)
     if json != "-":
-        from validation.diagnosis.text import text
+        from forcefit.validation.diagnosis.text import text
 
         print(text(diagnosis, tally))
     if report is not None:
-        from validation.diagnosis.report import write_report
+        from forcefit.validation.diagnosis.report import write_report
 
         folder = campaign if campaign.is_dir() else campaign.parent
         write_report(diagnosis, report, tally, provenance(folder))
@@ -103,7 +103,7 @@ def diagnose(
 
 def _odds(without: list[str], only: list[str], prior: list[str]) -> dict[str, float]:
     """Return the factors on the prior odds of the effects, from the options."""
-    from assembly.effects import LIBRARY
+    from forcefit.assembly.effects import LIBRARY
 
     names = [*LIBRARY, "function", "geometry", "springs"]
     odds = dict.fromkeys(names, 0.0) if only else {}

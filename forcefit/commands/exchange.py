@@ -40,7 +40,7 @@ def import_(
     Readings are assigned to commands by name, by time or by order.  The device's pose
     is fitted; exchanged targets and outliers are reported, and outliers are left out.
     """
-    from validation.exchange.tracker import import_readings
+    from forcefit.validation.exchange.tracker import import_readings
 
     if report is not None and not diagnose:
         raise BadInput(

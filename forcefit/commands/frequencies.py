@@ -46,7 +46,7 @@ def frequencies(
 
     Masses must be declared.
     """
-    from assembly.report.vibration import vibration_of, vibration_text
+    from forcefit.assembly.report.vibration import vibration_of, vibration_text
 
     word = parse_state(state, ("nominal", "exact"))
     applied = declared_under(

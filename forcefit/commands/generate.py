@@ -125,17 +125,20 @@ def generate(
     """
     import numpy as np
 
-    from assembly.exchange.robot_files import load_robot
-    from validation.multibody.simulation import SimulationFailed, without_clearance
-    from validation.synthetic.design import CampaignDesign, varied_for
-    from validation.synthetic.draws import NotApplicable
-    from validation.synthetic.generator import (
+    from forcefit.assembly.exchange.robot_files import load_robot
+    from forcefit.validation.multibody.simulation import (
+        SimulationFailed,
+        without_clearance,
+    )
+    from forcefit.validation.synthetic.design import CampaignDesign, varied_for
+    from forcefit.validation.synthetic.draws import NotApplicable
+    from forcefit.validation.synthetic.generator import (
         Noise,
         generate_campaign,
         write_campaign,
     )
-    from validation.synthetic.rest import PROGRAMS
-    from validation.synthetic.truth import truth_of
+    from forcefit.validation.synthetic.rest import PROGRAMS
+    from forcefit.validation.synthetic.truth import truth_of
 
     if program not in PROGRAMS:
         raise BadInput(

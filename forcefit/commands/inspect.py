@@ -31,13 +31,13 @@ def inspect(
     repeats: pose accuracy and repeatability, distance accuracy, drift; reversal,
     repeatability and accuracy of each reading approached from both sides.
     """
-    from validation.campaign.campaign_file import read_campaign
-    from validation.inspection.inspection import inspect_campaign
-    from validation.inspection.text import inspection_text
+    from forcefit.validation.campaign.campaign_file import read_campaign
+    from forcefit.validation.inspection.inspection import inspect_campaign
+    from forcefit.validation.inspection.text import inspection_text
 
     data = read_campaign(campaign)
     if iso:
-        from validation.standards.figures import standard_figures
+        from forcefit.validation.standards.figures import standard_figures
 
         figures = standard_figures(data)
         write_json(figures.table(), json)

@@ -27,7 +27,7 @@ def build(
     json: JsonOption = None,
 ) -> None:
     """Compute the missing entries of a build file."""
-    from stiffness.report.library_build import build_library, read_spec
+    from forcefit.stiffness.report.library_build import build_library, read_spec
 
     wanted = read_spec(spec)
     with progress_bars() as update:
@@ -86,7 +86,7 @@ def read(
 
 def _list(folder: Path, json: str | None) -> None:
     """Print the entries of a library and their estimated errors."""
-    from stiffness.report.library import read_library
+    from forcefit.stiffness.report.library import read_library
 
     entries = read_library(folder)
     write_json({"entries": [e.about for e in entries]}, json)
@@ -99,9 +99,9 @@ def _list(folder: Path, json: str | None) -> None:
 def _look_up(folder: Path, at: list[str], family: str, json: str | None) -> None:
     """Print K_E interpolated between the entries of a library, and its error."""
     from forcefit.commands.options import parse_assignments
-    from stiffness.link import scaled
-    from stiffness.report.library import look_up, read_library
-    from stiffness.report.results import matrix_text
+    from forcefit.stiffness.link import scaled
+    from forcefit.stiffness.report.library import look_up, read_library
+    from forcefit.stiffness.report.results import matrix_text
 
     wanted = parse_assignments(at, "--at")
     K, error = look_up(read_library(folder), wanted, family)
@@ -115,8 +115,8 @@ def _look_up(folder: Path, at: list[str], family: str, json: str | None) -> None
 
 def _export(folder: Path, to: str, key: str | None, json: str | None) -> None:
     """Print a library, or K_E of one entry for another program."""
-    from stiffness.report.export import library_csv, stiffness_for
-    from stiffness.report.library import read_entry, read_library
+    from forcefit.stiffness.report.export import library_csv, stiffness_for
+    from forcefit.stiffness.report.library import read_entry, read_library
 
     if json is not None and to != "json":
         raise BadInput(

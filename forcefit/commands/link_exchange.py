@@ -59,8 +59,8 @@ def import_(
 
     The matrix is condensed onto two interfaces.
     """
-    from stiffness.exchange.import_link import import_link
-    from stiffness.report.results import link_results, link_text
+    from forcefit.stiffness.exchange.import_link import import_link
+    from forcefit.stiffness.report.results import link_results, link_text
 
     link = import_link(
         file, mass=mass, nodes=nodes, base=base, tip=tip, unit=unit, order=order
@@ -91,7 +91,7 @@ def export(
 
     The matrix is that of two nodes, base and tip.
     """
-    from stiffness.exchange.export_link import link_file, read_link_results
+    from forcefit.stiffness.exchange.export_link import link_file, read_link_results
 
     stiffness, offset = read_link_results(file)
     content = link_file(stiffness, offset, to, unit)

@@ -30,7 +30,7 @@ def new(
 
     It solves as it is, and its numbers are to be replaced. No file is overwritten.
     """
-    from assembly.files.new_robot import KINDS, new_robot
+    from forcefit.assembly.files.new_robot import KINDS, new_robot
 
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     robot = path.stem
@@ -54,7 +54,7 @@ def new(
 
 def _asked(legs: int | None) -> tuple[str, int | None]:
     """Return the kind and the number of legs that the user types."""
-    from assembly.files.new_robot import KINDS
+    from forcefit.assembly.files.new_robot import KINDS
 
     for word, each in KINDS.items():
         print(f"{word:<8}{each.about}, {each.legs} legs")

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def _built_in_names(incomplete: str) -> list[str]:
     """Return the built-in robots whose names begin with a text."""
-    from assembly.robots import BUILT_IN
+    from forcefit.assembly.robots import BUILT_IN
 
     return [name for name in BUILT_IN if name.startswith(incomplete)]
 
@@ -154,8 +154,8 @@ def parse_load(texts: list[str] | None, option: str = "--load") -> list[float] |
     """
     if not texts:
         return None
-    from assembly.model.given_load import given_load
-    from assembly.model.largest import LARGEST
+    from forcefit.assembly.model.given_load import given_load
+    from forcefit.assembly.model.largest import LARGEST
 
     given = parse_assignments(texts, option, LARGEST)
     wrench: list[float] = given_load(given, option).tolist()
@@ -182,7 +182,7 @@ def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
     """
     if not texts:
         return None
-    from assembly.model.largest import LARGEST_LENGTH
+    from forcefit.assembly.model.largest import LARGEST_LENGTH
 
     given = parse_assignments(texts, option, LARGEST_LENGTH)
     for name in given:
@@ -229,7 +229,7 @@ def parse_point(texts: list[str] | None) -> tuple[float, float, float]:
     if "=" in texts[0]:
         x, y, z = parse_vector(texts, "--at") or (0.0, 0.0, 0.0)
         return x, y, z
-    from assembly.model.largest import LARGEST_LENGTH
+    from forcefit.assembly.model.largest import LARGEST_LENGTH
     from forcefit.inputs.number_arrays import comma_numbers
 
     text = ",".join(texts)
@@ -257,8 +257,8 @@ def parse_direction(texts: list[str] | None) -> list[float] | None:
     """
     if not texts:
         return None
-    from assembly.model.largest import LARGEST_LENGTH
-    from stiffness.screws import SCREW
+    from forcefit.assembly.model.largest import LARGEST_LENGTH
+    from forcefit.stiffness.screws import SCREW
 
     names = [name.lower() for name in SCREW]
     given = parse_assignments(texts, "--along", LARGEST_LENGTH)
@@ -287,7 +287,7 @@ def posture_of(
         mismatch: value of ``--mismatch``.
         own_errors: whether the robot keeps its declared errors in addition.
         note: whether to print remarks on the posture to stderr.
-        links: of :func:`assembly.exchange.robot_files.load_robot`.
+        links: of :func:`forcefit.assembly.exchange.robot_files.load_robot`.
         drive_force: of ``--drive-force``.
 
     Returns:
@@ -296,7 +296,7 @@ def posture_of(
     Raises:
         BadInput: an effect loads the robot, and the command supports no loads.
     """
-    from assembly.effects.robot_effects import apply_robot_effects
+    from forcefit.assembly.effects.robot_effects import apply_robot_effects
 
     declared = declared_posture(
         robot, pose, joint, rest, mismatch, own_errors, note, links, drive_force
@@ -319,12 +319,12 @@ def declared_posture(
 
     Remarks on the posture are printed to stderr if ``note`` is true.
     """
-    from assembly.exchange.robot_files import load_robot
-    from assembly.kinematics.closing import closing_of
-    from assembly.kinematics.posture import home_posture, place_robot
-    from assembly.kinematics.verdict import posture_remarks
-    from assembly.model.force_control import with_drive_forces
-    from assembly.model.largest import LARGEST, LARGEST_LENGTH
+    from forcefit.assembly.exchange.robot_files import load_robot
+    from forcefit.assembly.kinematics.closing import closing_of
+    from forcefit.assembly.kinematics.posture import home_posture, place_robot
+    from forcefit.assembly.kinematics.verdict import posture_remarks
+    from forcefit.assembly.model.force_control import with_drive_forces
+    from forcefit.assembly.model.largest import LARGEST, LARGEST_LENGTH
 
     joints = parse_assignments(joint, "--joint", LARGEST_LENGTH) if joint else None
     close = closing_of(rest, mismatch, joints, own_errors)
@@ -376,7 +376,7 @@ def declared_under(
     Returns:
         The posture, loads and conditions with the effects applied.
     """
-    from assembly.effects.robot_effects import apply_robot_effects
+    from forcefit.assembly.effects.robot_effects import apply_robot_effects
 
     posture = declared_posture(
         robot, pose, joint, rest, mismatch, note=note, drive_force=drive_force
@@ -390,7 +390,7 @@ def declared_under(
 
 def note_massless(robot: Any, gravity: list[float] | None) -> None:
     """Print a note to stderr if there is gravity and no body has a mass."""
-    from assembly.linear.load import massless
+    from forcefit.assembly.linear.load import massless
 
     for remark in massless(robot, gravity):
         print(f"forcefit: note: {robot.name}: {remark}", file=sys.stderr)
@@ -398,7 +398,7 @@ def note_massless(robot: Any, gravity: list[float] | None) -> None:
 
 def note_loose(robot: Any) -> None:
     """Print a note to stderr if a fixed joint's clearance is loose at every pose."""
-    from assembly.steps.bolted import loose_over_poses
+    from forcefit.assembly.steps.bolted import loose_over_poses
 
     for remark in loose_over_poses(robot):
         print(f"forcefit: note: {robot.name}: {remark}", file=sys.stderr)
@@ -452,7 +452,7 @@ def parse_axis(option: str, text: str) -> "NDArray":
     import numpy as np
 
     from forcefit.inputs.number_arrays import comma_numbers
-    from stiffness.screws import UNIT_VECTORS
+    from forcefit.stiffness.screws import UNIT_VECTORS
 
     name = text.strip().lower()
     if name.lstrip("+-") in UNIT_VECTORS and len(name) <= 2:

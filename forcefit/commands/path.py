@@ -96,9 +96,9 @@ def path(
 
     Masses must be declared.  Vibration is left out.
     """
-    from assembly.path.request import PathTimes, errors_along_path
-    from assembly.path.summary import path_summary, path_text
-    from assembly.sweeps.dataset import check_dataset
+    from forcefit.assembly.path.request import PathTimes, errors_along_path
+    from forcefit.assembly.path.summary import path_summary, path_text
+    from forcefit.assembly.sweeps.dataset import check_dataset
 
     if output is not None:
         check_dataset(output, "a path")
@@ -123,8 +123,8 @@ def path(
 
 def _closed(robot: str, rest: str | None, mismatch: str | None) -> Any:
     """Return the robot; its closures closed as the options specify."""
-    from assembly.exchange.robot_files import load_robot
-    from assembly.kinematics.closing import closing_of
+    from forcefit.assembly.exchange.robot_files import load_robot
+    from forcefit.assembly.kinematics.closing import closing_of
 
     machine = load_robot(robot, closing_of(rest, mismatch))
     note_closing(machine, rest, mismatch)
@@ -136,11 +136,11 @@ def _write(
     figure: Path | None, report: Path | None,
 ) -> None:  # fmt: skip
     """Write data, picture and page."""
-    from assembly.path.report import path_page, plot_path
+    from forcefit.assembly.path.report import path_page, plot_path
 
     if output is not None:
-        from assembly.path.dataset import path_dataset
-        from assembly.sweeps.dataset import save_dataset
+        from forcefit.assembly.path.dataset import path_dataset
+        from forcefit.assembly.sweeps.dataset import save_dataset
 
         save_dataset(path_dataset(errors, source.command), output)
     if figure is not None:

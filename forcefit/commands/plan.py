@@ -53,10 +53,10 @@ def plan(
     Writes campaign.toml, measurements.csv without readings and robot.toml.  Times and
     temperatures are targets; replace them by the measured ones.
     """
-    from assembly.exchange.robot_files import load_robot
-    from validation.inspection import planning
-    from validation.synthetic.design import CampaignDesign
-    from validation.synthetic.generator import write_campaign
+    from forcefit.assembly.exchange.robot_files import load_robot
+    from forcefit.validation.inspection import planning
+    from forcefit.validation.synthetic.design import CampaignDesign
+    from forcefit.validation.synthetic.generator import write_campaign
 
     x, y, z = parse_point(at)
     checked("--rotation", rotation, "rad", above=0)

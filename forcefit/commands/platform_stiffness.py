@@ -70,9 +70,9 @@ def stiffness(
     json: JsonOption = None,
 ) -> None:
     """Compute the platform's stiffness, and each part's compliance."""
-    from assembly.model.statuses import OK
-    from assembly.report.platform_stiffness import stiffness_of, stiffness_text
-    from assembly.report.share_pictures import plot_shares
+    from forcefit.assembly.model.statuses import OK
+    from forcefit.assembly.report.platform_stiffness import stiffness_of, stiffness_text
+    from forcefit.assembly.report.share_pictures import plot_shares
 
     if figure is not None:
         check_writable(figure, PICTURE)
@@ -123,9 +123,9 @@ def _slopes(
     under: list[str] | None,
 ) -> "tuple[dict[str, NDArray], dict[str, str]]":
     """Return derivatives of the compliance in one state, or reasons for none."""
-    from assembly.platform_stiffness.tangent_slopes import TangentState
-    from assembly.sweeps.parameters import load_design
-    from assembly.sweeps.stiffness_slopes import CannotChange, stiffness_slopes
+    from forcefit.assembly.platform_stiffness.tangent_slopes import TangentState
+    from forcefit.assembly.sweeps.parameters import load_design
+    from forcefit.assembly.sweeps.stiffness_slopes import CannotChange, stiffness_slopes
 
     design, state = load_design(robot), TangentState(*asked)
     at = parse_assignments(pose, "--pose") if pose else None

@@ -71,7 +71,7 @@ def plot(
     point and a column for each component of every variable.  Its first column, id,
     counts the rows from 0; the column headings have the units in brackets.
     """
-    from assembly.sweeps.point_table import write_point_table
+    from forcefit.assembly.sweeps.point_table import write_point_table
 
     if picture is None and csv is None:
         raise BadInput(
@@ -100,9 +100,9 @@ def _plot_file(
     file: Path, picture: Path, at: list[str], kind: str | None, quantities: list[str]
 ) -> None:
     """Plot a saved file."""
-    from assembly.statistics.plot import KINDS, figure_of_draws
-    from assembly.sweeps.dataset import open_dataset
-    from assembly.sweeps.maps import figure_of
+    from forcefit.assembly.statistics.plot import KINDS, figure_of_draws
+    from forcefit.assembly.sweeps.dataset import open_dataset
+    from forcefit.assembly.sweeps.maps import figure_of
 
     if kind is not None and kind not in KINDS:
         raise BadInput(f'--kind: found "{kind[:60]}"{nearest(kind, KINDS)}')

@@ -22,12 +22,12 @@ def schema(
     Editors use it to complete and check files: forcefit schema robot >
     robot.schema.json
     """
-    from assembly.files.robot_schema import ROBOT_FILE
-    from assembly.files.step_file import PLAN_FILE
+    from forcefit.assembly.files.robot_schema import ROBOT_FILE
+    from forcefit.assembly.files.step_file import PLAN_FILE
     from forcefit.results.outputs import OUTPUTS
     from forcefit.results.records import Content
     from forcefit.results.schema import schema_of
-    from validation.campaign.campaign_schema import CAMPAIGN_FILE
+    from forcefit.validation.campaign.campaign_schema import CAMPAIGN_FILE
 
     files: dict[str, Content] = {"robot": ROBOT_FILE, "campaign": CAMPAIGN_FILE}
     known: dict[str, Content] = {**files, **OUTPUTS, "steps": PLAN_FILE}

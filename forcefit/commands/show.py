@@ -72,13 +72,17 @@ def show(
 
     The nominal and the forced robot are drawn; with --json and without --figure, none.
     """
-    from assembly.linear.energy import CannotAssemble, failure_status, solve_assembly
-    from assembly.linear.reference.pose_error import ASSUMPTIONS
-    from assembly.linear.reference.reduction import FreeMotion
-    from assembly.report.error_body import PARTS
-    from assembly.report.mobility import shown_of, shown_text
-    from assembly.report.plot_closing import closing_pictures
-    from assembly.solvers.conic import SolverFailed
+    from forcefit.assembly.linear.energy import (
+        CannotAssemble,
+        failure_status,
+        solve_assembly,
+    )
+    from forcefit.assembly.linear.reference.pose_error import ASSUMPTIONS
+    from forcefit.assembly.linear.reference.reduction import FreeMotion
+    from forcefit.assembly.report.error_body import PARTS
+    from forcefit.assembly.report.mobility import shown_of, shown_text
+    from forcefit.assembly.report.plot_closing import closing_pictures
+    from forcefit.assembly.solvers.conic import SolverFailed
 
     drawn = figure is not None or json is None
     if figure is not None:
@@ -132,7 +136,7 @@ def _draw(
     error_body: str | None, assumption: str,
 ) -> None:  # fmt: skip
     """Write the picture, or open a window."""
-    from assembly.report.plot import plot_assembly
+    from forcefit.assembly.report.plot import plot_assembly
 
     plotter = plot_assembly(
         assembly, exaggeration, error_body, assumption, figure is not None

@@ -68,8 +68,8 @@ def solve(
 
 def _results(applied: Any) -> tuple[dict[str, Any], str]:
     """Return the solution of small motions, problem (22), and its text."""
-    from assembly.model.statuses import OK
-    from assembly.report.results import solution_of, solution_text
+    from forcefit.assembly.model.statuses import OK
+    from forcefit.assembly.report.results import solution_of, solution_text
 
     with one_thread():
         results = solution_of(applied.posture, applied.load, applied.gravity)
@@ -80,7 +80,7 @@ def _results(applied: Any) -> tuple[dict[str, Any], str]:
 
 def _exact_results(applied: Any) -> tuple[dict[str, Any], str]:
     """Return the solution of finite motions, and its text."""
-    from assembly.report.results import exact_of, exact_text
+    from forcefit.assembly.report.results import exact_of, exact_text
 
     with one_thread(), progress_lines() as update:
         results = exact_of(
@@ -109,8 +109,8 @@ def _solve_margins(
     mismatch: str | None, drive_force: list[str] | None, json: str | None,
 ) -> None:  # fmt: skip
     """Write and print the zone margins; link stiffnesses are not computed."""
-    from assembly.report.first_order import singular_status
-    from assembly.report.results import zone_of, zone_text
+    from forcefit.assembly.report.first_order import singular_status
+    from forcefit.assembly.report.results import zone_of, zone_text
 
     posture = posture_of(
         robot, pose, joint, rest, mismatch, links=False, drive_force=drive_force

@@ -40,7 +40,7 @@ from forcefit.inputs.writing import (
 )
 
 if TYPE_CHECKING:
-    from assembly.statistics.allocation import Allocation
+    from forcefit.assembly.statistics.allocation import Allocation
 
 ClearanceOption = Annotated[
     str,
@@ -155,18 +155,18 @@ def statistics(
     With OUTPUT, finished draws are kept in OUTPUT.journal.  After an interruption the
     same command continues from there and produces the same file.
     """
-    from assembly.model.error_distributions import read_sources
-    from assembly.report.first_order import posture_status
-    from assembly.report.results import status_line
-    from assembly.statistics.callout_sources import sources_of
-    from assembly.statistics.experiment import Experiment, precision_for
-    from assembly.statistics.importance_table import ImportanceOptions
-    from assembly.statistics.monte_carlo import run_draws
-    from assembly.statistics.plot import histogram_figure
-    from assembly.statistics.quantities import parse_limit
-    from assembly.statistics.summary import summarise, summary_text
-    from assembly.sweeps.dataset import check_dataset
-    from assembly.sweeps.point_table import write_point_table
+    from forcefit.assembly.model.error_distributions import read_sources
+    from forcefit.assembly.report.first_order import posture_status
+    from forcefit.assembly.report.results import status_line
+    from forcefit.assembly.statistics.callout_sources import sources_of
+    from forcefit.assembly.statistics.experiment import Experiment, precision_for
+    from forcefit.assembly.statistics.importance_table import ImportanceOptions
+    from forcefit.assembly.statistics.monte_carlo import run_draws
+    from forcefit.assembly.statistics.plot import histogram_figure
+    from forcefit.assembly.statistics.quantities import parse_limit
+    from forcefit.assembly.statistics.summary import summarise, summary_text
+    from forcefit.assembly.sweeps.dataset import check_dataset
+    from forcefit.assembly.sweeps.point_table import write_point_table
 
     _check_clearance_model(clearance, contact_length)
     _check_word("--by", by, ("source", "frame", "kind"))
@@ -211,7 +211,7 @@ def statistics(
     experiment.check_limits([*limits, *(["stress"] if yield_strength else [])])
     worst = None
     if worst_case:
-        from assembly.statistics.worst_pose_report import worst_results
+        from forcefit.assembly.statistics.worst_pose_report import worst_results
 
         worst = worst_results(experiment.energies, sources, seed)
     options = None
@@ -236,8 +236,8 @@ def statistics(
         summary["worst_case"] = worst
     write_json(summary, json)
     if report is not None:
-        from assembly.statistics.report import draws_page
-        from assembly.statistics.scenes import drawn_robot
+        from forcefit.assembly.statistics.report import draws_page
+        from forcefit.assembly.statistics.scenes import drawn_robot
 
         scene = drawn_robot(experiment, data)
         write_text(draws_page(summary, data, provenance(robot, errors), scene), report)
@@ -254,7 +254,7 @@ def _check_word(option: str, word: str, valid: Sequence[str]) -> None:
 
 def _check_clearance_model(clearance: str, contact_length: float | None) -> None:
     """Refuse an unknown model, and a length that the model does not use."""
-    from assembly.statistics.clearance_positions import CLEARANCE_MODELS
+    from forcefit.assembly.statistics.clearance_positions import CLEARANCE_MODELS
 
     _check_word("--clearance", clearance, tuple(CLEARANCE_MODELS))
     if contact_length is None:
@@ -324,22 +324,25 @@ def tolerances(
     """
     from dataclasses import replace
 
-    from assembly.exchange.robot_files import load_robot
-    from assembly.kinematics.closing import closing_of
-    from assembly.linear.zone import MARGINS
-    from assembly.model.statuses import SINGULAR
-    from assembly.statistics.allocated_tolerances import allocation_of, allocation_text
-    from assembly.statistics.allocation import allocate
-    from assembly.statistics.replay import journalled
-    from assembly.statistics.tolerance_file import read_plan
-    from assembly.statistics.tolerances import (
+    from forcefit.assembly.exchange.robot_files import load_robot
+    from forcefit.assembly.kinematics.closing import closing_of
+    from forcefit.assembly.linear.zone import MARGINS
+    from forcefit.assembly.model.statuses import SINGULAR
+    from forcefit.assembly.statistics.allocated_tolerances import (
+        allocation_of,
+        allocation_text,
+    )
+    from forcefit.assembly.statistics.allocation import allocate
+    from forcefit.assembly.statistics.replay import journalled
+    from forcefit.assembly.statistics.tolerance_file import read_plan
+    from forcefit.assembly.statistics.tolerances import (
         grid_postures,
         identity_of,
         left_out_text,
         present_errors,
         present_text,
     )
-    from assembly.sweeps.dataset import check_dataset
+    from forcefit.assembly.sweeps.dataset import check_dataset
 
     _check_clearance_model(clearance, contact_length)
     _check_word("--quantities", quantities, tuple(MARGINS))
@@ -400,8 +403,8 @@ def tolerances(
             _save_allocation(allocation, output, figure, csv)
     write_json(results, json)
     if report is not None:
-        from assembly.statistics.scenes import margin_map, tightest_robot
-        from assembly.statistics.tolerances_report import tolerances_page
+        from forcefit.assembly.statistics.scenes import margin_map, tightest_robot
+        from forcefit.assembly.statistics.tolerances_report import tolerances_page
 
         drawings = (margin_map, tightest_robot) if "present" in results else ()
         pictures = [draw(postures, results["present"]) for draw in drawings]
@@ -420,10 +423,10 @@ def _save_allocation(
     csv: Path | None,
 ) -> None:  # fmt: skip
     """Save the tolerances as a data set, a figure and a table, if requested."""
-    from assembly.statistics.allocated_tolerances import tolerance_dataset
-    from assembly.statistics.plot import allocation_figure
-    from assembly.sweeps.dataset import save_dataset
-    from assembly.sweeps.point_table import write_point_table
+    from forcefit.assembly.statistics.allocated_tolerances import tolerance_dataset
+    from forcefit.assembly.statistics.plot import allocation_figure
+    from forcefit.assembly.sweeps.dataset import save_dataset
+    from forcefit.assembly.sweeps.point_table import write_point_table
 
     data = tolerance_dataset(allocation)
     if output is not None:

@@ -23,7 +23,7 @@ from forcefit.inputs.errors import BadInput, nearest
 from forcefit.inputs.writing import write_text
 
 if TYPE_CHECKING:
-    from assembly.steps.state import State
+    from forcefit.assembly.steps.state import State
 
 
 def steps(
@@ -58,12 +58,12 @@ def steps(
     Each step is an equilibrium that starts from the last: closing forces, energies,
     spring-back at releases, wrenches locked in.
     """
-    from assembly.files.step_file import read_steps
-    from assembly.model.error_distributions import read_sources
-    from assembly.report.steps import drawn_steps, steps_of, steps_text
-    from assembly.report.steps_page import steps_page
-    from assembly.steps.machine import machine_at
-    from assembly.steps.search import OBJECTIVES, best_order
+    from forcefit.assembly.files.step_file import read_steps
+    from forcefit.assembly.model.error_distributions import read_sources
+    from forcefit.assembly.report.steps import drawn_steps, steps_of, steps_text
+    from forcefit.assembly.report.steps_page import steps_page
+    from forcefit.assembly.steps.machine import machine_at
+    from forcefit.assembly.steps.search import OBJECTIVES, best_order
 
     if (errors is None) != (draws is None):
         raise BadInput("steps: found only one of --errors and --draws, expected both")

@@ -46,7 +46,7 @@ from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_
 
 if TYPE_CHECKING:
     from forcefit.commands.beam_options import BeamOptions
-    from stiffness.link import LinkStiffness
+    from forcefit.stiffness.link import LinkStiffness
 
 app = Commands(no_args_is_help=True)
 app.add_typer(library, name="library", help="Libraries of link stiffnesses.")
@@ -87,7 +87,7 @@ def beam(
     a tapered, bent or L-shaped beam.
     """
     from forcefit.commands.beam_options import BeamOptions
-    from stiffness.report.results import link_results, link_text
+    from forcefit.stiffness.report.results import link_results, link_text
 
     options = BeamOptions(
         young, poisson, radius, inner_radius, width, height, section, theory
@@ -146,10 +146,10 @@ def fea(
     --part list prints the solids of a STEP file: name, volume, bounding box.
     """
     from forcefit.inputs.errors import checked
-    from stiffness.fem.fea import Budget, FemOptions, solve_link
-    from stiffness.fem.part_text import parse_mass
-    from stiffness.report.results import link_results, link_text
-    from stiffness.surface.surface import read_surface
+    from forcefit.stiffness.fem.fea import Budget, FemOptions, solve_link
+    from forcefit.stiffness.fem.part_text import parse_mass
+    from forcefit.stiffness.report.results import link_results, link_text
+    from forcefit.stiffness.surface.surface import read_surface
 
     if part and "list" in part:
         if part != ["list"] or base or tip or mass or young or poisson:
@@ -178,7 +178,7 @@ def _list_solids(file: Path, json: str | None) -> None:
     """Print the solids of a STEP file: name, volume, bounding box."""
     from dataclasses import asdict
 
-    from stiffness.surface.surface_files import step_solids
+    from forcefit.stiffness.surface.surface_files import step_solids
 
     found = step_solids(file)
     write_json({"solids": [asdict(solid) for solid in found]}, json)
@@ -241,10 +241,10 @@ def stress(
     from forcefit.commands.beam_options import BeamOptions
     from forcefit.commands.options import parse_gravity, parse_load
     from forcefit.inputs.errors import checked
-    from stiffness.fem.fea import FemOptions, solve_link
-    from stiffness.fem.stress import peak_stress, stress_influence
-    from stiffness.report.results import stress_results, stress_text
-    from stiffness.surface.surface import read_surface
+    from forcefit.stiffness.fem.fea import FemOptions, solve_link
+    from forcefit.stiffness.fem.stress import peak_stress, stress_influence
+    from forcefit.stiffness.report.results import stress_results, stress_text
+    from forcefit.stiffness.surface.surface import read_surface
 
     materials, roll = parse_materials(young, poisson, density, part), parse_up(up)
     options = BeamOptions(
@@ -279,7 +279,7 @@ def stress(
     )  # fmt: skip
     peak = peak_stress(solved, load, section=declared, up=roll, away=away, gravity=g)
     if figure is not None:
-        from stiffness.report.plot import plot_stress
+        from forcefit.stiffness.report.plot import plot_stress
 
         everywhere = stress_influence(solved, away=0.0)
         ends = solved.link.base, solved.link.tip

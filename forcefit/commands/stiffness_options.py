@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from forcefit.commands.beam_options import BeamOptions
-    from stiffness.fem.material import Material
-    from stiffness.link import LinkStiffness
-    from stiffness.surface.interface import Interface
+    from forcefit.stiffness.fem.material import Material
+    from forcefit.stiffness.link import LinkStiffness
+    from forcefit.stiffness.surface.interface import Interface
 
 Surface = Annotated[
     Path,
@@ -136,7 +136,7 @@ def parse_interfaces(
     base: str | None, tip: str | None
 ) -> "tuple[Interface, Interface]":
     """Return the interfaces of ``--base`` and ``--tip``."""
-    from stiffness.surface.interface import parse_interface
+    from forcefit.stiffness.surface.interface import parse_interface
 
     if base is None or tip is None:
         option = "--base" if base is None else "--tip"
@@ -157,8 +157,8 @@ def parse_materials(
     """Return the materials of the link: the one that fills it, then those of parts."""
     from forcefit.commands.beam_options import BeamOptions
     from forcefit.inputs.errors import checked
-    from stiffness.fem.material import Material
-    from stiffness.fem.part_text import parse_part
+    from forcefit.stiffness.fem.material import Material
+    from forcefit.stiffness.fem.part_text import parse_part
 
     others = [parse_part("--part", text) for text in parts or ()]
     if (young is None) != (poisson is None):
@@ -187,9 +187,9 @@ def curve_link(
 ) -> "tuple[LinkStiffness, float, float]":
     """Return a beam along a curve, the size of its section, and its length [m]."""
     from forcefit.commands.beam_options import beam_name
-    from stiffness.beam.curve import curve_compliance, curve_length
-    from stiffness.beam.curve_file import read_curve
-    from stiffness.link import LinkStiffness
+    from forcefit.stiffness.beam.curve import curve_compliance, curve_length
+    from forcefit.stiffness.beam.curve_file import read_curve
+    from forcefit.stiffness.link import LinkStiffness
 
     E, nu = options.material()
     theory = options.checked_theory()

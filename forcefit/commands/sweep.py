@@ -35,13 +35,13 @@ from forcefit.inputs.writing import (
 )
 
 if TYPE_CHECKING:
-    from assembly.sweeps.sweep import Solver
+    from forcefit.assembly.sweeps.sweep import Solver
 
 
 def _list_quantities(names: list[str] | None) -> list[str] | None:
     """Print the data variables of sweeps if ``list`` is requested."""
     if names == ["list"]:
-        from assembly.sweeps.selection import quantities_text
+        from forcefit.assembly.sweeps.selection import quantities_text
 
         print(quantities_text())
         raise typer.Exit
@@ -146,18 +146,18 @@ def sweep(
     Finished points are kept in OUTPUT.journal.  After an interruption the same command
     continues from there and produces the same file.
     """
-    from assembly.model.statuses import UNUSABLE
-    from assembly.sweeps.dataset import check_dataset, open_dataset
-    from assembly.sweeps.maps import check_axes, figure_of
-    from assembly.sweeps.netcdf import stored_dataset
-    from assembly.sweeps.point_table import write_point_table
-    from assembly.sweeps.request import (
+    from forcefit.assembly.model.statuses import UNUSABLE
+    from forcefit.assembly.sweeps.dataset import check_dataset, open_dataset
+    from forcefit.assembly.sweeps.maps import check_axes, figure_of
+    from forcefit.assembly.sweeps.netcdf import stored_dataset
+    from forcefit.assembly.sweeps.point_table import write_point_table
+    from forcefit.assembly.sweeps.request import (
         SweepOptions,
         ask_sweep,
         summary_of,
         summary_text,
     )
-    from assembly.sweeps.sweep import journal_path, run_sweep
+    from forcefit.assembly.sweeps.sweep import journal_path, run_sweep
 
     if workers is not None and scheduler is not None:
         raise BadInput(
@@ -228,10 +228,10 @@ def sweep(
 def _solver(workers: int | None, scheduler: str | None) -> "Solver":
     """Return solver of blocks of points: in this process, in several, on a cluster."""
     if workers is None and scheduler is None:
-        from assembly.sweeps.sweep import solve_here
+        from forcefit.assembly.sweeps.sweep import solve_here
 
         return solve_here
-    from assembly.sweeps.cluster import cluster_solver
+    from forcefit.assembly.sweeps.cluster import cluster_solver
 
     need("distributed")
     return cluster_solver(workers, scheduler)

@@ -40,8 +40,8 @@ from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from assembly.kinematics.posture import Posture
-    from assembly.model.robot import Robot
+    from forcefit.assembly.kinematics.posture import Posture
+    from forcefit.assembly.model.robot import Robot
 
 app = Commands(no_args_is_help=True)
 app.command()(diagnose)
@@ -78,8 +78,8 @@ def _with_errors(
     """Return the posture with one draw of errors, or with the robot's own errors."""
     if errors is None:
         return posture
-    from assembly.model.error_distributions import read_sources
-    from assembly.steps.bolted import bolt_joints
+    from forcefit.assembly.model.error_distributions import read_sources
+    from forcefit.assembly.steps.bolted import bolt_joints
 
     sources = read_sources(errors, posture.robot, fixed)
     errors_drawn = sources.errors(sources.draw(0, 1, seed)[0])
@@ -165,12 +165,15 @@ def crosscheck(
     Exit status 1 if a check fails, or if the robot has neither errors nor a load,
     because nothing can be compared then.
     """
-    from assembly.effects.robot_effects import apply_robot_effects
-    from assembly.exchange.robot_files import load_robot
-    from assembly.kinematics.closing import closing_of
-    from validation.crosscheck.crosscheck import Crosscheck, attempt
-    from validation.crosscheck.crosscheck import crosscheck as compare_models
-    from validation.crosscheck.stiffness_check import StiffnessCheck, check_stiffness
+    from forcefit.assembly.effects.robot_effects import apply_robot_effects
+    from forcefit.assembly.exchange.robot_files import load_robot
+    from forcefit.assembly.kinematics.closing import closing_of
+    from forcefit.validation.crosscheck.crosscheck import Crosscheck, attempt
+    from forcefit.validation.crosscheck.crosscheck import crosscheck as compare_models
+    from forcefit.validation.crosscheck.stiffness_check import (
+        StiffnessCheck,
+        check_stiffness,
+    )
 
     scales, wrench = parse_scales(scale), parse_load(load)
     g, covariates = parse_gravity(gravity), parse_covariates(under)
@@ -231,7 +234,7 @@ def crosscheck(
     if json != "-":
         print(failure["reason"] if results is None else results.text())
     if figure is not None and isinstance(results, Crosscheck):
-        from validation.crosscheck.plot import slope_figure
+        from forcefit.validation.crosscheck.plot import slope_figure
 
         save_figure(slope_figure(results), figure)
     if results is None or not results.passed:
@@ -242,8 +245,12 @@ def _crosscheck_grid(
     machine: "Robot", grid: str, compare: "Callable[[Posture], Any]", json: str | None
 ) -> None:
     """Compare at every pose of a grid, with a progress bar."""
-    from assembly.sweeps.targets import parse_grid
-    from validation.crosscheck.poses import check_poses, poses_table, poses_text
+    from forcefit.assembly.sweeps.targets import parse_grid
+    from forcefit.validation.crosscheck.poses import (
+        check_poses,
+        poses_table,
+        poses_text,
+    )
 
     axes = parse_grid(grid)
     with progress_bars() as update:
@@ -292,11 +299,11 @@ def validity(
     --solids also errors of the platform's stiffness.  Exit status 1 if there is nothing
     to compare, because the robot has no errors and no load.
     """
-    from assembly.sweeps.targets import grid_targets, parse_grid, read_targets
-    from validation.assumptions.over_poses import costs_at, costs_over_poses
-    from validation.assumptions.platform_cost import PlatformCosts
-    from validation.assumptions.plot import platform_cost_figure
-    from validation.assumptions.report import (
+    from forcefit.assembly.sweeps.targets import grid_targets, parse_grid, read_targets
+    from forcefit.validation.assumptions.over_poses import costs_at, costs_over_poses
+    from forcefit.validation.assumptions.platform_cost import PlatformCosts
+    from forcefit.validation.assumptions.plot import platform_cost_figure
+    from forcefit.validation.assumptions.report import (
         costs_table,
         costs_text,
         over_poses_table,

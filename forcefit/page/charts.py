@@ -2,7 +2,7 @@
 
 A chart is a list of plotly traces.  Every axis has its SI unit and a display unit.  A
 map shows several quantities over one or two axes, and has all numbers of each point.  A
-scene shows a robot, see :mod:`assembly.report.scene`.
+scene shows a robot, see :mod:`forcefit.assembly.report.scene`.
 """
 
 import html

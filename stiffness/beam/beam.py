@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from forcefit.inputs.errors import BadInput, describe, nearest
-from stiffness.beam.sections import Section, check_material, check_positive
-from stiffness.screws import UNIT_VECTORS
+from forcefit.stiffness.beam.sections import Section, check_material, check_positive
+from forcefit.stiffness.screws import UNIT_VECTORS
 
 THEORIES = ("timoshenko", "euler")
 
@@ -36,7 +36,7 @@ def beam_compliance(
     The link is clamped at its base; the screw is read at its tip.  Bending, torsion,
     stretching and (Timoshenko) shear are included.  Warping restraint, taper and the
     local compliance of the end fittings are left out;
-    :func:`stiffness.fem.fea.mesh_link` includes them.
+    :func:`forcefit.stiffness.fem.fea.mesh_link` includes them.
 
     Args:
         length: [m] from the clamped section to the tip, > 0.
@@ -60,7 +60,7 @@ def beam_compliance(
     Example:
         A downward force of 100 N rotates the tip about y:
 
-        >>> from stiffness.beam.sections import round_section
+        >>> from forcefit.stiffness.beam.sections import round_section
         >>> section = round_section(0.04, nu=0.3)
         >>> C = beam_compliance(0.452, section, E=60e9, nu=0.3)
         >>> print(f"{C[1] @ [0, 0, 0, 0, 0, -100.0] * 1e6:.1f} urad")

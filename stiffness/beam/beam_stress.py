@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from forcefit.inputs.table import BadInput
-from stiffness.beam.sections import Section, declared_section
+from forcefit.stiffness.beam.sections import Section, declared_section
 
 # number of fibres around a round section; the error between two fibres is at most 4e-5
 _AROUND = 360
@@ -57,7 +57,7 @@ def peak_beam_stress(
     - hollow rectangle: 33 points along each outer side.
 
     Two local effects are left out: the stress where a joint holds the link's ends (a
-    held edge is singular, see :mod:`stiffness.fem.stress`), and the stress in the inner
+    held edge is singular, see :mod:`forcefit.stiffness.fem.stress`), and the stress in the inner
     corners of a hollow rectangle, which depends on their fillets.
 
     Args:

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from forcefit.inputs.table import BadInput, describe, nearest
-from stiffness.beam.beam import THEORIES, section_axes, unit_vector
-from stiffness.beam.sections import Section, check_material
-from stiffness.screws import rotation_matrix, screw_map
+from forcefit.stiffness.beam.beam import THEORIES, section_axes, unit_vector
+from forcefit.stiffness.beam.sections import Section, check_material
+from forcefit.stiffness.screws import rotation_matrix, screw_map
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 _MOST_PARTS = 128
@@ -37,7 +37,7 @@ class Piece:
         section: function of t that returns the section.
         up: function of t that returns the section's z (3,), whose component along the
             tangent is removed; None for the default of
-            :func:`stiffness.beam.beam.section_axes`.
+            :func:`forcefit.stiffness.beam.beam.section_axes`.
     """
 
     place: Callable[[float], NDArray]
@@ -148,7 +148,7 @@ def curve_compliance(
     Example:
         A force at the end of an L of two bars, parallel to the first, bends both:
 
-        >>> from stiffness.beam.sections import round_section
+        >>> from forcefit.stiffness.beam.sections import round_section
         >>> bar = round_section(0.01, nu=0.3)
         >>> L = [straight_piece([0, 0, 0], [0.2, 0, 0], bar),
         ...      straight_piece([0.2, 0, 0], [0.2, 0.2, 0], bar)]

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput, Table, read_toml
-from stiffness.beam.curve import Piece, arc_piece, straight_piece
-from stiffness.beam.sections import Section, check_section, declared_section
+from forcefit.stiffness.beam.curve import Piece, arc_piece, straight_piece
+from forcefit.stiffness.beam.sections import Section, check_section, declared_section
 
 _LARGEST = 1e6  # largest absolute value in SI units; no beam has a larger one
 

@@ -261,7 +261,7 @@ def check_section(place: str, given: Mapping[str, float]) -> None:
     Args:
         place: name of the key, for the message.
         given: lengths or constants by name, see
-            :func:`stiffness.beam.sections.declared_section`.
+            :func:`forcefit.stiffness.beam.sections.declared_section`.
 
     Raises:
         BadInput: a name does not belong to a section, a name is missing, or a value is

@@ -14,10 +14,10 @@ from scipy.sparse import triu
 
 from forcefit.inputs.errors import BadInput, describe
 from forcefit.inputs.table import read_text
-from stiffness.exchange.matrix_file import FileMatrix
-from stiffness.exchange.nastran_files import bulk_fields
-from stiffness.exchange.real_numbers import real
-from stiffness.surface.interface import Interface, parse_interface
+from forcefit.stiffness.exchange.matrix_file import FileMatrix
+from forcefit.stiffness.exchange.nastran_files import bulk_fields
+from forcefit.stiffness.exchange.real_numbers import real
+from forcefit.stiffness.surface.interface import Interface, parse_interface
 
 _GRID = re.compile(r"^GRID\*?[\s,]", re.M | re.I)
 _NODE = re.compile(r"^\*NODE\s*(?:,.*)?$", re.M | re.I)
@@ -187,7 +187,7 @@ def condensed(
         BadInput: the interfaces share rows, or other degrees of freedom are not
             connected to them.
     """
-    from stiffness.fem.sparse_solver import solve
+    from forcefit.stiffness.fem.sparse_solver import solve
 
     n = matrix.matrix.shape[0]
     fields, free = np.zeros((n, 12)), np.ones(n, dtype=bool)

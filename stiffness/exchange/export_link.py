@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.errors import BadInput, nearest, one_line, quoted
 from forcefit.inputs.table import read_text
-from stiffness.exchange.import_link import LENGTHS
-from stiffness.exchange.two_interfaces import both_ends
-from stiffness.report.export import PROGRAMS, stiffness_for
+from forcefit.stiffness.exchange.import_link import LENGTHS
+from forcefit.stiffness.exchange.two_interfaces import both_ends
+from forcefit.stiffness.report.export import PROGRAMS, stiffness_for
 
 FORMATS = ("matrix-market", "abaqus", "calculix", "nastran", "numpy", *PROGRAMS)
 # indices that put translations before rotations at each node
@@ -65,7 +65,7 @@ def link_file(
 
     Returns:
         The content, with translations first at each node; for ``exudyn``, ``adams`` and
-        ``mapdl`` the result of :func:`stiffness.report.export.stiffness_for`.
+        ``mapdl`` the result of :func:`forcefit.stiffness.report.export.stiffness_for`.
 
     Raises:
         BadInput: the format or unit is unknown, or the format has a fixed unit.

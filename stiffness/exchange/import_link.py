@@ -8,10 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.errors import BadInput, nearest, quoted
-from stiffness.exchange.condensing import condensed, interface_rows, read_nodes
-from stiffness.exchange.matrix_file import FileMatrix, read_matrix
-from stiffness.exchange.two_interfaces import link_of_both_ends, mass_of_both_ends
-from stiffness.link import LinkStiffness, check_definite, inverted
+from forcefit.stiffness.exchange.condensing import condensed, interface_rows, read_nodes
+from forcefit.stiffness.exchange.matrix_file import FileMatrix, read_matrix
+from forcefit.stiffness.exchange.two_interfaces import (
+    link_of_both_ends,
+    mass_of_both_ends,
+)
+from forcefit.stiffness.link import LinkStiffness, check_definite, inverted
 
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "inch": 0.0254}
 ORDERS = ("translations-first", "rotations-first")
@@ -30,7 +33,7 @@ def import_link(
     """Return a link from a matrix of 6, 12 or more degrees of freedom.
 
     Args:
-        path: file of the stiffness matrix, see :mod:`stiffness.exchange.matrix_file`.
+        path: file of the stiffness matrix, see :mod:`forcefit.stiffness.exchange.matrix_file`.
         mass: file of the mass matrix for the same degrees of freedom; None without one.
         nodes: file with the positions of nodes, needed for interfaces of many nodes.
             Their order applies to rows that the matrix file does not name.

@@ -4,15 +4,15 @@
 file               written by
 =================  ===============================================================
 Matrix Market      Ansys (``*EXPORT,..,MMF``), SciPy, Exudyn scripts: ``.mtx``;
-                   see :mod:`stiffness.exchange.matrix_market`
+                   see :mod:`forcefit.stiffness.exchange.matrix_market`
 Harwell-Boeing     Ansys (``HBMAT``): ``.matrix``; see
-                   :mod:`stiffness.exchange.ansys_files` for its ``.mapping``
+                   :mod:`forcefit.stiffness.exchange.ansys_files` for its ``.mapping``
 user element       Abaqus and CalculiX, ``*SUBSTRUCTURE MATRIX OUTPUT``: ``.mtx``
 five columns       Abaqus ``*MATRIX OUTPUT``: node, direction, twice, and a value
 three columns      the same with ``FORMAT=COORDINATE``: row, column, value; CalculiX
                    ``SOLVER=MATRIXSTORAGE``: ``.sti``, ``.mas``, with their ``.dof``
 DMIG               Nastran: ``.pch``, ``.dmig``; see
-                   :mod:`stiffness.exchange.nastran_files`
+                   :mod:`forcefit.stiffness.exchange.nastran_files`
 NumPy              ``.npy``, SciPy's sparse ``.npz``
 =================  ===============================================================
 
@@ -31,10 +31,14 @@ from scipy.sparse import coo_array, csr_array
 
 from forcefit.inputs.errors import BadInput, describe, one_line
 from forcefit.inputs.table import read_text
-from stiffness.exchange.ansys_files import LARGEST, harwell_boeing, read_mapping
-from stiffness.exchange.matrix_market import matrix_market
-from stiffness.exchange.nastran_files import DMIG, Freedom, dmig_entries
-from stiffness.exchange.real_numbers import real, whole
+from forcefit.stiffness.exchange.ansys_files import (
+    LARGEST,
+    harwell_boeing,
+    read_mapping,
+)
+from forcefit.stiffness.exchange.matrix_market import matrix_market
+from forcefit.stiffness.exchange.nastran_files import DMIG, Freedom, dmig_entries
+from forcefit.stiffness.exchange.real_numbers import real, whole
 
 _ENDINGS = (
     ".mtx", ".sti", ".mas", ".pch", ".dmig", ".bdf", ".dat", ".txt", ".npy", ".npz",

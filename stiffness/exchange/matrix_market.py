@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, tril, triu
 
 from forcefit.inputs.errors import BadInput, describe
-from stiffness.exchange.ansys_files import LARGEST, both_halves
-from stiffness.exchange.real_numbers import real
+from forcefit.stiffness.exchange.ansys_files import LARGEST, both_halves
+from forcefit.stiffness.exchange.real_numbers import real
 
 _MARKET = (
     {"matrix"}, {"coordinate", "array"}, {"real", "integer", "double"},

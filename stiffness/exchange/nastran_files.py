@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from forcefit.inputs.errors import BadInput, describe
-from stiffness.exchange.real_numbers import real, whole
+from forcefit.stiffness.exchange.real_numbers import real, whole
 
 Freedom = tuple[int, int]
 Entries = dict[tuple[Freedom, Freedom], float]

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from forcefit.inputs.errors import BadInput
-from stiffness.link import LinkStiffness, check_definite, inverted
-from stiffness.screws import screw_map, skew
+from forcefit.stiffness.link import LinkStiffness, check_definite, inverted
+from forcefit.stiffness.screws import screw_map, skew
 
 # relative to the scale of K12: residual wrench due to text of seven digits
 _BALANCED = 1e-5

@@ -1,6 +1,6 @@
 """One step of adaptive refinement: solve, estimate the error, mark, refine.
 
-The error indicator (:mod:`stiffness.fem.error_indicator`) is multiplied by an
+The error indicator (:mod:`forcefit.stiffness.fem.error_indicator`) is multiplied by an
 effectivity index.  This is the change of the stiffness in the last refinement, divided
 by the change of the indicator.
 
@@ -16,33 +16,33 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from stiffness.fem.condensation import Condensed, condense
-from stiffness.fem.elements import ORDER, Elements, isoparametric
-from stiffness.fem.error_indicator import (
+from forcefit.stiffness.fem.condensation import Condensed, condense
+from forcefit.stiffness.fem.elements import ORDER, Elements, isoparametric
+from forcefit.stiffness.fem.error_indicator import (
     error_matrices,
     geometry_errors,
     material_errors,
     traction_errors,
 )
-from stiffness.fem.material import (
+from forcefit.stiffness.fem.material import (
     Material,
     material_at,
     material_of_elements,
     regions_of,
 )
-from stiffness.fem.quality import volume_error
-from stiffness.link import scaled
-from stiffness.mesh.curved_elements import refine_inverted
-from stiffness.mesh.edge_grading import (
+from forcefit.stiffness.fem.quality import volume_error
+from forcefit.stiffness.link import scaled
+from forcefit.stiffness.mesh.curved_elements import refine_inverted
+from forcefit.stiffness.mesh.edge_grading import (
     ENDS,
     graded_edges,
     layered,
     split_joining_edges,
 )
-from stiffness.mesh.improve import fitted
-from stiffness.mesh.refine import refine
-from stiffness.mesh.regions import is_jagged
-from stiffness.mesh.solid import Solid
+from forcefit.stiffness.mesh.improve import fitted
+from forcefit.stiffness.mesh.refine import refine
+from forcefit.stiffness.mesh.regions import is_jagged
+from forcefit.stiffness.mesh.solid import Solid
 
 # effectivity index of the first mesh; 0.6 to 1.1 was measured on the training parts of
 # benchmarks/evidence/stiffness_random_parts.py

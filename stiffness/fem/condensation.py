@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from stiffness.fem.elements import Elements, assemble, triangle_areas
-from stiffness.fem.sparse_solver import solve
-from stiffness.link import inverted
-from stiffness.screws import screw_map, skew
+from forcefit.stiffness.fem.elements import Elements, assemble, triangle_areas
+from forcefit.stiffness.fem.sparse_solver import solve
+from forcefit.stiffness.link import inverted
+from forcefit.stiffness.screws import screw_map, skew
 
 KINDS = ("rigid", "distributing", "distributing-both")
 

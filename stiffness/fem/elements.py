@@ -8,7 +8,7 @@ G      their gradients in space                                   (t, q, m, 3)
 w      quadrature weights times the Jacobian's determinant        (t, q)
 ====== ========================================================== ==========
 
-An element's m nodes are those of its lattice (:mod:`stiffness.mesh.lagrange`): 20 in a
+An element's m nodes are those of its lattice (:mod:`forcefit.stiffness.mesh.lagrange`): 20 in a
 cubic tetrahedron, 10 in a quadratic one.  The stiffness is assembled from the scalar
 gradients of all elements together, which is much faster than from a weak form: K[ai,
 bj] = sum_q w (lam G_ai G_bj + mu G_aj G_bi + mu d_ij G_a . G_b). Straight tetrahedra
@@ -23,17 +23,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from stiffness.mesh.curved_elements import curved_elements
-from stiffness.mesh.edge_grading import Parts, whole_elements
-from stiffness.mesh.lagrange import (
+from forcefit.stiffness.mesh.curved_elements import curved_elements
+from forcefit.stiffness.mesh.edge_grading import Parts, whole_elements
+from forcefit.stiffness.mesh.lagrange import (
     FACES,
     face_nodes,
     lattice,
     numbered,
     shape_functions,
 )
-from stiffness.mesh.quadrature import quadrature
-from stiffness.mesh.solid import Solid
+from forcefit.stiffness.mesh.quadrature import quadrature
+from forcefit.stiffness.mesh.solid import Solid
 
 # cubic; quadratic elements need several times as many unknowns for an error of 0.1 %
 ORDER = 3

@@ -31,9 +31,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.fem.elements import Elements, gradients_on_faces, integration
-from stiffness.surface.primitives import Plane, Shape
-from stiffness.surface.true_surface import TrueSurface
+from forcefit.stiffness.fem.elements import Elements, gradients_on_faces, integration
+from forcefit.stiffness.surface.primitives import Plane, Shape
+from forcefit.stiffness.surface.true_surface import TrueSurface
 
 VOIGT = np.array([[0, 0], [1, 1], [2, 2], [1, 2], [0, 2], [0, 1]])
 _SAME_MODULUS = 1e-6  # relative difference of two moduli that count as equal

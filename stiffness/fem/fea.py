@@ -1,7 +1,7 @@
 """A link's stiffness from its surface by finite elements, with an error estimate.
 
 A surface is meshed into tetrahedra, from which a stiffness and an estimate of its error
-are computed (:mod:`stiffness.fem.adaptive_step`).  The elements that contribute most to
+are computed (:mod:`forcefit.stiffness.fem.adaptive_step`).  The elements that contribute most to
 the error are refined until the required accuracy is reached or the budget is used.
 """
 
@@ -19,33 +19,33 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput, describe, nearest
 from forcefit.results.display import html_table, short_repr
-from stiffness.fem.adaptive_step import (
+from forcefit.stiffness.fem.adaptive_step import (
     Level,
     estimated_error,
     middle_stiffness,
     refine_level,
     solve_level,
 )
-from stiffness.fem.condensation import KINDS
-from stiffness.fem.mass_properties import PointMass, mass_properties
-from stiffness.fem.material import Material, check_materials, regions_of
-from stiffness.fem.material_of_solids import placed_materials
-from stiffness.fem.quality import mesh_report
-from stiffness.fem.sparse_solver import expected_cost, solver_name
-from stiffness.link import LinkStiffness, inverted, scaled
-from stiffness.mesh.fit_to_patches import MeshFailed
-from stiffness.mesh.mesh import mesh_solid
-from stiffness.mesh.regions import cut_by_regions
-from stiffness.mesh.slender_bar import slender_bar
-from stiffness.mesh.solid import Solid
-from stiffness.mesh.straight_bar import straight_bar
-from stiffness.surface.interface import Interface
-from stiffness.surface.patches import (
+from forcefit.stiffness.fem.condensation import KINDS
+from forcefit.stiffness.fem.mass_properties import PointMass, mass_properties
+from forcefit.stiffness.fem.material import Material, check_materials, regions_of
+from forcefit.stiffness.fem.material_of_solids import placed_materials
+from forcefit.stiffness.fem.quality import mesh_report
+from forcefit.stiffness.fem.sparse_solver import expected_cost, solver_name
+from forcefit.stiffness.link import LinkStiffness, inverted, scaled
+from forcefit.stiffness.mesh.fit_to_patches import MeshFailed
+from forcefit.stiffness.mesh.mesh import mesh_solid
+from forcefit.stiffness.mesh.regions import cut_by_regions
+from forcefit.stiffness.mesh.slender_bar import slender_bar
+from forcefit.stiffness.mesh.solid import Solid
+from forcefit.stiffness.mesh.straight_bar import straight_bar
+from forcefit.stiffness.surface.interface import Interface
+from forcefit.stiffness.surface.patches import (
     find_patches,
     refuse_common_edges,
     triangles_on,
 )
-from stiffness.surface.surface import Surface, read_surface
+from forcefit.stiffness.surface.surface import Surface, read_surface
 
 _LOG = logging.getLogger("forcefit.finite_elements")
 _SETUP = 2.0  # [s] time of a solution that does not depend on the mesh
@@ -75,7 +75,7 @@ class FemOptions:
     Attributes:
         accuracy: [-] required error, for entries scaled by sqrt(K_ii K_jj).
         interface: ``"rigid"``, ``"distributing"`` (the tip) or ``"distributing-both"``,
-            see :mod:`stiffness.fem.condensation`.
+            see :mod:`forcefit.stiffness.fem.condensation`.
         budget: limits of the computing cost.
         cache: folder of meshes; the user's cache folder if absent.
     """
@@ -143,7 +143,7 @@ def mesh_link(
         BadInput: the file or an interface is invalid.
 
     Sources:
-        Rivara (1984) for the bisection; :mod:`stiffness.fem.error_indicator` for the
+        Rivara (1984) for the bisection; :mod:`forcefit.stiffness.fem.error_indicator` for the
         error.
     """
     shape = read_surface(Path(surface), unit)
@@ -205,7 +205,7 @@ def solve_bar(
 
     Args:
         section: lengths of the section relative to the bar's length, see
-            :func:`stiffness.mesh.straight_bar.straight_bar`.
+            :func:`forcefit.stiffness.mesh.straight_bar.straight_bar`.
         material: material of the bar.
         options: options of the solution; no mesher runs.
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.fem.elements import Elements, integration
+from forcefit.stiffness.fem.elements import Elements, integration
 
 
 @dataclass(frozen=True, eq=False)

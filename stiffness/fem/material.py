@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput
-from stiffness.beam.sections import check_material
-from stiffness.fem.elements import Elements, lame
-from stiffness.mesh.cut_face import CutFace
-from stiffness.mesh.regions import Region, region_of_places
+from forcefit.stiffness.beam.sections import check_material
+from forcefit.stiffness.fem.elements import Elements, lame
+from forcefit.stiffness.mesh.cut_face import CutFace
+from forcefit.stiffness.mesh.regions import Region, region_of_places
 
 
 @dataclass(frozen=True, eq=False)

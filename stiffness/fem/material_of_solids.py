@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput, nearest, quoted
-from stiffness.fem.material import Material
-from stiffness.mesh.cut_face import CutFace
-from stiffness.surface.filled_solids import FilledSolids
-from stiffness.surface.recognition import recognise
-from stiffness.surface.surface import Surface, orient_shells
-from stiffness.surface.triangle_graph import TriangleGraph
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.mesh.cut_face import CutFace
+from forcefit.stiffness.surface.filled_solids import FilledSolids
+from forcefit.stiffness.surface.recognition import recognise
+from forcefit.stiffness.surface.surface import Surface, orient_shells
+from forcefit.stiffness.surface.triangle_graph import TriangleGraph
 
 
 def placed_materials(

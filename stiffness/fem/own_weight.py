@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput
-from stiffness.fem.elements import Elements, assemble, integration
-from stiffness.fem.fea import MeshedLink
-from stiffness.fem.sparse_solver import solve
-from stiffness.link import inverted
+from forcefit.stiffness.fem.elements import Elements, assemble, integration
+from forcefit.stiffness.fem.fea import MeshedLink
+from forcefit.stiffness.fem.sparse_solver import solve
+from forcefit.stiffness.link import inverted
 
 
 def with_own_weight(solved: MeshedLink) -> MeshedLink:

@@ -9,10 +9,10 @@ from forcefit.inputs.assignments import parse_assignments
 from forcefit.inputs.errors import checked
 from forcefit.inputs.number_arrays import comma_numbers
 from forcefit.inputs.table import BadInput, Table, describe
-from stiffness.fem.mass_properties import PointMass
-from stiffness.fem.material import Material
-from stiffness.mesh.cut_face import CutFace
-from stiffness.surface.primitives import Plane
+from forcefit.stiffness.fem.mass_properties import PointMass
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.mesh.cut_face import CutFace
+from forcefit.stiffness.surface.primitives import Plane
 
 _PART = (
     '"z=0.2..0.4/young=2e11,poisson=0.3", "x=0..1,z=0..0.1/...,density=7800" or '

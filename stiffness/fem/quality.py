@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.fem.elements import Elements, integration, triangle_areas
-from stiffness.mesh.lagrange import EDGES
-from stiffness.mesh.solid import Solid, element_quality
-from stiffness.surface.surface import directed_edges
+from forcefit.stiffness.fem.elements import Elements, integration, triangle_areas
+from forcefit.stiffness.mesh.lagrange import EDGES
+from forcefit.stiffness.mesh.solid import Solid, element_quality
+from forcefit.stiffness.surface.surface import directed_edges
 
 _FLAT = 0.01  # quality below which a tetrahedron is inaccurate and badly conditioned
 

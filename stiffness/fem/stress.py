@@ -16,13 +16,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
-from stiffness.beam.beam import section_axes
-from stiffness.beam.beam_stress import peak_beam_stress
-from stiffness.fem.adaptive_step import Level
-from stiffness.fem.elements import Elements, triangle_areas
-from stiffness.fem.fea import MeshedLink
-from stiffness.fem.own_weight import with_own_weight
-from stiffness.fem.stress_error import (
+from forcefit.stiffness.beam.beam import section_axes
+from forcefit.stiffness.beam.beam_stress import peak_beam_stress
+from forcefit.stiffness.fem.adaptive_step import Level
+from forcefit.stiffness.fem.elements import Elements, triangle_areas
+from forcefit.stiffness.fem.fea import MeshedLink
+from forcefit.stiffness.fem.own_weight import with_own_weight
+from forcefit.stiffness.fem.stress_error import (
     ZONE,
     element_stresses,
     estimated_error,
@@ -32,7 +32,7 @@ from stiffness.fem.stress_error import (
     on_inner_edges,
     von_mises,
 )
-from stiffness.link import inverted
+from forcefit.stiffness.link import inverted
 
 _CHUNK = 4096  # number of elements in a batch: 4096 x 20 x 36 values are 24 MB
 
@@ -43,7 +43,7 @@ class StressSource:
 
     Attributes:
         level: the solved mesh with n nodes, numbered by
-            :func:`stiffness.fem.stress_error.nodes_by_material`.
+            :func:`forcefit.stiffness.fem.stress_error.nodes_by_material`.
         far: (n,) bool, True for nodes far enough from the interfaces.
         singular: (n,) bool, True for nodes on re-entrant edges without a fillet.
         faceted: (n,) bool, True for nodes on a surface of no recognised shape.
@@ -66,7 +66,7 @@ class StressInfluence:
         places: (p, 3) [m] positions of the nodes, in the link's axes.
         influence: (p, 6, 6) [Pa/(N m), Pa/N] stress xx yy zz yz xz xy for each
             component of the tip's wrench.  If the link was solved under its own weight
-            (:func:`stiffness.fem.own_weight.with_own_weight`), it is (p, 9, 6) and the
+            (:func:`forcefit.stiffness.fem.own_weight.with_own_weight`), it is (p, 9, 6) and the
             last three rows [Pa per m/s^2] are for gravity; a wrench then has nine
             components, gravity last.
         away: [m] smallest distance of these nodes from an interface.
@@ -195,10 +195,10 @@ def peak_stress(
     """Return the peak stress of a tip wrench, by elements and by the beam formula.
 
     Args:
-        solved: result of :func:`stiffness.fem.fea.solve_link`.
+        solved: result of :func:`forcefit.stiffness.fem.fea.solve_link`.
         wrench: (6,) [N m, N] at the tip, in the link's axes.
         section: section of a straight beam from base to tip, in the form of
-            :func:`stiffness.beam.beam_stress.peak_beam_stress`.
+            :func:`forcefit.stiffness.beam.beam_stress.peak_beam_stress`.
         up: (3,) the section's z axis, in the link's axes.
         away: [m] distance from the interfaces; one interface radius if absent.
         gravity: (3,) [m/s^2] in the link's axes, for the link's own weight.
@@ -258,7 +258,7 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     """Return the stresses of the six unit tip wrenches of a solved link.
 
     Args:
-        solved: result of :func:`stiffness.fem.fea.solve_link`; a node between two
+        solved: result of :func:`forcefit.stiffness.fem.fea.solve_link`; a node between two
             materials counts once for each material.
         away: [m] distance from the interfaces; one interface radius if absent.
 

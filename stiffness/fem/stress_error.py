@@ -19,14 +19,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffness.fem.elements import node_gradients
-from stiffness.fem.error_indicator import VOIGT
-from stiffness.mesh.edge_grading import singular_edges
-from stiffness.mesh.regions import edges_between
-from stiffness.surface.facets import Facets
+from forcefit.stiffness.fem.elements import node_gradients
+from forcefit.stiffness.fem.error_indicator import VOIGT
+from forcefit.stiffness.mesh.edge_grading import singular_edges
+from forcefit.stiffness.mesh.regions import edges_between
+from forcefit.stiffness.surface.facets import Facets
 
 if TYPE_CHECKING:
-    from stiffness.fem.adaptive_step import Level
+    from forcefit.stiffness.fem.adaptive_step import Level
 
 # ratio of the error of a peak to the differences around it: at most 1.6, and 0.3 in the
 # median, for 9 shouldered bars in tension, torsion and bending on their first meshes

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.fem.condensation import condense, rigid_motions
-from stiffness.fem.elements import integration
-from stiffness.fem.fea import MeshedLink
-from stiffness.screws import screw_map
+from forcefit.stiffness.fem.condensation import condense, rigid_motions
+from forcefit.stiffness.fem.elements import integration
+from forcefit.stiffness.fem.fea import MeshedLink
+from forcefit.stiffness.screws import screw_map
 
 
 @dataclass(frozen=True, eq=False)

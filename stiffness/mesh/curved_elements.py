@@ -15,7 +15,7 @@ from itertools import count as steps
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.mesh.lagrange import (
+from forcefit.stiffness.mesh.lagrange import (
     EDGES,
     FACES,
     face_nodes,
@@ -23,10 +23,10 @@ from stiffness.mesh.lagrange import (
     numbered,
     shape_functions,
 )
-from stiffness.mesh.quadrature import quadrature
-from stiffness.mesh.refine import refine
-from stiffness.mesh.solid import Solid, node_patches, on_shapes
-from stiffness.surface.primitives import Shape
+from forcefit.stiffness.mesh.quadrature import quadrature
+from forcefit.stiffness.mesh.refine import refine
+from forcefit.stiffness.mesh.solid import Solid, node_patches, on_shapes
+from forcefit.stiffness.surface.primitives import Shape
 
 _LARGEST_MOVE = 0.05  # relative to the part's size: largest displacement of a node
 # ratio of smallest to largest Jacobian determinant of an element, below which it is

@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.mesh.refine import edge_code
-from stiffness.mesh.solid import Solid
-from stiffness.mesh.split_crossing import split_crossing
-from stiffness.surface.smooth_outline import SmoothOutline
+from forcefit.stiffness.mesh.refine import edge_code
+from forcefit.stiffness.mesh.solid import Solid
+from forcefit.stiffness.mesh.split_crossing import split_crossing
+from forcefit.stiffness.surface.smooth_outline import SmoothOutline
 
 # relative to the shortest edge at a corner: distance within which it is moved onto the
 # outline

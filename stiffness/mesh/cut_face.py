@@ -10,17 +10,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.mesh.lagrange import FACES
-from stiffness.mesh.refine import edge_code, edges_of, refine, split_edges
-from stiffness.mesh.solid import (
+from forcefit.stiffness.mesh.lagrange import FACES
+from forcefit.stiffness.mesh.refine import edge_code, edges_of, refine, split_edges
+from forcefit.stiffness.mesh.solid import (
     Solid,
     corner_groups,
     meeting_shapes,
     moved_onto_shapes,
 )
-from stiffness.mesh.split_crossing import one_of_each, split_crossing
-from stiffness.surface.facets import Facets
-from stiffness.surface.primitives import Plane, Shape, project
+from forcefit.stiffness.mesh.split_crossing import one_of_each, split_crossing
+from forcefit.stiffness.surface.facets import Facets
+from forcefit.stiffness.surface.primitives import Plane, Shape, project
 
 # relative to a corner's shortest edge: distance within which it is moved onto the face
 _NEAR = 0.3

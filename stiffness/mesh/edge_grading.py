@@ -19,15 +19,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.mesh.refine import (
+from forcefit.stiffness.mesh.refine import (
     chosen_by_all,
     edge_code,
     edges_of,
     length_ranks,
     split_edges,
 )
-from stiffness.mesh.regions import Region, material_edges
-from stiffness.mesh.solid import Solid, moved_onto_shapes
+from forcefit.stiffness.mesh.regions import Region, material_edges
+from forcefit.stiffness.mesh.solid import Solid, moved_onto_shapes
 
 ENDS = (0, 1)  # patches of base and tip; distributed tractions end at their outlines
 # ratio of layer thickness to element size; 0.15 to 0.3 are equally accurate

@@ -4,13 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput
-from stiffness.mesh.cut_along import cut_along
-from stiffness.mesh.improve import fitted
-from stiffness.mesh.solid import Solid, boundary_faces, element_quality
-from stiffness.surface.decimate import euler_characteristic
-from stiffness.surface.patches import Patches
-from stiffness.surface.surface import Surface
-from stiffness.surface.true_surface import TrueSurface
+from forcefit.stiffness.mesh.cut_along import cut_along
+from forcefit.stiffness.mesh.improve import fitted
+from forcefit.stiffness.mesh.solid import Solid, boundary_faces, element_quality
+from forcefit.stiffness.surface.decimate import euler_characteristic
+from forcefit.stiffness.surface.patches import Patches
+from forcefit.stiffness.surface.surface import Surface
+from forcefit.stiffness.surface.true_surface import TrueSurface
 
 
 class MeshFailed(BadInput):

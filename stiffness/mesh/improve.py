@@ -14,9 +14,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.mesh.lagrange import EDGES
-from stiffness.mesh.refine import edge_code, edges_of, split_edges
-from stiffness.mesh.solid import (
+from forcefit.stiffness.mesh.lagrange import EDGES
+from forcefit.stiffness.mesh.refine import edge_code, edges_of, split_edges
+from forcefit.stiffness.mesh.solid import (
     Solid,
     corner_groups,
     corners_on_shapes,
@@ -25,8 +25,8 @@ from stiffness.mesh.solid import (
     moved_onto_shapes,
     tetrahedra_quality,
 )
-from stiffness.mesh.split_crossing import one_of_each
-from stiffness.surface.primitives import project
+from forcefit.stiffness.mesh.split_crossing import one_of_each
+from forcefit.stiffness.surface.primitives import project
 
 # quality below which a tetrahedron is improved; those of pytetwild are better
 POOR = 0.08

@@ -1,7 +1,7 @@
 """Tetrahedra from surfaces, with exact interfaces and curved faces.
 
 Pytetwild makes the tetrahedra from a surface with fewer triangles
-(:mod:`stiffness.surface.decimate`), in a separate process with a time limit.  The
+(:mod:`forcefit.stiffness.surface.decimate`), in a separate process with a time limit.  The
 boundary of the mesh follows the surface only to within an envelope.  So every boundary
 triangle is assigned to a patch of the surface, and the nodes are projected onto the
 exact shapes of the patches. Meshes are cached by their input, because pytetwild is slow
@@ -24,12 +24,12 @@ from forcefit.inputs.cache_folder import cache_folder
 from forcefit.inputs.packages import need
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import whole_file
-from stiffness.mesh.fit_to_patches import MeshFailed, fit_to_patches
-from stiffness.mesh.solid import Solid
-from stiffness.surface.decimate import coarser_surface
-from stiffness.surface.interface import Interface, parse_interface
-from stiffness.surface.patches import Patches, find_patches
-from stiffness.surface.surface import Surface, read_surface
+from forcefit.stiffness.mesh.fit_to_patches import MeshFailed, fit_to_patches
+from forcefit.stiffness.mesh.solid import Solid
+from forcefit.stiffness.surface.decimate import coarser_surface
+from forcefit.stiffness.surface.interface import Interface, parse_interface
+from forcefit.stiffness.surface.patches import Patches, find_patches
+from forcefit.stiffness.surface.surface import Surface, read_surface
 
 __all__ = ["Interface", "Solid", "mesh_solid", "parse_interface", "read_surface"]
 

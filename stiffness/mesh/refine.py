@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.mesh.lagrange import EDGES
-from stiffness.mesh.solid import Solid, moved_onto_shapes
+from forcefit.stiffness.mesh.lagrange import EDGES
+from forcefit.stiffness.mesh.solid import Solid, moved_onto_shapes
 
 _TRIANGLE = np.array([[0, 1], [1, 2], [0, 2]])
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.mesh.cut_face import (
+from forcefit.stiffness.mesh.cut_face import (
     ON_FACE,
     CutFace,
     cut,
@@ -18,10 +18,10 @@ from stiffness.mesh.cut_face import (
     faces_inside,
     without_chords,
 )
-from stiffness.mesh.improve import fitted
-from stiffness.mesh.lagrange import FACES
-from stiffness.mesh.refine import edge_code
-from stiffness.mesh.solid import Solid
+from forcefit.stiffness.mesh.improve import fitted
+from forcefit.stiffness.mesh.lagrange import FACES
+from forcefit.stiffness.mesh.refine import edge_code
+from forcefit.stiffness.mesh.solid import Solid
 
 _POOR = 0.2  # quality from which tetrahedra remain valid when they follow a curved face
 # share of a piece's volume in one region, from which on the whole piece belongs to it

@@ -12,13 +12,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.mesh.solid import Solid
-from stiffness.mesh.straight_bar import straight_bar
-from stiffness.surface.interface import Interface
-from stiffness.surface.patches import find_patches
-from stiffness.surface.primitives import Cone, Plane, Shape
-from stiffness.surface.surface import Surface
-from stiffness.surface.true_surface import TrueSurface
+from forcefit.stiffness.mesh.solid import Solid
+from forcefit.stiffness.mesh.straight_bar import straight_bar
+from forcefit.stiffness.surface.interface import Interface
+from forcefit.stiffness.surface.patches import find_patches
+from forcefit.stiffness.surface.primitives import Cone, Plane, Shape
+from forcefit.stiffness.surface.surface import Surface
+from forcefit.stiffness.surface.true_surface import TrueSurface
 
 # ratio of length to width of the section from which on a bar is slender
 _SLENDER = 50.0

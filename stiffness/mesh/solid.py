@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.results.display import html_table, short_repr
-from stiffness.mesh.lagrange import EDGES
-from stiffness.surface.primitives import Shape, project
-from stiffness.surface.true_surface import TrueSurface
+from forcefit.stiffness.mesh.lagrange import EDGES
+from forcefit.stiffness.surface.primitives import Shape, project
+from forcefit.stiffness.surface.true_surface import TrueSurface
 
 # corners of each face, in outward orientation
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
@@ -26,12 +26,12 @@ class Solid:
         patch: (f,) number of each face's patch; 0 is the base interface, 1 the tip.
         shapes: shape of each patch; None leaves the nodes of a patch unchanged.
         walls: for a pair of an interface and a patch that continues it smoothly, the
-            wall through their common line, see :mod:`stiffness.surface.smooth_outline`.
+            wall through their common line, see :mod:`forcefit.stiffness.surface.smooth_outline`.
         surface: surface to approximate; None if the shapes of the patches are
             sufficient.
         inner: (k, 3) corners of triangles inside the link, between regions.
         inner_patch: (k,) index of the shape of each inner triangle.
-        region: (t,) region of each tetrahedron, see :mod:`stiffness.mesh.regions`; None
+        region: (t,) region of each tetrahedron, see :mod:`forcefit.stiffness.mesh.regions`; None
             if the mesh was not cut.
     """
 

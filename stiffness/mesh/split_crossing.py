@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.mesh.refine import chosen_by_all, edges_of, split_edges
-from stiffness.mesh.solid import Solid
+from forcefit.stiffness.mesh.refine import chosen_by_all, edges_of, split_edges
+from forcefit.stiffness.mesh.solid import Solid
 
 _PASSES = 200
 Crossing = Callable[[Solid, NDArray, NDArray], tuple[NDArray, NDArray]]

@@ -15,8 +15,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.mesh.solid import Solid, boundary_faces
-from stiffness.surface.primitives import Cone, Plane, Shape
+from forcefit.stiffness.mesh.solid import Solid, boundary_faces
+from forcefit.stiffness.surface.primitives import Cone, Plane, Shape
 
 _AROUND = 8  # smallest number of elements around a full circle
 # largest distance between arc and chord in units of length, which limits refinement
@@ -34,7 +34,7 @@ def straight_bar(section: Mapping[str, float], longest: float = _LONGEST) -> Sol
 
     Args:
         section: lengths in the form of
-            :func:`stiffness.beam.sections.declared_section`, relative to the length of
+            :func:`forcefit.stiffness.beam.sections.declared_section`, relative to the length of
             the bar.
         longest: thickness of the thickest layer, in widths of the section.
 

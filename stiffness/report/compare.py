@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
-from stiffness.link import LinkStiffness, scaled
-from stiffness.screws import rotation_matrix, screw_map
+from forcefit.stiffness.link import LinkStiffness, scaled
+from forcefit.stiffness.screws import rotation_matrix, screw_map
 
 # largest ratio of the remaining to the original difference for a reported rotation
 _MUCH_BETTER = 0.25

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from forcefit.inputs.table import BadInput, nearest
-from stiffness.report.library import Entry
-from stiffness.screws import SCREW
+from forcefit.stiffness.report.library import Entry
+from forcefit.stiffness.screws import SCREW
 
 # programs that put translations and forces first; here the order is [R T] / [m f]
 PROGRAMS = ("exudyn", "adams", "mapdl")

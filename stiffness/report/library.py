@@ -2,7 +2,7 @@
 
 A library is a folder with one JSON file for each entry.  An entry holds the stiffness
 and its error, the mesh, the parameters and the material, the digest of the geometry,
-the version of the program and the date.  :mod:`stiffness.report.library_build` makes
+the version of the program and the date.  :mod:`forcefit.stiffness.report.library_build` makes
 entries.
 """
 
@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput, nearest, read_text
 from forcefit.results.display import html_table, short_repr
-from stiffness.link import check_definite, inverted, scaled
-from stiffness.screws import SCREW, WRENCH
+from forcefit.stiffness.link import check_definite, inverted, scaled
+from forcefit.stiffness.screws import SCREW, WRENCH
 
 FORMAT = "forcefit link 1"
 

@@ -18,12 +18,20 @@ import numpy as np
 from forcefit.inputs.errors import LARGEST, checked
 from forcefit.inputs.table import BadInput, read_toml
 from forcefit.inputs.writing import write_json
-from stiffness.beam.curve import curve_compliance
-from stiffness.link import LinkStiffness
-from stiffness.report.library import FORMAT
-from stiffness.report.library_surface import SurfaceLink, is_current, read_surface_links
-from stiffness.report.results import link_results
-from stiffness.surface.beam_surfaces import check_shape, shape_beam, shape_surface
+from forcefit.stiffness.beam.curve import curve_compliance
+from forcefit.stiffness.link import LinkStiffness
+from forcefit.stiffness.report.library import FORMAT
+from forcefit.stiffness.report.library_surface import (
+    SurfaceLink,
+    is_current,
+    read_surface_links,
+)
+from forcefit.stiffness.report.results import link_results
+from forcefit.stiffness.surface.beam_surfaces import (
+    check_shape,
+    shape_beam,
+    shape_surface,
+)
 
 _MATERIAL = ("young", "poisson", "density")
 _METHODS = ("beam", "fea")
@@ -245,9 +253,9 @@ def _solve_point(spec: Spec, point: dict[str, float]) -> tuple[LinkStiffness, st
     if spec.method == "beam":
         C = curve_compliance(shape_beam(spec.shape, lengths, nu), E, nu)
         return LinkStiffness("Timoshenko beam", C, tip=tip, base=np.zeros(3)), ""
-    from stiffness.fem.fea import FemOptions, solve_link
-    from stiffness.fem.material import Material
-    from stiffness.surface.interface import parse_interface
+    from forcefit.stiffness.fem.fea import FemOptions, solve_link
+    from forcefit.stiffness.fem.material import Material
+    from forcefit.stiffness.surface.interface import parse_interface
 
     surface = shape_surface(spec.shape, lengths)
     solved = solve_link(

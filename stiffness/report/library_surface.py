@@ -17,10 +17,10 @@ from typing import Any
 
 from forcefit.inputs.errors import LARGEST
 from forcefit.inputs.table import BadInput, Table, describe, quoted, read_rows
-from stiffness.link import LinkStiffness
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.surface import UNITS
-from stiffness.surface.surface_files import named_solid
+from forcefit.stiffness.link import LinkStiffness
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.surface import UNITS
+from forcefit.stiffness.surface.surface_files import named_solid
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
@@ -38,7 +38,7 @@ class SurfaceLink:
         poisson: [-] Poisson's ratio.
         density: [kg/m^3] density; 0 leaves out mass and inertia.
         unit: unit of the surface file.
-        interface: one of :data:`stiffness.fem.condensation.KINDS`.
+        interface: one of :data:`forcefit.stiffness.fem.condensation.KINDS`.
         accuracy: [1] required relative error of every entry of K.
         family: name of a family of parts that differ in their sizes; empty for a single
             part.
@@ -100,10 +100,10 @@ class SurfaceLink:
         Raises:
             BadInput: the surface or an interface is not usable.
         """
-        from stiffness.fem.fea import FemOptions, solve_link
-        from stiffness.fem.material import Material
-        from stiffness.fem.part_text import parse_part
-        from stiffness.surface.surface import read_surface
+        from forcefit.stiffness.fem.fea import FemOptions, solve_link
+        from forcefit.stiffness.fem.material import Material
+        from forcefit.stiffness.fem.part_text import parse_part
+        from forcefit.stiffness.surface.surface import read_surface
 
         first = Material(self.young, self.poisson, self.density)
         try:
@@ -158,8 +158,8 @@ def _add(links: dict[str, SurfaceLink], link: SurfaceLink, table: Table) -> None
 
 def _link(table: Table, surface: Path, accuracy: float) -> SurfaceLink:
     """Read the keys that tables of a link and of a family share."""
-    from stiffness.fem.condensation import KINDS
-    from stiffness.fem.part_text import read_parts
+    from forcefit.stiffness.fem.condensation import KINDS
+    from forcefit.stiffness.fem.part_text import read_parts
 
     name = table.text("name")
     if not _NAME.fullmatch(name):

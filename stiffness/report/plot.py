@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from forcefit.results.text import value_text
-from stiffness.beam.beam import section_axes
-from stiffness.beam.beam_stress import peak_beam_stress
-from stiffness.fem.stress import PeakStress, StressInfluence, von_mises
-from stiffness.link import LinkStiffness
-from stiffness.report.compare import LinkComparison, entries_that_matter
-from stiffness.report.slenderness import SlendernessSweep
-from stiffness.screws import SCREW
+from forcefit.stiffness.beam.beam import section_axes
+from forcefit.stiffness.beam.beam_stress import peak_beam_stress
+from forcefit.stiffness.fem.stress import PeakStress, StressInfluence, von_mises
+from forcefit.stiffness.link import LinkStiffness
+from forcefit.stiffness.report.compare import LinkComparison, entries_that_matter
+from forcefit.stiffness.report.slenderness import SlendernessSweep
+from forcefit.stiffness.screws import SCREW
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.results.text import in_unit, value_text
-from stiffness.link import LinkStiffness
-from stiffness.report.compare import LinkComparison, entries_that_matter
-from stiffness.screws import SCREW, WRENCH
+from forcefit.stiffness.link import LinkStiffness
+from forcefit.stiffness.report.compare import LinkComparison, entries_that_matter
+from forcefit.stiffness.screws import SCREW, WRENCH
 
 if TYPE_CHECKING:
-    from stiffness.fem.stress import PeakStress
-    from stiffness.report.slenderness import SlendernessSweep
+    from forcefit.stiffness.fem.stress import PeakStress
+    from forcefit.stiffness.report.slenderness import SlendernessSweep
 
 
 def link_results(link: LinkStiffness) -> dict[str, Any]:

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
-from stiffness.beam.beam import beam_compliance
-from stiffness.beam.sections import declared_section
-from stiffness.link import LinkStiffness
-from stiffness.report.compare import LinkComparison, compare_link
-from stiffness.surface.beam_surfaces import shape_surface
+from forcefit.stiffness.beam.beam import beam_compliance
+from forcefit.stiffness.beam.sections import declared_section
+from forcefit.stiffness.link import LinkStiffness
+from forcefit.stiffness.report.compare import LinkComparison, compare_link
+from forcefit.stiffness.surface.beam_surfaces import shape_surface
 
 _SHAPES = {
     frozenset({"radius"}): "round",
@@ -90,7 +90,7 @@ def sweep_slenderness(
         E: [Pa] Young's modulus.
         nu: [-] Poisson's ratio.
         ratios: two or more values of L / r, with r as in
-            :attr:`stiffness.beam.sections.Section.size`.
+            :attr:`forcefit.stiffness.beam.sections.Section.size`.
         accuracy: [1] required relative error of the finite elements.
         interface: kind of the interfaces of the solid.
         update: called with the number of finished lengths and the number of all
@@ -102,9 +102,9 @@ def sweep_slenderness(
     Raises:
         BadInput: the section has a different kind, or there are fewer than two lengths.
     """
-    from stiffness.fem.fea import FemOptions, solve_link
-    from stiffness.fem.material import Material
-    from stiffness.surface.interface import parse_interface
+    from forcefit.stiffness.fem.fea import FemOptions, solve_link
+    from forcefit.stiffness.fem.material import Material
+    from forcefit.stiffness.surface.interface import parse_interface
 
     if frozenset(section) not in _SHAPES:
         raise BadInput(

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput, nearest
-from stiffness.beam.curve import Piece, straight_piece
-from stiffness.beam.sections import Section, declared_section, round_section
-from stiffness.surface.surface import Surface, check_surface
+from forcefit.stiffness.beam.curve import Piece, straight_piece
+from forcefit.stiffness.beam.sections import Section, declared_section, round_section
+from forcefit.stiffness.surface.surface import Surface, check_surface
 
 # names of the lengths of each shape, with the default of an optional length
 SHAPES: dict[str, dict[str, float | None]] = {

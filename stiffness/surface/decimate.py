@@ -9,7 +9,7 @@ coarser.
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.surface.surface import Surface, directed_edges, signed_volume
+from forcefit.stiffness.surface.surface import Surface, directed_edges, signed_volume
 
 _VOLUME = 0.01  # accepted relative difference of the enclosed volumes
 # shares of the number of triangles, tried in this order

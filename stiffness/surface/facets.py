@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.surface.surface import area_vectors
+from forcefit.stiffness.surface.surface import area_vectors
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from forcefit.inputs.number_arrays import comma_numbers, number_array
 from forcefit.inputs.table import BadInput, describe, nearest
-from stiffness.beam.beam import unit_vector
-from stiffness.screws import UNIT_VECTORS
+from forcefit.stiffness.beam.beam import unit_vector
+from forcefit.stiffness.screws import UNIT_VECTORS
 
 # [m] largest accepted coordinate or radius, so that squares do not overflow
 _FARTHEST = 1e6

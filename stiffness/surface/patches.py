@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput
-from stiffness.surface.interface import Interface
-from stiffness.surface.primitives import Cone, Plane, Shape
-from stiffness.surface.recognition import recognise
-from stiffness.surface.smooth_outline import SmoothOutline, smooth_outline
-from stiffness.surface.surface import Surface, directed_edges
-from stiffness.surface.triangle_graph import SHARP, TriangleGraph
+from forcefit.stiffness.surface.interface import Interface
+from forcefit.stiffness.surface.primitives import Cone, Plane, Shape
+from forcefit.stiffness.surface.recognition import recognise
+from forcefit.stiffness.surface.smooth_outline import SmoothOutline, smooth_outline
+from forcefit.stiffness.surface.surface import Surface, directed_edges
+from forcefit.stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.surface.primitives import (
+from forcefit.stiffness.surface.primitives import (
     Cone,
     Shape,
     Torus,
@@ -20,7 +20,7 @@ from stiffness.surface.primitives import (
     fit_sphere,
     fit_torus,
 )
-from stiffness.surface.triangle_graph import SHARP, TriangleGraph
+from forcefit.stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
 # largest number of seeds of a part that may fail: for shapes from strips, for any shape
 _MISSES = (60, 20)

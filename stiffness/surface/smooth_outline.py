@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.surface.facets import Facets
-from stiffness.surface.primitives import Shape, fit_cone, fit_plane
+from forcefit.stiffness.surface.facets import Facets
+from forcefit.stiffness.surface.primitives import Shape, fit_cone, fit_plane
 
 # cosine of the largest angle of an outline's corner that is smoothed
 _CORNER = np.cos(np.radians(35.0))

@@ -1,7 +1,7 @@
 """STEP files, read by gmsh: names of solids, and fine triangles.
 
 A damaged file can crash gmsh and its process, so these functions run in a separate
-process (:mod:`stiffness.surface.surface_worker`).
+process (:mod:`forcefit.stiffness.surface.surface_worker`).
 """
 
 from collections.abc import Generator, Mapping

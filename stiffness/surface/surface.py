@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput, describe, nearest
 from forcefit.results.display import html_table, short_repr
-from stiffness.surface.filled_solids import FilledSolids
-from stiffness.surface.surface_files import STEP, named_solid, read_triangles
+from forcefit.stiffness.surface.filled_solids import FilledSolids
+from forcefit.stiffness.surface.surface_files import STEP, named_solid, read_triangles
 
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 UNITS |= {"in": 0.0254, "inch": 0.0254, "ft": 0.3048}
@@ -187,7 +187,7 @@ def check_surface(
         )
     _check_closed(points, triangles, name)
     triangles, turned = _orient(points, triangles, name)
-    from stiffness.surface.intersections import crossing_triangles
+    from forcefit.stiffness.surface.intersections import crossing_triangles
 
     crossing = crossing_triangles(points, triangles)
     if len(crossing):

@@ -2,7 +2,7 @@
 
 STL is read here.  The other kinds need VTK, meshio or gmsh.  A damaged file can crash
 these packages and their process, so they run in a separate process
-(:mod:`stiffness.surface.surface_worker`).
+(:mod:`forcefit.stiffness.surface.surface_worker`).
 """
 
 import io
@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput
-from stiffness.surface.filled_solids import FilledSolids
-from stiffness.surface.stl_file import read_stl
+from forcefit.stiffness.surface.filled_solids import FilledSolids
+from forcefit.stiffness.surface.stl_file import read_stl
 
 STEP = (".step", ".stp")
 _TIME_LIMIT = 300.0  # [s] time limit of a reader; gmsh takes 1 s for 35 000 triangles
@@ -122,7 +122,7 @@ def _in_own_process(wanted: str, path: Path, solid: str = "") -> dict[str, NDArr
     with tempfile.TemporaryDirectory(prefix="forcefit-") as folder:
         made = Path(folder, "read.npz")
         # -P prevents that modules in the current folder replace others of the same name
-        module = "stiffness.surface.surface_worker"
+        module = "forcefit.stiffness.surface.surface_worker"
         command = [sys.executable, "-P", "-m", module, wanted, str(path), str(made)]
         search = {"PYTHONPATH": os.pathsep.join(sys.path)}
         try:

@@ -1,8 +1,8 @@
 """Process in which VTK, meshio and gmsh read a user's file, because they may crash.
 
-``python -m stiffness.surface.surface_worker triangles|solids FILE READ.npz [SOLID]``
+``python -m forcefit.stiffness.surface.surface_worker triangles|solids FILE READ.npz [SOLID]``
 
-:mod:`stiffness.surface.surface_files` runs this module in a separate process, so a
+:mod:`forcefit.stiffness.surface.surface_files` runs this module in a separate process, so a
 damaged file ends only that process.
 """
 
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.packages import naming_packages
 from forcefit.inputs.table import BadInput
-from stiffness.surface.obj_file import read_obj
-from stiffness.surface.step_file import read_solids, read_step
+from forcefit.stiffness.surface.obj_file import read_obj
+from forcefit.stiffness.surface.step_file import read_solids, read_step
 
 
 def main(wanted: str, path: Path, made: Path, solid: str = "") -> None:
@@ -27,7 +27,7 @@ def main(wanted: str, path: Path, made: Path, solid: str = "") -> None:
         path: path of an existing file.
         made: output file with ``points`` (n, 3) and ``faces`` (m, 3), for STEP also
             ``sides`` (m, 2), ``names`` and ``overlaps``, see
-            :class:`stiffness.surface.step_file.StepTriangles`; or with ``names`` (n,),
+            :class:`forcefit.stiffness.surface.step_file.StepTriangles`; or with ``names`` (n,),
             ``volumes`` (n,) and ``boxes`` (n, 6); or with ``refused``, one line of
             text.
         solid: name of one of several solids of a STEP file.

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.surface.facets import Facets
-from stiffness.surface.primitives import Shape
-from stiffness.surface.surface import Surface, directed_edges
+from forcefit.stiffness.surface.facets import Facets
+from forcefit.stiffness.surface.primitives import Shape
+from forcefit.stiffness.surface.surface import Surface, directed_edges
 
 # cosine of 35 degrees: a sharper edge separates two patches
 SHARP = np.cos(np.radians(35.0))

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.surface.facets import Facets
-from stiffness.surface.patches import Patches
-from stiffness.surface.surface import Surface
-from stiffness.surface.triangle_graph import SHARP, TriangleGraph
+from forcefit.stiffness.surface.facets import Facets
+from forcefit.stiffness.surface.patches import Patches
+from forcefit.stiffness.surface.surface import Surface
+from forcefit.stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
 _UNSURE = 0.3  # uncertain share of the lift of facets of unknown shape
 # coordinates of six points on a triangle, exact to degree 4 (Dunavant 1985)

@@ -7,9 +7,9 @@ import sys
 import pytest
 
 import forcefit as ff
-from assembly.files import solved_links
-from assembly.files.solved_links import solved_link
-from assembly.linear.energy import solve_assembly
+from forcefit.assembly.files import solved_links
+from forcefit.assembly.files.solved_links import solved_link
+from forcefit.assembly.linear.energy import solve_assembly
 from tests.assembly.exchange.test_sdf import four_bar
 from tests.assembly.files.test_stored_solutions import frame, solved_once, surface
 from tests.assembly.linear.test_method import beams, rigid

@@ -5,7 +5,7 @@ import pytest
 import xarray
 
 import forcefit as ff
-from assembly.sweeps.selection import BY_CLEARANCE, FINITE
+from forcefit.assembly.sweeps.selection import BY_CLEARANCE, FINITE
 
 ERRORS = """
 [[errors]]

@@ -226,4 +226,7 @@ def test_folder_of_the_same_name_does_not_hide_the_package(tmp_path):
     """Without ``__init__.py`` it is not a package while one exists further along the
     path."""
     (tmp_path / "assembly").mkdir()
-    assert imported([tmp_path, ROOT], "import forcefit, assembly.model") == (0, "")
+    assert imported([tmp_path, ROOT], "import forcefit, forcefit.assembly.model") == (
+        0,
+        "",
+    )

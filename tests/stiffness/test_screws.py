@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from stiffness.screws import (
+from forcefit.stiffness.screws import (
     rotation_matrix,
     rotation_vector,
     screw_map,

@@ -5,21 +5,21 @@ from dataclasses import replace
 
 from numpy.typing import ArrayLike
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import CannotAssemble
-from assembly.linear.load import driven
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.given_load import Load, given_load
-from assembly.model.robot import BeamLink
-from assembly.solvers.conic import SolverFailed
-from stiffness.mesh.fit_to_patches import MeshFailed
-from validation.assumptions.platform_cost import (
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import CannotAssemble
+from forcefit.assembly.linear.load import driven
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.given_load import Load, given_load
+from forcefit.assembly.model.robot import BeamLink
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.stiffness.mesh.fit_to_patches import MeshFailed
+from forcefit.validation.assumptions.platform_cost import (
     NoSolids,
     PlatformCosts,
     platform_costs,
 )
-from validation.assumptions.solid_links import solid_link
-from validation.assumptions.validity import (
+from forcefit.validation.assumptions.solid_links import solid_link
+from forcefit.validation.assumptions.validity import (
     Cost,
     bush_cost,
     closure_cost,
@@ -27,8 +27,8 @@ from validation.assumptions.validity import (
     pieces_cost,
     spread_cost,
 )
-from validation.crosscheck.spread_weight import energy_between_ends
-from validation.multibody.simulation import without_clearance
+from forcefit.validation.crosscheck.spread_weight import energy_between_ends
+from forcefit.validation.multibody.simulation import without_clearance
 
 _NOT_MESHED = "not computed, because it needs meshes of the links; add --solids"
 NOTHING = "nothing to compare: without errors and load no model deforms"

@@ -18,11 +18,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.assembled import Assembly
-from assembly.linear.closure import VirtualJoints, linearise, virtual_joints
-from assembly.linear.load import loads_on_frames
-from assembly.linear.reference.energy import solve_with
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.assembled import Assembly
+from forcefit.assembly.linear.closure import VirtualJoints, linearise, virtual_joints
+from forcefit.assembly.linear.load import loads_on_frames
+from forcefit.assembly.linear.reference.energy import solve_with
 
 
 def bush_joints(joints: VirtualJoints) -> VirtualJoints:

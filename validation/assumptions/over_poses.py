@@ -6,14 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from assembly.kinematics.posture import Posture, place_many, place_many_joints
-from assembly.kinematics.verdict import limits_passed
-from assembly.model.robot import Robot
-from assembly.sweeps.targets import Targets, goals_of, of_joints
+from forcefit.assembly.kinematics.posture import Posture, place_many, place_many_joints
+from forcefit.assembly.kinematics.verdict import limits_passed
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.sweeps.targets import Targets, goals_of, of_joints
 from forcefit.results.display import html_table, short_repr
-from validation.assumptions.assumptions import assumption_costs, stiffness_costs
-from validation.assumptions.platform_cost import PlatformCosts
-from validation.assumptions.validity import Cost
+from forcefit.validation.assumptions.assumptions import (
+    assumption_costs,
+    stiffness_costs,
+)
+from forcefit.validation.assumptions.platform_cost import PlatformCosts
+from forcefit.validation.assumptions.validity import Cost
 
 
 @dataclass(frozen=True, eq=False)

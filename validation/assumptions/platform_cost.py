@@ -27,14 +27,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.closure import virtual_joints
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.robot import BeamLink, MatrixLink, Robot
-from assembly.platform_stiffness.linear_tangent import without_clearance
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from stiffness.screws import screw_map
-from validation.assumptions.solid_links import SolidLink, solid_links
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.closure import virtual_joints
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.robot import BeamLink, MatrixLink, Robot
+from forcefit.assembly.platform_stiffness.linear_tangent import without_clearance
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.stiffness.screws import screw_map
+from forcefit.validation.assumptions.solid_links import SolidLink, solid_links
 
 # relative to the largest singular value; smaller singular values count as zero
 _RANK = 1e-9

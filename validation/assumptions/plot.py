@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from forcefit.inputs.errors import plot_label
-from validation.assumptions.platform_cost import PlatformCosts
-from validation.assumptions.report import COMPARED
+from forcefit.validation.assumptions.platform_cost import PlatformCosts
+from forcefit.validation.assumptions.report import COMPARED
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

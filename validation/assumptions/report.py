@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.statuses import OUT_OF_REACH
-from validation.assumptions.over_poses import CostsOverPoses
-from validation.assumptions.platform_cost import PlatformCosts
-from validation.assumptions.validity import ENERGY_LIMIT, POSITION_LIMIT, Cost
+from forcefit.assembly.model.statuses import OUT_OF_REACH
+from forcefit.validation.assumptions.over_poses import CostsOverPoses
+from forcefit.validation.assumptions.platform_cost import PlatformCosts
+from forcefit.validation.assumptions.validity import ENERGY_LIMIT, POSITION_LIMIT, Cost
 
 # the two models whose difference each error of the platform's compliance measures
 COMPARED = {

@@ -13,14 +13,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.mesh_link import mesh_solution, mesh_turn, modulus_factor
-from assembly.model.robot import BeamLink, Frame, MeshLink, Robot, beam_axis
-from stiffness.beam.beam import section_axes
-from stiffness.fem.condensation import condense
-from stiffness.fem.fea import Budget, FemOptions, MeshedLink, solve_bar
-from stiffness.fem.material import Material
-from stiffness.fem.two_ends import two_ends
-from stiffness.link import scaled
+from forcefit.assembly.model.mesh_link import mesh_solution, mesh_turn, modulus_factor
+from forcefit.assembly.model.robot import BeamLink, Frame, MeshLink, Robot, beam_axis
+from forcefit.stiffness.beam.beam import section_axes
+from forcefit.stiffness.fem.condensation import condense
+from forcefit.stiffness.fem.fea import Budget, FemOptions, MeshedLink, solve_bar
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.fem.two_ends import two_ends
+from forcefit.stiffness.link import scaled
 
 _KEPT = 32  # largest number of shapes in the cache
 _OPTIONS = FemOptions(

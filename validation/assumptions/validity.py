@@ -5,10 +5,10 @@ Each of five assumptions is compared with a model that does not make it:
 ==================  ==================================================================
 assumption          compared with
 ==================  ==================================================================
-linear closures     closures that hold with finite motions, :mod:`assembly.exact.exact`
+linear closures     closures that hold with finite motions, :mod:`forcefit.assembly.exact.exact`
 beams               solids with held ends, by finite elements
 loads at the ends   a weight spread over its link
-disc and cone       a pin in two bushes, :mod:`validation.assumptions.bushes`
+disc and cone       a pin in two bushes, :mod:`forcefit.validation.assumptions.bushes`
 one spring a beam   the same beam in ever more pieces, finite motions
 ==================  ==================================================================
 
@@ -28,13 +28,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.exact.exact import ExactAssembly, solve_exact
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import Assembly, solve_assembly
-from assembly.model.robot import BeamLink, MatrixLink
-from validation.assumptions.bushes import solve_bushes
-from validation.crosscheck.limits import FLOOR, HALVES, energy_floor
-from validation.crosscheck.spread_weight import energy_between_ends
+from forcefit.assembly.exact.exact import ExactAssembly, solve_exact
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import Assembly, solve_assembly
+from forcefit.assembly.model.robot import BeamLink, MatrixLink
+from forcefit.validation.assumptions.bushes import solve_bushes
+from forcefit.validation.crosscheck.limits import FLOOR, HALVES, energy_floor
+from forcefit.validation.crosscheck.spread_weight import energy_between_ends
 
 POSITION_LIMIT = 20e-6  # [m] required accuracy of the paper's robot
 ENERGY_LIMIT = 0.01  # [-] smallest significant relative error of the energy
@@ -149,7 +149,7 @@ def spread_cost(
 ) -> Cost:
     """Return the error of placing the weights of links at their ends.
 
-    The equivalent loads at the ends, :mod:`assembly.linear.load`, cause the correct
+    The equivalent loads at the ends, :mod:`forcefit.assembly.linear.load`, cause the correct
     pose; they lack the energy that beams store between their ends.
 
     Args:

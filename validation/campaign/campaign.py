@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.model.robot import Robot
+from forcefit.assembly.model.robot import Robot
 from forcefit.results.display import Figures, html_table, short_repr
 from forcefit.results.text import in_unit
 

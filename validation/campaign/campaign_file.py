@@ -12,12 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY
-from assembly.exchange.robot_files import load_robot
-from assembly.kinematics.posture import POSE, Posture, place_many, place_many_joints
-from assembly.measurement.conditions import COVARIATES
-from assembly.model.robot import Robot
-from assembly.robots import BUILT_IN
+from forcefit.assembly.effects import LIBRARY
+from forcefit.assembly.exchange.robot_files import load_robot
+from forcefit.assembly.kinematics.posture import (
+    POSE,
+    Posture,
+    place_many,
+    place_many_joints,
+)
+from forcefit.assembly.measurement.conditions import COVARIATES
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.robots import BUILT_IN
 from forcefit.inputs.table import (
     BadInput,
     Table,
@@ -26,15 +31,15 @@ from forcefit.inputs.table import (
     quoted,
     read_toml,
 )
-from validation.campaign.campaign import LOAD, READING, Campaign, number_rows
-from validation.campaign.checks import (
+from forcefit.validation.campaign.campaign import LOAD, READING, Campaign, number_rows
+from forcefit.validation.campaign.checks import (
     check_commands,
     check_measured,
     check_readings,
     extent_of,
 )
-from validation.campaign.dialect import Dialect, read_dialect
-from validation.campaign.measurement_table import (
+from forcefit.validation.campaign.dialect import Dialect, read_dialect
+from forcefit.validation.campaign.measurement_table import (
     MeasurementTable,
     join_tables,
     read_table,

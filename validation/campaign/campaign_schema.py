@@ -1,9 +1,9 @@
 """Schema of ``campaign.toml`` for editors: the keys that the reader accepts."""
 
-from assembly.effects import LIBRARY
+from forcefit.assembly.effects import LIBRARY
 from forcefit.results.quantities import number, text
 from forcefit.results.records import Each, Either, Listed, Record, Words, record
-from validation.campaign.dialect import DELIMITERS, MOTIONS, UNITS
+from forcefit.validation.campaign.dialect import DELIMITERS, MOTIONS, UNITS
 
 _BY_ROW = tuple(name for name, effect in LIBRARY.items() if effect.by_row)
 CAMPAIGN_FILE = record(

@@ -9,10 +9,10 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import POSE
-from assembly.model.robot import Robot
-from validation.campaign.campaign import LOAD, READING
-from validation.campaign.measurement_table import MeasurementTable
+from forcefit.assembly.kinematics.posture import POSE
+from forcefit.assembly.model.robot import Robot
+from forcefit.validation.campaign.campaign import LOAD, READING
+from forcefit.validation.campaign.measurement_table import MeasurementTable
 
 # [rad] largest accepted command of a joint; a larger one is probably in degrees
 _TURNS = 8 * np.pi

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import POSE
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.posture import POSE
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.errors import (
     LARGEST,
     BadInput,
@@ -26,8 +26,13 @@ from forcefit.inputs.errors import (
     quoted,
 )
 from forcefit.inputs.table import read_text
-from validation.campaign.campaign import LOAD, READING
-from validation.campaign.dialect import DELIMITERS, MOTIONS, Dialect, parse_number
+from forcefit.validation.campaign.campaign import LOAD, READING
+from forcefit.validation.campaign.dialect import (
+    DELIMITERS,
+    MOTIONS,
+    Dialect,
+    parse_number,
+)
 
 _TEXTS = ("id", "session")  # columns that are not numbers
 

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY
-from assembly.files.robot_file import write_robot
-from assembly.model.robot import Robot
-from validation.correction.carrying import CarriedRobot, carried_robot
-from validation.correction.machine_numbers import renumbered
-from validation.diagnosis.saved_covariance import (
+from forcefit.assembly.effects import LIBRARY
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.model.robot import Robot
+from forcefit.validation.correction.carrying import CarriedRobot, carried_robot
+from forcefit.validation.correction.machine_numbers import renumbered
+from forcefit.validation.diagnosis.saved_covariance import (
     EFFECT,
     FUNCTION,
     Number,

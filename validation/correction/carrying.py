@@ -18,21 +18,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import Robot
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.errors import BadInput, quoted
 from forcefit.results.display import html_table, short_repr
-from validation.campaign.campaign import Campaign
-from validation.correction.machine_numbers import machine_numbers, unchanging
-from validation.correction.session_fit import SessionsFit, SetUp, fit_sessions
-from validation.correction.session_unknowns import (
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.correction.machine_numbers import machine_numbers, unchanging
+from forcefit.validation.correction.session_fit import SessionsFit, SetUp, fit_sessions
+from forcefit.validation.correction.session_unknowns import (
     DRIFT,
     SessionUnknowns,
     of_one_session,
     session_unknowns,
     without_session,
 )
-from validation.diagnosis.sequence import Errors, errors_of
-from validation.diagnosis.unknowns import effects_in, with_effects_in
+from forcefit.validation.diagnosis.sequence import Errors, errors_of
+from forcefit.validation.diagnosis.unknowns import effects_in, with_effects_in
 
 _MACHINE = "the robot's own numbers"
 

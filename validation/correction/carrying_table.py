@@ -4,7 +4,7 @@ from dataclasses import asdict
 from typing import Any
 
 from forcefit.results.text import in_unit, readings_text
-from validation.correction.carrying import CarriedRobot
+from forcefit.validation.correction.carrying import CarriedRobot
 
 
 def table(carried: CarriedRobot) -> dict[str, Any]:

@@ -26,19 +26,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.nominal import size_of
-from assembly.kinematics.posture import place_many_joints
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import predict
-from assembly.measurement.settled_clearance import without_joint_clearances
-from assembly.measurement.without_clearance import flexibility
-from assembly.model.links import own_screw
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.kinematics.posture import place_many_joints
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.measurement.settled_clearance import without_joint_clearances
+from forcefit.assembly.measurement.without_clearance import flexibility
+from forcefit.assembly.model.links import own_screw
+from forcefit.assembly.model.robot import Robot
 from forcefit.results.display import html_table, short_repr
-from stiffness.screws import rotation_matrix, rotation_vector
-from validation.campaign.campaign import Campaign
-from validation.correction.spread import deviation_spread
-from validation.diagnosis.prediction import finite_conditions
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.correction.spread import deviation_spread
+from forcefit.validation.diagnosis.prediction import finite_conditions
 
 _STEPS = 25
 _HALVINGS = 8

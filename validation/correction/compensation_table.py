@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import POSE, pose_components
+from forcefit.assembly.kinematics.posture import POSE, pose_components
 from forcefit.results.text import readings_text
-from validation.campaign.campaign import LOAD
-from validation.correction.compensation import Compensation
-from validation.correction.prediction import csv_text
+from forcefit.validation.campaign.campaign import LOAD
+from forcefit.validation.correction.compensation import Compensation
+from forcefit.validation.correction.prediction import csv_text
 
 
 def command_table(compensation: Compensation) -> str:

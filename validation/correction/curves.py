@@ -12,15 +12,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.forms import FORMS
-from assembly.effects.formula import unit_text
-from assembly.effects.functions import CLOCKS, parameters_of, value_of
-from assembly.effects.units import result_unit, units_of, variable_unit, whole_unit
-from assembly.model.function import Function
-from assembly.model.robot import Robot
+from forcefit.assembly.effects.forms import FORMS
+from forcefit.assembly.effects.formula import unit_text
+from forcefit.assembly.effects.functions import CLOCKS, parameters_of, value_of
+from forcefit.assembly.effects.units import (
+    result_unit,
+    units_of,
+    variable_unit,
+    whole_unit,
+)
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.errors import plot_label
 from forcefit.results.display import html_table, short_repr
-from validation.diagnosis.saved_covariance import FUNCTION, known_covariance
+from forcefit.validation.diagnosis.saved_covariance import FUNCTION, known_covariance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -18,10 +18,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY
-from assembly.model.robot import Robot
-from validation.correction.session_unknowns import DRIFT, of_one_session
-from validation.diagnosis.saved_covariance import (
+from forcefit.assembly.effects import LIBRARY
+from forcefit.assembly.model.robot import Robot
+from forcefit.validation.correction.session_unknowns import DRIFT, of_one_session
+from forcefit.validation.diagnosis.saved_covariance import (
     EFFECT,
     FUNCTION,
     Number,

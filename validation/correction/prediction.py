@@ -7,20 +7,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.registration import BASE
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import Prediction
-from assembly.measurement.predict import predict as predict_rows
-from assembly.model.robot import Robot
+from forcefit.assembly.effects.registration import BASE
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.predict import Prediction
+from forcefit.assembly.measurement.predict import predict as predict_rows
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.errors import BadInput
 from forcefit.results.display import html_table, short_repr
-from validation.campaign.campaign import READING, Campaign
-from validation.correction.spread import deviation_spread
-from validation.diagnosis.learned_range import beyond_by_row
-from validation.diagnosis.prediction import finite_conditions
-from validation.diagnosis.registration import register
-from validation.diagnosis.sequence import Errors, errors_of, rms
-from validation.diagnosis.unknowns import effects_in, with_effects_in
+from forcefit.validation.campaign.campaign import READING, Campaign
+from forcefit.validation.correction.spread import deviation_spread
+from forcefit.validation.diagnosis.learned_range import beyond_by_row
+from forcefit.validation.diagnosis.prediction import finite_conditions
+from forcefit.validation.diagnosis.registration import register
+from forcefit.validation.diagnosis.sequence import Errors, errors_of, rms
+from forcefit.validation.diagnosis.unknowns import effects_in, with_effects_in
 
 _MOVED = 3.0  # factor on the residual above which the measuring device has been moved
 

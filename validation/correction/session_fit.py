@@ -28,18 +28,21 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.registration import BASE
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import predict
-from assembly.model.robot import Robot
-from validation.campaign.campaign import Campaign
-from validation.correction.machine_numbers import MachineNumbers, unchanging
-from validation.correction.session_unknowns import SessionUnknowns, without_session
-from validation.correction.spread import number_slopes
-from validation.diagnosis.gaussian import leave_block_out, marginalise, scale
-from validation.diagnosis.prediction import finite_conditions
-from validation.diagnosis.registration import coarse_frame
-from validation.diagnosis.separability import orthonormal_basis
+from forcefit.assembly.effects.registration import BASE
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.model.robot import Robot
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.correction.machine_numbers import MachineNumbers, unchanging
+from forcefit.validation.correction.session_unknowns import (
+    SessionUnknowns,
+    without_session,
+)
+from forcefit.validation.correction.spread import number_slopes
+from forcefit.validation.diagnosis.gaussian import leave_block_out, marginalise, scale
+from forcefit.validation.diagnosis.prediction import finite_conditions
+from forcefit.validation.diagnosis.registration import coarse_frame
+from forcefit.validation.diagnosis.separability import orthonormal_basis
 
 _STEPS = 8
 _SETTLED = 1e-3  # [standard deviations] change of every parameter at convergence

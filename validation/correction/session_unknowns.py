@@ -15,19 +15,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY, apply_effects
-from assembly.effects.functions import (
+from forcefit.assembly.effects import LIBRARY, apply_effects
+from forcefit.assembly.effects.functions import (
     CLOCKS,
     FORMULA,
     apply_functions,
     columns_of,
     parameters_of,
 )
-from assembly.effects.registration import BASE, TOOL
-from assembly.effects.units import units_of
-from assembly.measurement.conditions import Conditions
-from assembly.model.function import Function
-from assembly.model.robot import Robot
+from forcefit.assembly.effects.registration import BASE, TOOL
+from forcefit.assembly.effects.units import units_of
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.robot import Robot
 
 OF_A_SESSION = ("registration", "tool", "zeros")
 DRIFT = "drift"

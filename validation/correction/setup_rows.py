@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.errors import BadInput, nearest, quoted
-from validation.campaign.campaign import Campaign
+from forcefit.validation.campaign.campaign import Campaign
 
 
 def setup_rows(campaign: Campaign, text: str) -> NDArray:

@@ -1,7 +1,7 @@
 """Standard deviation of a robot's deviation due to the uncertainty in its file.
 
 The covariance of the readings is J C J', where C is the covariance of the parameters in
-the file (:mod:`validation.diagnosis.saved_covariance`) and J their derivatives.
+the file (:mod:`forcefit.validation.diagnosis.saved_covariance`) and J their derivatives.
 """
 
 from collections.abc import Callable
@@ -10,14 +10,19 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.functions import in_session, inputs_of, is_loaded, value_of
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import predict
-from assembly.model.function import PLACES, Function
-from assembly.model.robot import Robot
-from validation.campaign.campaign import READING
-from validation.diagnosis.responses import Responses, responses
-from validation.diagnosis.saved_covariance import (
+from forcefit.assembly.effects.functions import (
+    in_session,
+    inputs_of,
+    is_loaded,
+    value_of,
+)
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.model.function import PLACES, Function
+from forcefit.assembly.model.robot import Robot
+from forcefit.validation.campaign.campaign import READING
+from forcefit.validation.diagnosis.responses import Responses, responses
+from forcefit.validation.diagnosis.saved_covariance import (
     COMPLIANCE,
     ERROR,
     FUNCTION,

@@ -18,14 +18,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.closure import linearise
-from assembly.linear.reference.reduction import reduce_problem
-from assembly.model.links import link_compliance
-from assembly.model.robot import Robot
-from assembly.solvers.cones import into_cones
-from validation.crosscheck.limits import extrapolate, limit_difference, limit_of
-from validation.crosscheck.pair import Pair
-from validation.crosscheck.verdict import Check
+from forcefit.assembly.linear.closure import linearise
+from forcefit.assembly.linear.reference.reduction import reduce_problem
+from forcefit.assembly.model.links import link_compliance
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.solvers.cones import into_cones
+from forcefit.validation.crosscheck.limits import (
+    extrapolate,
+    limit_difference,
+    limit_of,
+)
+from forcefit.validation.crosscheck.pair import Pair
+from forcefit.validation.crosscheck.verdict import Check
 
 TOLERANCE = 0.02  # relative tolerance of limits: contacts are compliant and smoothed
 FLOOR_ENERGY = 1e-4  # [J] energy of the springs that centre clearances, at scale 1

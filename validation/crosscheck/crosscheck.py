@@ -2,9 +2,9 @@
 
 Both models are solved at several scales s of the load and all imperfections (geometric
 errors, clearances).  Without clearances, the platform's poses are compared
-(:mod:`validation.crosscheck.pose_metric`).  With clearances, the pose of least energy
+(:mod:`forcefit.validation.crosscheck.pose_metric`).  With clearances, the pose of least energy
 is not unique, so energies and springs are compared
-(:mod:`validation.crosscheck.clearance_metric`).
+(:mod:`forcefit.validation.crosscheck.clearance_metric`).
 """
 
 from collections.abc import Callable, Sequence
@@ -15,29 +15,39 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import CannotAssemble, failure_status, solve_assembly
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.given_load import Load, given_load
-from assembly.model.statuses import FAILS, OK, PASSED, SIMULATION_FAILED, UNDECIDED
-from assembly.solvers.conic import SolverFailed
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import (
+    CannotAssemble,
+    failure_status,
+    solve_assembly,
+)
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.given_load import Load, given_load
+from forcefit.assembly.model.statuses import (
+    FAILS,
+    OK,
+    PASSED,
+    SIMULATION_FAILED,
+    UNDECIDED,
+)
+from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.results.display import html_table, short_repr
-from validation.crosscheck.clearance_metric import ClearanceMetric
-from validation.crosscheck.link_models import link_models
-from validation.crosscheck.pair import (
+from forcefit.validation.crosscheck.clearance_metric import ClearanceMetric
+from forcefit.validation.crosscheck.link_models import link_models
+from forcefit.validation.crosscheck.pair import (
     Pair,
     exact_solution,
     hold_free_motions,
     scaled,
 )
-from validation.crosscheck.pose_metric import PoseMetric
-from validation.crosscheck.resolution import (
+from forcefit.validation.crosscheck.pose_metric import PoseMetric
+from forcefit.validation.crosscheck.resolution import (
     Resolution,
     resolution_text,
     resolutions,
 )
-from validation.crosscheck.spread_weight import energy_between_ends
-from validation.crosscheck.verdict import (
+from forcefit.validation.crosscheck.spread_weight import energy_between_ends
+from forcefit.validation.crosscheck.verdict import (
     NOT_CHECKED,
     SCALES,
     Check,
@@ -45,7 +55,7 @@ from validation.crosscheck.verdict import (
     verdict,
     verdict_text,
 )
-from validation.multibody.simulation import (
+from forcefit.validation.multibody.simulation import (
     TIME_LIMIT,
     SimulationFailed,
     simulate_assembly,

@@ -18,10 +18,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.model.robot import Robot
-from validation.crosscheck.link_models import link_stiffness
-from validation.crosscheck.pair import Pair, sprung
-from validation.crosscheck.verdict import Check
+from forcefit.assembly.model.robot import Robot
+from forcefit.validation.crosscheck.link_models import link_stiffness
+from forcefit.validation.crosscheck.pair import Pair, sprung
+from forcefit.validation.crosscheck.verdict import Check
 
 # relative tolerance of every quantity extrapolated to zero imperfections
 LIMIT_TOLERANCE = 1e-3

@@ -5,11 +5,11 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.links import link_compliance
-from assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.model.links import link_compliance
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
 from forcefit.inputs.table import BadInput
-from validation.crosscheck.solids import mesh_bodies
-from validation.multibody.simulation import SimulationModel
+from forcefit.validation.crosscheck.solids import mesh_bodies
+from forcefit.validation.multibody.simulation import SimulationModel
 
 KINDS = ("beam", "spring", "fem")
 

@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.exact.exact import ExactAssembly, solve_exact
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import Assembly
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.robot import Clearance, Frame, Robot
-from assembly.solvers.conic import SolverFailed
-from validation.multibody.exudyn_model import HOLDING_STIFFNESS, IDLE_STIFFNESS
-from validation.multibody.simulation import MultibodyAssembly
+from forcefit.assembly.exact.exact import ExactAssembly, solve_exact
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import Assembly
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.validation.multibody.exudyn_model import HOLDING_STIFFNESS, IDLE_STIFFNESS
+from forcefit.validation.multibody.simulation import MultibodyAssembly
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +151,7 @@ def hold_free_motions(posture: Posture) -> Posture:
 
     Returns:
         The posture of a robot whose passive joints have a spring of
-        :data:`~validation.multibody.exudyn_model.HOLDING_STIFFNESS`, unless they have a
+        :data:`~forcefit.validation.multibody.exudyn_model.HOLDING_STIFFNESS`, unless they have a
         spring already.
     """
 

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from validation.crosscheck.crosscheck import Crosscheck
-from validation.crosscheck.pose_metric import PoseMetric
+from forcefit.validation.crosscheck.crosscheck import Crosscheck
+from forcefit.validation.crosscheck.pose_metric import PoseMetric
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -16,7 +16,7 @@ def slope_figure(check: Crosscheck) -> "Figure":
     """Return a figure of the difference between both models over the scale.
 
     Args:
-        check: result of :func:`validation.crosscheck.crosscheck.crosscheck`, without
+        check: result of :func:`forcefit.validation.crosscheck.crosscheck.crosscheck`, without
             clearances.
 
     Returns:

@@ -25,8 +25,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import Robot
-from validation.crosscheck.limits import (
+from forcefit.assembly.model.robot import Robot
+from forcefit.validation.crosscheck.limits import (
     FLOOR,
     HALVES,
     difference_slope,
@@ -34,8 +34,8 @@ from validation.crosscheck.limits import (
     slope_check,
     spring_limits,
 )
-from validation.crosscheck.pair import Pair
-from validation.crosscheck.verdict import Check
+from forcefit.validation.crosscheck.pair import Pair
+from forcefit.validation.crosscheck.verdict import Check
 
 # largest accepted difference between 2 and the slope of the pose difference
 SLOPE_TOLERANCE = 0.1

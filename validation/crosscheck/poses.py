@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import POSE, Posture, place_many
-from assembly.kinematics.verdict import limits_passed
-from assembly.model.robot import Robot
-from assembly.model.statuses import (
+from forcefit.assembly.kinematics.posture import POSE, Posture, place_many
+from forcefit.assembly.kinematics.verdict import limits_passed
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.model.statuses import (
     BEYOND_LIMITS,
     NO_SIGNAL,
     NOT_DECIDED,
@@ -17,7 +17,7 @@ from assembly.model.statuses import (
     OUT_OF_REACH,
     PASSED,
 )
-from validation.crosscheck.crosscheck import Crosscheck, attempt
+from forcefit.validation.crosscheck.crosscheck import Crosscheck, attempt
 
 _VERDICTS = {
     PASSED: "passed",

@@ -15,23 +15,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.assembled import Assembly
-from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, MeshLink
-from assembly.model.statuses import NO_EQUILIBRIUM
-from assembly.solvers.conic import SolverFailed
-from stiffness.screws import SCREW
-from validation.crosscheck.clearance_metric import ClearanceMetric
-from validation.crosscheck.link_models import link_stiffness
-from validation.crosscheck.pair import (
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.assembled import Assembly
+from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.robot import (
+    BeamLink,
+    Clearance,
+    Frame,
+    MatrixLink,
+    MeshLink,
+)
+from forcefit.assembly.model.statuses import NO_EQUILIBRIUM
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.stiffness.screws import SCREW
+from forcefit.validation.crosscheck.clearance_metric import ClearanceMetric
+from forcefit.validation.crosscheck.link_models import link_stiffness
+from forcefit.validation.crosscheck.pair import (
     Pair,
     hold_free_motions,
     holding_energy,
     scaled,
 )
-from validation.crosscheck.pose_metric import PoseMetric
+from forcefit.validation.crosscheck.pose_metric import PoseMetric
 
 _CHANGE = 1e-2  # relative change of a parameter for the computation of its effect
 # name of the check that grows with the square of a change

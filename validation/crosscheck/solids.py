@@ -3,11 +3,11 @@
 import numpy as np
 from scipy.sparse import csr_matrix, diags
 
-from assembly.model.mesh_link import mesh_solution, mesh_turn, modulus_factor
-from assembly.model.robot import MeshLink, Robot
+from forcefit.assembly.model.mesh_link import mesh_solution, mesh_turn, modulus_factor
+from forcefit.assembly.model.robot import MeshLink, Robot
 from forcefit.inputs.table import BadInput
-from stiffness.fem.fea import MeshedLink
-from validation.multibody.exudyn_parts import MeshBody, MeshedSolid
+from forcefit.stiffness.fem.fea import MeshedLink
+from forcefit.validation.multibody.exudyn_parts import MeshBody, MeshedSolid
 
 
 def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
@@ -46,7 +46,7 @@ def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
 
 def _solid(solved: MeshedLink, factor: float) -> MeshedSolid:
     """Return the finest mesh of a link, with its stiffness matrix times a factor."""
-    from stiffness.fem.elements import assemble
+    from forcefit.stiffness.fem.elements import assemble
 
     mesh, constants = solved.level.mesh, solved.level.material
     upper = assemble(mesh, constants[:, 0], constants[:, 1])

@@ -2,7 +2,7 @@
 
 The virtual-joint model describes a link by its two ends.  If half of the weight acts at
 each end, with the moments of a beam clamped at both ends
-(:func:`assembly.linear.load.weights`), the displacements of the ends are exact, but the
+(:func:`forcefit.assembly.linear.load.weights`), the displacements of the ends are exact, but the
 energy between them is missing.  Without the moments, the displacements of the ends are
 wrong too: the tip of a cantilever moves by a third too far.
 """
@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.model.robot import BeamLink, beam_axis
-from stiffness.beam.beam import section_axes
-from stiffness.beam.sections import Section, declared_section
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.model.robot import BeamLink, beam_axis
+from forcefit.stiffness.beam.beam import section_axes
+from forcefit.stiffness.beam.sections import Section, declared_section
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 At the equilibrium with the robot's errors, its load and its weight, the residual of the
 simulation is differentiated.  In addition, the platform is loaded slightly along each
 axis, in both directions.  Each method has an estimated uncertainty
-(:mod:`validation.multibody.tangent`).  A method whose uncertainty exceeds the tolerance
+(:mod:`forcefit.validation.multibody.tangent`).  A method whose uncertainty exceeds the tolerance
 is not used for the verdict.
 
 Clearances are zero in both models unless requested.  If clearances are in contact, only
@@ -19,17 +19,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import Posture
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.platform_stiffness.exact_tangent import exact_tangent
-from assembly.platform_stiffness.linear_tangent import without_clearance as classical
-from assembly.platform_stiffness.matrices import PlatformStiffness
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.platform_stiffness.exact_tangent import exact_tangent
+from forcefit.assembly.platform_stiffness.linear_tangent import (
+    without_clearance as classical,
+)
+from forcefit.assembly.platform_stiffness.matrices import PlatformStiffness
 from forcefit.results.display import html_table, numbers, short_repr
-from stiffness.screws import SCREW, rotation_vector
-from validation.crosscheck.link_models import link_models
-from validation.multibody.simulation import TIME_LIMIT, without_clearance
-from validation.multibody.tangent import SimulatedTangent, is_bent, simulated_tangent
+from forcefit.stiffness.screws import SCREW, rotation_vector
+from forcefit.validation.crosscheck.link_models import link_models
+from forcefit.validation.multibody.simulation import TIME_LIMIT, without_clearance
+from forcefit.validation.multibody.tangent import (
+    SimulatedTangent,
+    is_bent,
+    simulated_tangent,
+)
 
 # tolerances of entries over sqrt(C_ii C_jj), by model of the links
 TOLERANCE = {"spring": 1e-6, "beam": 1e-3, "fem": 2e-2}

@@ -15,7 +15,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from assembly.model.statuses import (
+from forcefit.assembly.model.statuses import (
     FAILED,
     FAILS,
     NO_SIGNAL,
@@ -25,7 +25,7 @@ from assembly.model.statuses import (
     UNDECIDED,
 )
 from forcefit.inputs.table import BadInput
-from validation.crosscheck.pair import Pair
+from forcefit.validation.crosscheck.pair import Pair
 
 SCALES = (1.0, 0.5, 0.25, 0.125)
 NOT_CHECKED = "not checked, nothing to compare"

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from assembly.model.statuses import EXPLAINED
-from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.lack_of_fit import SIGNIFICANT
-from validation.diagnosis.select import select
-from validation.diagnosis.selected import Selected
-from validation.diagnosis.verdict import verdict
+from forcefit.assembly.model.statuses import EXPLAINED
+from forcefit.validation.diagnosis.diagnosis import Diagnosis
+from forcefit.validation.diagnosis.lack_of_fit import SIGNIFICANT
+from forcefit.validation.diagnosis.select import select
+from forcefit.validation.diagnosis.selected import Selected
+from forcefit.validation.diagnosis.verdict import verdict
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.functions import AXES
-from assembly.effects.places import body_axis, drives, growing
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.variables import variable
-from assembly.model.function import Function
-from assembly.model.robot import Robot
-from validation.diagnosis.function_forms import CandidateShape
+from forcefit.assembly.effects.functions import AXES
+from forcefit.assembly.effects.places import body_axis, drives, growing
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.variables import variable
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.robot import Robot
+from forcefit.validation.diagnosis.function_forms import CandidateShape
 
 TURN, SHIFT = AXES[:3], AXES[3:]
 # relative to the largest component of a vector; smaller changes are rounding

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from assembly.effects.combine import combined
-from validation.diagnosis.fit import MachineFit
-from validation.diagnosis.lack_of_fit import UNLIKELY
-from validation.diagnosis.separability import orthonormal_basis
-from validation.diagnosis.unknowns import STEP, Acting, effects_in
+from forcefit.assembly.effects.combine import combined
+from forcefit.validation.diagnosis.fit import MachineFit
+from forcefit.validation.diagnosis.lack_of_fit import UNLIKELY
+from forcefit.validation.diagnosis.separability import orthonormal_basis
+from forcefit.validation.diagnosis.unknowns import STEP, Acting, effects_in
 
 # relative to a bound: distance from which an unknown counts as at the bound
 _AT_BOUND = 1e-3

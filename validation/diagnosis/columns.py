@@ -11,31 +11,35 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY
-from assembly.measurement.variables import variable
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.candidates import variables_of
-from validation.diagnosis.derivatives import Derivatives
-from validation.diagnosis.elements import Element, effect_element
-from validation.diagnosis.functions import Functions
-from validation.diagnosis.holdout import SPANS, blocks_of, drawn
-from validation.diagnosis.hypotheses import (
+from forcefit.assembly.effects import LIBRARY
+from forcefit.assembly.measurement.variables import variable
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.candidates import variables_of
+from forcefit.validation.diagnosis.derivatives import Derivatives
+from forcefit.validation.diagnosis.elements import Element, effect_element
+from forcefit.validation.diagnosis.functions import Functions
+from forcefit.validation.diagnosis.holdout import SPANS, blocks_of, drawn
+from forcefit.validation.diagnosis.hypotheses import (
     Hypothesis,
     hypotheses,
     sessions_of,
     with_declared,
     with_sessions,
 )
-from validation.diagnosis.joint_functions import joint_functions
-from validation.diagnosis.nuisance import GEOMETRY, SPRINGS, nuisance
-from validation.diagnosis.registration import device_frame
-from validation.diagnosis.signatures import (
+from forcefit.validation.diagnosis.joint_functions import joint_functions
+from forcefit.validation.diagnosis.nuisance import GEOMETRY, SPRINGS, nuisance
+from forcefit.validation.diagnosis.registration import device_frame
+from forcefit.validation.diagnosis.signatures import (
     Signature,
     Tangents,
     fingerprints,
     loaded_components,
 )
-from validation.diagnosis.whitening import Whitening, platform_motions, whitening
+from forcefit.validation.diagnosis.whitening import (
+    Whitening,
+    platform_motions,
+    whitening,
+)
 
 FUNCTION = "function"
 _CLOCK = 0.999  # correlation with time above which a variable is taken as the time

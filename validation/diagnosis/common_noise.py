@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from validation.diagnosis.gaussian import size_penalty
-from validation.diagnosis.states import IN_USE, Models, State
-from validation.diagnosis.weighted_readings import NONE
+from forcefit.validation.diagnosis.gaussian import size_penalty
+from forcefit.validation.diagnosis.states import IN_USE, Models, State
+from forcefit.validation.diagnosis.weighted_readings import NONE
 
 # first step of the logarithms of both standard deviations, which start at one sigma
 _STEP = 1.0

@@ -6,17 +6,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.closure import virtual_joints
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import (
+from forcefit.assembly.linear.closure import virtual_joints
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.predict import (
     predict,
     with_finite_motions,
     with_rest_positions,
     with_second_order,
 )
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.derivatives import Derivatives
-from validation.diagnosis.signatures import conditions_of, whiten
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.derivatives import Derivatives
+from forcefit.validation.diagnosis.signatures import conditions_of, whiten
 
 
 @dataclass(frozen=True, eq=False)

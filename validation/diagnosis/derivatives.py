@@ -10,14 +10,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY, apply_effects
-from assembly.effects.effect import Values
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import predict, with_second_order
-from assembly.measurement.settled_clearance import with_clearances_taken_up
-from validation.diagnosis.hypotheses import Slot
-from validation.diagnosis.responses import Responses, responses
-from validation.diagnosis.sensitivities import Sensitivities
+from forcefit.assembly.effects import LIBRARY, apply_effects
+from forcefit.assembly.effects.effect import Values
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.predict import predict, with_second_order
+from forcefit.assembly.measurement.settled_clearance import with_clearances_taken_up
+from forcefit.validation.diagnosis.hypotheses import Slot
+from forcefit.validation.diagnosis.responses import Responses, responses
+from forcefit.validation.diagnosis.sensitivities import Sensitivities
 
 # relative to an unknown's plausible size: step that limits both rounding and curvature
 STEP = 1e-3

@@ -19,18 +19,18 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.columns import FUNCTION
-from validation.diagnosis.declared import declared
-from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.fit import MachineFit
-from validation.diagnosis.holdout import HeldOut, hidden, hold_out
-from validation.diagnosis.judge import Judged, judge
-from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
-from validation.diagnosis.setup_blunders import SetupBlunder, setup_blunders
-from validation.diagnosis.signatures import conditions_of
-from validation.diagnosis.trace import Traced, trace
+from forcefit.assembly.effects import LIBRARY
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.columns import FUNCTION
+from forcefit.validation.diagnosis.declared import declared
+from forcefit.validation.diagnosis.diagnosis import Diagnosis
+from forcefit.validation.diagnosis.fit import MachineFit
+from forcefit.validation.diagnosis.holdout import HeldOut, hidden, hold_out
+from forcefit.validation.diagnosis.judge import Judged, judge
+from forcefit.validation.diagnosis.nuisance import GEOMETRY, SPRINGS
+from forcefit.validation.diagnosis.setup_blunders import SetupBlunder, setup_blunders
+from forcefit.validation.diagnosis.signatures import conditions_of
+from forcefit.validation.diagnosis.trace import Traced, trace
 
 Update = Callable[[str, int, int], None]
 

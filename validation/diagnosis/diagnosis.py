@@ -10,18 +10,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.measurement.conditions import Conditions
-from assembly.model.robot import Robot
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.model.robot import Robot
 from forcefit.results.display import Figures, html_table, short_repr
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.fit import MachineFit
-from validation.diagnosis.holdout import HeldOut
-from validation.diagnosis.lack_of_fit import LackOfFit, Trend
-from validation.diagnosis.next_measurement import NextMeasurement
-from validation.diagnosis.noise_in_time import NoiseInTime
-from validation.diagnosis.sequence import Errors, Step
-from validation.diagnosis.setup_blunders import SetupBlunder
-from validation.diagnosis.trace import Traced
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.fit import MachineFit
+from forcefit.validation.diagnosis.holdout import HeldOut
+from forcefit.validation.diagnosis.lack_of_fit import LackOfFit, Trend
+from forcefit.validation.diagnosis.next_measurement import NextMeasurement
+from forcefit.validation.diagnosis.noise_in_time import NoiseInTime
+from forcefit.validation.diagnosis.sequence import Errors, Step
+from forcefit.validation.diagnosis.setup_blunders import SetupBlunder
+from forcefit.validation.diagnosis.trace import Traced
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class Diagnosis:
         conditions: declared conditions of the campaign, registered.
         open: (R,) bool, rows in which clearances leave the pose undetermined, in the
             declared model or with the effects found; see
-            :class:`assembly.measurement.predict.Prediction`.
+            :class:`forcefit.assembly.measurement.predict.Prediction`.
         residual_before: (R, 6) [rad, m] reading minus declared model; NaN if not
             measured.
         residual_after: (R, 6) [rad, m] reading minus reading of the saved robot.

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.functions import AXES
-from assembly.model.robot import Robot
-from validation.diagnosis.candidates import Candidate
-from validation.diagnosis.gaussian import Marginal, deviance, evidence_gains
-from validation.diagnosis.hypotheses import Hypothesis
-from validation.diagnosis.signatures import Signature
-from validation.diagnosis.whitening import Whitening
+from forcefit.assembly.effects.functions import AXES
+from forcefit.assembly.model.robot import Robot
+from forcefit.validation.diagnosis.candidates import Candidate
+from forcefit.validation.diagnosis.gaussian import Marginal, deviance, evidence_gains
+from forcefit.validation.diagnosis.hypotheses import Hypothesis
+from forcefit.validation.diagnosis.signatures import Signature
+from forcefit.validation.diagnosis.whitening import Whitening
 
 _PLAUSIBLE = 1e3  # largest ratio of an unknown to its plausible size
 _NO_OFFSET = 1e-9  # [sigma] smaller offsets are rounding

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.energy import Assembly, CannotAssemble
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.measurement.predict import assemble_row
-from assembly.report.scene import robot_scene
-from assembly.solvers.conic import SolverFailed
+from forcefit.assembly.linear.energy import Assembly, CannotAssemble
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.measurement.predict import assemble_row
+from forcefit.assembly.report.scene import robot_scene
+from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.page.charts import BLUE, GREY, RED, Axis, bars, chart, grid, label, matrix
-from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.separability import compare_signatures
-from validation.diagnosis.signatures import conditions_of
-from validation.diagnosis.verdict import CLAIM, RIVAL
+from forcefit.validation.diagnosis.diagnosis import Diagnosis
+from forcefit.validation.diagnosis.separability import compare_signatures
+from forcefit.validation.diagnosis.signatures import conditions_of
+from forcefit.validation.diagnosis.verdict import CLAIM, RIVAL
 
 _SIDES = ((0, 1, "from above"), (0, 2, "from the side"))
 _COLOURS = {"before": RED, "after": BLUE}

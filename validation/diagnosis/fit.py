@@ -5,7 +5,7 @@ The most probable x minimises
     F(x) = |W (y - f(x)) / sigma|^2 + |(x - m) / s|^2    within the bounds of x,
 
 Here f are the readings of the robot to be saved, computed by the function that predicts
-with the saved file (:mod:`validation.diagnosis.prediction`).  Steps are Gauss-Newton
+with the saved file (:mod:`forcefit.validation.diagnosis.prediction`).  Steps are Gauss-Newton
 steps, with the slopes of the linear model at the present robot; a step that increases F
 is halved.
 
@@ -32,12 +32,12 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 
-from assembly.model.robot import Robot
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.prediction import residual_of
-from validation.diagnosis.separability import ROUNDING
-from validation.diagnosis.unknowns import Acting, Unknowns
-from validation.diagnosis.whitening import whitening_of
+from forcefit.assembly.model.robot import Robot
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.prediction import residual_of
+from forcefit.validation.diagnosis.separability import ROUNDING
+from forcefit.validation.diagnosis.unknowns import Acting, Unknowns
+from forcefit.validation.diagnosis.whitening import whitening_of
 
 _STEPS = 20  # largest number of Gauss-Newton steps; most fits converge within ten
 _SLOPES = 6  # number of steps in which the slopes are recomputed

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.variables import variable
-from assembly.model.robot import Robot
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.variables import variable
+from forcefit.assembly.model.robot import Robot
 
 KNOTS = 7  # number of knots of a spline; powers up to three fit simpler shapes
 MANY = 150  # number of rows above which waves of high order are searched
@@ -43,7 +43,7 @@ class CandidateShape:
     """A form of a function, with the names of its columns.
 
     Attributes:
-        form: a name of :data:`assembly.effects.forms.FORMS`.
+        form: a name of :data:`forcefit.assembly.effects.forms.FORMS`.
         names: names of the columns, which are linear in the coefficients.
         given: names and values of the shape parameters, in which the form is nonlinear.
     """

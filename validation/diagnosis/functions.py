@@ -25,19 +25,19 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.measurement.conditions import Conditions
-from validation.campaign.campaign import Campaign
-from validation.diagnosis import function_forms as forms
-from validation.diagnosis.candidates import (
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis import function_forms as forms
+from forcefit.validation.diagnosis.candidates import (
     Candidate,
     CandidatePart,
     is_known,
 )
-from validation.diagnosis.elements import Element, function_element
-from validation.diagnosis.function_forms import CandidateShape
-from validation.diagnosis.gaussian import Marginal, evidence_gains
-from validation.diagnosis.places import Places, Weighted, Where
-from validation.diagnosis.sensitivities import Sensitivities, in_cells
+from forcefit.validation.diagnosis.elements import Element, function_element
+from forcefit.validation.diagnosis.function_forms import CandidateShape
+from forcefit.validation.diagnosis.gaussian import Marginal, evidence_gains
+from forcefit.validation.diagnosis.places import Places, Weighted, Where
+from forcefit.validation.diagnosis.sensitivities import Sensitivities, in_cells
 
 Variables = tuple[str, ...]
 # the variables of a function, and the forms to be scored

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.campaign.campaign import Campaign
+from forcefit.validation.campaign.campaign import Campaign
 
 FEWEST = 8  # smallest number of blocks of rows for a test on held-out rows
 # number of configurations from which on a single part of the rows is held out

@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY
-from assembly.effects.effect import Effect, Unknown, at
-from assembly.measurement.conditions import Conditions
-from assembly.model.robot import Robot
+from forcefit.assembly.effects import LIBRARY
+from forcefit.assembly.effects.effect import Effect, Unknown, at
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.model.robot import Robot
 
 PER_SESSION = ("registration", "encoder_offset", "drift")
 # largest number of unknowns of one effect; if more are needed, frames of the same kind

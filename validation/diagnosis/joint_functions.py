@@ -11,15 +11,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.friction_hysteresis import elastic_joints
-from assembly.effects.functions import AXES
-from assembly.effects.places import drives
-from validation.diagnosis import function_forms as forms
-from validation.diagnosis.candidates import Candidate, CandidatePart, places_of
-from validation.diagnosis.elements import Element
-from validation.diagnosis.function_forms import CandidateShape, is_angle
-from validation.diagnosis.functions import Functions
-from validation.diagnosis.gaussian import SIZES
+from forcefit.assembly.effects.friction_hysteresis import elastic_joints
+from forcefit.assembly.effects.functions import AXES
+from forcefit.assembly.effects.places import drives
+from forcefit.validation.diagnosis import function_forms as forms
+from forcefit.validation.diagnosis.candidates import Candidate, CandidatePart, places_of
+from forcefit.validation.diagnosis.elements import Element
+from forcefit.validation.diagnosis.function_forms import CandidateShape, is_angle
+from forcefit.validation.diagnosis.functions import Functions
+from forcefit.validation.diagnosis.gaussian import SIZES
 
 # compliance proportional to the squared wrench
 _CUBIC = CandidateShape("powers", ("2",))

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from assembly.measurement.predict import predict
-from assembly.model.statuses import (
+from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.model.statuses import (
     AMBIGUOUS,
     EXPLAINED,
     LEARNED,
@@ -16,11 +16,11 @@ from assembly.model.statuses import (
     NOT_ENOUGH_ROWS,
     OUTSIDE_LIBRARY,
 )
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.fit import MachineFit, fit_machine
-from validation.diagnosis.holdout import FEWEST, HeldOut, blocks_of
-from validation.diagnosis.lack_of_fit import (
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.diagnosis import Diagnosis
+from forcefit.validation.diagnosis.fit import MachineFit, fit_machine
+from forcefit.validation.diagnosis.holdout import FEWEST, HeldOut, blocks_of
+from forcefit.validation.diagnosis.lack_of_fit import (
     OUTLIERS,
     SIGNIFICANT,
     LackOfFit,
@@ -28,16 +28,24 @@ from validation.diagnosis.lack_of_fit import (
     outlying,
     trends,
 )
-from validation.diagnosis.next_measurement import next_measurement
-from validation.diagnosis.noise_in_time import NoiseInTime, noise_in_time, widened
-from validation.diagnosis.plausible import implausible, impossible_rows
-from validation.diagnosis.prediction import predicted, residual_of
-from validation.diagnosis.sequence import errors_of, joined, pooled, stages
-from validation.diagnosis.signatures import whiten
-from validation.diagnosis.text import text
-from validation.diagnosis.trace import FINITE, Traced
-from validation.diagnosis.verdict import by_names, verdict
-from validation.diagnosis.whitening import independent, size_of_noise, whitening_of
+from forcefit.validation.diagnosis.next_measurement import next_measurement
+from forcefit.validation.diagnosis.noise_in_time import (
+    NoiseInTime,
+    noise_in_time,
+    widened,
+)
+from forcefit.validation.diagnosis.plausible import implausible, impossible_rows
+from forcefit.validation.diagnosis.prediction import predicted, residual_of
+from forcefit.validation.diagnosis.sequence import errors_of, joined, pooled, stages
+from forcefit.validation.diagnosis.signatures import whiten
+from forcefit.validation.diagnosis.text import text
+from forcefit.validation.diagnosis.trace import FINITE, Traced
+from forcefit.validation.diagnosis.verdict import by_names, verdict
+from forcefit.validation.diagnosis.whitening import (
+    independent,
+    size_of_noise,
+    whitening_of,
+)
 
 # [sigma] rms of held-out rows below which a residual counts as noise, for any
 # probability

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, f
 
-from assembly.kinematics.posture import POSE, pose_components
-from assembly.measurement.conditions import Conditions
-from validation.campaign.campaign import LOAD, Campaign, number_rows
-from validation.diagnosis.noise import repeat_scatter
-from validation.diagnosis.separability import orthonormal_basis
+from forcefit.assembly.kinematics.posture import POSE, pose_components
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.validation.campaign.campaign import LOAD, Campaign, number_rows
+from forcefit.validation.diagnosis.noise import repeat_scatter
+from forcefit.validation.diagnosis.separability import orthonormal_basis
 
 SIGNIFICANT = 1e-4  # probability below which a residual is not noise
 UNLIKELY = 1e-3  # probability below which one of many tested residuals is unlikely

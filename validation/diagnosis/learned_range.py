@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.places import drives
-from assembly.model.function import Function
-from assembly.model.robot import Robot
-from validation.campaign.campaign import LOAD, Campaign
+from forcefit.assembly.effects.places import drives
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.robot import Robot
+from forcefit.validation.campaign.campaign import LOAD, Campaign
 
 _MARGIN = 0.05  # relative to the width of a range: accepted extrapolation
 _SAME = 1e-3  # relative to a value: accepted difference if the variable never varied

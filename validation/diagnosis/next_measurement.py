@@ -21,12 +21,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY, apply_effects
-from assembly.kinematics.posture import POSE, place_many_joints, pose_components
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import predict
-from validation.campaign.campaign import LOAD, Campaign
-from validation.diagnosis.fit import MachineFit
+from forcefit.assembly.effects import LIBRARY, apply_effects
+from forcefit.assembly.kinematics.posture import (
+    POSE,
+    place_many_joints,
+    pose_components,
+)
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.predict import predict
+from forcefit.validation.campaign.campaign import LOAD, Campaign
+from forcefit.validation.diagnosis.fit import MachineFit
 
 _TRIED = 240  # number of conditions that are tried
 # factor by which the tried range of loads and covariates exceeds the measured range

@@ -29,8 +29,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.lack_of_fit import SIGNIFICANT
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.lack_of_fit import SIGNIFICANT
 
 _SHARES = np.array([0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95])
 # number of time constants between the usual time step and the longest session

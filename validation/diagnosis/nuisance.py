@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.nominal import size_of
-from assembly.measurement.conditions import Conditions
-from assembly.model.links import in_series
-from assembly.model.robot import Robot
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.responses import Responses
-from validation.diagnosis.signatures import UNSEEN, whiten
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.model.links import in_series
+from forcefit.assembly.model.robot import Robot
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.responses import Responses
+from forcefit.validation.diagnosis.signatures import UNSEEN, whiten
 
 GEOMETRY, SPRINGS = "geometry", "springs"
 KINDS = ("rotation", "translation")

@@ -11,16 +11,16 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.functions import AXES
-from assembly.kinematics.nominal import size_of
-from assembly.measurement.variables import LOADS
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.candidates import is_turn, places_of
-from validation.diagnosis.gaussian import SIZES
-from validation.diagnosis.nuisance import LARGEST_SHIFT, LARGEST_TURN
-from validation.diagnosis.sensitivities import Sensitivities
-from validation.diagnosis.signatures import fingerprints
-from validation.diagnosis.whitening import Whitening
+from forcefit.assembly.effects.functions import AXES
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.measurement.variables import LOADS
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.candidates import is_turn, places_of
+from forcefit.validation.diagnosis.gaussian import SIZES
+from forcefit.validation.diagnosis.nuisance import LARGEST_SHIFT, LARGEST_TURN
+from forcefit.validation.diagnosis.sensitivities import Sensitivities
+from forcefit.validation.diagnosis.signatures import fingerprints
+from forcefit.validation.diagnosis.whitening import Whitening
 
 Where = tuple[str, str, str]  # place, component, kind of candidate
 # ratio of the largest unrecorded force, such as a cable's, to the largest recorded

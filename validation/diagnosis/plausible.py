@@ -15,11 +15,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY
-from assembly.kinematics.nominal import size_of
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.fit import MachineFit
-from validation.diagnosis.nuisance import (
+from forcefit.assembly.effects import LIBRARY
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.fit import MachineFit
+from forcefit.validation.diagnosis.nuisance import (
     GEOMETRY,
     KINDS,
     LARGEST_SHIFT,

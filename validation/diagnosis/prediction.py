@@ -9,12 +9,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.closure import virtual_joints
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import Prediction, predict, with_finite_motions
-from assembly.model.robot import Robot
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.signatures import conditions_of
+from forcefit.assembly.linear.closure import virtual_joints
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.predict import (
+    Prediction,
+    predict,
+    with_finite_motions,
+)
+from forcefit.assembly.model.robot import Robot
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.signatures import conditions_of
 
 
 def finite_conditions(campaign: Campaign, rows: NDArray | None = None) -> Conditions:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve, solve_triangular
 
-from validation.diagnosis.gaussian import FREEDOM, deviance, size_penalty
+from forcefit.validation.diagnosis.gaussian import FREEDOM, deviance, size_penalty
 
 Eigen = tuple[NDArray, NDArray]
 _STEPS = 25  # largest number of steps; about ten are needed

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.measurement.variables import variable
-from validation.diagnosis.candidates import Candidate
-from validation.diagnosis.gaussian import leave_block_out
-from validation.diagnosis.states import State
+from forcefit.assembly.measurement.variables import variable
+from forcefit.validation.diagnosis.candidates import Candidate
+from forcefit.validation.diagnosis.gaussian import leave_block_out
+from forcefit.validation.diagnosis.states import State
 
 PARTS = 5  # number of parts of a range, equal to the number of folds
 _DISTINCT = 4  # smallest number of different values of a variable in each part

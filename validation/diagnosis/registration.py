@@ -4,18 +4,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from assembly.effects import LIBRARY, apply_effects
-from assembly.effects.functions import in_session_alone
-from assembly.effects.registration import BASE
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import predict, with_second_order
+from forcefit.assembly.effects import LIBRARY, apply_effects
+from forcefit.assembly.effects.functions import in_session_alone
+from forcefit.assembly.effects.registration import BASE
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.predict import predict, with_second_order
 from forcefit.inputs.table import BadInput
-from stiffness.screws import rotation_matrix, rotation_vector
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.fit import fit_machine
-from validation.diagnosis.hypotheses import Hypothesis, Slot
-from validation.diagnosis.signatures import conditions_of
-from validation.diagnosis.unknowns import Acting, Unknowns
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.fit import fit_machine
+from forcefit.validation.diagnosis.hypotheses import Hypothesis, Slot
+from forcefit.validation.diagnosis.signatures import conditions_of
+from forcefit.validation.diagnosis.unknowns import Acting, Unknowns
 
 _FEWEST_POINTS = 3  # smallest number of points that determine a frame
 

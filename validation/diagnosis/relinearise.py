@@ -12,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.diagnosis.elements import Element, effect_element
-from validation.diagnosis.hypotheses import in_one_session, sessions_of
-from validation.diagnosis.signatures import Signature, Tangents
-from validation.diagnosis.states import Models, State
+from forcefit.validation.diagnosis.elements import Element, effect_element
+from forcefit.validation.diagnosis.hypotheses import in_one_session, sessions_of
+from forcefit.validation.diagnosis.signatures import Signature, Tangents
+from forcefit.validation.diagnosis.states import Models, State
 
 _ROUNDS = 3  # largest number of linearisations, because they may oscillate
 MOVED = 0.3  # change of the log posterior that does not alter any decision

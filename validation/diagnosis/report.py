@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from assembly.model.statuses import AMBIGUOUS, EXPLAINED, LEARNED, NONE_NEEDED
+from forcefit.assembly.model.statuses import AMBIGUOUS, EXPLAINED, LEARNED, NONE_NEEDED
 from forcefit.inputs.writing import write_text
 from forcefit.page.page import (
     Page,
@@ -16,11 +16,11 @@ from forcefit.page.page import (
     section,
 )
 from forcefit.page.tables import Cell, Column, Value, table
-from validation.diagnosis import figures, results
-from validation.diagnosis.calibration import Calibration
-from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.next_measurement import load_text
-from validation.diagnosis.sentence import calibration_text, open_text
+from forcefit.validation.diagnosis import figures, results
+from forcefit.validation.diagnosis.calibration import Calibration
+from forcefit.validation.diagnosis.diagnosis import Diagnosis
+from forcefit.validation.diagnosis.next_measurement import load_text
+from forcefit.validation.diagnosis.sentence import calibration_text, open_text
 
 _ASSUMED = (
     "Errors are computed on held-out rows, used neither to choose nor to fit models.",

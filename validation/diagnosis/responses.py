@@ -18,17 +18,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.closure import virtual_joints
-from assembly.linear.load import loads_with_weight
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import read
-from assembly.measurement.settled_clearance import (
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.closure import virtual_joints
+from forcefit.assembly.linear.load import loads_with_weight
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.predict import read
+from forcefit.assembly.measurement.settled_clearance import (
     with_clearances_at_rest,
     with_clearances_taken_up,
     without_joint_clearances,
 )
-from assembly.measurement.without_clearance import flexibility
+from forcefit.assembly.measurement.without_clearance import flexibility
 
 _STEP = 1e-5  # [rad, m] step of a central difference, exact to 1e-10
 # relative to the largest moment or force: smaller ones are rounding

@@ -6,16 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from assembly.effects import LIBRARY
-from assembly.model import statuses
-from validation.campaign.campaign import READING
-from validation.diagnosis.calibration import Calibration
-from validation.diagnosis.claims import Parameter, parameters_of
-from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.nuisance import GEOMETRY, KINDS, SPRINGS
-from validation.diagnosis.saving import functions_of
-from validation.diagnosis.sentence import WORDS, formula, sentence
-from validation.diagnosis.sequence import LEARNED
+from forcefit.assembly.effects import LIBRARY
+from forcefit.assembly.model import statuses
+from forcefit.validation.campaign.campaign import READING
+from forcefit.validation.diagnosis.calibration import Calibration
+from forcefit.validation.diagnosis.claims import Parameter, parameters_of
+from forcefit.validation.diagnosis.diagnosis import Diagnosis
+from forcefit.validation.diagnosis.nuisance import GEOMETRY, KINDS, SPRINGS
+from forcefit.validation.diagnosis.saving import functions_of
+from forcefit.validation.diagnosis.sentence import WORDS, formula, sentence
+from forcefit.validation.diagnosis.sequence import LEARNED
 
 # verdicts that list effects
 LISTED = {statuses.EXPLAINED, statuses.AMBIGUOUS, statuses.LEARNED}

@@ -18,15 +18,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from assembly.model.function import Function
-from assembly.model.links import in_series
-from assembly.model.robot import Robot
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.links import in_series
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import write_bytes
-from validation.campaign.campaign import READING
-from validation.diagnosis.fit import MachineFit
-from validation.diagnosis.nuisance import GEOMETRY, with_error
-from validation.diagnosis.unknowns import STEP, Small, effects_in, with_effects_in
+from forcefit.validation.campaign.campaign import READING
+from forcefit.validation.diagnosis.fit import MachineFit
+from forcefit.validation.diagnosis.nuisance import GEOMETRY, with_error
+from forcefit.validation.diagnosis.unknowns import (
+    STEP,
+    Small,
+    effects_in,
+    with_effects_in,
+)
 
 ERROR, COMPLIANCE, EFFECT, FUNCTION = (
     "geometric_error", "joint_compliance", "effect", "function",

@@ -13,16 +13,19 @@ from typing import Any
 
 import numpy as np
 
-from assembly.files.robot_file import write_robot
-from assembly.model.function import Function
-from assembly.model.robot import Robot
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.fit import MachineFit
-from validation.diagnosis.learned_range import learned_range
-from validation.diagnosis.nuisance import GEOMETRY
-from validation.diagnosis.saved_covariance import covariance_of, write_covariance
-from validation.diagnosis.unknowns import Small
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.robot import Robot
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.diagnosis import Diagnosis
+from forcefit.validation.diagnosis.fit import MachineFit
+from forcefit.validation.diagnosis.learned_range import learned_range
+from forcefit.validation.diagnosis.nuisance import GEOMETRY
+from forcefit.validation.diagnosis.saved_covariance import (
+    covariance_of,
+    write_covariance,
+)
+from forcefit.validation.diagnosis.unknowns import Small
 
 
 def corrected(diagnosis: Diagnosis) -> Robot:

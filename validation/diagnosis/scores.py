@@ -8,14 +8,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.diagnosis import function_forms as forms
-from validation.diagnosis.candidates import Candidate
-from validation.diagnosis.elements import Dense, Element
-from validation.diagnosis.functions import Request, ScoredFunction
-from validation.diagnosis.places import Weighted
-from validation.diagnosis.states import MORE, State
-from validation.diagnosis.weighted_readings import WeightedReadings
-from validation.diagnosis.whitening import Whitening
+from forcefit.validation.diagnosis import function_forms as forms
+from forcefit.validation.diagnosis.candidates import Candidate
+from forcefit.validation.diagnosis.elements import Dense, Element
+from forcefit.validation.diagnosis.functions import Request, ScoredFunction
+from forcefit.validation.diagnosis.places import Weighted
+from forcefit.validation.diagnosis.states import MORE, State
+from forcefit.validation.diagnosis.weighted_readings import WeightedReadings
+from forcefit.validation.diagnosis.whitening import Whitening
 
 BEAM = 6  # largest number of elements that are tried in a model
 OF_NAME = 2  # largest number of tried elements with the same name

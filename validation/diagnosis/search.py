@@ -11,11 +11,11 @@ Steps:
 
 from collections.abc import Callable, Iterable, Sequence
 
-from validation.diagnosis.elements import Element
-from validation.diagnosis.relinearise import MOVED, Relinearisation
-from validation.diagnosis.scores import BEAM, OF_NAME, Scores
-from validation.diagnosis.states import Models, State
-from validation.diagnosis.weighted_readings import WeightedReadings
+from forcefit.validation.diagnosis.elements import Element
+from forcefit.validation.diagnosis.relinearise import MOVED, Relinearisation
+from forcefit.validation.diagnosis.scores import BEAM, OF_NAME, Scores
+from forcefit.validation.diagnosis.states import Models, State
+from forcefit.validation.diagnosis.weighted_readings import WeightedReadings
 
 Update = Callable[[str, int, int], None]
 # elements to fit, and the model that gives start values

@@ -13,26 +13,26 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from assembly.effects import LIBRARY
-from assembly.effects.forms import FORMS
-from validation.diagnosis.columns import Columns
-from validation.diagnosis.common_noise import common_sizes, stable
-from validation.diagnosis.elements import Element, label
-from validation.diagnosis.gaussian import scale
-from validation.diagnosis.noise import (
+from forcefit.assembly.effects import LIBRARY
+from forcefit.assembly.effects.forms import FORMS
+from forcefit.validation.diagnosis.columns import Columns
+from forcefit.validation.diagnosis.common_noise import common_sizes, stable
+from forcefit.validation.diagnosis.elements import Element, label
+from forcefit.validation.diagnosis.gaussian import scale
+from forcefit.validation.diagnosis.noise import (
     Noise,
     cell_weights,
     findings,
     probability_good,
     repeat_scatter,
 )
-from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
-from validation.diagnosis.range_parts import range_error
-from validation.diagnosis.search import Search, Update
-from validation.diagnosis.selected import Learned, Model, Selected
-from validation.diagnosis.states import State, prediction_gain
-from validation.diagnosis.unknowns import Small
-from validation.diagnosis.weighted_readings import NONE, WeightedReadings
+from forcefit.validation.diagnosis.nuisance import GEOMETRY, SPRINGS
+from forcefit.validation.diagnosis.range_parts import range_error
+from forcefit.validation.diagnosis.search import Search, Update
+from forcefit.validation.diagnosis.selected import Learned, Model, Selected
+from forcefit.validation.diagnosis.states import State, prediction_gain
+from forcefit.validation.diagnosis.unknowns import Small
+from forcefit.validation.diagnosis.weighted_readings import NONE, WeightedReadings
 
 # difference of the log posterior (odds of 20) below which neither model is preferred
 _EQUAL = 3.0

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 from numpy.typing import NDArray
 
-from validation.diagnosis.candidates import Candidate, CandidatePart
-from validation.diagnosis.hypotheses import Hypothesis
-from validation.diagnosis.noise import Noise
-from validation.diagnosis.range_parts import RangeError
-from validation.diagnosis.states import State
-from validation.diagnosis.unknowns import Small
+from forcefit.validation.diagnosis.candidates import Candidate, CandidatePart
+from forcefit.validation.diagnosis.hypotheses import Hypothesis
+from forcefit.validation.diagnosis.noise import Noise
+from forcefit.validation.diagnosis.range_parts import RangeError
+from forcefit.validation.diagnosis.states import State
+from forcefit.validation.diagnosis.unknowns import Small
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,21 +19,21 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.forms import FORMS, roughness
-from assembly.effects.functions import AXES, basis
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import predict
-from assembly.measurement.variables import LOADS
-from assembly.model.function import Function
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.candidates import (
+from forcefit.assembly.effects.forms import FORMS, roughness
+from forcefit.assembly.effects.functions import AXES, basis
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.measurement.variables import LOADS
+from forcefit.assembly.model.function import Function
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.candidates import (
     Candidate,
     CandidatePart,
     is_known,
     is_turn,
 )
-from validation.diagnosis.function_forms import CandidateShape
-from validation.diagnosis.responses import Responses
+from forcefit.validation.diagnosis.function_forms import CandidateShape
+from forcefit.validation.diagnosis.responses import Responses
 
 # relative to a spline's size: prior size of its linear part, per step between knots
 _STIFF = 0.1

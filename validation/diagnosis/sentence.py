@@ -5,19 +5,19 @@ from collections.abc import Sequence
 
 from numpy.typing import NDArray
 
-from assembly.effects.functions import columns_of, parameters_of
-from assembly.model.function import Function
-from assembly.model.statuses import (
+from forcefit.assembly.effects.functions import columns_of, parameters_of
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.statuses import (
     AMBIGUOUS,
     EXPLAINED,
     LEARNED,
     NONE_NEEDED,
     NOT_ENOUGH_ROWS,
 )
-from validation.diagnosis.calibration import Calibration
-from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
-from validation.diagnosis.saving import functions_of
+from forcefit.validation.diagnosis.calibration import Calibration
+from forcefit.validation.diagnosis.diagnosis import Diagnosis
+from forcefit.validation.diagnosis.nuisance import GEOMETRY, SPRINGS
+from forcefit.validation.diagnosis.saving import functions_of
 
 WORDS = {GEOMETRY: "geometric errors", SPRINGS: "springs"}
 

@@ -17,7 +17,7 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from validation.diagnosis.signatures import UNSEEN
+from forcefit.validation.diagnosis.signatures import UNSEEN
 
 LIKE = 0.98  # cosine above which a design cannot distinguish two signatures
 SEEN = 3.0  # [sigma] norm from which on a signature is detectable

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.fit import MachineFit, fit_machine
-from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
-from validation.diagnosis.prediction import residual_of
-from validation.diagnosis.unknowns import Unknowns
+from forcefit.assembly.effects import LIBRARY
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.fit import MachineFit, fit_machine
+from forcefit.validation.diagnosis.nuisance import GEOMETRY, SPRINGS
+from forcefit.validation.diagnosis.prediction import residual_of
+from forcefit.validation.diagnosis.unknowns import Unknowns
 
 LEARNED = "learned effects"
 _TERMS = (

@@ -11,14 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import place_many, place_many_joints
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import predict
-from assembly.measurement.settled_clearance import without_joint_clearances
-from stiffness.screws import rotation_matrix, rotation_vector
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.registration import device_rotation, off_one_line
-from validation.diagnosis.setup_corrections import (
+from forcefit.assembly.kinematics.posture import place_many, place_many_joints
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.measurement.settled_clearance import without_joint_clearances
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.registration import device_rotation, off_one_line
+from forcefit.validation.diagnosis.setup_corrections import (
     Correction,
     SetUp,
     as_given,

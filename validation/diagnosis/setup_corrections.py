@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from stiffness.screws import rotation_matrix
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.signatures import loaded_components
+from forcefit.stiffness.screws import rotation_matrix
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.signatures import loaded_components
 
 _UNITS = {  # factors between units that are often confused
     "length": (25.4, 1e3),  # inches, millimetres

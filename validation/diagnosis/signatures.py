@@ -15,17 +15,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import apply_effects, apply_known
-from assembly.effects.effect import Values
-from assembly.effects.functions import covariates_of
-from assembly.kinematics.posture import Posture
-from assembly.measurement.conditions import Conditions, as_declared
-from assembly.measurement.predict import predict
-from assembly.measurement.variables import with_history
+from forcefit.assembly.effects import apply_effects, apply_known
+from forcefit.assembly.effects.effect import Values
+from forcefit.assembly.effects.functions import covariates_of
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.measurement.conditions import Conditions, as_declared
+from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.measurement.variables import with_history
 from forcefit.inputs.errors import BadInput
-from validation.campaign.campaign import LOAD, Campaign
-from validation.diagnosis.derivatives import STEP, Derivatives
-from validation.diagnosis.hypotheses import (
+from forcefit.validation.campaign.campaign import LOAD, Campaign
+from forcefit.validation.diagnosis.derivatives import STEP, Derivatives
+from forcefit.validation.diagnosis.hypotheses import (
     Hypothesis,
     Slot,
     in_one_session,

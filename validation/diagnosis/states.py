@@ -16,16 +16,16 @@ from numpy.typing import NDArray
 from scipy.special import log_ndtr
 from scipy.stats import rankdata
 
-from validation.diagnosis.elements import Element
-from validation.diagnosis.gaussian import (
+from forcefit.validation.diagnosis.elements import Element
+from forcefit.validation.diagnosis.gaussian import (
     Marginal,
     deviance,
     leave_block_out,
     marginalise,
     scale,
 )
-from validation.diagnosis.prior_sizes import Grouped, Sizes, best_sizes
-from validation.diagnosis.weighted_readings import NARROW, WeightedReadings
+from forcefit.validation.diagnosis.prior_sizes import Grouped, Sizes, best_sizes
+from forcefit.validation.diagnosis.weighted_readings import NARROW, WeightedReadings
 
 # whether geometric errors are in use, whether springs are in use
 Mode = tuple[bool, bool]

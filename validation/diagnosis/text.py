@@ -3,12 +3,12 @@
 import math
 from typing import Any
 
-from validation.diagnosis.calibration import Calibration
-from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.next_measurement import load_text
-from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
-from validation.diagnosis.results import table
-from validation.diagnosis.sentence import WORDS, calibration_text, open_text
+from forcefit.validation.diagnosis.calibration import Calibration
+from forcefit.validation.diagnosis.diagnosis import Diagnosis
+from forcefit.validation.diagnosis.next_measurement import load_text
+from forcefit.validation.diagnosis.nuisance import GEOMETRY, SPRINGS
+from forcefit.validation.diagnosis.results import table
+from forcefit.validation.diagnosis.sentence import WORDS, calibration_text, open_text
 
 Table = dict[str, Any]
 

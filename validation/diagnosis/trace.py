@@ -18,28 +18,32 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import predict
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.claims import supported
-from validation.diagnosis.columns import FUNCTION, Columns
-from validation.diagnosis.declared import Declared, at_rest
-from validation.diagnosis.derivatives import Derivatives
-from validation.diagnosis.fit import MachineFit, fit_machine
-from validation.diagnosis.holdout import drawn, hidden
-from validation.diagnosis.hypotheses import Hypothesis, in_one_session, sessions_of
-from validation.diagnosis.lack_of_fit import OUTLIERS, outlying
-from validation.diagnosis.noise import cell_weights
-from validation.diagnosis.plausible import impossible_rows
-from validation.diagnosis.prediction import residual_of
-from validation.diagnosis.registration import register
-from validation.diagnosis.select import select
-from validation.diagnosis.selected import Selected
-from validation.diagnosis.signatures import whiten
-from validation.diagnosis.states import prediction_gain
-from validation.diagnosis.unknowns import Acting, LearnedFunction, Unknowns
-from validation.diagnosis.weighted_readings import NONE
+from forcefit.assembly.effects import LIBRARY
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.predict import predict
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.claims import supported
+from forcefit.validation.diagnosis.columns import FUNCTION, Columns
+from forcefit.validation.diagnosis.declared import Declared, at_rest
+from forcefit.validation.diagnosis.derivatives import Derivatives
+from forcefit.validation.diagnosis.fit import MachineFit, fit_machine
+from forcefit.validation.diagnosis.holdout import drawn, hidden
+from forcefit.validation.diagnosis.hypotheses import (
+    Hypothesis,
+    in_one_session,
+    sessions_of,
+)
+from forcefit.validation.diagnosis.lack_of_fit import OUTLIERS, outlying
+from forcefit.validation.diagnosis.noise import cell_weights
+from forcefit.validation.diagnosis.plausible import impossible_rows
+from forcefit.validation.diagnosis.prediction import residual_of
+from forcefit.validation.diagnosis.registration import register
+from forcefit.validation.diagnosis.select import select
+from forcefit.validation.diagnosis.selected import Selected
+from forcefit.validation.diagnosis.signatures import whiten
+from forcefit.validation.diagnosis.states import prediction_gain
+from forcefit.validation.diagnosis.unknowns import Acting, LearnedFunction, Unknowns
+from forcefit.validation.diagnosis.weighted_readings import NONE
 
 Update = Callable[[str, int, int], None]
 FINITE = next(name for name, effect in LIBRARY.items() if effect.finite)

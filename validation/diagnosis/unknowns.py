@@ -12,19 +12,19 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.combine import combined
-from assembly.effects.effect import Values
-from assembly.linear.closure import virtual_joints
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import predict, with_rest_positions
-from assembly.model.robot import Robot
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.candidates import Candidate
-from validation.diagnosis.hypotheses import Hypothesis
-from validation.diagnosis.nuisance import GEOMETRY, with_compliance, with_error
-from validation.diagnosis.responses import responses
-from validation.diagnosis.sensitivities import Sensitivities
-from validation.diagnosis.signatures import conditions_of
+from forcefit.assembly.effects.combine import combined
+from forcefit.assembly.effects.effect import Values
+from forcefit.assembly.linear.closure import virtual_joints
+from forcefit.assembly.measurement.conditions import Conditions
+from forcefit.assembly.measurement.predict import predict, with_rest_positions
+from forcefit.assembly.model.robot import Robot
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.candidates import Candidate
+from forcefit.validation.diagnosis.hypotheses import Hypothesis
+from forcefit.validation.diagnosis.nuisance import GEOMETRY, with_compliance, with_error
+from forcefit.validation.diagnosis.responses import responses
+from forcefit.validation.diagnosis.sensitivities import Sensitivities
+from forcefit.validation.diagnosis.signatures import conditions_of
 
 _WIDE = 1e3  # prior standard deviation of an effect's unknown, in plausible sizes
 # largest change, and prior standard deviation, of a function's shape parameter,

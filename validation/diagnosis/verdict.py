@@ -1,14 +1,14 @@
 """The verdict of a diagnosis, from the probabilities of models."""
 
-from assembly.model.statuses import (
+from forcefit.assembly.model.statuses import (
     AMBIGUOUS,
     EXPLAINED,
     LEARNED,
     NONE_NEEDED,
     OUTSIDE_LIBRARY,
 )
-from validation.diagnosis.columns import FUNCTION
-from validation.diagnosis.selected import Selected
+from forcefit.validation.diagnosis.columns import FUNCTION
+from forcefit.validation.diagnosis.selected import Selected
 
 CLAIM = 0.9  # probability above which an effect is claimed
 RIVAL = 0.5  # probability above which another effect is a rival

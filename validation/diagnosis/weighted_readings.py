@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.diagnosis.columns import Columns
-from validation.diagnosis.elements import Element
-from validation.diagnosis.prior_sizes import Eigen
+from forcefit.validation.diagnosis.columns import Columns
+from forcefit.validation.diagnosis.elements import Element
+from forcefit.validation.diagnosis.prior_sizes import Eigen
 
 NARROW = 50  # largest number of columns of an element whose fitted cells are cached
 _RANK = 1e-9  # relative singular value below which a column depends on others

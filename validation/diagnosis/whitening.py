@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import spsolve
 
-from validation.campaign.campaign import Campaign
+from forcefit.validation.campaign.campaign import Campaign
 
 
 @dataclass(frozen=True, eq=False)

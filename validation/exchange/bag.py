@@ -13,8 +13,8 @@ import numpy as np
 
 from forcefit.inputs.errors import BadInput, one_line
 from forcefit.inputs.packages import naming_packages
-from validation.exchange.orientation import from_quaternion
-from validation.exchange.reading import LARGEST, Reading
+from forcefit.validation.exchange.orientation import from_quaternion
+from forcefit.validation.exchange.reading import LARGEST, Reading
 
 _MESSAGES = {
     "geometry_msgs/msg/PointStamped", "geometry_msgs/msg/PoseStamped",

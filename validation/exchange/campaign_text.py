@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import path_from
-from validation.exchange.commands_table import Commands
-from validation.exchange.device_frame import DeviceFrame
-from validation.exchange.reading import Reading
-from validation.exchange.targets_file import TargetsFile
+from forcefit.validation.exchange.commands_table import Commands
+from forcefit.validation.exchange.device_frame import DeviceFrame
+from forcefit.validation.exchange.reading import Reading
+from forcefit.validation.exchange.targets_file import TargetsFile
 
 # number of the command, and readings by target
 Rows = Sequence[tuple[int, Mapping[str, Reading]]]

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcefit.inputs.errors import BadInput, describe, quoted
-from validation.campaign.dialect import parse_number
-from validation.exchange.cells import Sheet
-from validation.exchange.header import Header
-from validation.exchange.reading import LARGEST, LENGTHS, Writing
+from forcefit.validation.campaign.dialect import parse_number
+from forcefit.validation.exchange.cells import Sheet
+from forcefit.validation.exchange.header import Header
+from forcefit.validation.exchange.reading import LARGEST, LENGTHS, Writing
 
 _NO_READING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---"}
 

@@ -6,8 +6,8 @@ from datetime import UTC, datetime
 import numpy as np
 
 from forcefit.inputs.errors import BadInput, describe
-from validation.campaign.dialect import parse_number
-from validation.exchange.reading import Writing
+from forcefit.validation.campaign.dialect import parse_number
+from forcefit.validation.exchange.reading import Writing
 
 DATES = ("day_first", "month_first")
 _DATE = re.compile(r"(\d{1,2})([./])(\d{1,2})[./](\d{4})(.*)")

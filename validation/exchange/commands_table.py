@@ -8,14 +8,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import POSE, Posture, place_many, place_many_joints
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.posture import (
+    POSE,
+    Posture,
+    place_many,
+    place_many_joints,
+)
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.errors import BadInput, describe, nearest, quoted
-from validation.campaign.campaign import LOAD
-from validation.campaign.dialect import UNITS, parse_number
-from validation.exchange.cells import read_sheet
-from validation.exchange.clock import parse_time
-from validation.exchange.reading import Writing
+from forcefit.validation.campaign.campaign import LOAD
+from forcefit.validation.campaign.dialect import UNITS, parse_number
+from forcefit.validation.exchange.cells import read_sheet
+from forcefit.validation.exchange.clock import parse_time
+from forcefit.validation.exchange.reading import Writing
 
 _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]$")
 # units of a temperature difference, with factors to K

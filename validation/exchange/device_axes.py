@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.errors import BadInput
-from validation.exchange.device_frame import robust_frame, scatter_of
-from validation.exchange.reading import LENGTHS
+from forcefit.validation.exchange.device_frame import robust_frame, scatter_of
+from forcefit.validation.exchange.reading import LENGTHS
 
 _UNITS = {**LENGTHS, "ft": 0.3048}
 # accepted scatter of corrected readings, relative to the scatter of uncorrected

@@ -15,19 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.errors import BadInput
-from validation.campaign.dialect import parse_number
-from validation.exchange.cell_values import CellValues, missing
-from validation.exchange.cells import read_sheet
-from validation.exchange.clock import parse_time
-from validation.exchange.header import by_target, find_header, without_header
-from validation.exchange.orientation import (
+from forcefit.validation.campaign.dialect import parse_number
+from forcefit.validation.exchange.cell_values import CellValues, missing
+from forcefit.validation.exchange.cells import read_sheet
+from forcefit.validation.exchange.clock import parse_time
+from forcefit.validation.exchange.header import by_target, find_header, without_header
+from forcefit.validation.exchange.orientation import (
     ANGLES,
     from_angles,
     from_quaternion,
     orientation_columns,
 )
-from validation.exchange.plain_rows import read_plain_rows
-from validation.exchange.reading import Reading, Writing
+from forcefit.validation.exchange.plain_rows import read_plain_rows
+from forcefit.validation.exchange.reading import Reading, Writing
 
 
 def read_device_table(

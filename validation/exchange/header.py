@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from validation.campaign.dialect import parse_number
-from validation.exchange.column_names import (
+from forcefit.validation.campaign.dialect import parse_number
+from forcefit.validation.exchange.column_names import (
     LENGTH_UNITS,
     Column,
     column_of,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcefit.inputs.errors import BadInput, describe, quoted
-from validation.exchange.commands_table import Commands
-from validation.exchange.reading import Reading
+from forcefit.validation.exchange.commands_table import Commands
+from forcefit.validation.exchange.reading import Reading
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from forcefit.inputs.errors import BadInput, quoted
-from validation.exchange.column_names import QUATERNION, Column
+from forcefit.validation.exchange.column_names import QUATERNION, Column
 
 ROTATION_VECTOR = "rotation_vector"
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180}

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.errors import BadInput, quoted
 from forcefit.results.text import in_unit
-from stiffness.screws import rotation_matrix, rotation_vector
-from validation.exchange.commands_table import Commands
-from validation.exchange.device_axes import check_axes, check_targets
-from validation.exchange.device_frame import (
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector
+from forcefit.validation.exchange.commands_table import Commands
+from forcefit.validation.exchange.device_axes import check_axes, check_targets
+from forcefit.validation.exchange.device_frame import (
     DeviceFrame,
     exchanged_here,
     exchanged_throughout,
@@ -20,9 +20,9 @@ from validation.exchange.device_frame import (
     scatter_of,
     spans_a_plane,
 )
-from validation.exchange.orientation import turns_of
-from validation.exchange.reading import Reading
-from validation.exchange.targets_file import TargetsFile
+from forcefit.validation.exchange.orientation import turns_of
+from forcefit.validation.exchange.reading import Reading
+from forcefit.validation.exchange.targets_file import TargetsFile
 
 # relative to the spread of the commands: larger scatter is not due to the machine
 _ASTRAY = 0.1

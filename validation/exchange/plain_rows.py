@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.errors import BadInput
-from validation.campaign.dialect import parse_number
-from validation.exchange.cell_values import CellValues, missing
-from validation.exchange.reading import Reading
+from forcefit.validation.campaign.dialect import parse_number
+from forcefit.validation.exchange.cell_values import CellValues, missing
+from forcefit.validation.exchange.reading import Reading
 
 # largest number of columns before the targets' columns: a counter, a time
 _COUNTERS = 3

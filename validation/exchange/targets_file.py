@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.robot_files import load_robot
-from assembly.model.robot import Robot
-from assembly.robots import BUILT_IN
+from forcefit.assembly.exchange.robot_files import load_robot
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.robots import BUILT_IN
 from forcefit.inputs.errors import nearest, quoted
 from forcefit.inputs.table import Table, read_toml
-from validation.exchange.clock import DATES
-from validation.exchange.orientation import ANGLES, orders
-from validation.exchange.reading import LENGTHS, Writing
+from forcefit.validation.exchange.clock import DATES
+from forcefit.validation.exchange.orientation import ANGLES, orders
+from forcefit.validation.exchange.reading import LENGTHS, Writing
 
 _REGISTRATIONS = ("unknown", "known")
 _MARKS = (".", ",")

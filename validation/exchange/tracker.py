@@ -11,21 +11,21 @@ from numpy.typing import NDArray
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import check_new_folder, whole_folder, write_text
 from forcefit.results.text import in_unit
-from validation.exchange.bag import is_bag, read_bag
-from validation.exchange.campaign_text import (
+from forcefit.validation.exchange.bag import is_bag, read_bag
+from forcefit.validation.exchange.campaign_text import (
     cell,
     columns_of,
     declaration,
     labels_of,
     spreads,
 )
-from validation.exchange.commands_table import Commands, read_commands
-from validation.exchange.device_frame import DeviceFrame
-from validation.exchange.device_table import read_device_table
-from validation.exchange.matching import Match, match
-from validation.exchange.placing import Placed, place
-from validation.exchange.reading import Reading
-from validation.exchange.targets_file import TargetsFile, read_targets
+from forcefit.validation.exchange.commands_table import Commands, read_commands
+from forcefit.validation.exchange.device_frame import DeviceFrame
+from forcefit.validation.exchange.device_table import read_device_table
+from forcefit.validation.exchange.matching import Match, match
+from forcefit.validation.exchange.placing import Placed, place
+from forcefit.validation.exchange.reading import Reading
+from forcefit.validation.exchange.targets_file import TargetsFile, read_targets
 
 # largest share of readings that may be left out; a larger share has another cause
 _MOST_LEFT_OUT = 0.2
@@ -103,8 +103,8 @@ def import_readings(
 
     Args:
         files: exports of the device, or ROS bags.
-        targets: the targets file (:mod:`validation.exchange.targets_file`).
-        commands: the table of commands (:mod:`validation.exchange.commands_table`).
+        targets: the targets file (:mod:`forcefit.validation.exchange.targets_file`).
+        commands: the table of commands (:mod:`forcefit.validation.exchange.commands_table`).
         folder: folder to be written; it must be absent or empty.
 
     Returns:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.campaign.campaign import LOAD, READING, Campaign
+from forcefit.validation.campaign.campaign import LOAD, READING, Campaign
 
 
 def row_counts(kinds: NDArray) -> dict:

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.table import quoted
-from validation.campaign.campaign import LOAD, READING, Campaign
-from validation.campaign.checks import extent_of
-from validation.inspection.counts import correlation
-from validation.inspection.measuring_order import Revisits
-from validation.inspection.remark import CAREFUL, FINE, LOST, Remark
-from validation.inspection.repeat_remarks import on_repeats
-from validation.inspection.repeats import RepeatNoise
+from forcefit.validation.campaign.campaign import LOAD, READING, Campaign
+from forcefit.validation.campaign.checks import extent_of
+from forcefit.validation.inspection.counts import correlation
+from forcefit.validation.inspection.measuring_order import Revisits
+from forcefit.validation.inspection.remark import CAREFUL, FINE, LOST, Remark
+from forcefit.validation.inspection.repeat_remarks import on_repeats
+from forcefit.validation.inspection.repeats import RepeatNoise
 
 # [1/K] expansion of aluminium, which is nearly the largest among materials of machines
 _EXPANSION = 2.4e-5

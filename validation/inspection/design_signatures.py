@@ -6,15 +6,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY
-from assembly.effects.registration import BASE
+from forcefit.assembly.effects import LIBRARY
+from forcefit.assembly.effects.registration import BASE
 from forcefit.inputs.table import BadInput
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.derivatives import Derivatives
-from validation.diagnosis.hypotheses import Hypothesis, hypotheses
-from validation.diagnosis.registration import register
-from validation.diagnosis.signatures import Tangents, conditions_of, loaded_components
-from validation.inspection.repeats import slow_changes
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.derivatives import Derivatives
+from forcefit.validation.diagnosis.hypotheses import Hypothesis, hypotheses
+from forcefit.validation.diagnosis.registration import register
+from forcefit.validation.diagnosis.signatures import (
+    Tangents,
+    conditions_of,
+    loaded_components,
+)
+from forcefit.validation.inspection.repeats import slow_changes
 
 # finite motions have no unknown, and their exact model takes seconds for each row
 _NOT_COMPARED = tuple(name for name, effect in LIBRARY.items() if effect.finite)
@@ -96,14 +100,14 @@ def design_signatures(
 def changes_between_repeats(
     campaign: Campaign, signatures: DesignSignatures
 ) -> dict[str, NDArray]:
-    """Return the columns for :func:`validation.inspection.repeats.repeat_noise`.
+    """Return the columns for :func:`forcefit.validation.inspection.repeats.repeat_noise`.
 
     Args:
         campaign: campaign of N measured cells.
         signatures: signatures of the library's effects on the campaign.
 
     Returns:
-        The columns of :func:`validation.inspection.repeats.slow_changes`, and the
+        The columns of :func:`forcefit.validation.inspection.repeats.slow_changes`, and the
         columns of thermal expansion and friction in each configuration.
     """
     slow = slow_changes(campaign)

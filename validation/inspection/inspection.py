@@ -5,26 +5,26 @@ from dataclasses import asdict, dataclass
 
 from numpy.typing import NDArray
 
-from assembly.measurement.predict import predict
+from forcefit.assembly.measurement.predict import predict
 from forcefit.results.display import html_table, short_repr
-from validation.campaign.campaign import READING, Campaign
-from validation.diagnosis.separability import Separability, compare_signatures
-from validation.diagnosis.signatures import conditions_of
-from validation.inspection.counts import (
+from forcefit.validation.campaign.campaign import READING, Campaign
+from forcefit.validation.diagnosis.separability import Separability, compare_signatures
+from forcefit.validation.diagnosis.signatures import conditions_of
+from forcefit.validation.inspection.counts import (
     covariate_counts,
     load_counts,
     reading_counts,
     row_counts,
 )
-from validation.inspection.design_remarks import remarks_on
-from validation.inspection.design_signatures import (
+from forcefit.validation.inspection.design_remarks import remarks_on
+from forcefit.validation.inspection.design_signatures import (
     DesignSignatures,
     changes_between_repeats,
     design_signatures,
 )
-from validation.inspection.measuring_order import Revisits, revisits
-from validation.inspection.remark import CAREFUL, LOST, Remark
-from validation.inspection.repeats import RepeatNoise, repeat_noise
+from forcefit.validation.inspection.measuring_order import Revisits, revisits
+from forcefit.validation.inspection.remark import CAREFUL, LOST, Remark
+from forcefit.validation.inspection.repeats import RepeatNoise, repeat_noise
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.campaign.campaign import Campaign
+from forcefit.validation.campaign.campaign import Campaign
 
 _FEW, _MOST = 0.2, 0.8  # limits of the share of repeats that directly follow each other
 # largest share of the session between first and last row of a set measured in a row

@@ -25,15 +25,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.nominal import Target, follow
-from assembly.kinematics.posture import home_posture
-from assembly.measurement.settled_clearance import without_joint_clearances
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.nominal import Target, follow
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.measurement.settled_clearance import without_joint_clearances
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.errors import BadInput
-from validation.campaign.campaign import Campaign, number_rows
-from validation.inspection.design_signatures import design_signatures
-from validation.synthetic.design import CampaignDesign, CampaignPlan, plan_campaign
-from validation.synthetic.generator import Synthetic
+from forcefit.validation.campaign.campaign import Campaign, number_rows
+from forcefit.validation.inspection.design_signatures import design_signatures
+from forcefit.validation.synthetic.design import (
+    CampaignDesign,
+    CampaignPlan,
+    plan_campaign,
+)
+from forcefit.validation.synthetic.generator import Synthetic
 
 _POOL = 600  # number of rows to choose from
 # number of rows of smallest and of largest derivative between which exchanges are tried

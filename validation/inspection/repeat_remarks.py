@@ -3,11 +3,11 @@
 import numpy as np
 from scipy.stats import chi2
 
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.lack_of_fit import UNLIKELY
-from validation.inspection.measuring_order import Revisits, session_clock
-from validation.inspection.remark import CAREFUL, FINE, LOST, Remark
-from validation.inspection.repeats import MOST, RepeatNoise
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.lack_of_fit import UNLIKELY
+from forcefit.validation.inspection.measuring_order import Revisits, session_clock
+from forcefit.validation.inspection.remark import CAREFUL, FINE, LOST, Remark
+from forcefit.validation.inspection.repeats import MOST, RepeatNoise
 
 _FEW = 20  # degrees of freedom below which the uncertainty of the noise exceeds 30 %
 _SEVERAL = 4  # number of suspect readings from which on a common cause is likely

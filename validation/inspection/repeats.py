@@ -28,9 +28,9 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 from scipy.stats import chi2, f, t
 
-from validation.campaign.campaign import READING, Campaign
-from validation.diagnosis.separability import orthonormal_basis
-from validation.inspection.measuring_order import session_clock
+from forcefit.validation.campaign.campaign import READING, Campaign
+from forcefit.validation.diagnosis.separability import orthonormal_basis
+from forcefit.validation.inspection.measuring_order import session_clock
 
 _LEVEL = 0.01  # probability that a campaign without errors has a suspect row
 MOST = 20  # largest number of suspects that are searched for

@@ -2,17 +2,17 @@
 
 import numpy as np
 
-from validation.campaign.campaign import READING, Campaign
-from validation.diagnosis.sentence import open_text
-from validation.inspection.counts import (
+from forcefit.validation.campaign.campaign import READING, Campaign
+from forcefit.validation.diagnosis.sentence import open_text
+from forcefit.validation.inspection.counts import (
     covariate_counts,
     load_counts,
     reading_counts,
     row_counts,
 )
-from validation.inspection.inspection import Inspection
-from validation.inspection.remark import CAREFUL, LOST
-from validation.inspection.repeats import RepeatNoise
+from forcefit.validation.inspection.inspection import Inspection
+from forcefit.validation.inspection.remark import CAREFUL, LOST
+from forcefit.validation.inspection.repeats import RepeatNoise
 
 
 def inspection_text(inspection: Inspection) -> str:

@@ -1,6 +1,6 @@
 """Beams of the simulation: their axes and the stiffness of their sections.
 
-This module is independent of :mod:`assembly.model.links`, except for the constants of a
+This module is independent of :mod:`forcefit.assembly.model.links`, except for the constants of a
 section.
 """
 
@@ -10,9 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import BeamLink, Frame
-from stiffness.beam.sections import declared_section
-from validation.multibody.motion import turned
+from forcefit.assembly.model.robot import BeamLink, Frame
+from forcefit.stiffness.beam.sections import declared_section
+from forcefit.validation.multibody.motion import turned
 
 
 def beam_span(frame: Frame, link: BeamLink) -> tuple[float, NDArray]:

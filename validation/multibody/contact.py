@@ -17,7 +17,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from assembly.model.robot import Clearance, Frame
+from forcefit.assembly.model.robot import Clearance, Frame
 
 TURN_STIFFNESS = 1e9  # [N m/rad] rotational stiffness of the contact
 SHIFT_STIFFNESS = 1e12  # [N/m] translational stiffness of the contact

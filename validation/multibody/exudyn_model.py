@@ -3,8 +3,8 @@
 Bodies are massless for the static solver.  Places are points and axes fixed to bodies;
 elastic parts and locked joints connect two places.  Exudyn orders screws and wrenches
 [T R]; arguments and results here are [R T] as in the whole library.
-:mod:`validation.multibody.exudyn_solver` solves the model,
-:mod:`validation.multibody.exudyn_reading` evaluates it.
+:mod:`forcefit.validation.multibody.exudyn_solver` solves the model,
+:mod:`forcefit.validation.multibody.exudyn_reading` evaluates it.
 """
 
 import math
@@ -17,10 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from validation.multibody.conservative_springs import far_couple, middle_wrench
-from validation.multibody.contact import NARROW, WIDE, JointClearance, cone_forces
-from validation.multibody.exudyn_parts import Closure, Contact, Elastic, Place
-from validation.multibody.motion import inverse, shifted
+from forcefit.validation.multibody.conservative_springs import far_couple, middle_wrench
+from forcefit.validation.multibody.contact import (
+    NARROW,
+    WIDE,
+    JointClearance,
+    cone_forces,
+)
+from forcefit.validation.multibody.exudyn_parts import Closure, Contact, Elastic, Place
+from forcefit.validation.multibody.motion import inverse, shifted
 
 _SWAP = np.r_[3:6, 0:3]  # converts our order [R T] to Exudyn's order [T R] and back
 IDLE_STIFFNESS = 1e-6  # [N m/rad, N/m] residual stiffness of free motions

@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from validation.multibody.contact import JointClearance
+from forcefit.validation.multibody.contact import JointClearance
 
 
 class SimulationFailed(RuntimeError):

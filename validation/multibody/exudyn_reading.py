@@ -5,10 +5,16 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.multibody.contact import cone_energy
-from validation.multibody.exudyn_model import Model
-from validation.multibody.exudyn_parts import Closure, Contact, Elastic, Modes, Place
-from validation.multibody.motion import inverse, logarithm, matrix
+from forcefit.validation.multibody.contact import cone_energy
+from forcefit.validation.multibody.exudyn_model import Model
+from forcefit.validation.multibody.exudyn_parts import (
+    Closure,
+    Contact,
+    Elastic,
+    Modes,
+    Place,
+)
+from forcefit.validation.multibody.motion import inverse, logarithm, matrix
 
 
 def pose(model: Model, place: Place) -> NDArray:

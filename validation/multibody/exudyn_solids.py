@@ -7,15 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import identity
 
-from validation.multibody.exudyn_model import Model
-from validation.multibody.exudyn_parts import (
+from forcefit.validation.multibody.exudyn_model import Model
+from forcefit.validation.multibody.exudyn_parts import (
     Elastic,
     MeshBody,
     MeshedSolid,
     Modes,
     Place,
 )
-from validation.multibody.motion import matrix, shifted
+from forcefit.validation.multibody.motion import matrix, shifted
 
 
 def add_mesh(model: Model, place: Place, body: MeshBody) -> Elastic:

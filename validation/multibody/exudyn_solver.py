@@ -16,16 +16,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.multibody.contact import WIDE
-from validation.multibody.exudyn_model import HOLDING_STIFFNESS, Model
-from validation.multibody.exudyn_parts import (
+from forcefit.validation.multibody.contact import WIDE
+from forcefit.validation.multibody.exudyn_model import HOLDING_STIFFNESS, Model
+from forcefit.validation.multibody.exudyn_parts import (
     Closure,
     Elastic,
     OutOfTime,
     SimulationFailed,
 )
-from validation.multibody.exudyn_reading import closure_error, idle_motions, pose
-from validation.multibody.motion import exponential, inverse, logarithm
+from forcefit.validation.multibody.exudyn_reading import (
+    closure_error,
+    idle_motions,
+    pose,
+)
+from forcefit.validation.multibody.motion import exponential, inverse, logarithm
 
 _CLOSED = 1e-12  # [rad, m] largest component of a closure error that counts as closed
 _LOAD_STEPS = 4

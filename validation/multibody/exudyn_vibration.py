@@ -11,8 +11,8 @@ infinite frequency.
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.multibody.exudyn_model import Model
-from validation.multibody.exudyn_parts import Place
+from forcefit.validation.multibody.exudyn_model import Model
+from forcefit.validation.multibody.exudyn_parts import Place
 
 _SIX = (np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1]))  # Exudyn's order
 _STEP = 1e-5  # [-] of the differences: errors 1e-4 to 1e-7 change no frequency by 1e-8

@@ -18,19 +18,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
-from stiffness.screws import rotation_vector
-from validation.multibody.extrapolation import steadiest, without_squares
-from validation.multibody.exudyn_model import Model
-from validation.multibody.exudyn_parts import Closure
-from validation.multibody.exudyn_reading import (
+from forcefit.stiffness.screws import rotation_vector
+from forcefit.validation.multibody.extrapolation import steadiest, without_squares
+from forcefit.validation.multibody.exudyn_model import Model
+from forcefit.validation.multibody.exudyn_parts import Closure
+from forcefit.validation.multibody.exudyn_reading import (
     closure_error,
     connector_wrench,
     idle_motions,
     pose,
 )
-from validation.multibody.exudyn_solver import raise_callback_error, static_settings
-from validation.multibody.motion import turned
-from validation.multibody.open_robot import OpenTree
+from forcefit.validation.multibody.exudyn_solver import (
+    raise_callback_error,
+    static_settings,
+)
+from forcefit.validation.multibody.motion import turned
+from forcefit.validation.multibody.open_robot import OpenTree
 
 # steps in Exudyn's coordinates, whose rotations are parameters of size 1; a contact is
 # smoothed over some nm, and its penetration is smaller

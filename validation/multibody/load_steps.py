@@ -12,13 +12,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.screws import rotation_vector
-from validation.multibody.extrapolation import steadiest, without_squares
-from validation.multibody.exudyn_model import Model
-from validation.multibody.exudyn_parts import OutOfTime, SimulationFailed
-from validation.multibody.exudyn_reading import idle_motions, pose
-from validation.multibody.exudyn_solver import close, equilibrate
-from validation.multibody.open_robot import OpenTree
+from forcefit.stiffness.screws import rotation_vector
+from forcefit.validation.multibody.extrapolation import steadiest, without_squares
+from forcefit.validation.multibody.exudyn_model import Model
+from forcefit.validation.multibody.exudyn_parts import OutOfTime, SimulationFailed
+from forcefit.validation.multibody.exudyn_reading import idle_motions, pose
+from forcefit.validation.multibody.exudyn_solver import close, equilibrate
+from forcefit.validation.multibody.open_robot import OpenTree
 
 # [rad, m] largest step of the platform; ratio and number of steps
 _LARGEST, _RATIO, _SIZES = 4e-3, 5.0, 4
@@ -45,7 +45,7 @@ def stepped_compliance(
         platform: name of the platform's frame.
         loads: loads from :func:`add_step_loads`.
         shift: shifts of the targets from
-            :func:`validation.multibody.exudyn_solver.solve`.
+            :func:`forcefit.validation.multibody.exudyn_solver.solve`.
         sizes: (6,) [rad or m per N m or N] approximate largest motion under unit loads.
 
     Returns:

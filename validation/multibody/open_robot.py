@@ -13,15 +13,21 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import BASE, BeamLink, Frame, MatrixLink, Robot
+from forcefit.assembly.model.robot import BASE, BeamLink, Frame, MatrixLink, Robot
 from forcefit.inputs.table import BadInput, quoted
-from stiffness.beam.sections import declared_section
-from validation.multibody.beams import beam_axes, beam_span, element_stiffness
-from validation.multibody.contact import joint_clearance
-from validation.multibody.exudyn_model import Model
-from validation.multibody.exudyn_parts import Closure, Contact, Elastic, MeshBody, Place
-from validation.multibody.exudyn_solids import add_mesh
-from validation.multibody.motion import inverse, matrix, placement, shifted
+from forcefit.stiffness.beam.sections import declared_section
+from forcefit.validation.multibody.beams import beam_axes, beam_span, element_stiffness
+from forcefit.validation.multibody.contact import joint_clearance
+from forcefit.validation.multibody.exudyn_model import Model
+from forcefit.validation.multibody.exudyn_parts import (
+    Closure,
+    Contact,
+    Elastic,
+    MeshBody,
+    Place,
+)
+from forcefit.validation.multibody.exudyn_solids import add_mesh
+from forcefit.validation.multibody.motion import inverse, matrix, placement, shifted
 
 
 class PostureLike(Protocol):

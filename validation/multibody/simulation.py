@@ -29,18 +29,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.model.robot import Robot
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
-from validation.multibody.exudyn_model import (
+from forcefit.validation.multibody.exudyn_model import (
     HOLDING_STIFFNESS,
     IDLE_STIFFNESS,
     Model,
     Regularisation,
 )
-from validation.multibody.exudyn_parts import Contact, Elastic, MeshBody, OutOfTime
-from validation.multibody.exudyn_parts import SimulationFailed as SimulationFailed
-from validation.multibody.exudyn_reading import (
+from forcefit.validation.multibody.exudyn_parts import (
+    Contact,
+    Elastic,
+    MeshBody,
+    OutOfTime,
+)
+from forcefit.validation.multibody.exudyn_parts import (
+    SimulationFailed as SimulationFailed,
+)
+from forcefit.validation.multibody.exudyn_reading import (
     closure_wrench,
     contact_energy,
     energy,
@@ -48,10 +55,13 @@ from validation.multibody.exudyn_reading import (
     screw_between,
     wrench,
 )
-from validation.multibody.exudyn_solver import largest_gap, solve
-from validation.multibody.exudyn_vibration import natural_frequencies, set_masses
-from validation.multibody.motion import shifted, turn_of
-from validation.multibody.open_robot import (
+from forcefit.validation.multibody.exudyn_solver import largest_gap, solve
+from forcefit.validation.multibody.exudyn_vibration import (
+    natural_frequencies,
+    set_masses,
+)
+from forcefit.validation.multibody.motion import shifted, turn_of
+from forcefit.validation.multibody.open_robot import (
     Case,
     OpenTree,
     PostureLike,
@@ -98,7 +108,7 @@ class SimulationModel:
         clearances: whether joints have their clearances, scaled like the errors.
         bushes: whether joints with radial clearance and tilt are pins in two bushes
             instead of a disc and a cone, see
-            :func:`validation.multibody.contact.joint_clearance`.
+            :func:`forcefit.validation.multibody.contact.joint_clearance`.
         hold: whether free motions are held from the start; otherwise they are held only
             if no equilibrium is found.
     """

@@ -12,14 +12,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from forcefit.results.display import html_table, short_repr
-from validation.multibody.exudyn_model import Model, Regularisation
-from validation.multibody.exudyn_parts import OutOfTime, SimulationFailed
-from validation.multibody.exudyn_reading import pose
-from validation.multibody.exudyn_solver import relax, solve
-from validation.multibody.linearised import linearised_compliance
-from validation.multibody.load_steps import add_step_loads, stepped_compliance
-from validation.multibody.open_robot import Case, PostureLike, build, link_springs
-from validation.multibody.simulation import (
+from forcefit.validation.multibody.exudyn_model import Model, Regularisation
+from forcefit.validation.multibody.exudyn_parts import OutOfTime, SimulationFailed
+from forcefit.validation.multibody.exudyn_reading import pose
+from forcefit.validation.multibody.exudyn_solver import relax, solve
+from forcefit.validation.multibody.linearised import linearised_compliance
+from forcefit.validation.multibody.load_steps import add_step_loads, stepped_compliance
+from forcefit.validation.multibody.open_robot import (
+    Case,
+    PostureLike,
+    build,
+    link_springs,
+)
+from forcefit.validation.multibody.simulation import (
     TIME_LIMIT,
     WITH_CLEARANCES,
     SimulationModel,

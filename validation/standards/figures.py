@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.errors import BadInput, quoted
 from forcefit.results.text import in_unit, table_lines
-from validation.campaign.campaign import READING, Campaign, number_rows
-from validation.standards.iso230 import AxisFigures, axis_figures
-from validation.standards.iso9283 import (
+from forcefit.validation.campaign.campaign import READING, Campaign, number_rows
+from forcefit.validation.standards.iso230 import AxisFigures, axis_figures
+from forcefit.validation.standards.iso9283 import (
     accuracy_drift,
     distance_accuracy,
     orientation_accuracy,

@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from assembly.statistics.report import draws_sections
+from forcefit.assembly.statistics.report import draws_sections
 from forcefit.page.page import Tile, paragraph, section
 from forcefit.page.tables import Value
-from validation.study.study import StudyResults
+from forcefit.validation.study.study import StudyResults
 
 
 def drawn_section(results: StudyResults) -> str:

@@ -8,15 +8,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from assembly.kinematics.posture import Posture
-from assembly.model.robot import Robot
-from assembly.statistics.callout_sources import sources_of
-from assembly.statistics.experiment import Experiment, precision_for
-from assembly.statistics.importance_table import ImportanceOptions
-from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.quantities import limit_names
-from assembly.statistics.summary import summarise
-from assembly.statistics.worst_pose_report import worst_results
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.statistics.callout_sources import sources_of
+from forcefit.assembly.statistics.experiment import Experiment, precision_for
+from forcefit.assembly.statistics.importance_table import ImportanceOptions
+from forcefit.assembly.statistics.monte_carlo import run_draws
+from forcefit.assembly.statistics.quantities import limit_names
+from forcefit.assembly.statistics.summary import summarise
+from forcefit.assembly.statistics.worst_pose_report import worst_results
 from forcefit.inputs.table import BadInput, Table, nearest
 
 if TYPE_CHECKING:

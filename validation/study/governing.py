@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.clearance import BOUNDS, own_cone
-from assembly.model.robot import Frame, Robot
-from assembly.solvers.conic import SolverFailed
-from assembly.steps.bolted import bolt_joints
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.clearance import BOUNDS, own_cone
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.steps.bolted import bolt_joints
 
 ERROR, CLEARANCE = "geometric error", "clearance"
 

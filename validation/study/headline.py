@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from assembly.model.statuses import BEYOND_LIMITS, SINGULAR
+from forcefit.assembly.model.statuses import BEYOND_LIMITS, SINGULAR
 from forcefit.results.text import in_unit
-from validation.study.study import StudyResults
+from forcefit.validation.study.study import StudyResults
 
 # assumption of (27): all motions within the clearances, without elastic deformation
 WORST = "frozen"
@@ -26,7 +26,7 @@ def worst_clearance(results: StudyResults) -> dict[str, Any]:
     """Return certified upper bounds of the platform's error within the clearances.
 
     Args:
-        results: results of :func:`validation.study.study.run_study`.
+        results: results of :func:`forcefit.validation.study.study.run_study`.
 
     Returns:
         Bounds ``rotation`` [rad] and ``translation`` [m] under the assumption
@@ -57,7 +57,7 @@ def verdict(results: StudyResults) -> str:
     the map if there is one.  The error at least energy follows.
 
     Args:
-        results: results of :func:`validation.study.study.run_study`.
+        results: results of :func:`forcefit.validation.study.study.run_study`.
 
     Returns:
         Plain text.
@@ -81,7 +81,7 @@ def by_force(results: StudyResults) -> bool:
     """Return whether the robot can be assembled only with elastic deformation.
 
     Args:
-        results: results of :func:`validation.study.study.run_study`.
+        results: results of :func:`forcefit.validation.study.study.run_study`.
 
     Returns:
         The answer; False also if the robot cannot be assembled at all.
@@ -186,7 +186,7 @@ def covered(results: StudyResults) -> list[str]:
     """Return the object and the result of each independent check that was run.
 
     Args:
-        results: results of :func:`validation.study.study.run_study`.
+        results: results of :func:`forcefit.validation.study.study.run_study`.
 
     Returns:
         A phrase for each check; checks without a significant comparison are left out.

@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.tables import component_unit
+from forcefit.assembly.model.tables import component_unit
 from forcefit.page.charts import Axis, Layer, value_map
 from forcefit.page.page import paragraph, section
 from forcefit.page.tables import Cell, Value, table
 from forcefit.results.quantities import unit_of
-from stiffness.screws import WRENCH
+from forcefit.stiffness.screws import WRENCH
 
 # quantities that are shown as maps: name in the results, description
 MAPPED = {
@@ -87,7 +87,7 @@ def maps_section(maps: Any, summary: dict[str, Any]) -> str:
 
     Args:
         maps: data set over the grid.
-        summary: result of :func:`validation.study.report.map_summary`.
+        summary: result of :func:`forcefit.validation.study.report.map_summary`.
 
     Returns:
         Counts, a table of smallest, median and largest values with the place of the

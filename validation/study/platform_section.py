@@ -4,17 +4,21 @@ from typing import Any
 
 import numpy as np
 
-from assembly.report.platform_stiffness import DIRECTIONS, largest_rows, share_rows
-from assembly.report.share_pictures import share_chart
+from forcefit.assembly.report.platform_stiffness import (
+    DIRECTIONS,
+    largest_rows,
+    share_rows,
+)
+from forcefit.assembly.report.share_pictures import share_chart
 from forcefit.page.tables import table
-from stiffness.screws import SCREW
+from forcefit.stiffness.screws import SCREW
 
 
 def platform_section(stiffness: dict[str, Any]) -> str:
     """Return K_C at the study's pose, and the most compliant parts, as HTML.
 
     Args:
-        stiffness: result of :func:`assembly.report.platform_stiffness.stiffness_of`.
+        stiffness: result of :func:`forcefit.assembly.report.platform_stiffness.stiffness_of`.
 
     Returns:
         Headings, tables and the chart of the parts' shares.

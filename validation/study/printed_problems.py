@@ -3,9 +3,9 @@
 import math
 from typing import Any
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.energy import Assembly
-from assembly.model.statuses import (
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.energy import Assembly
+from forcefit.assembly.model.statuses import (
     FAILED,
     FAILS,
     NO_ANSWER,
@@ -14,7 +14,7 @@ from assembly.model.statuses import (
     PASSED,
     UNDECIDED,
 )
-from validation.crosscheck.verdict import Check
+from forcefit.validation.crosscheck.verdict import Check
 
 TOLERANCE = 1e-6  # relative tolerance of energies and margins
 # tolerances of cvxpy's solver: [J] for energies, [-] for margins
@@ -37,7 +37,7 @@ def compare_printed(
         compared; ``checks``, the verdict on each; ``verdict`` and ``passed``.  If cvxpy
         finds no solution, only the ``reason``.
     """
-    from assembly.linear.reference.as_printed import (
+    from forcefit.assembly.linear.reference.as_printed import (
         energy_as_printed,
         margin_as_printed,
     )

@@ -6,18 +6,23 @@ from typing import Any
 
 import numpy as np
 
-from assembly.linear.assembled import Assembly, without_rounding
-from assembly.linear.zone import ASSEMBLABLE
+from forcefit.assembly.linear.assembled import Assembly, without_rounding
+from forcefit.assembly.linear.zone import ASSEMBLABLE
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import write_json, write_text
 from forcefit.page.page import Page, Provenance, Tile, command_line, page
 from forcefit.page.tables import Value
 from forcefit.results.display import largest_row
-from validation.study.drawn_section import drawn_section, drawn_tiles
-from validation.study.headline import by_force, covered, verdict, worst_clearance
-from validation.study.map_section import finite, mapped, maps_section
-from validation.study.platform_section import platform_section
-from validation.study.sections import (
+from forcefit.validation.study.drawn_section import drawn_section, drawn_tiles
+from forcefit.validation.study.headline import (
+    by_force,
+    covered,
+    verdict,
+    worst_clearance,
+)
+from forcefit.validation.study.map_section import finite, mapped, maps_section
+from forcefit.validation.study.platform_section import platform_section
+from forcefit.validation.study.sections import (
     crosscheck_section,
     governing_section,
     reference_section,
@@ -26,8 +31,8 @@ from validation.study.sections import (
     stiffness_section,
     unchecked_section,
 )
-from validation.study.service_section import service_section, service_tile
-from validation.study.study import StudyResults, points_solved
+from forcefit.validation.study.service_section import service_section, service_tile
+from forcefit.validation.study.study import StudyResults, points_solved
 
 _ASSUMED = (
     "Motions are small: closures are linearised; the linearisation error and the "
@@ -43,7 +48,7 @@ def write_study(results: StudyResults) -> Path:
     """Write ``report.html``, ``results.json`` and ``results.nc`` of a study.
 
     Args:
-        results: result of :func:`validation.study.study.run_study`.
+        results: result of :func:`forcefit.validation.study.study.run_study`.
 
     Returns:
         Path of the folder.
@@ -51,7 +56,7 @@ def write_study(results: StudyResults) -> Path:
     Raises:
         BadInput: the folder cannot be written.
     """
-    from assembly.sweeps.dataset import save_dataset
+    from forcefit.assembly.sweeps.dataset import save_dataset
 
     folder, page = results.study.folder, report_page(results)
     try:

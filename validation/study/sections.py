@@ -5,20 +5,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.assembled import without_rounding
-from assembly.linear.reference.pose_error import reachable_screws
-from assembly.report.error_body import ErrorBody, error_body
-from assembly.report.scene import robot_scene
-from assembly.solvers.conic import SolverFailed
+from forcefit.assembly.linear.assembled import without_rounding
+from forcefit.assembly.linear.reference.pose_error import reachable_screws
+from forcefit.assembly.report.error_body import ErrorBody, error_body
+from forcefit.assembly.report.scene import robot_scene
+from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.page.charts import GREY, Axis, chart, matrix
 from forcefit.page.page import paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 from forcefit.results.quantities import in_words, unit_of
-from stiffness.link import scaled
-from stiffness.screws import SCREW
-from validation.crosscheck.verdict import verdict_text
-from validation.study.headline import WORST, worst_clearance
-from validation.study.study import StudyResults
+from forcefit.stiffness.link import scaled
+from forcefit.stiffness.screws import SCREW
+from forcefit.validation.crosscheck.verdict import verdict_text
+from forcefit.validation.study.headline import WORST, worst_clearance
+from forcefit.validation.study.study import StudyResults
 
 _CLEARANCE_OF = {
     "frozen": "any position without a change of deformation",

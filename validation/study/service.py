@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.model.robot import Robot
-from assembly.model.statuses import OK
-from assembly.platform_stiffness.vibration import check_masses
-from assembly.report.results import solution_of
-from assembly.report.vibration import vibration_of
-from assembly.sweeps.plan import Sweep
-from assembly.sweeps.quantities import Question
-from assembly.sweeps.sweep import sweep_in_memory
-from assembly.sweeps.targets import grid_targets
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.model.statuses import OK
+from forcefit.assembly.platform_stiffness.vibration import check_masses
+from forcefit.assembly.report.results import solution_of
+from forcefit.assembly.report.vibration import vibration_of
+from forcefit.assembly.sweeps.plan import Sweep
+from forcefit.assembly.sweeps.quantities import Question
+from forcefit.assembly.sweeps.sweep import sweep_in_memory
+from forcefit.assembly.sweeps.targets import grid_targets
 from forcefit.inputs.table import BadInput, Table
 
 if TYPE_CHECKING:

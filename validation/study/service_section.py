@@ -6,7 +6,7 @@ import numpy as np
 
 from forcefit.page.page import Tile, paragraph, section
 from forcefit.page.tables import Cell, Value, table
-from stiffness.screws import SCREW
+from forcefit.stiffness.screws import SCREW
 
 _POSE = ("rad", "rad", "rad", "m", "m", "m")
 
@@ -15,7 +15,7 @@ def service_section(service: dict[str, Any] | None) -> str:
     """Return loads, platform deflection and natural frequencies as HTML.
 
     Args:
-        service: result of :func:`validation.study.service.at_pose`; None if not
+        service: result of :func:`forcefit.validation.study.service.at_pose`; None if not
             requested.
 
     Returns:

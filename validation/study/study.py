@@ -1,6 +1,6 @@
 """A study: every check of a study file on one robot.
 
-:mod:`validation.study.study_file` reads the file, :mod:`validation.study.report` writes
+:mod:`forcefit.validation.study.study_file` reads the file, :mod:`forcefit.validation.study.report` writes
 the results.
 """
 
@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.files.solved_links import solved_link
-from assembly.kinematics.posture import Posture, place_robot
-from assembly.linear.energy import Assembly, solve_assembly
-from assembly.linear.reference.pose_error import ASSUMPTIONS
-from assembly.model.links import link_compliance
-from assembly.model.mesh_link import mesh_link_stiffness
-from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
-from assembly.model.statuses import (
+from forcefit.assembly.files.solved_links import solved_link
+from forcefit.assembly.kinematics.posture import Posture, place_robot
+from forcefit.assembly.linear.energy import Assembly, solve_assembly
+from forcefit.assembly.linear.reference.pose_error import ASSUMPTIONS
+from forcefit.assembly.model.links import link_compliance
+from forcefit.assembly.model.mesh_link import mesh_link_stiffness
+from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from forcefit.assembly.model.statuses import (
     NO_ANSWER,
     NO_EQUILIBRIUM,
     NO_SIGNAL,
@@ -26,26 +26,26 @@ from assembly.model.statuses import (
     OK,
     PASSED,
 )
-from assembly.report.first_order import posture_status
-from assembly.report.platform_stiffness import stiffness_of
-from assembly.report.pose_errors import pose_error_of
-from assembly.report.results import solution_of
-from assembly.sweeps.sweep import sweep_poses
+from forcefit.assembly.report.first_order import posture_status
+from forcefit.assembly.report.platform_stiffness import stiffness_of
+from forcefit.assembly.report.pose_errors import pose_error_of
+from forcefit.assembly.report.results import solution_of
+from forcefit.assembly.sweeps.sweep import sweep_poses
 from forcefit.inputs.packages import need
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
-from validation.crosscheck.crosscheck import Crosscheck, attempt, crosscheck
-from validation.crosscheck.verdict import verdict
-from validation.multibody.simulation import (
+from forcefit.validation.crosscheck.crosscheck import Crosscheck, attempt, crosscheck
+from forcefit.validation.crosscheck.verdict import verdict
+from forcefit.validation.multibody.simulation import (
     SimulationFailed,
     closing_sequence,
     without_clearance,
 )
-from validation.study.drawn_tolerances import drawn_at_pose
-from validation.study.governing import governing
-from validation.study.printed_problems import compare_printed
-from validation.study.service import at_pose, over_grid
-from validation.study.study_file import Study
+from forcefit.validation.study.drawn_tolerances import drawn_at_pose
+from forcefit.validation.study.governing import governing
+from forcefit.validation.study.printed_problems import compare_printed
+from forcefit.validation.study.service import at_pose, over_grid
+from forcefit.validation.study.study_file import Study
 
 Progress = Callable[[str, int, int], None]
 THEORIES = ("euler", "timoshenko")
@@ -67,15 +67,15 @@ class StudyResults:
         solution: solution at the study's pose, with the keys of ``assembly solve``.
         assembly: assembly of the solution; None if the robot cannot be assembled.
         error: bounds (27) by assumption, with the keys of ``assembly error``.
-        reference: result of :func:`validation.study.printed_problems.compare_printed`.
+        reference: result of :func:`forcefit.validation.study.printed_problems.compare_printed`.
         stiffness: K_E of the beam and of the finite elements, by frame.
         maps: data set over the grid.
         crosscheck: comparison with the multibody simulation.
         crosscheck_failure: reason why the simulation failed; empty if it did not.
         platform_stiffness: K_C at the pose, with the keys of ``assembly stiffness``.
         governing: bounds (27) with one part made perfect, from
-            :func:`validation.study.governing.governing`.
-        service: the robot under load, from :func:`validation.study.service.at_pose`.
+            :func:`forcefit.validation.study.governing.governing`.
+        service: the robot under load, from :func:`forcefit.validation.study.service.at_pose`.
         statistics: drawn parts at the pose, with the keys of ``assembly statistics``;
             None of a robot without tolerances of a drawing.
         draws: the data set of the draws, or None.
@@ -158,7 +158,7 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
     """Run every check of a study.
 
     Args:
-        study: study from :func:`validation.study.study_file.read_study`.
+        study: study from :func:`forcefit.validation.study.study_file.read_study`.
         progress: called with the name of a check, the finished steps and their total.
 
     Returns:

@@ -11,27 +11,32 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.robot_files import load_robot
-from assembly.kinematics.closing import closing_of
-from assembly.kinematics.posture import POSE
-from assembly.linear.load import driven
-from assembly.model.largest import LARGEST_LENGTH
-from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_named
-from assembly.model.robot import BeamLink, MeshLink, Robot
-from assembly.robots import BUILT_IN
-from assembly.steps.bolted import bolt_joints, loose_over_poses
-from assembly.sweeps.targets import parse_grid
+from forcefit.assembly.exchange.robot_files import load_robot
+from forcefit.assembly.kinematics.closing import closing_of
+from forcefit.assembly.kinematics.posture import POSE
+from forcefit.assembly.linear.load import driven
+from forcefit.assembly.model.largest import LARGEST_LENGTH
+from forcefit.assembly.model.random_errors import (
+    SIGNS,
+    ErrorDraw,
+    draw_errors,
+    frames_named,
+)
+from forcefit.assembly.model.robot import BeamLink, MeshLink, Robot
+from forcefit.assembly.robots import BUILT_IN
+from forcefit.assembly.steps.bolted import bolt_joints, loose_over_poses
+from forcefit.assembly.sweeps.targets import parse_grid
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from forcefit.results.display import html_table, short_repr
-from stiffness.surface.surface import UNITS
-from stiffness.surface.surface_files import named_solid
-from validation.crosscheck.verdict import SCALES, check_scales
-from validation.study.drawn_tolerances import (
+from forcefit.stiffness.surface.surface import UNITS
+from forcefit.stiffness.surface.surface_files import named_solid
+from forcefit.validation.crosscheck.verdict import SCALES, check_scales
+from forcefit.validation.study.drawn_tolerances import (
     NOT_IN_BOUNDS,
     DrawnTolerances,
     read_statistics,
 )
-from validation.study.service import Service, read_service
+from forcefit.validation.study.service import Service, read_service
 
 _CHECKS = ("reference", "stiffness", "maps", "picture", "crosscheck")
 

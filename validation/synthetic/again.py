@@ -9,11 +9,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import Robot
-from stiffness.screws import rotation_matrix, rotation_vector
-from validation.campaign.campaign import Campaign
-from validation.synthetic.effects import Row
-from validation.synthetic.machine import (
+from forcefit.assembly.model.robot import Robot
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.synthetic.effects import Row
+from forcefit.validation.synthetic.machine import (
     Hidden,
     acts_on_machine,
     nominal_pose,

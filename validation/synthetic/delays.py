@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from validation.synthetic.effects import Row
+from forcefit.validation.synthetic.effects import Row
 
 
 def behind(time_constant: float) -> str:

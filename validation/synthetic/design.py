@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.nominal import Target, follow
-from assembly.kinematics.posture import POSE, home_posture, pose_components
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.nominal import Target, follow
+from forcefit.assembly.kinematics.posture import POSE, home_posture, pose_components
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.errors import BadInput, checked
-from validation.synthetic.effects import Row
+from forcefit.validation.synthetic.effects import Row
 
 TEMPERATURES = ("swing", "around", "constant")
 _PERIOD = 2400.0  # [s] period of the temperature

@@ -5,11 +5,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
 from forcefit.inputs.table import BadInput
-from validation.synthetic.effects import LIBRARY, SCREW, Parameters, own_compliance
-from validation.synthetic.machine import Hidden
-from validation.synthetic.outside import OUTSIDE
+from forcefit.validation.synthetic.effects import (
+    LIBRARY,
+    SCREW,
+    Parameters,
+    own_compliance,
+)
+from forcefit.validation.synthetic.machine import Hidden
+from forcefit.validation.synthetic.outside import OUTSIDE
 
 _SHAPES = (
     "phase", "exponent", "time_constant", "order", "at", "period", "knee",

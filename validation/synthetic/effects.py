@@ -19,10 +19,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import BASE, BeamLink, Clearance, Frame, Robot
-from validation.multibody.beams import beam_span
-from validation.multibody.motion import placement, turned
-from validation.synthetic.laws import ClearanceLaw, PowerLawSpring, TwoStepSpring
+from forcefit.assembly.model.robot import BASE, BeamLink, Clearance, Frame, Robot
+from forcefit.validation.multibody.beams import beam_span
+from forcefit.validation.multibody.motion import placement, turned
+from forcefit.validation.synthetic.laws import (
+    ClearanceLaw,
+    PowerLawSpring,
+    TwoStepSpring,
+)
 
 SCREW = ("rx", "ry", "rz", "tx", "ty", "tz")
 WRENCH = ("mx", "my", "mz", "fx", "fy", "fz")
@@ -58,7 +62,7 @@ class Machine:
         load: (6,) [N m, N] applied load.
         gravity: (3,) [m/s^2] base axes.
         laws: nonlinear laws of springs or positions, by frame; see
-            :mod:`validation.synthetic.rest`.
+            :mod:`forcefit.validation.synthetic.rest`.
     """
 
     robot: Robot

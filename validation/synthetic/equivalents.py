@@ -18,11 +18,11 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import BeamLink
-from validation.synthetic.delays import behind, with_delays
-from validation.synthetic.effects import SCREW, WRENCH, Row, own_compliance
-from validation.synthetic.generator import Synthetic
-from validation.synthetic.machine import Hidden, simulate_readings
+from forcefit.assembly.model.robot import BeamLink
+from forcefit.validation.synthetic.delays import behind, with_delays
+from forcefit.validation.synthetic.effects import SCREW, WRENCH, Row, own_compliance
+from forcefit.validation.synthetic.generator import Synthetic
+from forcefit.validation.synthetic.machine import Hidden, simulate_readings
 
 SAME = 10.0  # residual chi-square below which the difference is hidden by noise
 # time constants of a drift that are tried, relative to the duration

@@ -17,15 +17,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.files.robot_file import write_robot
-from assembly.model.robot import Robot
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.errors import BadInput, checked
 from forcefit.inputs.writing import whole_folder, write_text
 from forcefit.results.display import html_table, short_repr
-from validation.synthetic.design import CampaignDesign, CampaignPlan, plan_campaign
-from validation.synthetic.draws import NotApplicable, draw_effect, strengthened
-from validation.synthetic.effects import SCREW, WRENCH, Row
-from validation.synthetic.machine import Hidden, simulate_readings
+from forcefit.validation.synthetic.design import (
+    CampaignDesign,
+    CampaignPlan,
+    plan_campaign,
+)
+from forcefit.validation.synthetic.draws import NotApplicable, draw_effect, strengthened
+from forcefit.validation.synthetic.effects import SCREW, WRENCH, Row
+from forcefit.validation.synthetic.machine import Hidden, simulate_readings
 
 _GIVEN_STRENGTH = ("self_weight", "geometric_stiffening")
 _TRIES = 5

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from assembly.model.robot import Clearance
+from forcefit.assembly.model.robot import Clearance
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import BASE, Frame, Robot
-from validation.multibody.motion import placement, shifted, turn_of
-from validation.multibody.open_robot import refuse_helical
-from validation.synthetic.delays import behind, with_delays
-from validation.synthetic.effects import (
+from forcefit.assembly.model.robot import BASE, Frame, Robot
+from forcefit.validation.multibody.motion import placement, shifted, turn_of
+from forcefit.validation.multibody.open_robot import refuse_helical
+from forcefit.validation.synthetic.delays import behind, with_delays
+from forcefit.validation.synthetic.effects import (
     CHANGES,
     COVARIATES,
     POSES,
@@ -19,12 +19,12 @@ from validation.synthetic.effects import (
     Parameters,
     Row,
 )
-from validation.synthetic.outside import (
+from forcefit.validation.synthetic.outside import (
     OUTSIDE_CHANGES,
     OUTSIDE_COVARIATES,
     OUTSIDE_READINGS,
 )
-from validation.synthetic.rest import Progress, rest_poses
+from forcefit.validation.synthetic.rest import Progress, rest_poses
 
 _ALL_CHANGES = CHANGES | OUTSIDE_CHANGES
 _ALL_READINGS = READINGS | OUTSIDE_READINGS

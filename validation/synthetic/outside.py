@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import BASE, Clearance, Frame
-from validation.synthetic.effects import (
+from forcefit.assembly.model.robot import BASE, Clearance, Frame
+from forcefit.validation.synthetic.effects import (
     SCREW,
     SENSOR,
     Change,
@@ -26,7 +26,7 @@ from validation.synthetic.effects import (
     named,
     sprung,
 )
-from validation.synthetic.laws import ClearanceLaw, TwoStepSpring
+from forcefit.validation.synthetic.laws import ClearanceLaw, TwoStepSpring
 
 
 def _pose_stiffness(machine: Machine, row: Row, given: Parameters) -> Machine:

@@ -18,20 +18,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import Robot
-from validation.multibody.simulation import (
+from forcefit.assembly.model.robot import Robot
+from forcefit.validation.multibody.simulation import (
     SimulationFailed,
     SimulationModel,
     simulate_assembly,
 )
-from validation.synthetic.effects import (
+from forcefit.validation.synthetic.effects import (
     Machine,
     Rest,
     sprung,
     with_frame,
 )
-from validation.synthetic.laws import ClearanceLaw, PowerLawSpring, TwoStepSpring
-from validation.synthetic.springs import rest_on_springs
+from forcefit.validation.synthetic.laws import (
+    ClearanceLaw,
+    PowerLawSpring,
+    TwoStepSpring,
+)
+from forcefit.validation.synthetic.springs import rest_on_springs
 
 # number of elements of a beam; corrected elements are accurate at these small
 # deflections

@@ -28,12 +28,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from assembly.model.links import link_compliance
-from assembly.model.robot import BeamLink, Frame, Robot
-from stiffness.beam.sections import declared_section
-from validation.multibody.beams import beam_span
-from validation.multibody.simulation import SimulationFailed
-from validation.synthetic.effects import Machine, Rest
+from forcefit.assembly.model.links import link_compliance
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.stiffness.beam.sections import declared_section
+from forcefit.validation.multibody.beams import beam_span
+from forcefit.validation.multibody.simulation import SimulationFailed
+from forcefit.validation.synthetic.effects import Machine, Rest
 
 _STEPS = 60
 _CONVERGED = 1e-12  # [rad, m] size of the last step at convergence

@@ -4,15 +4,15 @@ from typing import Any
 
 import numpy as np
 
-from assembly.model.statuses import (
+from forcefit.assembly.model.statuses import (
     AMBIGUOUS,
     EXPLAINED,
     NONE_NEEDED,
     OUTSIDE_LIBRARY,
 )
-from validation.synthetic.generator import Synthetic
-from validation.synthetic.machine import Hidden
-from validation.synthetic.outside import OUTSIDE
+from forcefit.validation.synthetic.generator import Synthetic
+from forcefit.validation.synthetic.machine import Hidden
+from forcefit.validation.synthetic.outside import OUTSIDE
 
 _UNITS = {
     "self_weight": "m/s^2",

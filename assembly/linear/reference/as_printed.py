@@ -1,8 +1,8 @@
 """Problems (21) and (22) again, written in cvxpy as the paper prints them.
 
 Slow and simple on purpose: every screw of every frame is a variable, every constraint
-an equation of the paper.  Tests compare :mod:`assembly.linear.energy` and
-:mod:`assembly.linear.zone` with it.  Both use the same robot, bounds c-bar, compliances
+an equation of the paper.  Tests compare :mod:`forcefit.assembly.linear.energy` and
+:mod:`forcefit.assembly.linear.zone` with it.  Both use the same robot, bounds c-bar, compliances
 and eqs (13)-(15), but no common code solves the problems.
 
 Two departures from the printed problems: screws are in mrad and mm, to which the
@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
-from assembly.kinematics.posture import Posture
-from assembly.model.clearance import (
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.model.clearance import (
     CONES,
     clearance_bounds,
     scales_with_margin,
 )
-from assembly.model.links import link_compliances, spring_compliances
+from forcefit.assembly.model.links import link_compliances, spring_compliances
 
 OPTIMAL = {"optimal", "optimal_inaccurate"}
 _UNIT = 1e-3  # screws are in mrad and mm here

@@ -5,23 +5,23 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.assembled import Assembly
-from assembly.linear.closure import (
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.assembled import Assembly
+from forcefit.assembly.linear.closure import (
     Linearisation,
     VirtualJoints,
     linearise,
     virtual_joints,
 )
-from assembly.linear.load import FrameLoads
-from assembly.linear.reference.reduction import (
+from forcefit.assembly.linear.load import FrameLoads
+from forcefit.assembly.linear.reference.reduction import (
     FreeMotion,
     Reduction,
     reduce_problem,
 )
-from assembly.linear.rounding import differs_from_zero, stiffness_spread
-from assembly.model.clearance import has_bounded_motion
-from assembly.solvers.conic import ConicSolution, minimise_energy
+from forcefit.assembly.linear.rounding import differs_from_zero, stiffness_spread
+from forcefit.assembly.model.clearance import has_bounded_motion
+from forcefit.assembly.solvers.conic import ConicSolution, minimise_energy
 
 _RIGID_BESIDE = 1e19  # springs so much stiffer than the softest count as rigid
 
@@ -45,7 +45,7 @@ def least_energy(
         posture: the robot's configuration.
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
         frame_loads: all loads, this one among them.
-        own_axes_free: see :func:`assembly.linear.closure.virtual_joints`.
+        own_axes_free: see :func:`forcefit.assembly.linear.closure.virtual_joints`.
 
     Returns:
         The assembled manipulator.

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import svd
 
-from assembly.kinematics.ranks import (
+from forcefit.assembly.kinematics.ranks import (
     RANK,
     ROWS_RANK,
     UNBOUNDED,
@@ -29,22 +29,22 @@ from assembly.kinematics.ranks import (
     rank_of,
     rank_tolerance,
 )
-from assembly.linear.assembled import Assembly
-from assembly.linear.closure import VirtualJoints, virtual_joints
-from assembly.linear.reference.energy import least_energy
-from assembly.linear.reference.reduction import complement
-from assembly.model.clearance import (
+from forcefit.assembly.linear.assembled import Assembly
+from forcefit.assembly.linear.closure import VirtualJoints, virtual_joints
+from forcefit.assembly.linear.reference.energy import least_energy
+from forcefit.assembly.linear.reference.reduction import complement
+from forcefit.assembly.model.clearance import (
     clearance_bounds,
     clearance_components,
     component_bounds,
     scales_with_margin,
 )
-from assembly.solvers import one_problem, outer_cuts
-from assembly.solvers.cones import cone_sizes, cone_starts, into_cones
-from assembly.solvers.conic import minimise_energy
-from assembly.solvers.method import Method
+from forcefit.assembly.solvers import one_problem, outer_cuts
+from forcefit.assembly.solvers.cones import cone_sizes, cone_starts, into_cones
+from forcefit.assembly.solvers.conic import minimise_energy
+from forcefit.assembly.solvers.method import Method
 from forcefit.results.display import html_table, short_repr
-from stiffness.screws import skew
+from forcefit.stiffness.screws import skew
 
 ASSUMPTIONS = ("frozen", "free", "budget")
 # accepted excess of squares of cones: solutions are hardly better, and a cone at its
@@ -136,7 +136,7 @@ class ReachableSet:
 
         Args:
             direction: (6,) weights of the screw's components.
-            method: method of :func:`assembly.solvers.conic.minimise_energy`.
+            method: method of :func:`forcefit.assembly.solvers.conic.minimise_energy`.
 
         Returns:
             The height with the point that attains it; infinite where the platform
@@ -277,7 +277,7 @@ def within_bounds(
         assembly: the start.
         kept: frames whose bound of the joint's own motion counts from the first.
         moving: function of virtual joints that returns the cones that move.
-        own_axes_free: see :func:`assembly.linear.closure.virtual_joints`; then no
+        own_axes_free: see :func:`forcefit.assembly.linear.closure.virtual_joints`; then no
             spring acts.
 
     Returns:

@@ -1,6 +1,6 @@
 """Problem (22) reduced: free motions and springs eliminated exactly.
 
-With the columns of :mod:`assembly.linear.closure` the assembly constraints read
+With the columns of :mod:`forcefit.assembly.linear.closure` the assembly constraints read
 
     A_q q + A_u u + A_y y = -misfit,      |u_k| <= 1 for each cone k.
 
@@ -26,21 +26,21 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr, svd
 
-from assembly.kinematics.ranks import (
+from forcefit.assembly.kinematics.ranks import (
     RANK,
     ROWS_RANK,
     noise_of,
     rank_of,
     rank_tolerance,
 )
-from assembly.linear.closure import (
+from forcefit.assembly.linear.closure import (
     Linearisation,
     VirtualJoints,
     in_reference_lengths,
 )
-from assembly.linear.load import FrameLoads, loads_on_frames
+from forcefit.assembly.linear.load import FrameLoads, loads_on_frames
 from forcefit.results.display import html_table, numbers, short_repr
-from stiffness.screws import SCREW
+from forcefit.stiffness.screws import SCREW
 
 _STILL = 1e-6  # relative to the largest motion: smaller ones count as rounding
 _NAMED = 4  # largest number of joints that a message names

@@ -4,22 +4,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import svd
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.closure import (
+from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.linear.closure import (
     Linearisation,
     VirtualJoints,
     linearise,
     virtual_joints,
 )
-from assembly.linear.reference.reduction import Reduction, reduce_problem
-from assembly.model.clearance import (
+from forcefit.assembly.linear.reference.reduction import Reduction, reduce_problem
+from forcefit.assembly.model.clearance import (
     clearance_bounds,
     clearance_components,
     clearance_excess,
     scales_with_margin,
 )
-from assembly.solvers.cones import cone_sizes, cone_starts
-from assembly.solvers.conic import least_factor
+from forcefit.assembly.solvers.cones import cone_sizes, cone_starts
+from forcefit.assembly.solvers.conic import least_factor
 
 
 def least_margin(posture: Posture, own_axes_free: bool) -> tuple[float, float]:

@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from assembly.callouts.fits import clearance_fit, limits_of, parse_fit, parse_size
+from forcefit.assembly.callouts.fits import (
+    clearance_fit,
+    limits_of,
+    parse_fit,
+    parse_size,
+)
 from forcefit.inputs.table import BadInput
 
 

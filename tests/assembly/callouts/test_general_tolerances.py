@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from assembly.callouts.general_tolerances import (
+from forcefit.assembly.callouts.general_tolerances import (
     linear_tolerance,
     parse_general,
     perpendicularity_tolerance,
 )
-from assembly.callouts.written_tolerances import parse_length, parse_width
+from forcefit.assembly.callouts.written_tolerances import parse_length, parse_width
 from forcefit.inputs.table import BadInput
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from assembly.callouts.zone import Zone, intersection
-from assembly.callouts.zones_of_features import (
+from forcefit.assembly.callouts.zone import Zone, intersection
+from forcefit.assembly.callouts.zones_of_features import (
     axis_orientation,
     axis_position,
     axis_position_along,

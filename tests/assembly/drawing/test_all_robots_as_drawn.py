@@ -5,17 +5,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.exchange.convert import convert
-from assembly.exchange.robot_files import load_robot
-from assembly.files.robot_file import read_robot
-from assembly.kinematics.mobility import mobility
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.linear.zone import zone_margin
-from assembly.model.frame import between_origins
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.platform_stiffness.vibration import natural_modes
-from assembly.robots import BUILT_IN
+from forcefit.assembly.exchange.convert import convert
+from forcefit.assembly.exchange.robot_files import load_robot
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.kinematics.mobility import mobility
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.frame import between_origins
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.platform_stiffness.vibration import natural_modes
+from forcefit.assembly.robots import BUILT_IN
 from forcefit.inputs.errors import BadInput
 
 SAME = 1e-12

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import read_robot
-from assembly.kinematics.mobility import mobility
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.robots import BUILT_IN, load_robot
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.kinematics.mobility import mobility
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.robots import BUILT_IN, load_robot
 from tests.drawn_robots_for_tests import (
     drawn_bennett,
     drawn_delta,

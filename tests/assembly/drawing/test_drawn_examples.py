@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.exchange.convert import convert
-from assembly.exchange.robot_files import load_robot
-from assembly.kinematics.mobility import mobility
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.sweeps.parameters import load_design
+from forcefit.assembly.exchange.convert import convert
+from forcefit.assembly.exchange.robot_files import load_robot
+from forcefit.assembly.kinematics.mobility import mobility
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.sweeps.parameters import load_design
 
 DRAWN = Path(__file__).parents[3] / "examples" / "drawn"
 # lines at most; freedoms, of the platform, with drives locked, redundant constraints

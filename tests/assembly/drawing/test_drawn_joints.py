@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from assembly.drawing.drawing import (
+from forcefit.assembly.drawing.drawing import (
     Drawing,
     DrawnBody,
     DrawnJoint,
@@ -11,16 +11,16 @@ from assembly.drawing.drawing import (
     perpendicular,
     unit,
 )
-from assembly.drawing.frames import robot_of_drawing
-from assembly.kinematics.mobility import mobility
-from assembly.kinematics.nominal import mobile, motion_screws
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.closure import linearise
-from assembly.linear.energy import solve_assembly
-from assembly.model.link_kinds import MatrixLink
-from assembly.model.robot import BASE, Clearance
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from stiffness.screws import screw_map
+from forcefit.assembly.drawing.frames import robot_of_drawing
+from forcefit.assembly.kinematics.mobility import mobility
+from forcefit.assembly.kinematics.nominal import mobile, motion_screws
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.closure import linearise
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.link_kinds import MatrixLink
+from forcefit.assembly.model.robot import BASE, Clearance
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.stiffness.screws import screw_map
 
 AT, AXIS, AXIS2 = (
     np.array([0.1, -0.2, 0.3]),

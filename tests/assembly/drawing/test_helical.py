@@ -5,25 +5,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.exact.exact import solve_exact
-from assembly.files.robot_file import read_robot
-from assembly.kinematics.mobility import mobility
-from assembly.kinematics.posture import home_posture, place_robot, together
-from assembly.kinematics.verdict import limits_passed
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.as_printed import energy_as_printed
-from assembly.measurement.conditions import as_declared
-from assembly.measurement.exact_rows import solve_rows
-from assembly.measurement.predict import assemble_row, predict
-from assembly.model.error_distributions import tolerance_sources
-from assembly.platform_stiffness.deflection import deflection_curve
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.platform_stiffness.vibration import natural_modes
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.linear_response import linear_response
-from assembly.statistics.monte_carlo import run_draws
-from assembly.sweeps.sweep import sweep_poses
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.kinematics.mobility import mobility
+from forcefit.assembly.kinematics.posture import home_posture, place_robot, together
+from forcefit.assembly.kinematics.verdict import limits_passed
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.reference.as_printed import energy_as_printed
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.measurement.exact_rows import solve_rows
+from forcefit.assembly.measurement.predict import assemble_row, predict
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.platform_stiffness.deflection import deflection_curve
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.platform_stiffness.vibration import natural_modes
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.monte_carlo import run_draws
+from forcefit.assembly.sweeps.sweep import sweep_poses
 from tests.screws_for_tests import DIFFERENTIAL, LIFT, NUT
 
 METHODS = ["compiled", "reference"]

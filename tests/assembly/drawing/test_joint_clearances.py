@@ -9,19 +9,19 @@ import itertools
 import numpy as np
 import pytest
 
-from assembly.exact.exact import solve_exact
-from assembly.files.robot_file import read_robot, write_robot
-from assembly.kinematics.mobility import mobility
-from assembly.kinematics.posture import home_posture
-from assembly.linear.closure import linearise
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.pose_error import reachable_screws
-from assembly.statistics.clearance_positions import position_clearances
-from assembly.statistics.linear_response import linear_response
-from validation.assumptions.bushes import solve_bushes
-from validation.crosscheck.crosscheck import crosscheck
-from validation.crosscheck.pair import scaled
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.kinematics.mobility import mobility
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.closure import linearise
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.reference.pose_error import reachable_screws
+from forcefit.assembly.statistics.clearance_positions import position_clearances
+from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.validation.assumptions.bushes import solve_bushes
+from forcefit.validation.crosscheck.crosscheck import crosscheck
+from forcefit.validation.crosscheck.pair import scaled
 
 C, L = 10e-6, 40e-3  # [m]
 BORE = 'radial = "10 um", length = "40 mm"'

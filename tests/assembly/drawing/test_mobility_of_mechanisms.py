@@ -7,11 +7,17 @@ are Kutzbach's count as well, where the closures are independent.
 import numpy as np
 import pytest
 
-from assembly.drawing.drawing import Drawing, DrawnBody, DrawnJoint, perpendicular, unit
-from assembly.drawing.frames import robot_of_drawing
-from assembly.kinematics.mobility import mobility
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.robots.hexapod import points
+from forcefit.assembly.drawing.drawing import (
+    Drawing,
+    DrawnBody,
+    DrawnJoint,
+    perpendicular,
+    unit,
+)
+from forcefit.assembly.drawing.frames import robot_of_drawing
+from forcefit.assembly.kinematics.mobility import mobility
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.robots.hexapod import points
 
 X, Y, Z = np.eye(3)
 

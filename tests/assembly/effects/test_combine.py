@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from assembly.effects import LIBRARY, apply_effects
-from assembly.effects.combine import combined
-from assembly.kinematics.posture import place_robot
-from assembly.measurement.conditions import as_declared
-from assembly.measurement.predict import predict
-from assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.effects import LIBRARY, apply_effects
+from forcefit.assembly.effects.combine import combined
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
 
 SPRING = np.diag([np.inf, np.inf, 5e4, np.inf, np.inf, np.inf])
 TUBE = BeamLink({"radius": 0.03, "inner_radius": 0.025}, 70e9, 0.33, density=2700.0)

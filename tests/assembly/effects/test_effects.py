@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from assembly.effects import LIBRARY, apply_effects
-from assembly.effects.base_compliance import on_foundation
-from assembly.effects.friction_hysteresis import elastic_joints
-from assembly.effects.joint_clearance import moving_joints
-from assembly.kinematics.posture import place_robot, together
-from assembly.measurement.conditions import as_declared
-from assembly.measurement.predict import assemble_row, predict, read
-from assembly.measurement.variables import with_history
-from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
-from assembly.robots import load_robot
+from forcefit.assembly.effects import LIBRARY, apply_effects
+from forcefit.assembly.effects.base_compliance import on_foundation
+from forcefit.assembly.effects.friction_hysteresis import elastic_joints
+from forcefit.assembly.effects.joint_clearance import moving_joints
+from forcefit.assembly.kinematics.posture import place_robot, together
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.measurement.predict import assemble_row, predict, read
+from forcefit.assembly.measurement.variables import with_history
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.robots import load_robot
 
 L, RADIUS, E, NU, RHO = 0.8, 0.015, 70e9, 0.33, 2700.0
 AREA, I = pi * RADIUS**2, pi * RADIUS**4 / 4

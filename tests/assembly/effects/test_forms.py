@@ -5,7 +5,12 @@ import pytest
 from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 
-from assembly.effects.forms import FORMS, natural_spline, roughness, shape_names
+from forcefit.assembly.effects.forms import (
+    FORMS,
+    natural_spline,
+    roughness,
+    shape_names,
+)
 
 X = np.linspace(-1.2, 1.7, 31)
 Y = np.cos(3 * X)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from assembly.effects.formula import (
+from forcefit.assembly.effects.formula import (
     evaluate,
     names_in,
     parameter_units,

@@ -6,15 +6,19 @@ from math import cos, exp, sin
 import numpy as np
 import pytest
 
-from assembly.effects import apply_effects, apply_known
-from assembly.effects.functions import apply_functions, basis
-from assembly.kinematics.posture import place_many_joints, place_robot, together
-from assembly.measurement.conditions import as_declared
-from assembly.measurement.predict import assemble_row, predict
-from assembly.measurement.variables import with_history
-from assembly.model.function import Function
-from assembly.model.links import in_series
-from assembly.robots import load_robot
+from forcefit.assembly.effects import apply_effects, apply_known
+from forcefit.assembly.effects.functions import apply_functions, basis
+from forcefit.assembly.kinematics.posture import (
+    place_many_joints,
+    place_robot,
+    together,
+)
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.measurement.predict import assemble_row, predict
+from forcefit.assembly.measurement.variables import with_history
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.links import in_series
+from forcefit.assembly.robots import load_robot
 from tests.assembly.effects.test_effects import L, arm, here
 
 RIGID = arm(rigid=True)

@@ -6,15 +6,19 @@ from math import atan2, cos, hypot, sin
 import numpy as np
 import pytest
 
-from assembly.effects import LIBRARY, apply_effects
-from assembly.effects.base_compliance import FOUNDATION, on_foundation, with_foundation
-from assembly.effects.functions import covariates_of
-from assembly.effects.robot_effects import check_covariates
-from assembly.kinematics.posture import place_robot
-from assembly.measurement.conditions import as_declared
-from assembly.model.function import Function
-from assembly.model.robot import Clearance, Frame
-from assembly.robots import load_robot
+from forcefit.assembly.effects import LIBRARY, apply_effects
+from forcefit.assembly.effects.base_compliance import (
+    FOUNDATION,
+    on_foundation,
+    with_foundation,
+)
+from forcefit.assembly.effects.functions import covariates_of
+from forcefit.assembly.effects.robot_effects import check_covariates
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.robot import Clearance, Frame
+from forcefit.assembly.robots import load_robot
 from forcefit.inputs.errors import BadInput
 from tests.assembly.effects.test_effects import K, L, arm, change, here, standing
 

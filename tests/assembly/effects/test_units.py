@@ -2,11 +2,11 @@
 
 import pytest
 
-from assembly.effects import LIBRARY
-from assembly.effects.units import units_of, variable_unit
-from assembly.model.function import Function
-from assembly.model.robot import Frame, Robot
-from assembly.robots import load_robot
+from forcefit.assembly.effects import LIBRARY
+from forcefit.assembly.effects.units import units_of, variable_unit
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.robots import load_robot
 from tests.assembly.effects.test_effects import arm
 from tests.assembly.effects.test_functions import RIGID
 

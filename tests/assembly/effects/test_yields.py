@@ -6,9 +6,9 @@ from math import cos
 import numpy as np
 import pytest
 
-from assembly.effects import apply_effects
-from assembly.model.function import Function
-from assembly.model.robot import MatrixLink
+from forcefit.assembly.effects import apply_effects
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.robot import MatrixLink
 from tests.assembly.effects.test_effects import L, here
 from tests.assembly.effects.test_functions import (
     RIGID,

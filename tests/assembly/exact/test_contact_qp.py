@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from assembly.exact.contact_qp import ClearanceProblem, clearance_step
+from forcefit.assembly.exact.contact_qp import ClearanceProblem, clearance_step
 
 GROUP = np.array([0, 0, 1, 2, 2, 2])  # cones of two, one and three clearances
 seeds = st.integers(0, 10**6)

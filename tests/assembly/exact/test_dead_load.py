@@ -6,29 +6,29 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from assembly.exact.dead_load import (
+from forcefit.assembly.exact.dead_load import (
     dead_loads,
     dead_loads_of_rows,
     work_gradient,
     wrenches_on_frames,
 )
-from assembly.exact.exact import solve_exact
-from assembly.exact.finite_robot import FiniteRobot
-from assembly.exact.placement import place
-from assembly.kinematics.posture import home_posture, place_robot, together
-from assembly.linear.closure import virtual_joints
-from assembly.linear.energy import solve_assembly
-from assembly.model.links import link_compliance
-from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
-from stiffness.screws import rotation_matrix, rotation_vector, screw_map
-from tests.assembly.exact.test_exact import only
-from tests.assembly.exact.test_placement import moved_unknowns
-from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot, with_bodies
-from validation.multibody.simulation import (
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.exact.finite_robot import FiniteRobot
+from forcefit.assembly.exact.placement import place
+from forcefit.assembly.kinematics.posture import home_posture, place_robot, together
+from forcefit.assembly.linear.closure import virtual_joints
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.links import link_compliance
+from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector, screw_map
+from forcefit.validation.multibody.simulation import (
     SimulationModel,
     simulate_assembly,
     without_clearance,
 )
+from tests.assembly.exact.test_exact import only
+from tests.assembly.exact.test_placement import moved_unknowns
+from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot, with_bodies
 
 G = 9.81
 

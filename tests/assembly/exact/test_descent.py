@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-import assembly.exact.descent as descent
-from assembly.exact.dead_load import dead_loads, work_gradient
-from assembly.exact.descent import NotConverged, advance, expand, potential
-from assembly.exact.finite_robot import FiniteRobot
-from assembly.exact.placement import place
-from assembly.kinematics.posture import home_posture
-from assembly.kinematics.se3 import inverse
-from assembly.linear.closure import virtual_joints
-from assembly.model.robot import Clearance, Frame, Robot
+import forcefit.assembly.exact.descent as descent
+from forcefit.assembly.exact.dead_load import dead_loads, work_gradient
+from forcefit.assembly.exact.descent import NotConverged, advance, expand, potential
+from forcefit.assembly.exact.finite_robot import FiniteRobot
+from forcefit.assembly.exact.placement import place
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.kinematics.se3 import inverse
+from forcefit.assembly.linear.closure import virtual_joints
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from tests.assembly.exact.test_dead_load import heavy
 from tests.assembly.exact.test_placement import moved_unknowns
 from tests.robots_for_tests import random_robot

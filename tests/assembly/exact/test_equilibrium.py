@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 
-from assembly.exact.dead_load import dead_loads
-from assembly.exact.descent import expand
-from assembly.exact.equilibrium import (
+from forcefit.assembly.exact.dead_load import dead_loads
+from forcefit.assembly.exact.descent import expand
+from forcefit.assembly.exact.equilibrium import (
     active_clearances,
     imbalance,
     least_curvature,
     tangent_space,
 )
-from assembly.exact.exact import solve_exact
-from assembly.exact.finite_robot import FiniteRobot
-from assembly.exact.placement import place
-from assembly.kinematics.posture import home_posture
-from assembly.linear.closure import virtual_joints
-from assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.exact.finite_robot import FiniteRobot
+from forcefit.assembly.exact.placement import place
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.closure import virtual_joints
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from tests.assembly.exact.test_exact import only, pendulum, two_bars
 
 C = 2e-3  # [m] of clearances

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, root
 
-import assembly.exact.exact as exact
-from assembly.exact.descent import NotConverged, energy_of
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import home_posture, place_many, place_robot
-from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.model.links import link_compliance
-from assembly.model.robot import Clearance, Frame, Robot
-from assembly.solvers.conic import SolverFailed
-from stiffness.screws import rotation_matrix, rotation_vector
+import forcefit.assembly.exact.exact as exact
+from forcefit.assembly.exact.descent import NotConverged, energy_of
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import home_posture, place_many, place_robot
+from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.model.links import link_compliance
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector
+from forcefit.validation.multibody.simulation import SimulationModel, without_clearance
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with, small_clearance
-from validation.multibody.simulation import SimulationModel, without_clearance
 
 CASES = {case["name"]: case for case in NUMBERS["cases"]}
 A, B, D = 0.3, 0.25, 0.4  # [m] sides of the triangle of two hinged bars
@@ -304,7 +304,7 @@ def test_exact_solution_equals_the_multibody_simulation_at_full_errors(case, pla
     gradient to s^2 / 24 only: 1e-5 of the wrench in hinges turned by 2e-2 rad, and up
     to 1e-7 rad of the soft ones.
     """
-    from validation.multibody.simulation import simulate_assembly
+    from forcefit.validation.multibody.simulation import simulate_assembly
 
     robot = without_clearance(irsbot2_with(CASES[case]))
     posture = place_robot(robot, pose=dict(zip(("tx", "tz"), place, strict=True)))
@@ -330,7 +330,7 @@ def test_exact_solution_equals_the_multibody_simulation_at_full_errors(case, pla
 @pytest.mark.parametrize("case", CASES)
 def test_exact_solution_with_clearances_equals_the_multibody_simulation(case):
     """Contacts of the simulation deform; twice their energy is added (first order)."""
-    from validation.multibody.simulation import simulate_assembly
+    from forcefit.validation.multibody.simulation import simulate_assembly
 
     robot = irsbot2_with(CASES[case])
     posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.4})

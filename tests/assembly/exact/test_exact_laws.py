@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.closure_rates import closure_signs
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.kinematics.se3 import left_jacobian
-from assembly.linear.energy import solve_assembly
-from assembly.model.links import joint_compliances, link_compliances
-from assembly.model.robot import BeamLink, Frame, Robot
-from assembly.robots import load_robot
-from assembly.robots.delta import delta
-from assembly.robots.hexapod import hexapod
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.closure_rates import closure_signs
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.kinematics.se3 import left_jacobian
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.links import joint_compliances, link_compliances
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.robots.delta import delta
+from forcefit.assembly.robots.hexapod import hexapod
+from forcefit.validation.multibody.simulation import without_clearance
 from tests.assembly.exact.test_exact import pendulum
 from tests.assembly.kinematics.test_closing import parallelograms
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with, random_robot
-from validation.multibody.simulation import without_clearance
 
 CASES = {case["name"]: case for case in NUMBERS["cases"]}
 

@@ -5,24 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics import continuation_side_by_side
-from assembly.kinematics.posture import home_posture
-from assembly.linear import lanes
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.pose_error import ASSUMPTIONS
-from assembly.linear.zone import zone_margin
-from assembly.model.robot import Clearance
-from assembly.platform_stiffness.arc_length import follow_load
-from assembly.platform_stiffness.deflection import deflection_curve
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.platform_stiffness.vibration import natural_modes
-from assembly.robots import BUILT_IN
-from assembly.solvers import one_problem
-from assembly.solvers.conic import GAP
-from assembly.solvers.method import METHODS
-from stiffness.link import scaled
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics import continuation_side_by_side
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear import lanes
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.reference.pose_error import ASSUMPTIONS
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.robot import Clearance
+from forcefit.assembly.platform_stiffness.arc_length import follow_load
+from forcefit.assembly.platform_stiffness.deflection import deflection_curve
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.platform_stiffness.vibration import natural_modes
+from forcefit.assembly.robots import BUILT_IN
+from forcefit.assembly.solvers import one_problem
+from forcefit.assembly.solvers.conic import GAP
+from forcefit.assembly.solvers.method import METHODS
+from forcefit.stiffness.link import scaled
 from tests.robots_for_tests import coaxial_beams
 
 LOAD = [1.0, 0, 2, 10, 0, -50]

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from assembly.exact.finite_robot import FiniteRobot
-from assembly.exact.placement import place
-from assembly.kinematics.posture import home_posture
-from assembly.kinematics.se3 import (
+from forcefit.assembly.exact.finite_robot import FiniteRobot
+from forcefit.assembly.exact.placement import place
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.kinematics.se3 import (
     bracket,
     exponential,
     inverse,
@@ -15,8 +15,8 @@ from assembly.kinematics.se3 import (
     logarithm,
     second_form,
 )
-from assembly.linear.closure import virtual_joints
-from assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.closure import virtual_joints
+from forcefit.assembly.linear.energy import solve_assembly
 from tests.robots_for_tests import random_robot
 
 

@@ -17,16 +17,16 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
-from assembly.platform_stiffness.matrices import Part
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.robots import load_robot
 from benchmarks.evidence.princeton_solids import in_pieces, root_link
-from stiffness.screws import screw_map
-from validation.multibody.simulation import SimulationModel, simulate_assembly
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from forcefit.assembly.platform_stiffness.matrices import Part
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.robots import load_robot
+from forcefit.stiffness.screws import screw_map
+from forcefit.validation.multibody.simulation import SimulationModel, simulate_assembly
 
 ANGLES = np.radians([0, 15, 30, 45, 60, 75, 90])
 # [m] along the height and across, ANSYS beam elements, at 8.896 N and 13.345 N

@@ -5,13 +5,18 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import home_posture
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.zone import zone_margin
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
-from stiffness.screws import rotation_matrix, rotation_vector, screw_map, transform
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from forcefit.stiffness.screws import (
+    rotation_matrix,
+    rotation_vector,
+    screw_map,
+    transform,
+)
 
 
 @dataclass

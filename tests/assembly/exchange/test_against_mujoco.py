@@ -5,10 +5,10 @@ import re
 import numpy as np
 import pytest
 
-from assembly.exchange.convert import convert
-from assembly.exchange.mechanism import body_poses
-from assembly.exchange.mjcf import read_mjcf
-from assembly.exchange.urdf import read_urdf
+from forcefit.assembly.exchange.convert import convert
+from forcefit.assembly.exchange.mechanism import body_poses
+from forcefit.assembly.exchange.mjcf import read_mjcf
+from forcefit.assembly.exchange.urdf import read_urdf
 from tests.examples_for_tests import example
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")

@@ -4,9 +4,9 @@ import importlib.util
 
 import pytest
 
-from assembly.exchange import comparison
-from assembly.exchange.convert import convert
-from assembly.exchange.mjcf import read_mjcf
+from forcefit.assembly.exchange import comparison
+from forcefit.assembly.exchange.convert import convert
+from forcefit.assembly.exchange.mjcf import read_mjcf
 
 TEXT = """<mujoco><worldbody><body name="a"><joint name="j"/><geom size="0.1"/></body>
 </worldbody></mujoco>"""
@@ -52,7 +52,7 @@ def test_convert_command_exits_with_1_if_mujoco_differs(
     run, path, tmp_path, monkeypatch
 ):
     other = comparison.Comparison("MuJoCo", "robot.xml", "", 1, 1, 0, 0.3, "body a")
-    monkeypatch.setattr("assembly.exchange.foreign.compare", lambda *_: other)
+    monkeypatch.setattr("forcefit.assembly.exchange.foreign.compare", lambda *_: other)
     status, out, _ = run("convert", path, "-o", tmp_path / "robot.toml")
     assert status == 1
     assert "MuJoCo reads robot.xml otherwise: body a differs by 0.3" in out

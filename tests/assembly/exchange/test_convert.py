@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.exchange.convert import convert
-from assembly.files.robot_file import read_robot, write_robot
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.load import weights
-from assembly.robots import BUILT_IN
+from forcefit.assembly.exchange.convert import convert
+from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.load import weights
+from forcefit.assembly.robots import BUILT_IN
 from forcefit.inputs.errors import BadInput
 from tests.examples_for_tests import example
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.exchange.convert import convert
-from assembly.exchange.robot_files import load_robot as load_robot_of_any_kind
-from assembly.files.robot_file import read_robot, write_robot
-from assembly.kinematics.verdict import limits_passed
-from assembly.robots import load_robot
+from forcefit.assembly.exchange.convert import convert
+from forcefit.assembly.exchange.robot_files import load_robot as load_robot_of_any_kind
+from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.kinematics.verdict import limits_passed
+from forcefit.assembly.robots import load_robot
 
 URDF = """<robot name="arm"><link name="a"/><link name="b"/><link name="c"/>
 <joint name="turn" type="revolute"><parent link="a"/><child link="b"/>

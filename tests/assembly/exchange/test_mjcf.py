@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.exchange.convert import convert
-from assembly.exchange.mjcf import read_mjcf
-from assembly.exchange.mujoco_reading import compare_here as compare
-from assembly.files.robot_file import read_robot
+from forcefit.assembly.exchange.convert import convert
+from forcefit.assembly.exchange.mjcf import read_mjcf
+from forcefit.assembly.exchange.mujoco_reading import compare_here as compare
+from forcefit.assembly.files.robot_file import read_robot
 from forcefit.inputs.errors import BadInput
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")

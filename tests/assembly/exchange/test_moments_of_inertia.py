@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.exchange.convert import convert
-from assembly.exchange.mjcf import read_mjcf
-from assembly.exchange.robot_files import load_robot
-from assembly.exchange.sdf import read_sdf
-from assembly.exchange.urdf import read_urdf
-from assembly.files.robot_file import read_robot, write_robot
-from assembly.kinematics.posture import home_posture
-from assembly.platform_stiffness.vibration import natural_modes
-from stiffness.screws import rotation_matrix
+from forcefit.assembly.exchange.convert import convert
+from forcefit.assembly.exchange.mjcf import read_mjcf
+from forcefit.assembly.exchange.robot_files import load_robot
+from forcefit.assembly.exchange.sdf import read_sdf
+from forcefit.assembly.exchange.urdf import read_urdf
+from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.platform_stiffness.vibration import natural_modes
+from forcefit.stiffness.screws import rotation_matrix
 
 URDF = """<robot name="r"><link name="a"/><link name="b"><inertial>
 <origin xyz="0.1 0.2 0.3" rpy="0.3 -0.4 1.2"/><mass value="2"/>
@@ -172,7 +172,7 @@ def test_written_moments_of_inertia_are_read_back(ending, tmp_path):
 
 def test_difference_of_moments_from_mujoco_is_named(tmp_path):
     pytest.importorskip("mujoco", reason="MuJoCo is not installed")
-    from assembly.exchange.mujoco_reading import compare_here
+    from forcefit.assembly.exchange.mujoco_reading import compare_here
 
     for name, text, read in (
         ("r.urdf", URDF, read_urdf), ("r.xml", SPRINGS, read_mjcf)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import forcefit as ff
-from assembly.exchange.mjcf import read_mjcf
-from assembly.exchange.mujoco_model import mjcf_of_model
-from assembly.exchange.mujoco_reading import compare_here as compare
+from forcefit.assembly.exchange.mjcf import read_mjcf
+from forcefit.assembly.exchange.mujoco_model import mjcf_of_model
+from forcefit.assembly.exchange.mujoco_reading import compare_here as compare
 from forcefit.inputs.errors import BadInput
 from tests.assembly.exchange.test_mjcf import KINDS, file_of
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import forcefit as ff
-from assembly.exchange.mechanism import body_poses
-from assembly.exchange.mjcf import read_mjcf
-from assembly.exchange.pinocchio_model import mjcf_of_pinocchio
+from forcefit.assembly.exchange.mechanism import body_poses
+from forcefit.assembly.exchange.mjcf import read_mjcf
+from forcefit.assembly.exchange.pinocchio_model import mjcf_of_pinocchio
 from forcefit.inputs.errors import BadInput
 
 pinocchio = pytest.importorskip("pinocchio", reason="Pinocchio is not installed")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import forcefit as ff
-from assembly.robots import BUILT_IN
+from forcefit.assembly.robots import BUILT_IN
 from forcefit.inputs.errors import BadInput
 from tests.assembly.exchange.test_sdf import four_bar, pin
 from tests.examples_for_tests import example

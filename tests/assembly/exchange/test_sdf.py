@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from assembly.exchange.convert import convert
-from assembly.files.robot_file import read_robot
-from assembly.kinematics.posture import place_robot
+from forcefit.assembly.exchange.convert import convert
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.kinematics.posture import place_robot
 
 # crank 0.1, coupler 0.3, rocker 0.25, ground 0.3 [m]; at home the crank lies along x
 GROUND, CRANK, COUPLER, ROCKER = 0.3, 0.1, 0.3, 0.25

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from assembly.exchange.mechanism import WORLD, body_poses
-from assembly.exchange.sdf import read_sdf
+from forcefit.assembly.exchange.mechanism import WORLD, body_poses
+from forcefit.assembly.exchange.sdf import read_sdf
 
 ARM = """<link name="base"/><joint name="fix" type="fixed"><parent>world</parent>
 <child>base</child></joint>"""

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from assembly.exchange.convert import convert
+from forcefit.assembly.exchange.convert import convert
 
 M = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>'
 MJCF = f"""<mujoco><worldbody><body name="a">{M}<joint name="drive" axis="0 0 1"/>

@@ -5,13 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from assembly.exchange.convert import convert
-from assembly.exchange.mechanism import body_poses
-from assembly.exchange.urdf import read_urdf
-from assembly.files.robot_file import read_robot
-from assembly.kinematics.posture import place_robot
+from forcefit.assembly.exchange.convert import convert
+from forcefit.assembly.exchange.mechanism import body_poses
+from forcefit.assembly.exchange.urdf import read_urdf
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.kinematics.posture import place_robot
 from forcefit.inputs.errors import BadInput
-from stiffness.screws import rotation_matrix
+from forcefit.stiffness.screws import rotation_matrix
 
 
 def joint(name, parent, child, inside="", kind="continuous", tag="joint"):

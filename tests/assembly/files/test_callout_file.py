@@ -5,10 +5,10 @@ import re
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import read_robot, write_robot
-from assembly.kinematics.callout_maps import place_callouts
-from assembly.kinematics.posture import home_posture
-from assembly.statistics.linear_response import linear_response
+from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.kinematics.callout_maps import place_callouts
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import ROBOT_MARK
 

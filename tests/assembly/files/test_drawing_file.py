@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.exchange.robot_files import load_robot
-from assembly.files.robot_file import read_robot
-from assembly.kinematics.mobility import mobility
-from assembly.kinematics.posture import home_posture
-from assembly.model.link_kinds import BeamLink
-from assembly.model.robot import BASE
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.exchange.robot_files import load_robot
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.kinematics.mobility import mobility
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.link_kinds import BeamLink
+from forcefit.assembly.model.robot import BASE
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from forcefit.inputs.table import BadInput
 
 CASES = Path(__file__).parents[4] / "shared" / "cases" / "robots_drawn"

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from assembly.effects import LIBRARY
-from assembly.files.effect_file import parameter_names
-from assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.effects import LIBRARY
+from forcefit.assembly.files.effect_file import parameter_names
+from forcefit.assembly.files.robot_file import read_robot, write_robot
 from forcefit.inputs.table import BadInput
 
 L = 0.8

@@ -5,8 +5,8 @@ from math import cos, sin
 
 import pytest
 
-from assembly.files.robot_file import read_robot, write_robot
-from assembly.model.function import Function
+from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.model.function import Function
 from forcefit.inputs.table import BadInput
 from tests.assembly.files.test_effect_file import L, arm_with
 

@@ -3,12 +3,12 @@
 from dataclasses import replace
 from pathlib import Path
 
-from assembly.effects.modulus_scale import MODULUS_SCALE
-from assembly.files.robot_file import read_robot, write_robot
-from assembly.kinematics.posture import home_posture
-from assembly.measurement.conditions import as_declared
-from assembly.model.robot import Frame, MeshLink, Robot
-from stiffness.fem.part_text import parse_part
+from forcefit.assembly.effects.modulus_scale import MODULUS_SCALE
+from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.model.robot import Frame, MeshLink, Robot
+from forcefit.stiffness.fem.part_text import parse_part
 
 PARTS = ("solid=end a+end_b/young=2.1e11,poisson=0.3", "z=0..0.1/young=1e9,poisson=0.3")
 

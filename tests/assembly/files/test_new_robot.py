@@ -7,11 +7,11 @@ import tomllib
 import pytest
 from jsonschema import Draft202012Validator
 
-from assembly.files.new_robot import KINDS
-from assembly.files.robot_schema import ROBOT_FILE
-from assembly.kinematics.mobility import mobility
-from assembly.kinematics.posture import home_posture
-from assembly.robots import load_robot
+from forcefit.assembly.files.new_robot import KINDS
+from forcefit.assembly.files.robot_schema import ROBOT_FILE
+from forcefit.assembly.kinematics.mobility import mobility
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.robots import load_robot
 from forcefit.results.schema import schema_of
 
 # all freedoms, of the platform, over-constraints: Merlet, Parallel Robots (2006), by

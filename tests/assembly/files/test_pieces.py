@@ -2,10 +2,10 @@
 
 import pytest
 
-from assembly.exact.exact import solve_exact
-from assembly.files.robot_file import read_robot, write_robot
-from assembly.kinematics.posture import home_posture
-from assembly.sweeps.parameters import load_design
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.sweeps.parameters import load_design
 
 BEAM = """
 name = "beam"

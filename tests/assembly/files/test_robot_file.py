@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import read_robot, write_robot
-from assembly.kinematics.mobility import mobility
-from assembly.kinematics.posture import home_posture
-from assembly.linear.energy import solve_assembly
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.robot import (
+from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.kinematics.mobility import mobility
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.robot import (
     BeamLink,
     Clearance,
     Frame,
@@ -320,7 +320,9 @@ dh = { d = 0.1 }
         def close(self):
             pass
 
-    monkeypatch.setattr("assembly.report.plot.plot_assembly", lambda *_: Plotter())
+    monkeypatch.setattr(
+        "forcefit.assembly.report.plot.plot_assembly", lambda *_: Plotter()
+    )
     status, out, _ = run("assembly", "show", file, "--figure", file.with_suffix(".png"))
     assert status == 0
     assert out.endswith(f"\nnote: {told}\n")

@@ -5,8 +5,8 @@ import re
 
 import pytest
 
-from assembly.files.robot_file import read_robot
-from assembly.kinematics.posture import home_posture
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.inputs.table import BadInput
 from tests.robot_files_for_tests import (
     FOUR_BAR,

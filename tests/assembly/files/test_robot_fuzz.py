@@ -8,9 +8,9 @@ from random import Random
 
 import pytest
 
-from assembly.files.robot_file import read_robot
-from assembly.kinematics.posture import home_posture, place_robot
 from benchmarks.fuzz_mutations import change_file
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.inputs.table import BadInput
 from tests.robot_files_for_tests import FOUR_BAR, rows
 

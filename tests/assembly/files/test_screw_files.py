@@ -2,8 +2,8 @@
 
 import pytest
 
-from assembly.exchange.convert import convert
-from assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.exchange.convert import convert
+from forcefit.assembly.files.robot_file import read_robot, write_robot
 from forcefit.inputs.table import BadInput
 from tests.screws_for_tests import LIFT
 

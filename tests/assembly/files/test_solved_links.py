@@ -9,38 +9,38 @@ import pickle
 import numpy as np
 import pytest
 
-from assembly.effects.robot_effects import apply_robot_effects
-from assembly.exact.exact import solve_exact
-from assembly.exchange.robot_files import load_robot
-from assembly.files.robot_file import read_robot
-from assembly.files.solved_links import solve_links, solved_link
-from assembly.kinematics.posture import home_posture
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.zone import zone_margin
-from assembly.measurement.conditions import as_declared
-from assembly.measurement.predict import predict
-from assembly.model.error_distributions import tolerance_sources
-from assembly.model.link_stress import peak_stresses
-from assembly.model.links import link_compliances
-from assembly.model.robot import MatrixLink, MeshLink
-from assembly.platform_stiffness.deflection import deflection_curve
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.platform_stiffness.vibration import natural_modes
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.monte_carlo import run_draws
-from assembly.sweeps.identity import robot_hash
-from assembly.sweeps.plan import Sweep
-from assembly.sweeps.quantities import Question
-from assembly.sweeps.sweep import sweep_in_memory
-from assembly.sweeps.targets import grid_targets, parse_grid
+from forcefit.assembly.effects.robot_effects import apply_robot_effects
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.exchange.robot_files import load_robot
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.files.solved_links import solve_links, solved_link
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.model.link_stress import peak_stresses
+from forcefit.assembly.model.links import link_compliances
+from forcefit.assembly.model.robot import MatrixLink, MeshLink
+from forcefit.assembly.platform_stiffness.deflection import deflection_curve
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.platform_stiffness.vibration import natural_modes
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.monte_carlo import run_draws
+from forcefit.assembly.sweeps.identity import robot_hash
+from forcefit.assembly.sweeps.plan import Sweep
+from forcefit.assembly.sweeps.quantities import Question
+from forcefit.assembly.sweeps.sweep import sweep_in_memory
+from forcefit.assembly.sweeps.targets import grid_targets, parse_grid
 from forcefit.inputs.cache_folder import cache_folder
 from forcefit.inputs.table import BadInput
-from stiffness.link import scaled
-from stiffness.report.library_build import build_library, read_spec
-from stiffness.surface.beam_surfaces import shape_surface
+from forcefit.stiffness.link import scaled
+from forcefit.stiffness.report.library_build import build_library, read_spec
+from forcefit.stiffness.surface.beam_surfaces import shape_surface
+from forcefit.validation.crosscheck.crosscheck import crosscheck
 from tests.libraries_for_tests import SPEC
-from validation.crosscheck.crosscheck import crosscheck
 
 FILE = """
 name = "loop"
@@ -156,9 +156,9 @@ def sealed(monkeypatch, folder):
     def seal():
         for module in (builtins, io):
             monkeypatch.setattr(module, "open", checked_open)
-        monkeypatch.setattr("stiffness.fem.fea.solve_link", refuse)
+        monkeypatch.setattr("forcefit.stiffness.fem.fea.solve_link", refuse)
         for module in ("condensation", "own_weight"):
-            monkeypatch.setattr(f"stiffness.fem.{module}.solve", refuse)
+            monkeypatch.setattr(f"forcefit.stiffness.fem.{module}.solve", refuse)
 
     return seal
 
@@ -238,8 +238,8 @@ def test_unusable_link_file_is_refused_before_finite_elements(
     folder, old, new, message, monkeypatch
 ):
     """The message is one line."""
-    monkeypatch.setattr("stiffness.fem.fea.solve_link", refuse)
-    monkeypatch.setattr("assembly.files.solved_links._SOLVED", {})
+    monkeypatch.setattr("forcefit.stiffness.fem.fea.solve_link", refuse)
+    monkeypatch.setattr("forcefit.assembly.files.solved_links._SOLVED", {})
     path = folder / "refused.toml"
     path.write_text(FILE.partition("[[closure]]")[0].replace(old, new))
     with pytest.raises(BadInput, match=rf"refused\.toml: frame {message}") as refused:
@@ -251,7 +251,7 @@ def test_finite_elements_of_equal_links_run_once_and_are_logged(
     folder, caplog, tmp_path, monkeypatch
 ):
     monkeypatch.setenv("FORCEFIT_CACHE", str(tmp_path))
-    monkeypatch.setattr("assembly.files.solved_links._SOLVED", {})
+    monkeypatch.setattr("forcefit.assembly.files.solved_links._SOLVED", {})
     link = 'link = { mesh = { surface = "bar.stl", base = "z=0", tip = "z=0.3" }, '
     link += "young = 7e10, poisson = 0.3, density = 2700 }"
     both = "\n".join(
@@ -270,7 +270,9 @@ def test_finite_elements_of_equal_links_run_once_and_are_logged(
 def test_robot_hash_depends_on_the_content_of_a_step_file(folder, monkeypatch):
     """The name of the solid after the path does not belong to the file name."""
     bar = shape_surface("rectangle", {"length": 0.3, "width": 0.02, "height": 0.02})
-    monkeypatch.setattr("stiffness.surface.surface.read_surface", lambda *given: bar)
+    monkeypatch.setattr(
+        "forcefit.stiffness.surface.surface.read_surface", lambda *given: bar
+    )
     (folder / "step.toml").write_text(FILE.replace("bar.stl", "bar.step#*"))
     digests = set()
     for content in ("one", "other"):

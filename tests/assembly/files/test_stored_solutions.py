@@ -9,19 +9,19 @@ from dataclasses import fields, is_dataclass, replace
 import numpy as np
 import pytest
 
-from assembly.files import solved_links, stored_solutions
-from assembly.files.solved_links import solved_link
-from assembly.model.robot import Frame, MeshLink
+from forcefit.assembly.files import solved_links, stored_solutions
+from forcefit.assembly.files.solved_links import solved_link
+from forcefit.assembly.model.robot import Frame, MeshLink
 from forcefit.inputs.table import BadInput
-from stiffness.surface.beam_surfaces import shape_surface
+from forcefit.stiffness.surface.beam_surfaces import shape_surface
 
 BAR = {"length": 0.08, "width": 0.02, "height": 0.02}
 # each question in a process of its own: how often finite elements ran, and K's digest
 PROCESS = """
 import hashlib, sys
-from assembly.files import solved_links
-from assembly.exchange.robot_files import load_robot
-from assembly.model.links import link_compliances
+from forcefit.assembly.files import solved_links
+from forcefit.assembly.exchange.robot_files import load_robot
+from forcefit.assembly.model.links import link_compliances
 runs, usual = [], solved_links._solve
 solved_links._solve = lambda *given: (runs.append(1), usual(*given))[1]
 C = link_compliances(load_robot(sys.argv[1]))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from assembly.files.robot_file import read_robot
+from forcefit.assembly.files.robot_file import read_robot
 from forcefit.inputs.table import BadInput
 from tests.drawn_four_bar_for_tests import four_bar_file
 

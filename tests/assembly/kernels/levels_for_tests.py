@@ -8,23 +8,23 @@ from dataclasses import is_dataclass
 
 import numpy as np
 
-from assembly.kernels.choice import kernels
-from assembly.kinematics.posture import (
+from forcefit.assembly.kernels.choice import kernels
+from forcefit.assembly.kinematics.posture import (
     home_posture,
     place_many,
     place_many_joints,
     together,
 )
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.zone import zone_margin
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.robots import load_robot
-from assembly.solvers.conic import minimise_energy
-from assembly.statistics.clearance_positions import position_clearances
-from assembly.statistics.linear_response import linear_response
-from assembly.statistics.posture_margins import prepare_margins
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.solvers.conic import minimise_energy
+from forcefit.assembly.statistics.clearance_positions import position_clearances
+from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.posture_margins import prepare_margins
 
 LOAD = [5.0, -3.0, 8.0, 60.0, 20.0, -90.0]
 

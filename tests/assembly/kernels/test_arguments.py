@@ -6,12 +6,12 @@ import re
 import numpy as np
 import pytest
 
-from assembly.kernels.choice import kernels
-from assembly.kinematics import nominal
-from assembly.kinematics.posture import home_posture
-from assembly.linear.lanes import _robot
-from assembly.linear.robot_structure import structure_of
-from assembly.robots import load_robot
+from forcefit.assembly.kernels.choice import kernels
+from forcefit.assembly.kinematics import nominal
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.lanes import _robot
+from forcefit.assembly.linear.robot_structure import structure_of
+from forcefit.assembly.robots import load_robot
 
 ROBOT = load_robot("five_bar")
 N, K = len(ROBOT.frames), 3

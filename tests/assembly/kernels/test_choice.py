@@ -10,8 +10,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from assembly.kernels import choice
-from assembly.kernels.choice import LEVELS, chosen, kernels, levels_here
+from forcefit.assembly.kernels import choice
+from forcefit.assembly.kernels.choice import LEVELS, chosen, kernels, levels_here
 from forcefit.inputs.errors import BadInput
 
 PROGRAM = Path(__file__).with_name("levels_for_tests.py")
@@ -128,7 +128,9 @@ def test_other_architecture_loads_the_portable_module(monkeypatch):
 
 def test_missing_module_raises_an_import_error_with_the_remedy(monkeypatch):
     monkeypatch.setattr(choice, "find_spec", lambda _: None)
-    with pytest.raises(ImportError, match=r"^assembly.kernels.\w+ is not built: run `"):
+    with pytest.raises(
+        ImportError, match=r"^forcefit.assembly.kernels.\w+ is not built: run `"
+    ):
         chosen()
 
 

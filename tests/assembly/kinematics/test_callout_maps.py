@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.callouts.callout import Callout, Datum
-from assembly.kinematics.callout_maps import place_callouts
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.model.robot import Frame, Robot
+from forcefit.assembly.callouts.callout import Callout, Datum
+from forcefit.assembly.kinematics.callout_maps import place_callouts
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.inputs.table import BadInput
-from stiffness.screws import rotation_matrix, rotation_vector
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 
 TURN = np.pi / 2
 # body "plate": face A (normal z, at the origin), face B (normal x, at the origin, its

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.mobility import mobility
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import Frame, Robot
+from forcefit.assembly.kinematics.mobility import mobility
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import Frame, Robot
 from tests.linkages_for_tests import five_bar, four_bar
 
 TURNING = {"joint": "revolute", "actuated": True}

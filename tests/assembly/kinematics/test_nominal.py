@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.model.robot import Robot
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput
-from stiffness.screws import rotation_matrix, rotation_vector, transform
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform
 from tests.linkages_for_tests import (
     CRANK,
     GROUND,

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.pieces import cut_beams
-from assembly.kinematics.posture import home_posture, place_robot, together
-from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from forcefit.assembly.kinematics.pieces import cut_beams
+from forcefit.assembly.kinematics.posture import home_posture, place_robot, together
+from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 
 BEAM = BeamLink({"radius": 0.01}, 7e10, 0.3)
 

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.nominal import size_of
-from assembly.kinematics.posture import (
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.kinematics.posture import (
     home_posture,
     joint_target,
     place_robot,
     together,
 )
-from assembly.model.robot import Frame, Robot
-from assembly.robots import load_robot
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
 from tests.linkages_for_tests import GROUND, four_bar, four_bar_angles
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.crossing import beyond_singularity
-from assembly.kinematics.nominal import Target
-from assembly.kinematics.posture import home_posture, place_many, place_robot
-from assembly.kinematics.singular_posture import is_singular
-from assembly.kinematics.singularity import find_singularities
-from assembly.kinematics.verdict import limits_passed, posture_remarks
-from assembly.robots import BUILT_IN, load_robot
+from forcefit.assembly.kinematics.crossing import beyond_singularity
+from forcefit.assembly.kinematics.nominal import Target
+from forcefit.assembly.kinematics.posture import home_posture, place_many, place_robot
+from forcefit.assembly.kinematics.singular_posture import is_singular
+from forcefit.assembly.kinematics.singularity import find_singularities
+from forcefit.assembly.kinematics.verdict import limits_passed, posture_remarks
+from forcefit.assembly.robots import BUILT_IN, load_robot
 from forcefit.inputs.table import BadInput
 from tests.linkages_for_tests import slider_crank
 from tests.three_upu_for_tests import BASE, HEIGHT, LENGTH, PLATFORM, three_upu

@@ -6,16 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.nominal import size_of
-from assembly.kinematics.posture import (
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.kinematics.posture import (
     home_posture,
     place_many,
     place_many_joints,
     place_robot,
 )
-from assembly.kinematics.singularity import find_singularities
-from assembly.model.robot import Frame, Robot
-from assembly.robots import load_robot
+from forcefit.assembly.kinematics.singularity import find_singularities
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.robots import load_robot
 
 
 def at(robot, **options):

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assembly.kinematics.nominal import Target, follow
-from assembly.kinematics.posture import (
+from forcefit.assembly.kinematics.nominal import Target, follow
+from forcefit.assembly.kinematics.posture import (
     home_posture,
     place_many,
     place_many_joints,
     place_robot,
     pose_components,
 )
-from assembly.model.robot import Frame, Robot
-from assembly.robots import BUILT_IN, load_robot
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.robots import BUILT_IN, load_robot
 from tests.linkages_for_tests import five_bar
 
 EXACT = 1e-9  # closures are solved to 1e-10 of the longest body, all near 1 m here

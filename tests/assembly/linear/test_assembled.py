@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, together
-from assembly.linear.energy import solve_assembly, together_at
-from assembly.model.clearance import CONES, clearance_bounds
-from assembly.model.links import joint_compliances, link_compliances
-from assembly.model.robot import Frame
+from forcefit.assembly.kinematics.posture import home_posture, together
+from forcefit.assembly.linear.energy import solve_assembly, together_at
+from forcefit.assembly.model.clearance import CONES, clearance_bounds
+from forcefit.assembly.model.links import joint_compliances, link_compliances
+from forcefit.assembly.model.robot import Frame
 from tests.robots_for_tests import coaxial_beams, random_robot
 
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.certificate import bound_screw, unproved, unproved_screw
-from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.reference.as_printed import energy_as_printed
-from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
-from assembly.statistics.linear_response import linear_response
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.certificate import bound_screw, unproved, unproved_screw
+from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.linear.reference.as_printed import energy_as_printed
+from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from forcefit.assembly.statistics.linear_response import linear_response
 from tests.robots_for_tests import (
     NUMBERS,
     assemble_at,

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.linear.energy import solve_assembly
-from assembly.model.robot import Frame, MatrixLink, Robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.robot import Frame, MatrixLink, Robot
 from tests.robots_for_tests import (
     assemble_at,
     coaxial_beams,

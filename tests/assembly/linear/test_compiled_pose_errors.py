@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, together
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.robot import Clearance, Frame, Robot
-from assembly.robots import BUILT_IN
+from forcefit.assembly.kinematics.posture import home_posture, together
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.robots import BUILT_IN
 from tests.assembly.linear.test_pose_error import hinged_frame
 from tests.robots_for_tests import coaxial_beams, random_robot
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.force_control import with_drive_forces
-from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.force_control import with_drive_forces
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from forcefit.inputs.table import BadInput
 from tests.assembly.exact.test_exact import only
 

@@ -7,19 +7,19 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.certificate import unproved
-from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.as_printed import energy_as_printed
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.linear.zone import zone_margin
-from assembly.measurement.settled_clearance import without_joint_clearances
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
-from assembly.robots import load_robot
-from assembly.solvers.conic import minimise_energy
-from assembly.solvers.method import METHODS
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.certificate import unproved
+from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.reference.as_printed import energy_as_printed
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.measurement.settled_clearance import without_joint_clearances
+from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.solvers.conic import minimise_energy
+from forcefit.assembly.solvers.method import METHODS
 from tests.robots_for_tests import (
     NUMBERS,
     assemble_at,
@@ -75,7 +75,7 @@ def test_wrench_equals_stiffness_times_deformation_of_every_spring(method):
     answer = solve_assembly(
         posture, load=[1.0, 2.0, 3.0, 40.0, 50.0, 60.0], method=method
     )
-    from assembly.model.links import joint_compliances, link_compliances
+    from forcefit.assembly.model.links import joint_compliances, link_compliances
 
     robot = posture.robot
     gap = 2 * answer.uncertainty / answer.energy

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, together
-from assembly.linear import zone
-from assembly.linear.closure import linearise, virtual_joints
-from assembly.linear.energy import solve_assembly
-from assembly.linear.robot_structure import structure_of
-from assembly.linear.zone import zone_margin
-from assembly.robots import BUILT_IN
+from forcefit.assembly.kinematics.posture import home_posture, together
+from forcefit.assembly.linear import zone
+from forcefit.assembly.linear.closure import linearise, virtual_joints
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.robot_structure import structure_of
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.robots import BUILT_IN
 from tests.robots_for_tests import (
     ROWS,
     assemble_at,

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import home_posture
-from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.linear.zone import zone_margin
-from assembly.model.robot import BeamLink, Frame, Robot
-from assembly.robots.irsbot2 import irsbot2
-from assembly.solvers.conic import SolverFailed
-from stiffness.screws import rotation_matrix, rotation_vector, transform
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.robots.irsbot2 import irsbot2
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform
 from tests.robots_for_tests import in_millimetres, planar_four_bar, random_robot
 
 REFUSALS = (CannotAssemble, FreeMotion, SolverFailed)

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import home_posture
-from assembly.linear.energy import solve_assembly
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.robots import load_robot
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.robots import load_robot
 from forcefit.inputs.errors import BadInput
-from stiffness.screws import rotation_matrix
+from forcefit.stiffness.screws import rotation_matrix
 from tests.robots_for_tests import planar_four_bar
 
 L, RADIUS, E, RHO, G = 0.8, 0.02, 70e9, 2700.0, 9.81

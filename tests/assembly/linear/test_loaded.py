@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.linear.certificate import unproved
-from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.measurement.settled_clearance import without_joint_clearances
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
-from assembly.robots import BUILT_IN, load_robot
-from assembly.solvers.conic import SolverFailed
-from assembly.solvers.method import METHODS
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.certificate import unproved
+from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.measurement.settled_clearance import without_joint_clearances
+from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.robots import BUILT_IN, load_robot
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.solvers.method import METHODS
 from tests.robots_for_tests import (
     NUMBERS,
     ROWS,

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.linear import energy
-from assembly.linear.energy import solve_assembly
-from assembly.model.robot import Clearance
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear import energy
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.robot import Clearance
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
 
 GAP = np.array([0, 0, 0, 1e-4, 0, 0])

@@ -8,16 +8,16 @@ import cvxpy as cp
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.linear.nearest_pose import nearest_pose
-from assembly.linear.reference.as_printed import energy_as_printed
-from assembly.measurement.conditions import as_declared
-from assembly.measurement.predict import predict, with_rest_positions
-from assembly.model.clearance import CONES, clearance_bounds
-from assembly.model.links import joint_compliances, link_compliances
-from assembly.model.robot import Clearance, Frame, Robot
-from assembly.robots import load_robot
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.nearest_pose import nearest_pose
+from forcefit.assembly.linear.reference.as_printed import energy_as_printed
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.measurement.predict import predict, with_rest_positions
+from forcefit.assembly.model.clearance import CONES, clearance_bounds
+from forcefit.assembly.model.links import joint_compliances, link_compliances
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.robots import load_robot
 from tests.campaigns_for_tests import write_campaign
 from tests.robots_for_tests import coaxial_beams
 

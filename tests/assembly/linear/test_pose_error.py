@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.closure import linearise
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.pose_error import reachable_screws
-from assembly.model.clearance import CONES, clearance_bounds
-from assembly.model.robot import Clearance, Frame, Robot
-from assembly.robots.irsbot2 import irsbot2
-from assembly.solvers.method import METHODS
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.closure import linearise
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.reference.pose_error import reachable_screws
+from forcefit.assembly.model.clearance import CONES, clearance_bounds
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.robots.irsbot2 import irsbot2
+from forcefit.assembly.solvers.method import METHODS
 from tests.robots_for_tests import (
     NUMBERS,
     coaxial_beams,
@@ -154,7 +154,7 @@ def test_screws_of_the_bounds_are_feasible_in_the_closed_chain(spin, rng):
     """Checked in the closures by cvxpy, which also gives the supports; to 1e-6."""
     import cvxpy as cp
 
-    from assembly.linear.reference.as_printed import OPTIMAL, _solve
+    from forcefit.assembly.linear.reference.as_printed import OPTIMAL, _solve
 
     posture = home_posture(hinged_frame(spin))
     answer = solve_assembly(posture)

@@ -6,12 +6,12 @@ import cvxpy as cp
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.pose_error import ReachableSet, reachable_screws
-from assembly.robots.irsbot2 import irsbot2
-from assembly.solvers.cones import cone_sizes
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.reference.pose_error import ReachableSet, reachable_screws
+from forcefit.assembly.robots.irsbot2 import irsbot2
+from forcefit.assembly.solvers.cones import cone_sizes
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
 
 

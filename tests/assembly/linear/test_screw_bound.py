@@ -6,13 +6,13 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.linear.certificate import bound_screw, unproved
-from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.model.robot import Clearance, Frame, MatrixLink
-from assembly.report.results import solution_of, solution_text
-from assembly.robots import load_robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.certificate import bound_screw, unproved
+from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink
+from forcefit.assembly.report.results import solution_of, solution_text
+from forcefit.assembly.robots import load_robot
 from tests.robots_for_tests import coaxial_beams, random_robot
 
 

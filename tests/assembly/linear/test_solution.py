@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from tests.robots_for_tests import coaxial_beams
 
 K = 1e6

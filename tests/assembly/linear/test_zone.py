@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from assembly.kinematics.posture import home_posture
-from assembly.linear.reference.as_printed import margin_as_printed
-from assembly.linear.zone import Zone, zone_margin
-from assembly.model.robot import Clearance, Frame, Robot
-from assembly.robots import BUILT_IN
-from assembly.solvers.method import METHODS
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.reference.as_printed import margin_as_printed
+from forcefit.assembly.linear.zone import Zone, zone_margin
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.robots import BUILT_IN
+from forcefit.assembly.solvers.method import METHODS
 from tests.robots_for_tests import (
     NUMBERS,
     coaxial_beams,

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from assembly.measurement.conditions import ContactLaw
-from assembly.measurement.contacts import contact_deflections
+from forcefit.assembly.measurement.conditions import ContactLaw
+from forcefit.assembly.measurement.contacts import contact_deflections
 
 LAWS = (ContactLaw("a", 3e5, 1.5), ContactLaw("b", 2e3, 1.1))
 

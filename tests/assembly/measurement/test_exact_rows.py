@@ -6,13 +6,17 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from assembly.kinematics.posture import home_posture, place_many_joints, together
-from assembly.measurement.conditions import ContactLaw, as_declared
-from assembly.measurement.exact_rows import solve_rows
-from assembly.measurement.predict import assemble_row, predict
-from assembly.measurement.settled_clearance import without_joint_clearances
-from assembly.model.robot import Frame, Robot
-from assembly.robots import load_robot
+from forcefit.assembly.kinematics.posture import (
+    home_posture,
+    place_many_joints,
+    together,
+)
+from forcefit.assembly.measurement.conditions import ContactLaw, as_declared
+from forcefit.assembly.measurement.exact_rows import solve_rows
+from forcefit.assembly.measurement.predict import assemble_row, predict
+from forcefit.assembly.measurement.settled_clearance import without_joint_clearances
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.robots import load_robot
 from tests.robots_for_tests import in_millimetres, random_robot
 
 ROBOTS = {"five_bar": 0.3, "3rrr": 0.2, "hexapod": 0.02, "arm6": 0.4}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from assembly.measurement.history import in_order
+from forcefit.assembly.measurement.history import in_order
 
 TIMES = np.array([3.0, 10.0, 10.0, 35.0, 36.0, 90.0])
 VALUES = np.array([1.0, 4.0, -2.0, -2.0, 5.0, 5.0])

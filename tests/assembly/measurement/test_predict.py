@@ -6,18 +6,22 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from assembly.effects import apply_effects
-from assembly.kinematics.posture import home_posture, place_many_joints, together
-from assembly.measurement.conditions import ContactLaw, Yield, as_declared
-from assembly.measurement.exact_rows import solve_rows
-from assembly.measurement.predict import (
+from forcefit.assembly.effects import apply_effects
+from forcefit.assembly.kinematics.posture import (
+    home_posture,
+    place_many_joints,
+    together,
+)
+from forcefit.assembly.measurement.conditions import ContactLaw, Yield, as_declared
+from forcefit.assembly.measurement.exact_rows import solve_rows
+from forcefit.assembly.measurement.predict import (
     assemble_row,
     predict,
     with_finite_motions,
     with_rest_positions,
     with_second_order,
 )
-from assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from tests.linkages_for_tests import four_bar
 
 LENGTH, STIFFNESS, FORCE = 0.8, 2e3, 150.0

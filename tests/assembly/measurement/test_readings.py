@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assembly.kinematics.posture import place_robot, together
-from assembly.measurement.conditions import as_declared
-from assembly.measurement.predict import predict, read
-from assembly.model.robot import Frame, Robot
+from forcefit.assembly.kinematics.posture import place_robot, together
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.measurement.predict import predict, read
+from forcefit.assembly.model.robot import Frame, Robot
 
 ROWS = 5
 POINT = np.array([0.3, -0.4, 0.2])  # [m] platform axes

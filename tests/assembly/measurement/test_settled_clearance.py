@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, together
-from assembly.measurement.conditions import as_declared
-from assembly.measurement.settled_clearance import (
+from forcefit.assembly.kinematics.posture import home_posture, together
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.measurement.settled_clearance import (
     fractions,
     with_clearances_at_rest,
     with_clearances_taken_up,
 )
-from assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
 
 RADIAL, AXIAL = 1e-5, 3e-5
 

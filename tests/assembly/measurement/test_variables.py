@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import place_robot, together
-from assembly.measurement.conditions import as_declared
-from assembly.measurement.variables import past, variable, with_history
-from assembly.model.robot import Frame, Robot
+from forcefit.assembly.kinematics.posture import place_robot, together
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.measurement.variables import past, variable, with_history
+from forcefit.assembly.model.robot import Frame, Robot
 
 ROWS = 4
 

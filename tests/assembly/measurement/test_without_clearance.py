@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from assembly.kinematics.posture import home_posture, together
-from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.load import loads_with_weight
-from assembly.measurement.conditions import as_declared
-from assembly.measurement.predict import predict
-from assembly.measurement.settled_clearance import without_joint_clearances
-from assembly.measurement.without_clearance import flexibility
-from assembly.model.robot import Clearance
+from forcefit.assembly.kinematics.posture import home_posture, together
+from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.linear.load import loads_with_weight
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.measurement.settled_clearance import without_joint_clearances
+from forcefit.assembly.measurement.without_clearance import flexibility
+from forcefit.assembly.model.robot import Clearance
 from tests.robots_for_tests import coaxial_beams, planar_four_bar, random_robot
 
 seeds = st.integers(0, 2**32 - 1)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from assembly.kinematics.posture import home_posture
-from assembly.measurement.conditions import Yield, as_declared
-from assembly.measurement.yields import Yields, settle_yields, with_springs
-from assembly.model.robot import Frame, Robot
-from assembly.solvers.conic import SolverFailed
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.measurement.conditions import Yield, as_declared
+from forcefit.assembly.measurement.yields import Yields, settle_yields, with_springs
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.solvers.conic import SolverFailed
 
 POST = Robot("post", "top", (Frame("foot"), Frame("top", "foot", [0, 0, 1.0])))
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import forcefit as ff
-from assembly.kinematics.posture import home_posture
-from assembly.linear.energy import solve_assembly
-from assembly.model.function import Function
-from assembly.model.link_kinds import LibraryLink, MeshLink, MeshSolution
-from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
-from assembly.robots import BUILT_IN
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.link_kinds import LibraryLink, MeshLink, MeshSolution
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.robots import BUILT_IN
 
 K = np.diag([1e3, 1e3, 1e3, 1e5, 1e5, 1e5])
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from assembly.model.error_distributions import read_sources, tolerance_sources
-from assembly.robots import load_robot
+from forcefit.assembly.model.error_distributions import read_sources, tolerance_sources
+from forcefit.assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
 
 FILE = """

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import forcefit as ff
-from assembly.kinematics.posture import home_posture
-from assembly.model.given_load import given_load
-from assembly.model.robot import BeamLink, Frame, Robot
-from assembly.statistics.experiment import Experiment
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.given_load import given_load
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.commands.options import parse_load
 from forcefit.inputs.table import BadInput
 

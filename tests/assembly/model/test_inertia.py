@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from assembly.model.inertia import joined_bodies
-from assembly.model.robot import Frame
+from forcefit.assembly.model.inertia import joined_bodies
+from forcefit.assembly.model.robot import Frame
 from forcefit.inputs.table import BadInput
-from stiffness.screws import rotation_matrix
+from forcefit.stiffness.screws import rotation_matrix
 
 
 def box(mass, edges):

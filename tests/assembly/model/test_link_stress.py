@@ -6,19 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.files.solved_links import solve_links
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.model.error_distributions import tolerance_sources
-from assembly.model.link_stress import peak_stresses, stressed_links
-from assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
-from assembly.robots import load_robot
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.monte_carlo import draws_dataset
-from assembly.sweeps.plan import Sweep
-from assembly.sweeps.quantities import Question
-from assembly.sweeps.sweep import sweep_in_memory
-from assembly.sweeps.targets import grid_targets, parse_grid
+from forcefit.assembly.files.solved_links import solve_links
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.model.link_stress import peak_stresses, stressed_links
+from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.monte_carlo import draws_dataset
+from forcefit.assembly.sweeps.plan import Sweep
+from forcefit.assembly.sweeps.quantities import Question
+from forcefit.assembly.sweeps.sweep import sweep_in_memory
+from forcefit.assembly.sweeps.targets import grid_targets, parse_grid
 
 PLAIN = Path(__file__).parents[3] / "meshes" / "distal_plain.stl"
 

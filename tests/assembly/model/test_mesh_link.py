@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from assembly.files.robot_file import read_robot, write_robot
-from assembly.files.solved_links import solved_link
-from assembly.model.mesh_link import mesh_link_stiffness, mesh_rotation
+from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.files.solved_links import solved_link
+from forcefit.assembly.model.mesh_link import mesh_link_stiffness, mesh_rotation
 from forcefit.inputs.table import BadInput
-from stiffness.link import scaled
-from stiffness.screws import rotation_vector, screw_map
-from stiffness.surface.beam_surfaces import shape_surface
+from forcefit.stiffness.link import scaled
+from forcefit.stiffness.screws import rotation_vector, screw_map
+from forcefit.stiffness.surface.beam_surfaces import shape_surface
 
 numbers = st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(
     lambda v: np.linalg.norm(v) > 1e-3

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from assembly.model.random_errors import ErrorDraw, draw_errors, frames_named
-from assembly.robots import load_robot
+from forcefit.assembly.model.random_errors import ErrorDraw, draw_errors, frames_named
+from forcefit.assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
 
 

@@ -1,6 +1,6 @@
 """Statuses and verdicts are those of the public format, each with a meaning."""
 
-from assembly.model import statuses
+from forcefit.assembly.model import statuses
 
 
 def test_every_status_of_a_sweep_has_a_meaning():

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from assembly.kinematics.posture import place_many_joints, together
-from assembly.model.robot import BeamLink, Frame, Robot
-from assembly.path.motion import follow_path
-from assembly.path.trajectory import Trajectory
-from assembly.sweeps.targets import goals_of
-from stiffness.screws import rotation_matrix
+from forcefit.assembly.kinematics.posture import place_many_joints, together
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.path.motion import follow_path
+from forcefit.assembly.path.trajectory import Trajectory
+from forcefit.assembly.sweeps.targets import goals_of
+from forcefit.stiffness.screws import rotation_matrix
 
 GRAVITY = np.array([0.0, -9.81, 0.0])
 

@@ -5,11 +5,11 @@ import exudyn.itemInterface as item
 import numpy as np
 import pytest
 
-from assembly.model.robot import Frame, Robot
-from assembly.path.path_errors import path_errors
-from assembly.path.path_file import PathTable
-from assembly.path.profiles import PROFILES
-from assembly.path.trajectory import profiled
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.path.path_errors import path_errors
+from forcefit.assembly.path.path_file import PathTable
+from forcefit.assembly.path.profiles import PROFILES
+from forcefit.assembly.path.trajectory import profiled
 from tests.assembly.exact.test_exact import only
 from tests.assembly.path.moving_robots_for_tests import hinge, rod
 

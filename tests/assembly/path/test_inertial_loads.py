@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.linear.energy import solve_assembly
-from assembly.model.robot import Frame, Robot
-from assembly.path.inertial_loads import inertial_loads
-from assembly.path.path_errors import path_errors
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.path.inertial_loads import inertial_loads
+from forcefit.assembly.path.path_errors import path_errors
 from tests.assembly.path.moving_robots_for_tests import (
     GRAVITY,
     hinge,

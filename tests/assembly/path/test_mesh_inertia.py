@@ -7,11 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from assembly.files.solved_links import solved_link
-from assembly.model.link_kinds import MeshSolution
-from assembly.model.robot import BeamLink, Frame, MeshLink, Robot
-from assembly.path.inertial_loads import inertial_loads
-from assembly.path.mesh_inertia import mesh_end_wrenches
+from forcefit.assembly.files.solved_links import solved_link
+from forcefit.assembly.model.link_kinds import MeshSolution
+from forcefit.assembly.model.robot import BeamLink, Frame, MeshLink, Robot
+from forcefit.assembly.path.inertial_loads import inertial_loads
+from forcefit.assembly.path.mesh_inertia import mesh_end_wrenches
 from tests.assembly.path.moving_robots_for_tests import hinge, moving_drives
 
 MESHES = Path(__file__).parents[3] / "meshes"

@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import (
+from forcefit.assembly.kinematics.posture import (
     POSE,
     home_posture,
     place_many,
     place_many_joints,
     together,
 )
-from assembly.model.robot import Frame, Robot
-from assembly.path.motion import NotFollowed, follow_path
-from assembly.robots import load_robot
-from assembly.sweeps.targets import goals_of, of_joints
-from stiffness.screws import rotation_vector
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.path.motion import NotFollowed, follow_path
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.sweeps.targets import goals_of, of_joints
+from forcefit.stiffness.screws import rotation_vector
 from tests.assembly.path.moving_robots_for_tests import hinge
 
 CASES = {

@@ -5,20 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import read_robot
-from assembly.kinematics.posture import home_posture, place_many, together
-from assembly.model.robot import BeamLink, Clearance, Frame, Robot, beam_axis
-from assembly.path.motion import follow_path
-from assembly.path.path_errors import path_errors
-from assembly.path.path_file import PathTable
-from assembly.path.report import path_page
-from assembly.path.summary import path_summary
-from assembly.path.trajectory import Trajectory, profiled
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.robots import load_robot
-from assembly.sweeps.targets import goals_of
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.kinematics.posture import home_posture, place_many, together
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot, beam_axis
+from forcefit.assembly.path.motion import follow_path
+from forcefit.assembly.path.path_errors import path_errors
+from forcefit.assembly.path.path_file import PathTable
+from forcefit.assembly.path.report import path_page
+from forcefit.assembly.path.summary import path_summary
+from forcefit.assembly.path.trajectory import Trajectory, profiled
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.sweeps.targets import goals_of
 from forcefit.page.page import Provenance
-from stiffness.beam.sections import declared_section
+from forcefit.stiffness.beam.sections import declared_section
 from tests.assembly.path.moving_robots_for_tests import GRAVITY, hinge, instants, rod
 from tests.assembly.path.test_motion import CASES, path_of
 

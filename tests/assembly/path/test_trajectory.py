@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from assembly.path.path_file import PathTable, check_path, read_path
-from assembly.path.profiles import PROFILES
-from assembly.path.trajectory import profiled, timed
-from assembly.robots import load_robot
+from forcefit.assembly.path.path_file import PathTable, check_path, read_path
+from forcefit.assembly.path.profiles import PROFILES
+from forcefit.assembly.path.trajectory import profiled, timed
+from forcefit.assembly.robots import load_robot
 
 PEAKS = {
     "quintic": (15 / 8, 10 / np.sqrt(3)),

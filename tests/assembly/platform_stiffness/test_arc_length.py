@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.robot import Frame, Robot
-from assembly.platform_stiffness.arc_length import follow_load
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.robots import load_robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.platform_stiffness.arc_length import follow_load
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.robots import load_robot
 from tests.assembly.platform_stiffness.test_deflection import FY, shallow_arch
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
-from assembly.platform_stiffness.deflection import deflection_curve
-from assembly.robots import load_robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.platform_stiffness.deflection import deflection_curve
+from forcefit.assembly.robots import load_robot
 
 FY, FZ = 4, 5
 

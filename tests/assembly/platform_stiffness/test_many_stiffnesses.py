@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_many, together
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
-from assembly.platform_stiffness.linear_tangent import without_clearance
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.robots import BUILT_IN, load_robot
-from assembly.solvers.method import METHODS
+from forcefit.assembly.kinematics.posture import home_posture, place_many, together
+from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.platform_stiffness.linear_tangent import without_clearance
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.robots import BUILT_IN, load_robot
+from forcefit.assembly.solvers.method import METHODS
 from tests.robots_for_tests import coaxial_beams, random_robot
 
 UNIT = np.eye(6)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import BeamLink, Frame, Robot
-from assembly.platform_stiffness.vibration import natural_modes
-from stiffness.screws import rotation_matrix, rotation_vector
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.platform_stiffness.vibration import natural_modes
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 from tests.assembly.exact.test_exact import only
 
 TURN = rotation_matrix([0.4, -0.9, 1.3])

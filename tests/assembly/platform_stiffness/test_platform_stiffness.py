@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.kinematics.se3 import turn_jacobian
-from assembly.linear.energy import solve_assembly
-from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
-from assembly.platform_stiffness.active_set import contacts
-from assembly.platform_stiffness.matrices import Part
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.robots import load_robot
-from assembly.robots.hexapod import HexapodParameters, hexapod, points
 from benchmarks.evidence.stiffness_random_robots import by_differences
-from stiffness.screws import screw_map
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.kinematics.se3 import turn_jacobian
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.platform_stiffness.active_set import contacts
+from forcefit.assembly.platform_stiffness.matrices import Part
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.robots.hexapod import HexapodParameters, hexapod, points
+from forcefit.stiffness.screws import screw_map
 from tests.assembly.exact.test_exact import only
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.model.robot import Clearance, Frame, Robot
-from assembly.platform_stiffness.active_set import contacts
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.platform_stiffness.tangent_slopes import TangentState
-from assembly.sweeps.parameters import design_of
-from assembly.sweeps.stiffness_slopes import stiffness_slopes
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.platform_stiffness.active_set import contacts
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.platform_stiffness.tangent_slopes import TangentState
+from forcefit.assembly.sweeps.parameters import design_of
+from forcefit.assembly.sweeps.stiffness_slopes import stiffness_slopes
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
 
 PAPER = irsbot2_with({case["name"]: case for case in NUMBERS["cases"]}["literal"])

@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import read_robot
-from assembly.files.solved_links import solved_link
-from assembly.kinematics.posture import home_posture
-from assembly.model.mesh_link import mesh_link_mass
-from assembly.model.robot import BeamLink, Clearance, Frame, MeshLink, Robot
-from assembly.platform_stiffness.vibration import natural_modes
-from assembly.robots import load_robot
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.files.solved_links import solved_link
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.mesh_link import mesh_link_mass
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, MeshLink, Robot
+from forcefit.assembly.platform_stiffness.vibration import natural_modes
+from forcefit.assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
-from stiffness.screws import rotation_matrix
+from forcefit.stiffness.screws import rotation_matrix
 from tests.assembly.exact.test_exact import only
 
 MESHES = Path(__file__).parents[3] / "meshes"

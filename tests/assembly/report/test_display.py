@@ -7,21 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.kinematics.singularity import find_singularities
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.pose_error import reachable_screws
-from assembly.linear.zone import zone_margin
-from assembly.model.robot import Clearance
-from assembly.report.results import solution_of, solution_text
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.kinematics.singularity import find_singularities
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.reference.pose_error import reachable_screws
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.robot import Clearance
+from forcefit.assembly.report.results import solution_of, solution_text
 from forcefit.results.display import brief, html_table, short_repr
-from stiffness.beam.beam import beam_compliance
-from stiffness.beam.sections import round_section
-from stiffness.link import LinkStiffness
+from forcefit.stiffness.beam.beam import beam_compliance
+from forcefit.stiffness.beam.sections import round_section
+from forcefit.stiffness.link import LinkStiffness
+from forcefit.validation.campaign.campaign_file import read_campaign
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
-from validation.campaign.campaign_file import read_campaign
 
 CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
 LINES, CHARACTERS = 16, 1000

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.drawing.drawing import DrawnJoint, perpendicular, unit
-from assembly.kinematics.mobility import mobility
-from assembly.kinematics.posture import Posture, home_posture, place_robot
-from assembly.kinematics.pure_motions import pure_motions
-from assembly.report.mobility import mobility_lines, mobility_of
-from assembly.robots import load_robot
+from forcefit.assembly.drawing.drawing import DrawnJoint, perpendicular, unit
+from forcefit.assembly.kinematics.mobility import mobility
+from forcefit.assembly.kinematics.posture import Posture, home_posture, place_robot
+from forcefit.assembly.kinematics.pure_motions import pure_motions
+from forcefit.assembly.report.mobility import mobility_lines, mobility_of
+from forcefit.assembly.robots import load_robot
 from tests.assembly.drawing import test_mobility_of_mechanisms as mechanisms
 from tests.assembly.drawing.test_mobility_of_mechanisms import (
     MECHANISMS,

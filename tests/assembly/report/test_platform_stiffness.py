@@ -3,12 +3,16 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.model.robot import Frame, MatrixLink, Robot
-from assembly.report.platform_stiffness import DIRECTIONS, stiffness_of, stiffness_text
-from assembly.report.share_pictures import plot_shares
-from assembly.robots import load_robot
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.robot import Frame, MatrixLink, Robot
+from forcefit.assembly.report.platform_stiffness import (
+    DIRECTIONS,
+    stiffness_of,
+    stiffness_text,
+)
+from forcefit.assembly.report.share_pictures import plot_shares
+from forcefit.assembly.robots import load_robot
 
 
 def total(shares):

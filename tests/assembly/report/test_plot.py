@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import write_robot
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.report.plot import displaced_bodies, robot_plotter
-from assembly.robots import load_robot
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.report.plot import displaced_bodies, robot_plotter
+from forcefit.assembly.robots import load_robot
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 
@@ -84,10 +84,10 @@ def test_picture_shows_the_axes_of_driven_and_passive_joints():
 def test_impossible_picture_is_refused_before_solving(
     run, tmp_path, monkeypatch, words, message
 ):
-    import assembly.linear.energy
+    import forcefit.assembly.linear.energy
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(assembly.linear.energy, "solve_assembly", None)
+    monkeypatch.setattr(forcefit.assembly.linear.energy, "solve_assembly", None)
     status, out, err = run("assembly", "show", "five_bar", *words)
     assert (status, out) == (2, "")
     assert err.startswith(f"forcefit: {message}")
@@ -100,16 +100,16 @@ def test_error_body_of_a_loaded_robot_uses_the_frozen_assumption(
     run, tmp_path, monkeypatch
 ):
     """The assumption budget, the default without a load, needs an unloaded robot."""
-    import assembly.report.error_body
+    import forcefit.assembly.report.error_body
 
     readings = []
-    reach = assembly.report.error_body.reachable_screws
+    reach = forcefit.assembly.report.error_body.reachable_screws
 
     def noted(answer, reading):
         readings.append(reading)
         return reach(answer, reading)
 
-    monkeypatch.setattr(assembly.report.error_body, "reachable_screws", noted)
+    monkeypatch.setattr(forcefit.assembly.report.error_body, "reachable_screws", noted)
     write_robot(irsbot2_with(NUMBERS["cases"][0]), tmp_path / "robot.toml")
     words = [tmp_path / "robot.toml", "--pose", "tx=0.1,tz=-0.5", "--error-body",
              "translation", "--figure", tmp_path / "x.jpg"]  # fmt: skip

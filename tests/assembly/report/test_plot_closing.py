@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from assembly.files.robot_file import write_robot
-from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.report.plot_closing import closing_gaps
-from assembly.robots import load_robot
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.report.plot_closing import closing_gaps
+from forcefit.assembly.robots import load_robot
 
 POSE = {"tx": 0.1, "tz": -0.5}
 LONGER = 1e-3  # [m]

@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.linear.assembled import without_rounding
-from assembly.linear.load import massless
-from assembly.model.robot import Clearance, Frame, MeshLink, Robot
-from assembly.report.pose_errors import pose_error_of
-from assembly.report.results import solution_of, solution_text
-from assembly.robots import load_robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.assembled import without_rounding
+from forcefit.assembly.linear.load import massless
+from forcefit.assembly.model.robot import Clearance, Frame, MeshLink, Robot
+from forcefit.assembly.report.pose_errors import pose_error_of
+from forcefit.assembly.report.results import solution_of, solution_text
+from forcefit.assembly.robots import load_robot
 from forcefit.results.display import largest_row
 
 

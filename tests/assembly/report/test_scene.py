@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.linear.energy import solve_assembly
-from assembly.model.robot import BeamLink, Frame, Robot
-from assembly.report.error_body import ErrorBody
-from assembly.report.scene import robot_scene
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.report.error_body import ErrorBody
+from forcefit.assembly.report.scene import robot_scene
 from tests.pages_for_tests import parse
 
 FORCE, LENGTH = 50.0, 0.4

@@ -11,10 +11,10 @@ from matplotlib import pyplot
 from mpl_toolkits.mplot3d.art3d import Line3D, Poly3DCollection
 
 import forcefit as ff
-from assembly.kinematics.posture import home_posture
-from assembly.linear.energy import solve_assembly
-from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from forcefit.inputs.table import BadInput
 from tests.forcefit.page.test_browser import browser, wait
 from tests.pages_for_tests import parse

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.linear.energy import solve_assembly
-from assembly.report.plot import displaced_bodies
-from assembly.report.steps import drawn_steps, steps_of
-from assembly.report.steps_page import assembly_of, steps_page
-from assembly.robots import load_robot
-from assembly.steps.machine import machine_at
-from assembly.steps.plan import Join, Plan
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.report.plot import displaced_bodies
+from forcefit.assembly.report.steps import drawn_steps, steps_of
+from forcefit.assembly.report.steps_page import assembly_of, steps_page
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.steps.machine import machine_at
+from forcefit.assembly.steps.plan import Join, Plan
 from forcefit.page.page import Provenance
 from tests.pages_for_tests import parse
 

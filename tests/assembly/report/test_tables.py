@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.zone import zone_margin
-from assembly.sweeps.quantities import Question, variables
-from stiffness.screws import SCREW, WRENCH
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.sweeps.quantities import Question, variables
+from forcefit.stiffness.screws import SCREW, WRENCH
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.mobility import mobility
-from assembly.kinematics.posture import place_many, place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.linear.zone import zone_margin
-from assembly.model.links import link_compliance
-from assembly.model.random_errors import ErrorDraw, draw_errors, frames_named
-from assembly.robots.irsbot2 import (
+from forcefit.assembly.kinematics.mobility import mobility
+from forcefit.assembly.kinematics.posture import place_many, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.links import link_compliance
+from forcefit.assembly.model.random_errors import ErrorDraw, draw_errors, frames_named
+from forcefit.assembly.robots.irsbot2 import (
     ERROR_FRAMES,
     ERROR_LEAST,
     ERROR_MOST,

@@ -7,12 +7,12 @@ would be the reference's rounding, so the tolerance is one unit of its last digi
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import place_many
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.robots.irsbot2 import irsbot2
-from assembly.sweeps.sweep import assemblable, sweep_poses
-from assembly.sweeps.targets import parse_grid
+from forcefit.assembly.kinematics.posture import place_many
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.robots.irsbot2 import irsbot2
+from forcefit.assembly.sweeps.sweep import assemblable, sweep_poses
+from forcefit.assembly.sweeps.targets import parse_grid
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 GRID = "tx=-0.8:0.8:0.025,tz=-0.8:0:0.025"

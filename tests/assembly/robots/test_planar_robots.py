@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.model.robot import Clearance
-from assembly.robots import BUILT_IN
-from assembly.robots.five_bar import FiveBarParameters
-from assembly.robots.planar import arm_angle
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.model.robot import Clearance
+from forcefit.assembly.robots import BUILT_IN
+from forcefit.assembly.robots.five_bar import FiveBarParameters
+from forcefit.assembly.robots.planar import arm_angle
 from forcefit.inputs.table import BadInput
-from stiffness.screws import rotation_matrix
+from forcefit.stiffness.screws import rotation_matrix
 from tests.built_in_robots_for_tests import (
     farthest_corner,
     joints_of,

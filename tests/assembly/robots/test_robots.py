@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import read_robot, write_robot
-from assembly.kinematics.mobility import mobility
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.linear.reference.as_printed import energy_as_printed
-from assembly.linear.zone import zone_margin
-from assembly.model.clearance import clearance_bounds
-from assembly.model.links import joint_compliances, link_compliances
-from assembly.model.random_errors import frames_named
-from assembly.model.robot import BeamLink, Robot, beam_axis
-from assembly.robots import BUILT_IN, load_robot
-from assembly.robots.irsbot2 import ERROR_FRAMES
+from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.kinematics.mobility import mobility
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.reference.as_printed import energy_as_printed
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.clearance import clearance_bounds
+from forcefit.assembly.model.links import joint_compliances, link_compliances
+from forcefit.assembly.model.random_errors import frames_named
+from forcefit.assembly.model.robot import BeamLink, Robot, beam_axis
+from forcefit.assembly.robots import BUILT_IN, load_robot
+from forcefit.assembly.robots.irsbot2 import ERROR_FRAMES
 from forcefit.inputs.table import BadInput
 from tests.built_in_robots_for_tests import (
     LOAD,

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.model.robot import Clearance
-from assembly.robots import BUILT_IN
-from stiffness.screws import skew
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.robot import Clearance
+from forcefit.assembly.robots import BUILT_IN
+from forcefit.stiffness.screws import skew
 from tests.built_in_robots_for_tests import (
     LOAD,
     only_drives_give,

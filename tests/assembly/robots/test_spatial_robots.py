@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.mobility import mobility
-from assembly.kinematics.posture import POSE, home_posture, place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.robots import BUILT_IN
-from assembly.robots.delta import DeltaParameters, drive_angle
-from assembly.robots.hexapod import HexapodParameters
+from forcefit.assembly.kinematics.mobility import mobility
+from forcefit.assembly.kinematics.posture import POSE, home_posture, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.robots import BUILT_IN
+from forcefit.assembly.robots.delta import DeltaParameters, drive_angle
+from forcefit.assembly.robots.hexapod import HexapodParameters
 from forcefit.inputs.table import BadInput
 from tests.built_in_robots_for_tests import (
     LOAD,

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from assembly.model.error_distributions import draw_generator
-from assembly.solvers.billiard_walk import Positions
+from forcefit.assembly.model.error_distributions import draw_generator
+from forcefit.assembly.solvers.billiard_walk import Positions
 
 FLIGHT = 2.0  # mean time of a trajectory
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from assembly.solvers.cones import cone_sizes
-from assembly.solvers.conic import least_factor, minimise_energy
+from forcefit.assembly.solvers.cones import cone_sizes
+from forcefit.assembly.solvers.conic import least_factor, minimise_energy
 
 GROUP = np.array([0, 0, 1, 2, 2])
 

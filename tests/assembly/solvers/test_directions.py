@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from assembly.solvers.cones import cone_sizes, cone_starts
-from assembly.solvers.one_problem import farthest_points
+from forcefit.assembly.solvers.cones import cone_sizes, cone_starts
+from forcefit.assembly.solvers.one_problem import farthest_points
 
 GROUP = np.array([0, 0, 1, 2, 2, 2])  # cones of two, one and three columns
 

@@ -4,10 +4,10 @@ import cvxpy as cp
 import numpy as np
 import pytest
 
-from assembly.linear.reference.pose_error import ReachableSet
-from assembly.solvers import conic, one_problem
-from assembly.solvers.cones import cone_sizes, cone_starts
-from assembly.solvers.conic import ConeProgramme
+from forcefit.assembly.linear.reference.pose_error import ReachableSet
+from forcefit.assembly.solvers import conic, one_problem
+from forcefit.assembly.solvers.cones import cone_sizes, cone_starts
+from forcefit.assembly.solvers.conic import ConeProgramme
 
 GROUP = np.array([0, 0, 1, 2, 2, 3])  # discs and intervals
 SPRINGS = 4

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from assembly.solvers.outer_cuts import farthest
+from forcefit.assembly.solvers.outer_cuts import farthest
 
 
 def screw(point, half):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from assembly.solvers.pressed_cones import refine
+from forcefit.assembly.solvers.pressed_cones import refine
 
 NONE = np.zeros((0, 2))
 

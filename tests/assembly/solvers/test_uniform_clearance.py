@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from assembly.model.error_distributions import draw_generator
-from assembly.solvers.uniform_clearance import (
+from forcefit.assembly.model.error_distributions import draw_generator
+from forcefit.assembly.solvers.uniform_clearance import (
     _ellipsoid,
     diagnose,
     is_mixed,

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.statistics.allocated_tolerances import (
+from forcefit.assembly.statistics.allocated_tolerances import (
     Allocation,
     allocation_of,
     allocation_text,
 )
-from assembly.statistics.clearance_positions import CLEARANCE_MODELS
+from forcefit.assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from tests.robots_for_tests import coaxial_beams
 from tests.tolerances_for_tests import plan_for
 

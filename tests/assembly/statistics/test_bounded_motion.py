@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from assembly.kinematics.posture import home_posture
-from assembly.model.error_distributions import draw_generator, tolerance_sources
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
-from assembly.statistics.clearance_positions import position_clearances
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.linear_response import linear_response
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.error_distributions import (
+    draw_generator,
+    tolerance_sources,
+)
+from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.statistics.clearance_positions import position_clearances
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.linear_response import linear_response
 from tests.robots_for_tests import random_robot, with_bounded_motion
 from tests.tolerances_for_tests import ARM, arm
 

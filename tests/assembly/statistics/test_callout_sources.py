@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from assembly.files.robot_file import read_robot
-from assembly.kinematics.posture import home_posture
-from assembly.model.error_distributions import tolerance_sources
-from assembly.statistics.callout_sources import sources_of
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.importance import linear_importance, source_groups
-from assembly.statistics.linear_response import linear_response
-from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.worst_pose import worst_pose
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.statistics.callout_sources import sources_of
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.importance import linear_importance, source_groups
+from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.monte_carlo import run_draws
+from forcefit.assembly.statistics.worst_pose import worst_pose
 from forcefit.inputs.table import BadInput
 from tests.drawn_four_bar_for_tests import COEFFICIENTS, LEVER, four_bar_file
 

@@ -5,13 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.callouts.callout import Callout, Datum
-from assembly.files.robot_file import write_robot
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import Frame, Robot
-from assembly.statistics.allocated_tolerances import allocation_of, allocation_text
-from assembly.statistics.allocation import allocate
-from assembly.statistics.tolerance_file import read_plan
+from forcefit.assembly.callouts.callout import Callout, Datum
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.statistics.allocated_tolerances import (
+    allocation_of,
+    allocation_text,
+)
+from forcefit.assembly.statistics.allocation import allocate
+from forcefit.assembly.statistics.tolerance_file import read_plan
 from forcefit.inputs.table import BadInput
 
 ARM = Robot(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from assembly.statistics.capability import (
+from forcefit.assembly.statistics.capability import (
     capability,
     cp_interval,
     cpk_interval,
@@ -11,7 +11,7 @@ from assembly.statistics.capability import (
     quantile_cpk,
     share_outside,
 )
-from assembly.statistics.estimates import proportion
+from forcefit.assembly.statistics.estimates import proportion
 
 
 @pytest.mark.parametrize(

@@ -6,17 +6,20 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from assembly.kinematics.nominal import size_of
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.model.error_distributions import draw_generator, tolerance_sources
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
-from assembly.robots import load_robot
-from assembly.solvers.uniform_clearance import sample_uniform_position
-from assembly.statistics.clearance_positions import (
+from forcefit.assembly.kinematics.nominal import size_of
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.model.error_distributions import (
+    draw_generator,
+    tolerance_sources,
+)
+from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.solvers.uniform_clearance import sample_uniform_position
+from forcefit.assembly.statistics.clearance_positions import (
     loaded_clearances,
     position_clearances,
 )
-from assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.linear_response import linear_response
 from tests.robots_for_tests import in_millimetres
 
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.model.error_distributions import draw_generator
-from assembly.statistics.clearance_positions import position_clearances
-from assembly.statistics.contact_positions import move_to_contact
-from assembly.statistics.linear_response import linear_response
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.error_distributions import draw_generator
+from forcefit.assembly.statistics.clearance_positions import position_clearances
+from forcefit.assembly.statistics.contact_positions import move_to_contact
+from forcefit.assembly.statistics.linear_response import linear_response
 from tests.tolerances_for_tests import ARM, arm
 
 

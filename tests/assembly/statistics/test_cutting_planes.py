@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from assembly.statistics.cutting_planes import cheapest_within, cut_planes
-from assembly.statistics.requirement import Plan
+from forcefit.assembly.statistics.cutting_planes import cheapest_within, cut_planes
+from forcefit.assembly.statistics.requirement import Plan
 from forcefit.inputs.table import BadInput
 from tests.tolerances_for_tests import silent
 

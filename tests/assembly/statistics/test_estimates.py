@@ -5,7 +5,7 @@ from math import comb
 import numpy as np
 import pytest
 
-from assembly.statistics.estimates import (
+from forcefit.assembly.statistics.estimates import (
     bracketed,
     mean,
     most_probable,

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.model.error_distributions import tolerance_sources
-from assembly.model.link_stress import peak_stresses
-from assembly.model.robot import Clearance
-from assembly.robots import load_robot
-from assembly.statistics.experiment import Experiment, precision_for
-from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.summary import summarise, summary_text
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.model.link_stress import peak_stresses
+from forcefit.assembly.model.robot import Clearance
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.statistics.experiment import Experiment, precision_for
+from forcefit.assembly.statistics.monte_carlo import run_draws
+from forcefit.assembly.statistics.summary import summarise, summary_text
 from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import coaxial_beams
 from tests.tolerances_for_tests import PLAY, arm, rigid_pair

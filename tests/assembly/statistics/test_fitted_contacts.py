@@ -8,13 +8,13 @@ to 17.5 um, of uniform sizes 10.25 um with a deviation of sqrt(18^2 + 11^2)/sqrt
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import read_robot, write_robot
-from assembly.kinematics.posture import home_posture
-from assembly.statistics.callout_sources import sources_of
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.linear_response import linear_response
-from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.worst_pose import worst_pose
+from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.statistics.callout_sources import sources_of
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.monte_carlo import run_draws
+from forcefit.assembly.statistics.worst_pose import worst_pose
 from forcefit.inputs.table import BadInput
 
 FIRST = np.sqrt((18.0**2 + 11.0**2) / 12) / 2 * 1e-6  # [m] deviation of 12 H7/g6

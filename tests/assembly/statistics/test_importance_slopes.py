@@ -3,13 +3,19 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.model.error_distributions import tolerance_sources
-from assembly.robots import load_robot
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.importance_slopes import platform_gains, platform_slopes
-from assembly.statistics.importance_table import ImportanceOptions, importance_design
-from assembly.statistics.linear_response import linear_response
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.importance_slopes import (
+    platform_gains,
+    platform_slopes,
+)
+from forcefit.assembly.statistics.importance_table import (
+    ImportanceOptions,
+    importance_design,
+)
+from forcefit.assembly.statistics.linear_response import linear_response
 from tests.tolerances_for_tests import arm
 
 

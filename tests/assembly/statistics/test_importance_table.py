@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.model.error_distributions import tolerance_sources
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.importance_table import (
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.importance_table import (
     ImportanceOptions,
     importance_dataset,
     importance_design,

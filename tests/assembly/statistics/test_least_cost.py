@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from assembly.statistics.least_cost import least_cost
-from assembly.statistics.requirement import Plan
-from assembly.statistics.scaling import Samples
+from forcefit.assembly.statistics.least_cost import least_cost
+from forcefit.assembly.statistics.requirement import Plan
+from forcefit.assembly.statistics.scaling import Samples
 from tests.tolerances_for_tests import silent
 
 COSTS = np.array([1.0, 4.0])

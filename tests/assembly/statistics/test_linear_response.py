@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.robots import load_robot
-from assembly.solvers.conic import SolverFailed
-from assembly.statistics.linear_response import linear_response
-from assembly.statistics.posture_margins import prepare_margins
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.solvers.conic import SolverFailed
+from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.posture_margins import prepare_margins
 from tests.robots_for_tests import random_robot
 from tests.tolerances_for_tests import drawn_errors
 

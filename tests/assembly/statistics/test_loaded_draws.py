@@ -7,15 +7,18 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from assembly.files.robot_file import write_robot
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.model.error_distributions import draw_generator, tolerance_sources
-from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
-from assembly.robots import load_robot
-from assembly.statistics.clearance_positions import position_clearances
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.linear_response import linear_response
-from assembly.statistics.monte_carlo import run_draws
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.model.error_distributions import (
+    draw_generator,
+    tolerance_sources,
+)
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.statistics.clearance_positions import position_clearances
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.monte_carlo import run_draws
 from forcefit.commands.assembly import app
 from forcefit.inputs.table import BadInput
 from tests.tolerances_for_tests import drawn_errors

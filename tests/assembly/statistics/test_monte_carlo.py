@@ -7,15 +7,19 @@ import sys
 import pytest
 import xarray
 
-from assembly.kinematics.posture import place_robot
-from assembly.model.error_distributions import tolerance_sources
-from assembly.robots import load_robot
-from assembly.statistics import monte_carlo
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.importance_table import ImportanceOptions
-from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.plot import allocation_figure, histogram_figure, tornado_figure
-from assembly.sweeps.sweep import journal_path
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.statistics import monte_carlo
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.importance_table import ImportanceOptions
+from forcefit.assembly.statistics.monte_carlo import run_draws
+from forcefit.assembly.statistics.plot import (
+    allocation_figure,
+    histogram_figure,
+    tornado_figure,
+)
+from forcefit.assembly.sweeps.sweep import journal_path
 
 ERRORS = """
 [[errors]]

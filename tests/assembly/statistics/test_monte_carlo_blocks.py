@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import place_robot
-from assembly.model.error_distributions import tolerance_sources
-from assembly.statistics import monte_carlo
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.importance_table import ImportanceOptions
-from assembly.statistics.monte_carlo import provenance, run_draws
-from assembly.sweeps.sweep import journal_path
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.statistics import monte_carlo
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.importance_table import ImportanceOptions
+from forcefit.assembly.statistics.monte_carlo import provenance, run_draws
+from forcefit.assembly.sweeps.sweep import journal_path
 from forcefit.inputs.table import BadInput
 from tests import tolerances_for_tests
 

@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import write_robot
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.model.error_distributions import tolerance_sources
-from assembly.robots import load_robot
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.perfect_parts import limits_broken, perfect_parts
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.perfect_parts import limits_broken, perfect_parts
 from tests.pages_for_tests import tiles
 from tests.tolerances_for_tests import ARM, arm
 

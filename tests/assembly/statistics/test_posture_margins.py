@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import place_robot
-from assembly.linear.zone import zone_margin
-from assembly.robots import load_robot
-from assembly.statistics.posture_margins import prepare_margins
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.statistics.posture_margins import prepare_margins
 from tests.robots_for_tests import random_robot
 from tests.tolerances_for_tests import drawn_errors
 

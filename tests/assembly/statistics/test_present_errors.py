@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.model.robot import Clearance, Frame, Robot
-from assembly.robots import load_robot
-from assembly.statistics.tolerances import (
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.statistics.tolerances import (
     grid_postures,
     identity_of,
     left_out_text,

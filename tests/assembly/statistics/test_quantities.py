@@ -2,7 +2,7 @@
 
 import pytest
 
-from assembly.statistics.quantities import UNITS, limit_names, parse_limit
+from forcefit.assembly.statistics.quantities import UNITS, limit_names, parse_limit
 from forcefit.inputs.table import BadInput
 
 

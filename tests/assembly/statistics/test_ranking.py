@@ -1,6 +1,6 @@
 """Ranks by intervals, and names of errors that intervals do not distinguish."""
 
-from assembly.statistics.ranking import (
+from forcefit.assembly.statistics.ranking import (
     kind_of,
     leaders,
     named_together,

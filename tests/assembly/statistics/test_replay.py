@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from assembly.statistics.replay import journalled
-from assembly.sweeps.sweep import journal_path
+from forcefit.assembly.statistics.replay import journalled
+from forcefit.assembly.sweeps.sweep import journal_path
 
 
 class Killed(Exception):

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import write_robot
-from assembly.kinematics.posture import place_robot
-from assembly.model.error_distributions import read_sources
-from assembly.robots import load_robot
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.scenes import drawn_robot, margin_map, tightest_robot
-from assembly.statistics.tolerances import grid_postures, present_errors
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.model.error_distributions import read_sources
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.monte_carlo import run_draws
+from forcefit.assembly.statistics.scenes import drawn_robot, margin_map, tightest_robot
+from forcefit.assembly.statistics.tolerances import grid_postures, present_errors
 from tests.pages_for_tests import parse
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 

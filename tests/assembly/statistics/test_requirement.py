@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import Clearance, Frame, Robot
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.requirement import Requirement
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.requirement import Requirement
 from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import coaxial_beams
 from tests.tolerances_for_tests import PLAY, arm, plan_for, rigid_pair

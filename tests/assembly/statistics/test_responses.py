@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.model.error_distributions import tolerance_sources
-from assembly.model.robot import Frame, MatrixLink, Robot
-from assembly.robots import load_robot
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.linear_response import linear_response
-from assembly.statistics.responses import respond
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.model.robot import Frame, MatrixLink, Robot
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.responses import respond
 from tests.tolerances_for_tests import PLAY, arm, rigid_pair
 
 STIFFNESS = 1e6  # [N/m]

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from assembly.statistics.scaling import Samples, draw_samples, scale_uniformly
+from forcefit.assembly.statistics.scaling import Samples, draw_samples, scale_uniformly
 from forcefit.inputs.table import BadInput
 
 

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.zone import zone_margin
-from assembly.model.error_distributions import tolerance_sources
-from assembly.robots import load_robot
-from assembly.statistics.linear_response import linear_response
-from assembly.statistics.posture_margins import prepare_margins
-from assembly.statistics.responses import respond
-from assembly.statistics.sensitivity import energy_slopes, solution_slopes
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.posture_margins import prepare_margins
+from forcefit.assembly.statistics.responses import respond
+from forcefit.assembly.statistics.sensitivity import energy_slopes, solution_slopes
 from tests.robots_for_tests import random_robot
 
 POSES = [{"tx": 0.1, "tz": -0.5}, {"tx": -0.23, "tz": -0.41}, {"tx": 0.3, "tz": -0.55}]

@@ -5,8 +5,8 @@ import pytest
 import xarray
 from scipy import stats
 
-from assembly.statistics.clearance_positions import CLEARANCE_MODELS
-from assembly.statistics.summary import summarise, summary_text
+from forcefit.assembly.statistics.clearance_positions import CLEARANCE_MODELS
+from forcefit.assembly.statistics.summary import summarise, summary_text
 from forcefit.inputs.table import BadInput
 
 NAN = float("nan")

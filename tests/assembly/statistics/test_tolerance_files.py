@@ -7,12 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.linear.zone import zone_margin
-from assembly.robots import load_robot
-from assembly.statistics import verification
-from assembly.statistics.tolerance_file import read_plan
-from assembly.statistics.tolerances import grid_postures, present_errors, present_text
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.statistics import verification
+from forcefit.assembly.statistics.tolerance_file import read_plan
+from forcefit.assembly.statistics.tolerances import (
+    grid_postures,
+    present_errors,
+    present_text,
+)
 from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 

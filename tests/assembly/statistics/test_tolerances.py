@@ -6,18 +6,18 @@ from itertools import product
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.zone import zone_margin
-from assembly.model.link_stress import peak_stresses
-from assembly.robots import load_robot
-from assembly.statistics.allocation import allocate
-from assembly.statistics.linear_response import linear_response
-from assembly.statistics.posture_margins import prepare_margins
-from assembly.statistics.requirement import Plan
-from assembly.statistics.responses import respond
-from assembly.statistics.worst_case import (
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.link_stress import peak_stresses
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.statistics.allocation import allocate
+from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.posture_margins import prepare_margins
+from forcefit.assembly.statistics.requirement import Plan
+from forcefit.assembly.statistics.responses import respond
+from forcefit.assembly.statistics.worst_case import (
     bound_energy,
     bound_margin,
     random_corners,

@@ -5,10 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import place_robot
-from assembly.model.robot import Frame, MatrixLink, Robot
-from assembly.statistics.allocated_tolerances import allocation_of, allocation_text
-from assembly.statistics.allocation import allocate
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.model.robot import Frame, MatrixLink, Robot
+from forcefit.assembly.statistics.allocated_tolerances import (
+    allocation_of,
+    allocation_text,
+)
+from forcefit.assembly.statistics.allocation import allocate
 from tests.tolerances_for_tests import PLAY, arm, plan_for
 
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import write_robot
-from assembly.statistics.allocated_tolerances import Allocation, allocation_of
-from assembly.statistics.tolerances_report import tolerances_page
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.statistics.allocated_tolerances import Allocation, allocation_of
+from forcefit.assembly.statistics.tolerances_report import tolerances_page
 from forcefit.page.page import Provenance
 from tests.pages_for_tests import parse, tiles
 from tests.robots_for_tests import coaxial_beams

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import Clearance
-from assembly.statistics.requirement import Requirement
-from assembly.statistics.verification import prove_worst, verify_yield
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import Clearance
+from forcefit.assembly.statistics.requirement import Requirement
+from forcefit.assembly.statistics.verification import prove_worst, verify_yield
 from tests.robots_for_tests import coaxial_beams
 from tests.tolerances_for_tests import PLAY, plan_for, silent
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
-from assembly.statistics.linear_response import linear_response
-from assembly.statistics.posture_margins import prepare_margins
-from assembly.statistics.worst_case import (
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.posture_margins import prepare_margins
+from forcefit.assembly.statistics.worst_case import (
     bound_energy,
     bound_margin,
     random_corners,

@@ -9,13 +9,16 @@ import pytest
 from scipy.optimize import minimize_scalar
 from typer.testing import CliRunner
 
-from assembly.callouts.callout import Callout, Datum
-from assembly.files.robot_file import read_robot, write_robot
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import Clearance, Frame, Robot
-from assembly.statistics.allocated_tolerances import allocation_of, allocation_text
-from assembly.statistics.allocation import allocate
-from assembly.statistics.tolerance_file import read_plan
+from forcefit.assembly.callouts.callout import Callout, Datum
+from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.statistics.allocated_tolerances import (
+    allocation_of,
+    allocation_text,
+)
+from forcefit.assembly.statistics.allocation import allocate
+from forcefit.assembly.statistics.tolerance_file import read_plan
 from forcefit.commands.app import app
 from forcefit.inputs.table import BadInput
 from tests.drawn_four_bar_for_tests import COEFFICIENTS, LEVER, four_bar_file

@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.model.error_distributions import tolerance_sources
-from assembly.model.robot import Clearance
-from assembly.robots import load_robot
-from assembly.statistics.clearance_positions import CLEARANCE_MODELS
-from assembly.statistics.experiment import Experiment, precision_for
-from assembly.statistics.linear_response import linear_response
-from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.responses import respond
-from assembly.statistics.summary import summarise, summary_text
-from assembly.statistics.worst_clearance import bound_worst_errors
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.model.robot import Clearance
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.statistics.clearance_positions import CLEARANCE_MODELS
+from forcefit.assembly.statistics.experiment import Experiment, precision_for
+from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.monte_carlo import run_draws
+from forcefit.assembly.statistics.responses import respond
+from forcefit.assembly.statistics.summary import summarise, summary_text
+from forcefit.assembly.statistics.worst_clearance import bound_worst_errors
 from tests.tolerances_for_tests import ARM, arm
 
 RADIAL, TILT = 1e-4, 2e-3

@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.callouts.callout import Callout, Datum
-from assembly.files.robot_file import read_robot
-from assembly.kinematics.posture import home_posture
-from assembly.model.error_distributions import tolerance_sources
-from assembly.model.robot import Clearance, Frame, Robot
-from assembly.statistics.callout_sources import sources_of
-from assembly.statistics.linear_response import linear_response
-from assembly.statistics.responses import respond
-from assembly.statistics.worst_pose import worst_pose
+from forcefit.assembly.callouts.callout import Callout, Datum
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.statistics.callout_sources import sources_of
+from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.responses import respond
+from forcefit.assembly.statistics.worst_pose import worst_pose
 from forcefit.inputs.table import BadInput
 from tests.drawn_four_bar_for_tests import four_bar_file
 
@@ -173,7 +173,7 @@ def on_springs(positions, clearance, stiffness=STIFF):
 
 def _pose(frames):
     """Rotation vector of the last of three frames."""
-    from stiffness.screws import rotation_matrix, rotation_vector
+    from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 
     R = np.eye(3)
     for frame in frames:

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assembly.callouts.callout import Callout, Datum
-from assembly.files.robot_file import read_robot
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import Frame, Robot
-from assembly.statistics.callout_sources import sources_of
-from assembly.statistics.estimates import proportion
-from assembly.statistics.linear_response import linear_response
+from forcefit.assembly.callouts.callout import Callout, Datum
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.statistics.callout_sources import sources_of
+from forcefit.assembly.statistics.estimates import proportion
+from forcefit.assembly.statistics.linear_response import linear_response
 from tests.drawn_four_bar_for_tests import four_bar_file
 
 FINITE, LINEAR = 1_000_000, 20_000

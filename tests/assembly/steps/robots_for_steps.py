@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
-from stiffness.screws import rotation_vector
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from forcefit.stiffness.screws import rotation_vector
 
 STIFF = 1e9  # [N m/rad, N/m] of directions in which no worked case moves
 

@@ -9,20 +9,20 @@ import cvxpy as cp
 import numpy as np
 import pytest
 
-from assembly.exchange.robot_files import load_robot
-from assembly.files.robot_file import write_robot
-from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.model.error_distributions import read_sources, tolerance_sources
-from assembly.model.links import link_compliances
-from assembly.statistics.experiment import Experiment
-from assembly.statistics.linear_response import linear_response
-from assembly.statistics.tolerance_file import read_plan
-from assembly.statistics.worst_pose import worst_pose
-from assembly.steps.bolted import bolt_joints, loose_over_poses
-from assembly.sweeps.robot_sweep import sweep
+from forcefit.assembly.exchange.robot_files import load_robot
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.error_distributions import read_sources, tolerance_sources
+from forcefit.assembly.model.links import link_compliances
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.statistics.tolerance_file import read_plan
+from forcefit.assembly.statistics.worst_pose import worst_pose
+from forcefit.assembly.steps.bolted import bolt_joints, loose_over_poses
+from forcefit.assembly.sweeps.robot_sweep import sweep
 from forcefit.inputs.table import BadInput
-from stiffness.screws import rotation_matrix
+from forcefit.stiffness.screws import rotation_matrix
 
 STEEL = "link = { beam = { radius = 0.02 }, young = 2.1e11, poisson = 0.3 }"
 PIN = "clearance = { radial = 1e-5, axial = 1e-5, tilt = 1e-4 }"

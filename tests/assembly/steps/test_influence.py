@@ -5,12 +5,12 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from assembly.report.steps import steps_of
-from assembly.steps.influence import influences
-from assembly.steps.machine import machine_at
-from assembly.steps.plan import Join, Measure, Plan
-from assembly.steps.run import assemble_in_steps, carry_out
-from assembly.steps.state import first_state
+from forcefit.assembly.report.steps import steps_of
+from forcefit.assembly.steps.influence import influences
+from forcefit.assembly.steps.machine import machine_at
+from forcefit.assembly.steps.plan import Join, Measure, Plan
+from forcefit.assembly.steps.run import assemble_in_steps, carry_out
+from forcefit.assembly.steps.state import first_state
 from tests.assembly.steps.robots_for_steps import planar_platform, three_legs
 
 Z = ("TZ",)

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from assembly.exchange.robot_files import load_robot
-from assembly.files.robot_file import write_robot
-from assembly.kinematics.posture import place_robot
-from assembly.model.error_distributions import read_sources, tolerance_sources
-from assembly.model.robot import Clearance, Frame, LockedAt, Robot
-from assembly.statistics.experiment import Experiment
-from assembly.steps.bolted import bolt_generators, bolt_joints, bolted_errors
-from assembly.sweeps.robot_sweep import sweep
+from forcefit.assembly.exchange.robot_files import load_robot
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.model.error_distributions import read_sources, tolerance_sources
+from forcefit.assembly.model.robot import Clearance, Frame, LockedAt, Robot
+from forcefit.assembly.statistics.experiment import Experiment
+from forcefit.assembly.steps.bolted import bolt_generators, bolt_joints, bolted_errors
+from forcefit.assembly.sweeps.robot_sweep import sweep
 from forcefit.inputs.table import BadInput
 from tests.assembly.steps.robots_for_steps import spring
 from tests.assembly.steps.test_bolted import four_bar

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import Frame, MatrixLink, Robot
-from assembly.steps.plan import Fix, Join, Plan, Preload, Release
-from assembly.steps.run import assemble_in_steps
-from stiffness.screws import SCREW
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import Frame, MatrixLink, Robot
+from forcefit.assembly.steps.plan import Fix, Join, Plan, Preload, Release
+from forcefit.assembly.steps.run import assemble_in_steps
+from forcefit.stiffness.screws import SCREW
 
 LEGS = 4
 SIZES = np.repeat([1e-2, 1e-3], 3)

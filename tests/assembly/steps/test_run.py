@@ -10,17 +10,25 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.linear.energy import solve_assembly
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.placed_frames import place_frames
-from assembly.model.robot import Clearance, Frame, Robot
-from assembly.robots import load_robot
-from assembly.robots.placing import at, ball_joint, cardan_joint
-from assembly.steps.plan import Adjust, Fix, Join, Measure, Plan, Preload, Release
-from assembly.steps.run import assemble_in_steps
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.placed_frames import place_frames
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.robots.placing import at, ball_joint, cardan_joint
+from forcefit.assembly.steps.plan import (
+    Adjust,
+    Fix,
+    Join,
+    Measure,
+    Plan,
+    Preload,
+    Release,
+)
+from forcefit.assembly.steps.run import assemble_in_steps
 from forcefit.inputs.table import BadInput
-from stiffness.screws import SCREW
+from forcefit.stiffness.screws import SCREW
 from tests.assembly.steps.robots_for_steps import (
     gough_points,
     planar_platform,

@@ -6,12 +6,12 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import Frame, Robot
-from assembly.steps.influence import why_order_matters
-from assembly.steps.plan import Fix, Join, Plan, Release
-from assembly.steps.run import assemble_in_steps
-from assembly.steps.search import OBJECTIVES, best_order
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.assembly.steps.influence import why_order_matters
+from forcefit.assembly.steps.plan import Fix, Join, Plan, Release
+from forcefit.assembly.steps.run import assemble_in_steps
+from forcefit.assembly.steps.search import OBJECTIVES, best_order
 from forcefit.inputs.table import BadInput
 from tests.assembly.steps.robots_for_steps import leg, planar_platform, three_legs
 

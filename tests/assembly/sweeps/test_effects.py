@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.effects.robot_effects import apply_robot_effects
-from assembly.files.robot_file import read_robot
-from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.model.function import Function
-from assembly.robots import load_robot
-from assembly.sweeps.plan import Sweep
-from assembly.sweeps.quantities import Question
-from assembly.sweeps.request import SweepOptions, ask_sweep
-from assembly.sweeps.robot_sweep import sweep
-from assembly.sweeps.sweep import sweep_in_memory
-from assembly.sweeps.targets import grid_targets, parse_grid
+from forcefit.assembly.effects.robot_effects import apply_robot_effects
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.sweeps.plan import Sweep
+from forcefit.assembly.sweeps.quantities import Question
+from forcefit.assembly.sweeps.request import SweepOptions, ask_sweep
+from forcefit.assembly.sweeps.robot_sweep import sweep
+from forcefit.assembly.sweeps.sweep import sweep_in_memory
+from forcefit.assembly.sweeps.targets import grid_targets, parse_grid
 from forcefit.inputs.table import BadInput
 from tests.assembly.files.test_effect_file import L, arm_with
 from tests.robots_for_tests import NUMBERS, irsbot2_with

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import place_robot
-from assembly.platform_stiffness.vibration import natural_modes
-from assembly.sweeps.maps import figure_of
-from assembly.sweeps.parameters import load_design
-from assembly.sweeps.robot_sweep import sweep
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.platform_stiffness.vibration import natural_modes
+from forcefit.assembly.sweeps.maps import figure_of
+from forcefit.assembly.sweeps.parameters import load_design
+from forcefit.assembly.sweeps.robot_sweep import sweep
 from forcefit.inputs.table import BadInput
 
 

@@ -13,15 +13,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.robots import load_robot
-from assembly.sweeps import identity
-from assembly.sweeps.identity import question_hash
-from assembly.sweeps.journal import open_journal
-from assembly.sweeps.parameters import load_design
-from assembly.sweeps.plan import Sweep
-from assembly.sweeps.quantities import Question, record_type
-from assembly.sweeps.sweep import journal_path, run_sweep, solve_here, sweep_in_memory
-from assembly.sweeps.targets import grid_targets, parse_grid
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.sweeps import identity
+from forcefit.assembly.sweeps.identity import question_hash
+from forcefit.assembly.sweeps.journal import open_journal
+from forcefit.assembly.sweeps.parameters import load_design
+from forcefit.assembly.sweeps.plan import Sweep
+from forcefit.assembly.sweeps.quantities import Question, record_type
+from forcefit.assembly.sweeps.sweep import (
+    journal_path,
+    run_sweep,
+    solve_here,
+    sweep_in_memory,
+)
+from forcefit.assembly.sweeps.targets import grid_targets, parse_grid
 from forcefit.inputs.table import BadInput
 
 ROOT = Path(__file__).parents[3]

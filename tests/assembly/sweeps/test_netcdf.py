@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import xarray
 
-from assembly.sweeps.dataset import open_dataset, save_dataset
-from assembly.sweeps.netcdf import check_heaps, netcdf_file
+from forcefit.assembly.sweeps.dataset import open_dataset, save_dataset
+from forcefit.assembly.sweeps.netcdf import check_heaps, netcdf_file
 from forcefit.inputs.table import BadInput
 
 SIZE = 6_500_000  # bytes of the file below, about

@@ -5,8 +5,8 @@ import pytest
 import xarray
 
 import forcefit as ff
-from assembly.statistics.plot import figure_of_draws
-from assembly.sweeps.dataset import save_dataset
+from forcefit.assembly.statistics.plot import figure_of_draws
+from forcefit.assembly.sweeps.dataset import save_dataset
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import forcefit as ff
-from assembly.sweeps.dataset import save_dataset
-from assembly.sweeps.point_table import write_point_table
-from stiffness.screws import WRENCH
+from forcefit.assembly.sweeps.dataset import save_dataset
+from forcefit.assembly.sweeps.point_table import write_point_table
+from forcefit.stiffness.screws import WRENCH
 
 
 @pytest.fixture(scope="module")

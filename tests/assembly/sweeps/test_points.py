@@ -5,24 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.exact.exact import solve_exact
-from assembly.files.robot_file import write_robot
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.model.error_distributions import read_sources
-from assembly.model.robot import BeamLink
-from assembly.robots import load_robot
-from assembly.sweeps import points
-from assembly.sweeps.maps import figure_of
-from assembly.sweeps.parameters import load_design
-from assembly.sweeps.plan import Sweep
-from assembly.sweeps.quantities import Question
-from assembly.sweeps.request import SweepOptions, ask_sweep, summary_of
-from assembly.sweeps.robot_sweep import sweep
-from assembly.sweeps.selection import BY_CLEARANCE
-from assembly.sweeps.sweep import sweep_in_memory, sweep_poses
-from assembly.sweeps.targets import grid_targets, parse_grid
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.model.error_distributions import read_sources
+from forcefit.assembly.model.robot import BeamLink
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.sweeps import points
+from forcefit.assembly.sweeps.maps import figure_of
+from forcefit.assembly.sweeps.parameters import load_design
+from forcefit.assembly.sweeps.plan import Sweep
+from forcefit.assembly.sweeps.quantities import Question
+from forcefit.assembly.sweeps.request import SweepOptions, ask_sweep, summary_of
+from forcefit.assembly.sweeps.robot_sweep import sweep
+from forcefit.assembly.sweeps.selection import BY_CLEARANCE
+from forcefit.assembly.sweeps.sweep import sweep_in_memory, sweep_poses
+from forcefit.assembly.sweeps.targets import grid_targets, parse_grid
 from forcefit.inputs.table import BadInput
 from tests.linkages_for_tests import SLIDER_CRANK, slider_crank
 from tests.robots_for_tests import NUMBERS, irsbot2_with

@@ -4,7 +4,7 @@ import pytest
 import xarray
 
 import forcefit as ff
-from assembly.sweeps.selection import BY_CLEARANCE, FINITE
+from forcefit.assembly.sweeps.selection import BY_CLEARANCE, FINITE
 
 GRID = "tx=-0.02:0.02:0.02,ty=0.13:0.14:0.01"
 TEXTS = {"status", "reason", "near_singularity"}

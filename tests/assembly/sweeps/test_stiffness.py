@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import place_robot
-from assembly.platform_stiffness.linear_tangent import without_clearance
-from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.robots import load_robot
-from assembly.sweeps.maps import figure_of
-from assembly.sweeps.request import SweepOptions, ask_sweep
-from assembly.sweeps.robot_sweep import sweep
-from assembly.sweeps.sweep import sweep_in_memory
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.platform_stiffness.linear_tangent import without_clearance
+from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.sweeps.maps import figure_of
+from forcefit.assembly.sweeps.request import SweepOptions, ask_sweep
+from forcefit.assembly.sweeps.robot_sweep import sweep
+from forcefit.assembly.sweeps.sweep import sweep_in_memory
 from forcefit.inputs.table import BadInput
 
 

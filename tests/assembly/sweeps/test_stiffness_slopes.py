@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import place_robot
-from assembly.platform_stiffness.linear_tangent import without_clearance
-from assembly.robots import load_robot
-from assembly.sweeps.parameters import load_design
-from assembly.sweeps.stiffness_slopes import CannotChange, stiffness_slopes
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.platform_stiffness.linear_tangent import without_clearance
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.sweeps.parameters import load_design
+from forcefit.assembly.sweeps.stiffness_slopes import CannotChange, stiffness_slopes
 
 POSE = {"tx": 0.1, "tz": -0.5}
 

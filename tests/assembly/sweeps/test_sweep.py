@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 import xarray
 
-from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.sweeps import points
-from assembly.sweeps.dataset import save_dataset
-from assembly.sweeps.maps import map_figure
-from assembly.sweeps.sweep import sweep_poses
-from assembly.sweeps.targets import parse_grid
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.sweeps import points
+from forcefit.assembly.sweeps.dataset import save_dataset
+from forcefit.assembly.sweeps.maps import map_figure
+from forcefit.assembly.sweeps.sweep import sweep_poses
+from forcefit.assembly.sweeps.targets import parse_grid
 from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
 

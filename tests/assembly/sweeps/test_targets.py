@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
-from assembly.robots import load_robot
-from assembly.sweeps.targets import goals_of, grid_targets, parse_grid, read_targets
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.sweeps.targets import (
+    goals_of,
+    grid_targets,
+    parse_grid,
+    read_targets,
+)
 from forcefit.inputs.table import BadInput
 
 

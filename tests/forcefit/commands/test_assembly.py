@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.exact.exact import solve_exact
-from assembly.files.robot_file import write_robot
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.pose_error import reachable_screws
-from assembly.robots import load_robot
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit.assembly.linear.reference.pose_error import reachable_screws
+from forcefit.assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
 from tests.three_upu_for_tests import three_upu
 

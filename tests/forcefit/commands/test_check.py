@@ -9,17 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from assembly.exchange.robot_files import load_robot
-from assembly.files.toml_text import toml_value
-from assembly.model.error_distributions import read_sources
-from assembly.robots import BUILT_IN
-from assembly.statistics.tolerance_file import read_plan
+from forcefit.assembly.exchange.robot_files import load_robot
+from forcefit.assembly.files.toml_text import toml_value
+from forcefit.assembly.model.error_distributions import read_sources
+from forcefit.assembly.robots import BUILT_IN
+from forcefit.assembly.statistics.tolerance_file import read_plan
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.mending import MOST_MESSAGES, all_messages
+from forcefit.validation.campaign.campaign_file import read_campaign
+from forcefit.validation.study.study_file import read_study
 from tests.robot_files_for_tests import FOUR_BAR
 from tests.schemas_for_tests import validator
-from validation.campaign.campaign_file import read_campaign
-from validation.study.study_file import read_study
 
 ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "examples"

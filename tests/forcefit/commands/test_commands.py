@@ -16,7 +16,7 @@ import typer
 import xarray
 
 import forcefit
-from assembly.files.robot_file import write_robot
+from forcefit.assembly.files.robot_file import write_robot
 from forcefit.commands import app as command
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
 

@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import write_robot
-from assembly.robots import load_robot
-from assembly.sweeps.targets import grid_targets
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.robots import load_robot
+from forcefit.assembly.sweeps.targets import grid_targets
 from forcefit.commands import app as command
+from forcefit.validation.assumptions.over_poses import costs_over_poses
+from forcefit.validation.crosscheck.crosscheck import crosscheck
+from forcefit.validation.crosscheck.poses import check_poses, poses_table, poses_text
+from forcefit.validation.multibody.simulation import SimulationFailed
 from tests.robots_for_tests import NUMBERS, irsbot2_with
-from validation.assumptions.over_poses import costs_over_poses
-from validation.crosscheck.crosscheck import crosscheck
-from validation.crosscheck.poses import check_poses, poses_table, poses_text
-from validation.multibody.simulation import SimulationFailed
 
 pytestmark = pytest.mark.exudyn
 AXES = {"tx": [-0.7, 0.0, 0.2], "tz": [-0.45]}

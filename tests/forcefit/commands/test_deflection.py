@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from assembly.files.robot_file import write_robot
+from forcefit.assembly.files.robot_file import write_robot
 from tests.assembly.platform_stiffness.test_deflection import shallow_arch
 
 

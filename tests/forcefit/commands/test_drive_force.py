@@ -6,9 +6,9 @@ import json
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import write_robot
-from assembly.model.force_control import with_drive_forces
-from assembly.model.robot import Frame, Robot
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.model.force_control import with_drive_forces
+from forcefit.assembly.model.robot import Frame, Robot
 from tests.assembly.linear.test_drive_forces import crossed_cranks
 
 # force of the coupler [N] by a moment of 12 N m on a crank of 0.3 m at 60 degrees

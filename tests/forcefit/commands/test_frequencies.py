@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import write_robot
-from assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
 
 
 def test_frequencies_are_ascending_with_shares_of_the_parts(run):

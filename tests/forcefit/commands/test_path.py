@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import write_robot
-from assembly.model.robot import BeamLink, Frame, Robot
-from assembly.path.path_file import PathTable
-from assembly.path.request import PathTimes, errors_along_path
-from assembly.sweeps.dataset import open_dataset
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.path.path_file import PathTable
+from forcefit.assembly.path.request import PathTimes, errors_along_path
+from forcefit.assembly.sweeps.dataset import open_dataset
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "hexapod_path.csv"
 PEAK = 10 / np.sqrt(3)  # largest acceleration of the quintic in D / T^2

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from assembly.sweeps.request import SweepOptions, ask_sweep
-from assembly.sweeps.sweep import sweep_in_memory
+from forcefit.assembly.sweeps.request import SweepOptions, ask_sweep
+from forcefit.assembly.sweeps.sweep import sweep_in_memory
 
 SLIDER = """
 name = "slider"

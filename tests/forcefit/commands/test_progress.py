@@ -5,12 +5,12 @@ import logging
 import numpy as np
 import pytest
 
-from assembly.exact.exact import solve_exact
-from assembly.files.solved_links import solve_links
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import Frame, MeshLink, Robot
-from assembly.platform_stiffness.deflection import deflection_curve
-from assembly.robots import load_robot
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.files.solved_links import solve_links
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import Frame, MeshLink, Robot
+from forcefit.assembly.platform_stiffness.deflection import deflection_curve
+from forcefit.assembly.robots import load_robot
 from forcefit.commands import progress
 from forcefit.commands.progress import report_loading
 from forcefit.inputs.errors import BadInput

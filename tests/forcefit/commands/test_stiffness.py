@@ -10,12 +10,12 @@ from typer.testing import CliRunner
 from forcefit.commands.options import parse_axis
 from forcefit.commands.stiffness import app
 from forcefit.inputs.table import BadInput
-from stiffness.beam.beam import beam_compliance
-from stiffness.beam.sections import rectangular_section, round_section
-from stiffness.link import LinkStiffness, inverted
-from stiffness.report.compare import compare_link
-from stiffness.report.plot import plot_comparison
-from stiffness.report.results import comparison_text
+from forcefit.stiffness.beam.beam import beam_compliance
+from forcefit.stiffness.beam.sections import rectangular_section, round_section
+from forcefit.stiffness.link import LinkStiffness, inverted
+from forcefit.stiffness.report.compare import compare_link
+from forcefit.stiffness.report.plot import plot_comparison
+from forcefit.stiffness.report.results import comparison_text
 
 MESHES = Path(__file__).parents[3] / "meshes"
 MATERIAL = ["--young", "6e10", "--poisson", "0.3"]

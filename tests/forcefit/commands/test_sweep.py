@@ -9,7 +9,7 @@ import zlib
 import pytest
 import xarray
 
-from assembly.sweeps.selection import BY_CLEARANCE, FINITE
+from forcefit.assembly.sweeps.selection import BY_CLEARANCE, FINITE
 from forcefit.commands import app as command
 
 ERRORS = """
@@ -74,7 +74,7 @@ def test_plot_draws_a_saved_sweep_without_solving(run, tmp_path, monkeypatch):
     file, picture = tmp_path / "x.nc", tmp_path / "x.png"
     grid = "tx=-0.01:0.01:0.01,ty=0.12:0.14:0.02"
     assert run("assembly", "sweep", "five_bar", "--grid", grid, "-o", file)[0] == 0
-    from assembly.sweeps import points
+    from forcefit.assembly.sweeps import points
 
     monkeypatch.setattr(points, "_solve_reached", None)
     status, out, err = run("assembly", "plot", file, "--figure", picture)
@@ -111,7 +111,7 @@ def test_bad_input_to_a_sweep_gives_one_message_and_writes_nothing(
 
 
 def test_journal_of_another_sweep_is_refused(run, tmp_path):
-    from assembly.sweeps.sweep import journal_path
+    from forcefit.assembly.sweeps.sweep import journal_path
 
     file = tmp_path / "x.nc"
     journal = journal_path(file)
@@ -213,9 +213,9 @@ def test_sweep_of_listed_poses_and_designs_draws_a_map(run, tmp_path):
 
 
 def test_ask_sweep_takes_paths_as_text_or_as_paths(tmp_path):
-    from assembly.files.robot_file import write_robot
-    from assembly.robots import load_robot
-    from assembly.sweeps.request import SweepOptions, ask_sweep
+    from forcefit.assembly.files.robot_file import write_robot
+    from forcefit.assembly.robots import load_robot
+    from forcefit.assembly.sweeps.request import SweepOptions, ask_sweep
 
     (tmp_path / "errors.toml").write_text(ERRORS)
     (tmp_path / "poses.csv").write_text("pose.tx,pose.ty\n0,0.13\n")

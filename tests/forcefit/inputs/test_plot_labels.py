@@ -4,8 +4,12 @@ import numpy as np
 import pytest
 import xarray
 
-from assembly.statistics.plot import allocation_figure, histogram_figure, tornado_figure
-from assembly.sweeps.maps import map_figure, path_figure
+from forcefit.assembly.statistics.plot import (
+    allocation_figure,
+    histogram_figure,
+    tornado_figure,
+)
+from forcefit.assembly.sweeps.maps import map_figure, path_figure
 from forcefit.inputs.errors import plot_label
 
 ODD = ["$x^{<b>&_\\$", "a$b", "$\\frac{1}{$", "_$_$", "\\$", "\\\\$a$", "^_\\&<>"]

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from assembly.files.robot_file import read_robot, write_robot
-from assembly.robots import load_robot
+from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import (
     JSON,
@@ -93,7 +93,7 @@ def a_figure(title=""):
 def a_dataset(path):
     import xarray
 
-    from assembly.sweeps.dataset import save_dataset
+    from forcefit.assembly.sweeps.dataset import save_dataset
 
     save_dataset(xarray.Dataset({"x": ("i", np.arange(1000.0))}), path)
 

@@ -12,9 +12,9 @@ import shutil
 import numpy as np
 import pytest
 
-from validation.study.report import write_study
-from validation.study.study import run_study
-from validation.study.study_file import read_study
+from forcefit.validation.study.report import write_study
+from forcefit.validation.study.study import run_study
+from forcefit.validation.study.study_file import read_study
 
 pytestmark = [pytest.mark.slow, pytest.mark.exudyn]
 STUDY = """

@@ -16,7 +16,7 @@ ERRORS = ROOT / "examples" / "irsbot2_errors.toml"
 def imperfect(folder):
     """The paper's robot with an error in one link, as a file."""
     import forcefit as ff
-    from assembly.files.robot_file import write_robot
+    from forcefit.assembly.files.robot_file import write_robot
 
     robot = ff.load_robot("irsbot2")
     errors = np.zeros((len(robot.frames), 6))

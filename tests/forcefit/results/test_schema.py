@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from jsonschema import Draft202012Validator
 
-from assembly.files.robot_file import robot_of, write_robot
-from assembly.robots import BUILT_IN
+from forcefit.assembly.files.robot_file import robot_of, write_robot
+from forcefit.assembly.robots import BUILT_IN
 from forcefit.inputs.table import BadInput, Table
 from forcefit.results.outputs import OUTPUTS
 from forcefit.results.schema import schema_of

@@ -86,7 +86,7 @@ def test_lists_and_tables_are_aligned():
 
 
 def test_labels_of_dimensions_equal_those_of_screws_and_wrenches():
-    from stiffness.screws import SCREW, WRENCH
+    from forcefit.stiffness.screws import SCREW, WRENCH
 
     assert LABELS["screw"] == SCREW
     assert LABELS["wrench_component"] == WRENCH

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.beam.beam import beam_compliance, section_axes, unit_vector
-from stiffness.beam.sections import Section, rectangular_section, round_section
-from stiffness.link import LinkStiffness, inverted, scaled, turn_link
-from stiffness.screws import rotation_matrix, screw_map
+from forcefit.stiffness.beam.beam import beam_compliance, section_axes, unit_vector
+from forcefit.stiffness.beam.sections import Section, rectangular_section, round_section
+from forcefit.stiffness.link import LinkStiffness, inverted, scaled, turn_link
+from forcefit.stiffness.screws import rotation_matrix, screw_map
 
 E, NU = 60e9, 0.3
 SECTION = Section(1.2e-3, 4e-8, 9e-8, 7e-8, 0.8, 0.6)

@@ -6,8 +6,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.linalg import spsolve
 
 from forcefit.inputs.table import BadInput
-from stiffness.beam.beam_stress import peak_beam_stress, section_stress
-from stiffness.beam.sections import declared_section
+from forcefit.stiffness.beam.beam_stress import peak_beam_stress, section_stress
+from forcefit.stiffness.beam.sections import declared_section
 
 BAR = {"radius": 0.04}
 TUBE = {"radius": 0.04, "inner_radius": 0.034}

@@ -7,25 +7,25 @@ import pytest
 from scipy.integrate import quad
 
 from forcefit.inputs.table import BadInput
-from stiffness.beam.beam import beam_compliance
-from stiffness.beam.curve import (
+from forcefit.stiffness.beam.beam import beam_compliance
+from forcefit.stiffness.beam.curve import (
     Piece,
     arc_piece,
     curve_compliance,
     curve_length,
     straight_piece,
 )
-from stiffness.beam.sections import (
+from forcefit.stiffness.beam.sections import (
     Section,
     box_section,
     i_section,
     rectangular_section,
     round_section,
 )
-from stiffness.fem.condensation import condense
-from stiffness.fem.elements import isoparametric, lame
-from stiffness.link import inverted, scaled
-from stiffness.screws import rotation_matrix, screw_map
+from forcefit.stiffness.fem.condensation import condense
+from forcefit.stiffness.fem.elements import isoparametric, lame
+from forcefit.stiffness.link import inverted, scaled
+from forcefit.stiffness.screws import rotation_matrix, screw_map
 from tests.solids_for_tests import bar_solid, box_solid, masked_solid
 
 E, NU = 60e9, 0.3

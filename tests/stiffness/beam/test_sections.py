@@ -6,7 +6,7 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from forcefit.inputs.table import BadInput
-from stiffness.beam.sections import (
+from forcefit.stiffness.beam.sections import (
     box_section,
     check_section,
     declared_section,

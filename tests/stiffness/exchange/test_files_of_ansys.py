@@ -5,8 +5,8 @@ import pytest
 from scipy.sparse import csc_array, tril
 
 from forcefit.inputs.errors import BadInput
-from stiffness.exchange.import_link import import_link
-from stiffness.exchange.matrix_file import read_matrix
+from forcefit.stiffness.exchange.import_link import import_link
+from forcefit.stiffness.exchange.matrix_file import read_matrix
 from tests.stiffness.exchange.test_full_matrices import full_matrix, write_solid
 from tests.stiffness.exchange.test_links_of_others import assert_same
 

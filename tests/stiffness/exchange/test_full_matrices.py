@@ -5,10 +5,10 @@ import pytest
 from scipy.sparse import csr_matrix, diags
 
 from forcefit.inputs.errors import BadInput
-from stiffness.exchange.condensing import read_nodes
-from stiffness.exchange.import_link import import_link
-from stiffness.exchange.matrix_file import read_matrix
-from stiffness.fem.elements import assemble, isoparametric, lame
+from forcefit.stiffness.exchange.condensing import read_nodes
+from forcefit.stiffness.exchange.import_link import import_link
+from forcefit.stiffness.exchange.matrix_file import read_matrix
+from forcefit.stiffness.fem.elements import assemble, isoparametric, lame
 from tests.solids_for_tests import box_solid
 from tests.stiffness.exchange.test_links_of_others import assert_same, three_columns
 

@@ -8,12 +8,16 @@ from scipy.io import mmread, mmwrite
 from scipy.sparse import csr_matrix, save_npz
 
 from forcefit.inputs.errors import BadInput
-from stiffness.beam.beam import beam_compliance
-from stiffness.beam.sections import round_section
-from stiffness.exchange.export_link import FORMATS, link_file, read_link_results
-from stiffness.exchange.import_link import import_link
-from stiffness.exchange.two_interfaces import both_ends
-from stiffness.link import scaled
+from forcefit.stiffness.beam.beam import beam_compliance
+from forcefit.stiffness.beam.sections import round_section
+from forcefit.stiffness.exchange.export_link import (
+    FORMATS,
+    link_file,
+    read_link_results,
+)
+from forcefit.stiffness.exchange.import_link import import_link
+from forcefit.stiffness.exchange.two_interfaces import both_ends
+from forcefit.stiffness.link import scaled
 
 # a steel bar of 0.5 m along x in mm, N, tonnes
 E, NU, RADIUS, LENGTH, RHO = 2.1e5, 0.3, 10.0, 500.0, 7.85e-9

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.errors import BadInput
-from stiffness.exchange.import_link import import_link
-from stiffness.exchange.matrix_file import read_matrix
+from forcefit.stiffness.exchange.import_link import import_link
+from forcefit.stiffness.exchange.matrix_file import read_matrix
 from tests.stiffness.exchange.test_links_of_others import (
     LENGTH,
     RADIUS,

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from stiffness.fem.condensation import (
+from forcefit.stiffness.fem.condensation import (
     KINDS,
     Condensed,
     _distributed_loads,
     condense,
     rigid_motions,
 )
-from stiffness.fem.elements import assemble, isoparametric, triangle_areas
-from stiffness.link import scaled
+from forcefit.stiffness.fem.elements import assemble, isoparametric, triangle_areas
+from forcefit.stiffness.link import scaled
 from tests.solids_for_tests import bar_solid, box_solid, constants
 
 SIZE = np.array([0.05, 0.08, 0.2])

@@ -5,10 +5,10 @@ import pytest
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import eigsh
 
-from stiffness.beam.beam import beam_compliance
-from stiffness.beam.sections import rectangular_section, round_section
-from stiffness.fem.condensation import KINDS, condense, rigid_motions
-from stiffness.fem.elements import (
+from forcefit.stiffness.beam.beam import beam_compliance
+from forcefit.stiffness.beam.sections import rectangular_section, round_section
+from forcefit.stiffness.fem.condensation import KINDS, condense, rigid_motions
+from forcefit.stiffness.fem.elements import (
     Elements,
     assemble,
     gradients_on_faces,
@@ -16,12 +16,12 @@ from stiffness.fem.elements import (
     isoparametric,
     lame,
 )
-from stiffness.fem.sparse_solver import FactorisationFailed, solve, solver_name
-from stiffness.link import inverted, scaled
-from stiffness.mesh.edge_grading import layered, split_joining_edges
-from stiffness.mesh.lagrange import face_nodes, lattice
-from stiffness.mesh.solid import Solid
-from stiffness.screws import rotation_matrix, screw_map
+from forcefit.stiffness.fem.sparse_solver import FactorisationFailed, solve, solver_name
+from forcefit.stiffness.link import inverted, scaled
+from forcefit.stiffness.mesh.edge_grading import layered, split_joining_edges
+from forcefit.stiffness.mesh.lagrange import face_nodes, lattice
+from forcefit.stiffness.mesh.solid import Solid
+from forcefit.stiffness.screws import rotation_matrix, screw_map
 from tests.solids_for_tests import bar_solid, box_solid, constants, outward
 
 E, NU = 60e9, 0.3

@@ -5,25 +5,25 @@ from functools import cache
 import numpy as np
 import pytest
 
-from stiffness.beam.beam import beam_compliance
-from stiffness.beam.sections import round_section
-from stiffness.fem.adaptive_step import (
+from forcefit.stiffness.beam.beam import beam_compliance
+from forcefit.stiffness.beam.sections import round_section
+from forcefit.stiffness.fem.adaptive_step import (
     estimated_error,
     solve_level,
 )
-from stiffness.fem.condensation import condense, rigid_motions
-from stiffness.fem.elements import integration, isoparametric, lame
-from stiffness.fem.error_indicator import (
+from forcefit.stiffness.fem.condensation import condense, rigid_motions
+from forcefit.stiffness.fem.elements import integration, isoparametric, lame
+from forcefit.stiffness.fem.error_indicator import (
     error_matrices,
     geometry_errors,
     traction_errors,
 )
-from stiffness.fem.material import Material
-from stiffness.link import inverted, scaled
-from stiffness.mesh.edge_grading import split_joining_edges
-from stiffness.mesh.lagrange import lattice
-from stiffness.mesh.quadrature import quadrature
-from stiffness.surface.primitives import Cone
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.link import inverted, scaled
+from forcefit.stiffness.mesh.edge_grading import split_joining_edges
+from forcefit.stiffness.mesh.lagrange import lattice
+from forcefit.stiffness.mesh.quadrature import quadrature
+from forcefit.stiffness.surface.primitives import Cone
 from tests.solids_for_tests import Z, bar_solid, box_solid, constants, with_plane_sides
 
 E, NU = 60e9, 0.3

@@ -4,22 +4,22 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.fem import fea
-from stiffness.fem.fea import (
+from forcefit.stiffness.fem import fea
+from forcefit.stiffness.fem.fea import (
     Budget,
     FemOptions,
     interface_center,
     solve_bar,
     solve_link,
 )
-from stiffness.fem.mass_properties import PointMass
-from stiffness.fem.material import Material
-from stiffness.link import scaled
-from stiffness.mesh.cut_face import CutFace
-from stiffness.mesh.fit_to_patches import MeshFailed
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.primitives import Plane
-from stiffness.surface.surface import check_surface
+from forcefit.stiffness.fem.mass_properties import PointMass
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.link import scaled
+from forcefit.stiffness.mesh.cut_face import CutFace
+from forcefit.stiffness.mesh.fit_to_patches import MeshFailed
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.primitives import Plane
+from forcefit.stiffness.surface.surface import check_surface
 from tests.solids_for_tests import cylinder
 
 E, NU = 60e9, 0.3

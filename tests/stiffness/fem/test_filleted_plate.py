@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from stiffness.fem.fea import FemOptions, solve_link
-from stiffness.fem.material import Material
+from forcefit.stiffness.fem.fea import FemOptions, solve_link
+from forcefit.stiffness.fem.material import Material
 from tests.stiffness.surface.test_recognition import ENDS, filleted_plate, volume_of
 
 # upper bounds of the diagonal of K, by a conforming mesh of another program

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from stiffness.fem.elements import isoparametric
-from stiffness.fem.mass_properties import PointMass, mass_properties
-from stiffness.mesh.edge_grading import layered
+from forcefit.stiffness.fem.elements import isoparametric
+from forcefit.stiffness.fem.mass_properties import PointMass, mass_properties
+from forcefit.stiffness.mesh.edge_grading import layered
 from tests.solids_for_tests import box_solid
 
 SIZE = np.array([0.1, 0.2, 0.4])

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.errors import BadInput
-from stiffness.fem.elements import isoparametric
-from stiffness.fem.material import Material, material_of_elements
-from stiffness.mesh.edge_grading import layered
+from forcefit.stiffness.fem.elements import isoparametric
+from forcefit.stiffness.fem.material import Material, material_of_elements
+from forcefit.stiffness.mesh.edge_grading import layered
 from tests.solids_for_tests import box_solid
 
 

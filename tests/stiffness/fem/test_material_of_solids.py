@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.fem.elements import integration
-from stiffness.fem.fea import FemOptions, solve_link
-from stiffness.fem.material import Material
-from stiffness.fem.material_of_solids import placed_materials
-from stiffness.fem.part_text import parse_part, scaled_part
-from stiffness.fem.stress import stress_influence, von_mises
-from stiffness.link import inverted
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.surface import check_surface
+from forcefit.stiffness.fem.elements import integration
+from forcefit.stiffness.fem.fea import FemOptions, solve_link
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.fem.material_of_solids import placed_materials
+from forcefit.stiffness.fem.part_text import parse_part, scaled_part
+from forcefit.stiffness.fem.stress import stress_influence, von_mises
+from forcefit.stiffness.link import inverted
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.surface import check_surface
 from tests.solids_for_tests import bar_of_two_boxes, cylinder, rod_in_tube
 
 ALUMINIUM, STEEL = 7e10, 2.1e11

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiffness.fem.adaptive_step import middle_stiffness
-from stiffness.fem.fea import Budget, FemOptions, solve_bar
-from stiffness.fem.material import Material
-from stiffness.fem.stress import stress_influence
-from stiffness.fem.two_ends import two_ends
-from stiffness.link import scaled
+from forcefit.stiffness.fem.adaptive_step import middle_stiffness
+from forcefit.stiffness.fem.fea import Budget, FemOptions, solve_bar
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.fem.stress import stress_influence
+from forcefit.stiffness.fem.two_ends import two_ends
+from forcefit.stiffness.link import scaled
 
 NONE = np.zeros((6, 6))
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stiffness.fem.elements import (
+from forcefit.stiffness.fem.elements import (
     assemble,
     integration,
     isoparametric,
@@ -17,7 +17,7 @@ from stiffness.fem.elements import (
     node_gradients,
     triangle_rule,
 )
-from stiffness.fem.sparse_solver import solve
+from forcefit.stiffness.fem.sparse_solver import solve
 from tests.solids_for_tests import box_solid
 
 LAM, MU = lame(210e9, 0.3)

@@ -5,16 +5,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from stiffness.fem.elements import Elements, isoparametric, lame, node_gradients
-from stiffness.fem.error_indicator import VOIGT
-from stiffness.fem.stress import (
+from forcefit.stiffness.fem.elements import (
+    Elements,
+    isoparametric,
+    lame,
+    node_gradients,
+)
+from forcefit.stiffness.fem.error_indicator import VOIGT
+from forcefit.stiffness.fem.stress import (
     _nodal_stresses,
     stress_influence,
     von_mises,
 )
-from stiffness.fem.stress_error import nodes_by_material
-from stiffness.mesh.lagrange import face_nodes, lattice
-from stiffness.screws import rotation_matrix
+from forcefit.stiffness.fem.stress_error import nodes_by_material
+from forcefit.stiffness.mesh.lagrange import face_nodes, lattice
+from forcefit.stiffness.screws import rotation_matrix
 from tests.solids_for_tests import bar_solid, box_solid
 
 

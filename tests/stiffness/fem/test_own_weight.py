@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.fem.fea import FemOptions, solve_bar
-from stiffness.fem.material import Material
-from stiffness.fem.own_weight import with_own_weight
-from stiffness.fem.stress import peak_stress, stress_influence
+from forcefit.stiffness.fem.fea import FemOptions, solve_bar
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.fem.own_weight import with_own_weight
+from forcefit.stiffness.fem.stress import peak_stress, stress_influence
 
 SIDE, DENSITY, G = 0.02, 7850.0, 9.81
 SECTION = {"width": SIDE, "height": SIDE}

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from stiffness.fem.elements import isoparametric
-from stiffness.fem.quality import dihedral_angles, element_quality, mesh_report
-from stiffness.mesh.solid import Solid
+from forcefit.stiffness.fem.elements import isoparametric
+from forcefit.stiffness.fem.quality import dihedral_angles, element_quality, mesh_report
+from forcefit.stiffness.mesh.solid import Solid
 from tests.solids_for_tests import bar_solid, box_solid
 
 REGULAR = np.array([[1.0, 1, 1], [-1, 1, -1], [1, -1, -1], [-1, -1, 1]])

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from stiffness.fem.elements import isoparametric, lame
-from stiffness.fem.error_indicator import (
+from forcefit.stiffness.fem.elements import isoparametric, lame
+from forcefit.stiffness.fem.error_indicator import (
     error_matrices,
     traction_errors,
 )
-from stiffness.mesh.quadrature import quadrature
+from forcefit.stiffness.mesh.quadrature import quadrature
 from tests.solids_for_tests import box_solid, constants
 
 E = 60e9

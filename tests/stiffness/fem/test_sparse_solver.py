@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array, random_array
 
-from stiffness.fem import sparse_solver
-from stiffness.fem.sparse_solver import _mkl, solve, solver_name
+from forcefit.stiffness.fem import sparse_solver
+from forcefit.stiffness.fem.sparse_solver import _mkl, solve, solver_name
 
 
 @pytest.fixture

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.fem.adaptive_step import solve_level
-from stiffness.fem.fea import MeshedLink
-from stiffness.fem.material import Material
-from stiffness.fem.stress import peak_stress, stress_influence, von_mises
-from stiffness.link import LinkStiffness, inverted
-from stiffness.report.plot import plot_stress
-from stiffness.report.results import stress_results, stress_text
+from forcefit.stiffness.fem.adaptive_step import solve_level
+from forcefit.stiffness.fem.fea import MeshedLink
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.fem.stress import peak_stress, stress_influence, von_mises
+from forcefit.stiffness.link import LinkStiffness, inverted
+from forcefit.stiffness.report.plot import plot_stress
+from forcefit.stiffness.report.results import stress_results, stress_text
 from tests.solids_for_tests import bar_solid, masked_solid, with_plane_sides
 
 R, L = 0.04, 0.4

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stiffness.fem.adaptive_step import solve_level
-from stiffness.fem.fea import FemOptions, MeshedLink, solve_link
-from stiffness.fem.material import Material
-from stiffness.fem.stress import peak_stress, stress_influence
-from stiffness.fem.stress_error import estimated_error
-from stiffness.link import LinkStiffness, inverted
-from stiffness.report.results import stress_results, stress_text
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.surface import check_surface
+from forcefit.stiffness.fem.adaptive_step import solve_level
+from forcefit.stiffness.fem.fea import FemOptions, MeshedLink, solve_link
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.fem.stress import peak_stress, stress_influence
+from forcefit.stiffness.fem.stress_error import estimated_error
+from forcefit.stiffness.link import LinkStiffness, inverted
+from forcefit.stiffness.report.results import stress_results, stress_text
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.surface import check_surface
 from tests.solids_for_tests import (
     bar_solid,
     masked_solid,

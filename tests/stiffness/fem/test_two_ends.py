@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from stiffness.fem.condensation import rigid_motions
-from stiffness.fem.elements import assemble
-from stiffness.fem.fea import Budget, FemOptions, solve_bar
-from stiffness.fem.material import Material
-from stiffness.fem.two_ends import two_ends
+from forcefit.stiffness.fem.condensation import rigid_motions
+from forcefit.stiffness.fem.elements import assemble
+from forcefit.stiffness.fem.fea import Budget, FemOptions, solve_bar
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.fem.two_ends import two_ends
 
 
 @pytest.mark.parametrize("interface", ["rigid", "distributing"])

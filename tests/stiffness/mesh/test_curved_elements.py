@@ -3,16 +3,21 @@
 import numpy as np
 import pytest
 
-from stiffness.fem.elements import integration, isoparametric, lame, triangle_areas
-from stiffness.fem.error_indicator import geometry_errors
-from stiffness.mesh.curved_elements import (
+from forcefit.stiffness.fem.elements import (
+    integration,
+    isoparametric,
+    lame,
+    triangle_areas,
+)
+from forcefit.stiffness.fem.error_indicator import geometry_errors
+from forcefit.stiffness.mesh.curved_elements import (
     curved_elements,
     refine_inverted,
 )
-from stiffness.mesh.edge_grading import layered, split_joining_edges
-from stiffness.mesh.lagrange import lattice, shape_functions
-from stiffness.mesh.solid import Solid, boundary_faces
-from stiffness.surface.primitives import Plane, Sphere
+from forcefit.stiffness.mesh.edge_grading import layered, split_joining_edges
+from forcefit.stiffness.mesh.lagrange import lattice, shape_functions
+from forcefit.stiffness.mesh.solid import Solid, boundary_faces
+from forcefit.stiffness.surface.primitives import Plane, Sphere
 from tests.solids_for_tests import bar_solid, box_cells, outward
 
 HALF = 0.5  # tangent of half the angle that the shell's piece is seen under

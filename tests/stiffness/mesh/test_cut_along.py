@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stiffness.fem.fea import FemOptions, solve_link
-from stiffness.fem.material import Material
-from stiffness.link import scaled
-from stiffness.mesh.cut_along import cut_along
-from stiffness.mesh.mesh import mesh_solid
-from stiffness.mesh.solid import boundary_faces
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.primitives import Plane
-from stiffness.surface.smooth_outline import smooth_outline
+from forcefit.stiffness.fem.fea import FemOptions, solve_link
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.link import scaled
+from forcefit.stiffness.mesh.cut_along import cut_along
+from forcefit.stiffness.mesh.mesh import mesh_solid
+from forcefit.stiffness.mesh.solid import boundary_faces
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.primitives import Plane
+from forcefit.stiffness.surface.smooth_outline import smooth_outline
 from tests.solids_for_tests import box_solid, rounded_block
 
 Z = np.array([0.0, 0, 1])

@@ -7,18 +7,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stiffness.fem.condensation import KINDS, condense
-from stiffness.fem.elements import integration, isoparametric, triangle_areas
-from stiffness.link import scaled
-from stiffness.mesh.edge_grading import (
+from forcefit.stiffness.fem.condensation import KINDS, condense
+from forcefit.stiffness.fem.elements import integration, isoparametric, triangle_areas
+from forcefit.stiffness.link import scaled
+from forcefit.stiffness.mesh.edge_grading import (
     layered,
     singular_edges,
     split_joining_edges,
 )
-from stiffness.mesh.lagrange import FACES
-from stiffness.mesh.refine import edges_of
-from stiffness.mesh.solid import Solid, boundary_faces
-from stiffness.surface.primitives import Plane
+from forcefit.stiffness.mesh.lagrange import FACES
+from forcefit.stiffness.mesh.refine import edges_of
+from forcefit.stiffness.mesh.solid import Solid, boundary_faces
+from forcefit.stiffness.surface.primitives import Plane
 from tests.solids_for_tests import (
     Z,
     box_solid,

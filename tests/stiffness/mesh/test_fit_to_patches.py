@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.mesh.fit_to_patches import MeshFailed, fit_to_patches
-from stiffness.mesh.solid import boundary_faces
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.patches import Patches, find_patches
-from stiffness.surface.primitives import Plane
-from stiffness.surface.surface import check_surface
+from forcefit.stiffness.mesh.fit_to_patches import MeshFailed, fit_to_patches
+from forcefit.stiffness.mesh.solid import boundary_faces
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.patches import Patches, find_patches
+from forcefit.stiffness.surface.primitives import Plane
+from forcefit.stiffness.surface.surface import check_surface
 from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, box_solid
 
 Z = np.array([0.0, 0, 1])

@@ -5,8 +5,8 @@ from math import prod
 import numpy as np
 import pytest
 
-from stiffness.fem.elements import isoparametric
-from stiffness.mesh.lagrange import lattice, shape_functions
+from forcefit.stiffness.fem.elements import isoparametric
+from forcefit.stiffness.mesh.lagrange import lattice, shape_functions
 from tests.solids_for_tests import box_solid
 
 ORDERS = (1, 2, 3)

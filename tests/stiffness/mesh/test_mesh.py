@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stiffness.mesh import mesh as mesh_module
-from stiffness.mesh.fit_to_patches import MeshFailed, fit_to_patches
-from stiffness.mesh.mesh import mesh_solid
-from stiffness.surface.decimate import coarser_surface, euler_characteristic
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.patches import find_patches
-from stiffness.surface.surface import check_surface, read_surface
+from forcefit.stiffness.mesh import mesh as mesh_module
+from forcefit.stiffness.mesh.fit_to_patches import MeshFailed, fit_to_patches
+from forcefit.stiffness.mesh.mesh import mesh_solid
+from forcefit.stiffness.surface.decimate import coarser_surface, euler_characteristic
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.patches import find_patches
+from forcefit.stiffness.surface.surface import check_surface, read_surface
 from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, bar, bar_solid, box_solid
 
 FACES = parse_interface("z=0"), parse_interface("z=0.1")

@@ -5,8 +5,8 @@ from math import factorial, prod
 import numpy as np
 import pytest
 
-from stiffness.mesh.lagrange import lattice
-from stiffness.mesh.quadrature import quadrature
+from forcefit.stiffness.mesh.lagrange import lattice
+from forcefit.stiffness.mesh.quadrature import quadrature
 
 CORNERS = (3, 4)
 

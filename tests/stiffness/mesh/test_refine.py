@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from stiffness.fem.quality import element_quality
-from stiffness.mesh.refine import refine
-from stiffness.mesh.solid import Solid, boundary_faces
+from forcefit.stiffness.fem.quality import element_quality
+from forcefit.stiffness.mesh.refine import refine
+from forcefit.stiffness.mesh.solid import Solid, boundary_faces
 from tests.solids_for_tests import bar_solid, box_solid
 
 

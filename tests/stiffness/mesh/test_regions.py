@@ -5,11 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stiffness.fem.adaptive_step import estimated_error, middle_stiffness, solve_level
-from stiffness.fem.material import Material, regions_of
-from stiffness.fem.part_text import parse_part
-from stiffness.link import scaled
-from stiffness.mesh.regions import cut_by_regions, material_edges, region_of_cells
+from forcefit.stiffness.fem.adaptive_step import (
+    estimated_error,
+    middle_stiffness,
+    solve_level,
+)
+from forcefit.stiffness.fem.material import Material, regions_of
+from forcefit.stiffness.fem.part_text import parse_part
+from forcefit.stiffness.link import scaled
+from forcefit.stiffness.mesh.regions import (
+    cut_by_regions,
+    material_edges,
+    region_of_cells,
+)
 from tests.solids_for_tests import box_solid, with_plane_sides
 
 E = 2e11

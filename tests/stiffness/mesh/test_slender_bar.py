@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from stiffness.fem.fea import FemOptions, solve_link
-from stiffness.fem.material import Material
-from stiffness.mesh.slender_bar import slender_bar
-from stiffness.screws import rotation_matrix
-from stiffness.surface.interface import Interface, parse_interface
-from stiffness.surface.surface import check_surface
+from forcefit.stiffness.fem.fea import FemOptions, solve_link
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.mesh.slender_bar import slender_bar
+from forcefit.stiffness.screws import rotation_matrix
+from forcefit.stiffness.surface.interface import Interface, parse_interface
+from forcefit.stiffness.surface.surface import check_surface
 from tests.solids_for_tests import cylinder
 
 E, NU = 70e9, 0.3

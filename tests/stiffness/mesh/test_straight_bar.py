@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from stiffness.beam.sections import declared_section
-from stiffness.fem.fea import Budget, FemOptions, solve_bar
-from stiffness.fem.material import Material
-from stiffness.mesh.curved_elements import curved_elements
-from stiffness.mesh.straight_bar import straight_bar
-from stiffness.surface.surface import directed_edges
+from forcefit.stiffness.beam.sections import declared_section
+from forcefit.stiffness.fem.fea import Budget, FemOptions, solve_bar
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.mesh.curved_elements import curved_elements
+from forcefit.stiffness.mesh.straight_bar import straight_bar
+from forcefit.stiffness.surface.surface import directed_edges
 
 ROUND = {"radius": 0.1}
 THIN = {"radius": 0.03, "inner_radius": 0.024}

@@ -12,21 +12,26 @@ from typer.testing import CliRunner
 
 from forcefit.commands.stiffness import app
 from forcefit.inputs.table import BadInput
-from stiffness.beam.curve import curve_compliance
-from stiffness.fem.adaptive_step import estimated_error, solve_level
-from stiffness.fem.material import Material
-from stiffness.link import inverted, scaled
-from stiffness.report import library_build
-from stiffness.report.export import stiffness_for, translations_first
-from stiffness.report.library import (
+from forcefit.stiffness.beam.curve import curve_compliance
+from forcefit.stiffness.fem.adaptive_step import estimated_error, solve_level
+from forcefit.stiffness.fem.material import Material
+from forcefit.stiffness.link import inverted, scaled
+from forcefit.stiffness.report import library_build
+from forcefit.stiffness.report.export import stiffness_for, translations_first
+from forcefit.stiffness.report.library import (
     Entry,
     look_up,
     read_compliance,
     read_entry,
     read_library,
 )
-from stiffness.report.library_build import Spec, build_library, entry_key, read_spec
-from stiffness.surface.beam_surfaces import SHAPES, shape_beam, shape_surface
+from forcefit.stiffness.report.library_build import (
+    Spec,
+    build_library,
+    entry_key,
+    read_spec,
+)
+from forcefit.stiffness.surface.beam_surfaces import SHAPES, shape_beam, shape_surface
 from tests.libraries_for_tests import GRID, MATERIAL, SPEC, exact
 from tests.solids_for_tests import bar_solid
 
@@ -401,7 +406,7 @@ def test_failed_library_build_leaves_no_folder(tmp_path, monkeypatch):
     def fail(*_):
         raise BadInput("no link")
 
-    monkeypatch.setattr("stiffness.report.library_build._solve_point", fail)
+    monkeypatch.setattr("forcefit.stiffness.report.library_build._solve_point", fail)
     with pytest.raises(BadInput, match="no link"):
         build_library(spec)
     assert not spec.folder.exists()

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.link import LinkStiffness, inverted, scaled
-from stiffness.report.library import look_up, read_library
-from stiffness.report.library_build import build_library, read_spec
-from stiffness.report.library_surface import SurfaceLink
+from forcefit.stiffness.link import LinkStiffness, inverted, scaled
+from forcefit.stiffness.report.library import look_up, read_library
+from forcefit.stiffness.report.library_build import build_library, read_spec
+from forcefit.stiffness.report.library_surface import SurfaceLink
 from tests.libraries_for_tests import exact
 
 SPEC = """

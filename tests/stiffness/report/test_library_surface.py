@@ -11,18 +11,18 @@ from typer.testing import CliRunner
 
 from forcefit.commands.stiffness import app
 from forcefit.inputs.table import BadInput
-from stiffness.beam.beam import beam_compliance
-from stiffness.beam.sections import rectangular_section
-from stiffness.link import LinkStiffness, inverted, scaled
-from stiffness.report.export import library_csv
-from stiffness.report.library import (
+from forcefit.stiffness.beam.beam import beam_compliance
+from forcefit.stiffness.beam.sections import rectangular_section
+from forcefit.stiffness.link import LinkStiffness, inverted, scaled
+from forcefit.stiffness.report.export import library_csv
+from forcefit.stiffness.report.library import (
     look_up,
     read_compliance,
     read_entry,
 )
-from stiffness.report.library_build import Spec, build_library, read_spec
-from stiffness.report.library_surface import SurfaceLink
-from stiffness.surface.beam_surfaces import shape_surface
+from forcefit.stiffness.report.library_build import Spec, build_library, read_spec
+from forcefit.stiffness.report.library_surface import SurfaceLink
+from forcefit.stiffness.surface.beam_surfaces import shape_surface
 from tests.libraries_for_tests import GRID, MATERIAL, SPEC, exact
 
 

@@ -11,15 +11,15 @@ from typer.testing import CliRunner
 from forcefit.commands.options import parse_load, parse_sizes
 from forcefit.commands.stiffness import app
 from forcefit.inputs.table import BadInput
-from stiffness.beam.beam import beam_compliance
-from stiffness.beam.curve import curve_compliance, curve_length
-from stiffness.beam.curve_file import read_curve
-from stiffness.beam.sections import rectangular_section, round_section
-from stiffness.link import LinkStiffness
-from stiffness.report.compare import compare_link
-from stiffness.report.plot import plot_slenderness
-from stiffness.report.results import comparison_results, sweep_text
-from stiffness.report.slenderness import fit_end_effect, sweep_slenderness
+from forcefit.stiffness.beam.beam import beam_compliance
+from forcefit.stiffness.beam.curve import curve_compliance, curve_length
+from forcefit.stiffness.beam.curve_file import read_curve
+from forcefit.stiffness.beam.sections import rectangular_section, round_section
+from forcefit.stiffness.link import LinkStiffness
+from forcefit.stiffness.report.compare import compare_link
+from forcefit.stiffness.report.plot import plot_slenderness
+from forcefit.stiffness.report.results import comparison_results, sweep_text
+from forcefit.stiffness.report.slenderness import fit_end_effect, sweep_slenderness
 
 MATERIAL = ["--young", "6e10", "--poisson", "0.3"]
 

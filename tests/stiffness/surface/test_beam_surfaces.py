@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.surface.beam_surfaces import check_shape, shape_beam, shape_surface
+from forcefit.stiffness.surface.beam_surfaces import (
+    check_shape,
+    shape_beam,
+    shape_surface,
+)
 
 NU = 0.3
 GON = 64 / 2 * math.sin(2 * math.pi / 64)  # area of the 64-gon in a unit circle

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from stiffness.surface.decimate import coarser_surface
-from stiffness.surface.surface import check_surface
+from forcefit.stiffness.surface.decimate import coarser_surface
+from forcefit.stiffness.surface.surface import check_surface
 from tests.solids_for_tests import box_solid
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stiffness.surface.facets import Facets
+from forcefit.stiffness.surface.facets import Facets
 from tests.solids_for_tests import cylinder
 
 

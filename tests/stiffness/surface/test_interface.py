@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.surface.interface import Interface, parse_interface
-from stiffness.surface.patches import refuse_common_edges
-from stiffness.surface.surface import check_surface
+from forcefit.stiffness.surface.interface import Interface, parse_interface
+from forcefit.stiffness.surface.patches import refuse_common_edges
+from forcefit.stiffness.surface.surface import check_surface
 from tests.solids_for_tests import CUBE, CUBE_TRIANGLES
 
 POINT, UNIT = [1.0, 2.0, 3.0], [0, 0.6, 0.8]

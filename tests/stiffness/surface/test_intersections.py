@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stiffness.surface.intersections import crossing_triangles
+from forcefit.stiffness.surface.intersections import crossing_triangles
 
 
 def crosses(one, other):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.surface.obj_file import read_obj
-from stiffness.surface.surface import read_surface
+from forcefit.stiffness.surface.obj_file import read_obj
+from forcefit.stiffness.surface.surface import read_surface
 
 CORNERS = [(x, y, z) for z in (0, 0.1) for y in (0, 0.1) for x in (0, 0.1)]
 SIDES = [(1, 3, 4, 2), (5, 6, 8, 7), (1, 2, 6, 5), (3, 7, 8, 4), (1, 5, 7, 3),

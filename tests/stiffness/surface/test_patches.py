@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.fem.elements import integration, isoparametric
-from stiffness.mesh.mesh import mesh_solid
-from stiffness.screws import rotation_matrix
-from stiffness.surface.facets import Facets
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.patches import find_patches
-from stiffness.surface.primitives import (
+from forcefit.stiffness.fem.elements import integration, isoparametric
+from forcefit.stiffness.mesh.mesh import mesh_solid
+from forcefit.stiffness.screws import rotation_matrix
+from forcefit.stiffness.surface.facets import Facets
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.patches import find_patches
+from forcefit.stiffness.surface.primitives import (
     Cone,
     Plane,
     Sphere,
@@ -21,7 +21,7 @@ from stiffness.surface.primitives import (
     fit_torus,
     project,
 )
-from stiffness.surface.surface import check_surface
+from forcefit.stiffness.surface.surface import check_surface
 from tests.solids_for_tests import bar
 
 

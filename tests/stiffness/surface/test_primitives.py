@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from stiffness.screws import rotation_matrix
-from stiffness.surface.primitives import (
+from forcefit.stiffness.screws import rotation_matrix
+from forcefit.stiffness.surface.primitives import (
     Cone,
     Plane,
     Sphere,

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.patches import find_patches
-from stiffness.surface.primitives import Cone, Plane, Torus
-from stiffness.surface.surface import check_surface
-from stiffness.surface.true_surface import TrueSurface
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.patches import find_patches
+from forcefit.stiffness.surface.primitives import Cone, Plane, Torus
+from forcefit.stiffness.surface.surface import check_surface
+from forcefit.stiffness.surface.true_surface import TrueSurface
 from tests.solids_for_tests import cylinder, fillet_profile, rounded_block
 
 ENDS = parse_interface("x=-0.1"), parse_interface("x=0.1")

@@ -2,10 +2,10 @@
 
 import pytest
 
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.patches import find_patches
-from stiffness.surface.primitives import Cone, Plane, Torus
-from stiffness.surface.surface import check_surface
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.patches import find_patches
+from forcefit.stiffness.surface.primitives import Cone, Plane, Torus
+from forcefit.stiffness.surface.surface import check_surface
 from tests.solids_for_tests import shouldered_shaft
 
 

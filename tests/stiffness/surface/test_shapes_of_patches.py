@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.patches import find_patches, interface_shape, triangles_on
-from stiffness.surface.primitives import Cone, Plane
-from stiffness.surface.surface import Surface, check_surface
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.patches import (
+    find_patches,
+    interface_shape,
+    triangles_on,
+)
+from forcefit.stiffness.surface.primitives import Cone, Plane
+from forcefit.stiffness.surface.surface import Surface, check_surface
 from tests.solids_for_tests import bar, cylinder
 
 FAR = np.array([[0.0, 0, 1], [0.6, 0, 1], [0, 0.8, 1]])  # off every interface

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.surface.stl_file import read_stl
+from forcefit.stiffness.surface.stl_file import read_stl
 from tests.solids_for_tests import CUBE, CUBE_TRIANGLES
 
 CORNERS = CUBE[CUBE_TRIANGLES]  # (12, 3, 3)

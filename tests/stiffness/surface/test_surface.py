@@ -7,7 +7,7 @@ import pytest
 from scipy import constants
 
 from forcefit.inputs.table import BadInput
-from stiffness.surface.surface import (
+from forcefit.stiffness.surface.surface import (
     UNITS,
     check_surface,
     read_surface,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.surface import surface as surface_module
-from stiffness.surface.surface import (
+from forcefit.stiffness.surface import surface as surface_module
+from forcefit.stiffness.surface.surface import (
     Surface,
     area_vectors,
     check_surface,

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.surface import surface_files
-from stiffness.surface.interface import parse_interface
-from stiffness.surface.patches import find_patches
-from stiffness.surface.primitives import Cone, Plane
-from stiffness.surface.step_file import chosen_solids, read_step, sides
-from stiffness.surface.surface import read_surface
-from stiffness.surface.surface_files import step_solids
+from forcefit.stiffness.surface import surface_files
+from forcefit.stiffness.surface.interface import parse_interface
+from forcefit.stiffness.surface.patches import find_patches
+from forcefit.stiffness.surface.primitives import Cone, Plane
+from forcefit.stiffness.surface.step_file import chosen_solids, read_step, sides
+from forcefit.stiffness.surface.surface import read_surface
+from forcefit.stiffness.surface.surface_files import step_solids
 from tests.solids_for_tests import cylinder
 
 CORNERS = [(x, y, z) for z in (0, 0.1) for y in (0, 0.1) for x in (0, 0.1)]

@@ -2,8 +2,8 @@
 
 import pytest
 
-from stiffness.fem.fea import Budget, FemOptions
-from validation.assumptions import solid_links
+from forcefit.stiffness.fem.fea import Budget, FemOptions
+from forcefit.validation.assumptions import solid_links
 
 
 @pytest.fixture(scope="module")

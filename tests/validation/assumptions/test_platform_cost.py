@@ -5,19 +5,19 @@ import json
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import write_robot
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.links import link_compliance
-from assembly.model.robot import BeamLink, Frame, Robot
-from assembly.robots import load_robot
-from validation.assumptions.platform_cost import (
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.reference.reduction import FreeMotion
+from forcefit.assembly.model.links import link_compliance
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.robots import load_robot
+from forcefit.validation.assumptions.platform_cost import (
     NoSolids,
     difference,
     platform_costs,
     solid_compliance,
 )
-from validation.assumptions.solid_links import solid_link
+from forcefit.validation.assumptions.solid_links import solid_link
 
 pytestmark = pytest.mark.usefixtures("coarse_solids")
 

@@ -8,29 +8,29 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from assembly.exact.exact import solve_exact
-from assembly.files.robot_file import write_robot
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.closure import virtual_joints
-from assembly.linear.energy import solve_assembly
-from assembly.linear.zone import zone_margin
-from assembly.model.links import link_compliance
-from assembly.model.robot import BeamLink, Clearance, Frame, Robot
-from assembly.robots import load_robot
 from benchmarks.evidence.validity_models import bush_margin, halves_cost, with_bars
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.linear.closure import virtual_joints
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.links import link_compliance
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot
+from forcefit.assembly.robots import load_robot
 from forcefit.commands.validation import app
-from tests.robots_for_tests import NUMBERS, irsbot2_with
-from validation.assumptions.assumptions import assumption_costs
-from validation.assumptions.bushes import bush_joints, solve_bushes
-from validation.assumptions.solid_links import solid_link
-from validation.assumptions.validity import (
+from forcefit.validation.assumptions.assumptions import assumption_costs
+from forcefit.validation.assumptions.bushes import bush_joints, solve_bushes
+from forcefit.validation.assumptions.solid_links import solid_link
+from forcefit.validation.assumptions.validity import (
     Cost,
     closure_cost,
     link_cost,
     pieces_cost,
     spread_cost,
 )
-from validation.crosscheck.spread_weight import energy_between_ends
+from forcefit.validation.crosscheck.spread_weight import energy_between_ends
+from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 E, NU, RHO = 60e9, 0.3, 2700.0
 FLAT = BeamLink({"width": 0.02, "height": 0.05}, E, NU, density=RHO)
@@ -116,7 +116,10 @@ def test_simulation_with_two_bushes_gives_the_same_energy_ratio(posture):
     At a sixteenth both models of contact differ from finite rotations by 0.2 per cent,
     their ratio by what separates linear from finite, some 1e-4.
     """
-    from validation.multibody.simulation import SimulationModel, simulate_assembly
+    from forcefit.validation.multibody.simulation import (
+        SimulationModel,
+        simulate_assembly,
+    )
 
     expected = solve_bushes(posture).energy / solve_assembly(posture).energy
     scale = 1 / 16
@@ -166,7 +169,10 @@ def test_energy_of_simulated_elements_equals_that_of_ends_plus_between_ends(elem
     Exudyn has no energy within an element. The weight is scaled down to 1e-3 m/s^2,
     where bending is linear to 1e-8.
     """
-    from validation.multibody.simulation import SimulationModel, simulate_assembly
+    from forcefit.validation.multibody.simulation import (
+        SimulationModel,
+        simulate_assembly,
+    )
 
     at, g = cantilever(), 1e-3 * np.array([3.0, -5.0, 8.0])
     energy = simulate_assembly(
@@ -196,7 +202,7 @@ def test_link_cost_is_zero_for_equal_stiffness(posture):
 
 def test_cost_of_linear_closures_grows_with_the_square_of_the_errors(posture):
     """The position error falls to a quarter as errors and clearances are halved."""
-    from validation.crosscheck.pair import scaled
+    from forcefit.validation.crosscheck.pair import scaled
 
     full, half = closure_cost(posture), closure_cost(scaled(posture, 0.5))
     assert full.position / half.position == pytest.approx(4, rel=0.1)

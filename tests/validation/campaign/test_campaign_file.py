@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.robots import load_robot
+from forcefit.assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
+from forcefit.validation.campaign.campaign import number_rows
+from forcefit.validation.campaign.campaign_file import read_campaign
 from tests.campaigns_for_tests import ARM, HEAD, NOISE, ROWS, write_campaign
-from validation.campaign.campaign import number_rows
-from validation.campaign.campaign_file import read_campaign
 
 
 def test_campaign_has_the_values_of_its_files(tmp_path):

@@ -9,12 +9,12 @@ import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from assembly.files.robot_file import read_robot
-from assembly.model.error_distributions import read_sources
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.model.error_distributions import read_sources
 from forcefit.inputs.table import BadInput
+from forcefit.validation.campaign.campaign_file import read_campaign
+from forcefit.validation.study.study_file import read_study
 from tests.campaigns_for_tests import HEAD, NOISE, ROWS, write_campaign
-from validation.campaign.campaign_file import read_campaign
-from validation.study.study_file import read_study
 
 LIGHT = settings(
     max_examples=100,

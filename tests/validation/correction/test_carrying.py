@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import write_robot
-from assembly.model.function import Function
-from assembly.robots import load_robot
-from stiffness.screws import rotation_matrix, rotation_vector
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.robots import load_robot
+from forcefit.stiffness.screws import rotation_matrix, rotation_vector
+from forcefit.validation.campaign.campaign_file import read_campaign, read_commands
+from forcefit.validation.correction.prediction import predict
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.saving import corrected
 from tests.campaigns_for_tests import write_campaign
-from validation.campaign.campaign_file import read_campaign, read_commands
-from validation.correction.prediction import predict
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.saving import corrected
 
 SIGMA = 2e-5
 HOUR = 3600.0

@@ -8,13 +8,13 @@ from math import acos, atan2, cos, sin
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import write_robot
-from assembly.robots import load_robot
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.robots import load_robot
+from forcefit.validation.campaign.campaign_file import read_commands
+from forcefit.validation.correction.compensation import compensate
+from forcefit.validation.synthetic.again import distances
+from forcefit.validation.synthetic.machine import Hidden
 from tests.campaigns_for_tests import ARM
-from validation.campaign.campaign_file import read_commands
-from validation.correction.compensation import compensate
-from validation.synthetic.again import distances
-from validation.synthetic.machine import Hidden
 
 LONGER = ARM.replace("translation = [0.8, 0, 0]", """translation = [0.8, 0, 0]
 geometric_error = [0, 0, 0, 0.01, 0, 0]""")  # fmt: skip

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import read_robot, write_robot
-from assembly.model.function import Function
+from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.model.function import Function
+from forcefit.validation.campaign.campaign_file import read_commands
+from forcefit.validation.diagnosis.learned_range import beyond, learned_range
 from tests.campaigns_for_tests import ARM, write_campaign
-from validation.campaign.campaign_file import read_commands
-from validation.diagnosis.learned_range import beyond, learned_range
 
 HEAD = "id,q.one,q.two,cov.tilt,cov.time,meas.tx"
 ROWS = ["a,0.1,0.2,0.0,0,0", "b,0.5,0.2,0.4,9,0", "c,0.3,0.2,9.0,5,0"]

@@ -5,20 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import read_robot
-from assembly.measurement.predict import predict as predict_rows
-from assembly.model.function import Function
-from tests.campaigns_for_tests import campaign_of
-from tests.elastic_arm_for_tests import arm, with_errors
-from tests.validation.diagnosis.test_sessions import FRAMES, measured
-from validation.campaign.campaign_file import read_campaign, read_commands
-from validation.correction.carried_file import save
-from validation.correction.carrying import carry
-from validation.correction.machine_numbers import machine_numbers
-from validation.correction.prediction import predict
-from validation.correction.spread import number_slopes
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.saved_covariance import (
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.measurement.predict import predict as predict_rows
+from forcefit.assembly.model.function import Function
+from forcefit.validation.campaign.campaign_file import read_campaign, read_commands
+from forcefit.validation.correction.carried_file import save
+from forcefit.validation.correction.carrying import carry
+from forcefit.validation.correction.machine_numbers import machine_numbers
+from forcefit.validation.correction.prediction import predict
+from forcefit.validation.correction.spread import number_slopes
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.saved_covariance import (
     COMPLIANCE,
     EFFECT,
     FUNCTION,
@@ -27,9 +24,12 @@ from validation.diagnosis.saved_covariance import (
     read_covariance,
     write_covariance,
 )
-from validation.diagnosis.saving import save as save_found
-from validation.diagnosis.signatures import conditions_of
-from validation.synthetic.machine import Hidden
+from forcefit.validation.diagnosis.saving import save as save_found
+from forcefit.validation.diagnosis.signatures import conditions_of
+from forcefit.validation.synthetic.machine import Hidden
+from tests.campaigns_for_tests import campaign_of
+from tests.elastic_arm_for_tests import arm, with_errors
+from tests.validation.diagnosis.test_sessions import FRAMES, measured
 
 SIGMA = 1e-5
 

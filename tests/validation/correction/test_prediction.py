@@ -6,11 +6,11 @@ from math import cos, sin
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import write_robot
-from assembly.robots import load_robot
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.robots import load_robot
+from forcefit.validation.campaign.campaign_file import read_commands
+from forcefit.validation.correction.prediction import predict
 from tests.campaigns_for_tests import ARM, write_campaign
-from validation.campaign.campaign_file import read_commands
-from validation.correction.prediction import predict
 
 WAVE = """
 [[effect]]

@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.model.function import Function
-from assembly.robots import load_robot
-from validation.correction.session_unknowns import session_unknowns, without_session
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.robots import load_robot
+from forcefit.validation.correction.session_unknowns import (
+    session_unknowns,
+    without_session,
+)
 
 DRIFT = {"amplitude.tx": 3e-5, "amplitude.tz": -4e-5, "time_constant": 900.0}
 STEP = Function("reading", ("tx",), ("cov.time",), "step", {"size": 2e-5, "at": 600.0})

@@ -5,8 +5,8 @@ from functools import lru_cache, partial
 
 import pytest
 
-from assembly.kinematics.posture import place_robot
-from assembly.robots import load_robot
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.robots import load_robot
 from tests.robots_for_tests import with_papers_errors
 
 Cached = type(lru_cache(len))
@@ -29,8 +29,8 @@ def broken(monkeypatch):
     Robots of equal data share what is cached.  The compiled model has each term a
     second time.
     """
-    from assembly.linear.energy import solve_assembly
-    from validation.crosscheck import crosscheck
+    from forcefit.assembly.linear.energy import solve_assembly
+    from forcefit.validation.crosscheck import crosscheck
 
     def breaks(mutation):
         mutation(monkeypatch)

@@ -7,22 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.model.error_distributions import tolerance_sources
-from assembly.model.robot import BeamLink, Clearance, Frame, Robot
-from assembly.robots import load_robot
-from validation.crosscheck.crosscheck import crosscheck
-from validation.crosscheck.verdict import verdict
-from validation.multibody.contact import (
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot
+from forcefit.assembly.robots import load_robot
+from forcefit.validation.crosscheck.crosscheck import crosscheck
+from forcefit.validation.crosscheck.verdict import verdict
+from forcefit.validation.multibody.contact import (
     ClearanceCone,
     JointClearance,
     cone_energy,
     cone_forces,
     joint_clearance,
 )
-from validation.multibody.exudyn_parts import OutOfTime
-from validation.multibody.simulation import SimulationModel, simulate_assembly
+from forcefit.validation.multibody.exudyn_parts import OutOfTime
+from forcefit.validation.multibody.simulation import SimulationModel, simulate_assembly
 
 pytestmark = pytest.mark.exudyn
 
@@ -145,7 +145,7 @@ def test_time_limit_ends_only_its_own_simulation(pause, monkeypatch):
     posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5))
     with monkeypatch.context() as patch:
         patch.setattr(
-            "validation.multibody.exudyn_model.cone_forces",
+            "forcefit.validation.multibody.exudyn_model.cone_forces",
             lambda *args: time.sleep(pause) or cone_forces(*args),
         )
         with pytest.raises(OutOfTime, match="time limit was reached while") as error:
@@ -156,12 +156,14 @@ def test_time_limit_ends_only_its_own_simulation(pause, monkeypatch):
 
 def test_interruption_inside_the_solver_is_raised(monkeypatch):
     """Exudyn turns Ctrl-C into an error of its own."""
-    import validation.multibody.exudyn_model
+    import forcefit.validation.multibody.exudyn_model
 
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(validation.multibody.exudyn_model, "cone_forces", interrupted)
+    monkeypatch.setattr(
+        forcefit.validation.multibody.exudyn_model, "cone_forces", interrupted
+    )
     posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5))
     with pytest.raises(KeyboardInterrupt):
         simulate_assembly(posture, model=SimulationModel(clearances=True))
@@ -267,11 +269,11 @@ def test_crosscheck_passes_for_weight_together_with_clearance(links):
 
 def test_crosscheck_with_clearances_fails_for_a_wrong_weight(monkeypatch):
     """The weight in the linear model is 5 % too large."""
-    import assembly.linear.assembled
+    import forcefit.assembly.linear.assembled
 
-    right = assembly.linear.assembled.weights
+    right = forcefit.assembly.linear.assembled.weights
     monkeypatch.setattr(
-        assembly.linear.assembled,
+        forcefit.assembly.linear.assembled,
         "weights",
         lambda at, g: right(at, 1.05 * np.asarray(g)),
     )

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.model.error_distributions import tolerance_sources
-from assembly.model.robot import BeamLink, Clearance, Frame, Robot
-from assembly.robots import load_robot
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot
+from forcefit.assembly.robots import load_robot
+from forcefit.validation.crosscheck.crosscheck import attempt, crosscheck
 from tests.mutations_for_tests import BEAM_MUTATIONS, MUTATIONS
 from tests.robots_for_tests import with_papers_errors
-from validation.crosscheck.crosscheck import attempt, crosscheck
 
 pytestmark = pytest.mark.exudyn
 
@@ -77,15 +77,15 @@ def test_crosscheck_fails_for_a_difference_that_finite_rotations_do_not_explain(
 ):
     """The exact model gets errors that are one per cent too large;
     the two others agree."""
-    import validation.crosscheck.pair
+    import forcefit.validation.crosscheck.pair
 
-    right = validation.crosscheck.pair.solve_exact
+    right = forcefit.validation.crosscheck.pair.solve_exact
 
     def wrong(place, *_, **__):
         robot = place.robot.with_errors(1.01 * place.robot.errors)
         return right(replace(place, robot=robot))
 
-    monkeypatch.setattr(validation.crosscheck.pair, "solve_exact", wrong)
+    monkeypatch.setattr(forcefit.validation.crosscheck.pair, "solve_exact", wrong)
     result = crosscheck(posture, links="spring")
     failed = [name for name, check in result.checks.items() if check.verdict == "fails"]
     assert failed == [
@@ -155,11 +155,11 @@ def test_exact_model_and_simulation_agree_under_weight_and_moment(name):
 
 def test_crosscheck_fails_for_a_wrong_weight_in_the_exact_model(monkeypatch):
     """The weight is 5 % too large in the model with finite motions only."""
-    import assembly.exact.exact
+    import forcefit.assembly.exact.exact
 
-    right = assembly.exact.exact.dead_loads
+    right = forcefit.assembly.exact.exact.dead_loads
     monkeypatch.setattr(
-        assembly.exact.exact,
+        forcefit.assembly.exact.exact,
         "dead_loads",
         lambda at, w, b, g, p: right(at, w, b, 1.05 * np.asarray(g), p),
     )
@@ -332,7 +332,7 @@ def test_crosscheck_fails_for_a_broken_beam_of_the_linear_model(mutation, broken
 
 
 def test_slope_figure_shows_the_measured_differences(posture):
-    from validation.crosscheck.plot import slope_figure
+    from forcefit.validation.crosscheck.plot import slope_figure
 
     check = crosscheck(posture, scales=(1.0, 0.5))
     panels = slope_figure(check).axes

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from assembly.files.robot_file import write_robot
-from assembly.model.robot import Clearance
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.model.robot import Clearance
 from forcefit.commands.validation import app
 from forcefit.inputs.table import BadInput
 from tests.mutations_for_tests import MUTATIONS

@@ -5,7 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from validation.crosscheck.limits import difference_slope, extrapolate, slope_check
+from forcefit.validation.crosscheck.limits import (
+    difference_slope,
+    extrapolate,
+    slope_check,
+)
 
 
 def test_extrapolation_is_exact_for_polynomials():

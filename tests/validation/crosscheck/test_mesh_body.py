@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix, diags
 
-from assembly.files.solved_links import solve_links
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
+from forcefit.assembly.files.solved_links import solve_links
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
 from forcefit.inputs.table import BadInput
-from stiffness.fem.condensation import condense
-from stiffness.fem.elements import assemble, isoparametric, lame
+from forcefit.stiffness.fem.condensation import condense
+from forcefit.stiffness.fem.elements import assemble, isoparametric, lame
+from forcefit.validation.crosscheck.crosscheck import crosscheck
+from forcefit.validation.crosscheck.link_models import link_models
+from forcefit.validation.multibody.exudyn_parts import MeshBody, MeshedSolid
+from forcefit.validation.multibody.motion import placement
+from forcefit.validation.multibody.simulation import SimulationModel, simulate_assembly
 from tests.solids_for_tests import box_solid
-from validation.crosscheck.crosscheck import crosscheck
-from validation.crosscheck.link_models import link_models
-from validation.multibody.exudyn_parts import MeshBody, MeshedSolid
-from validation.multibody.motion import placement
-from validation.multibody.simulation import SimulationModel, simulate_assembly
 
 pytestmark = pytest.mark.exudyn
 

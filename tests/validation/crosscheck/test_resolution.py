@@ -6,16 +6,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.linear.energy import solve_assembly
-from assembly.model.robot import Clearance
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.robot import Clearance
+from forcefit.validation.crosscheck import crosscheck
+from forcefit.validation.crosscheck.clearance_metric import TOLERANCE, ClearanceMetric
+from forcefit.validation.crosscheck.limits import LIMIT_TOLERANCE
+from forcefit.validation.crosscheck.pair import Pair, scaled
+from forcefit.validation.crosscheck.pose_metric import PoseMetric
+from forcefit.validation.crosscheck.resolution import resolution_text, resolutions
 from tests.robots_for_tests import coaxial_beams
-from validation.crosscheck import crosscheck
-from validation.crosscheck.clearance_metric import TOLERANCE, ClearanceMetric
-from validation.crosscheck.limits import LIMIT_TOLERANCE
-from validation.crosscheck.pair import Pair, scaled
-from validation.crosscheck.pose_metric import PoseMetric
-from validation.crosscheck.resolution import resolution_text, resolutions
 
 ERROR, CLEARANCE, STIFFNESS = 4e-4, 1e-4, 1e6  # [m], [m], [N/m]
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
-from assembly.robots import load_robot
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.robots import load_robot
+from forcefit.validation.crosscheck.stiffness_check import check_stiffness
 from tests.robots_for_tests import NUMBERS, irsbot2_with
-from validation.crosscheck.stiffness_check import check_stiffness
 
 pytestmark = pytest.mark.exudyn
 

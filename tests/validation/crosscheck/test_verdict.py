@@ -5,8 +5,12 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from validation.crosscheck.limits import difference_slope, limit_difference, slope_check
-from validation.crosscheck.verdict import Check, compare_scales, verdict
+from forcefit.validation.crosscheck.limits import (
+    difference_slope,
+    limit_difference,
+    slope_check,
+)
+from forcefit.validation.crosscheck.verdict import Check, compare_scales, verdict
 
 
 @dataclass

@@ -5,16 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.effects.functions import AXES
-from assembly.files.robot_file import read_robot
+from forcefit.assembly.effects.functions import AXES
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.validation.campaign.campaign_file import read_commands
+from forcefit.validation.diagnosis.candidates import (
+    Candidate,
+    CandidatePart,
+    variables_of,
+)
+from forcefit.validation.diagnosis.function_forms import CandidateShape
+from forcefit.validation.diagnosis.responses import responses
+from forcefit.validation.diagnosis.sensitivities import Sensitivities
+from forcefit.validation.diagnosis.signatures import conditions_of
 from tests.bar_for_tests import BEAM, LENGTH, along, bar
 from tests.campaigns_for_tests import ARM
-from validation.campaign.campaign_file import read_commands
-from validation.diagnosis.candidates import Candidate, CandidatePart, variables_of
-from validation.diagnosis.function_forms import CandidateShape
-from validation.diagnosis.responses import responses
-from validation.diagnosis.sensitivities import Sensitivities
-from validation.diagnosis.signatures import conditions_of
 
 LINE = CandidateShape("powers", ("0", "1"))
 

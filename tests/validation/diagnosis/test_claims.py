@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from assembly.effects.effect import Unknown
+from forcefit.assembly.effects.effect import Unknown
+from forcefit.validation.diagnosis.claims import supported
+from forcefit.validation.diagnosis.fit import MachineFit, fit_machine
+from forcefit.validation.diagnosis.hypotheses import Hypothesis, Slot
+from forcefit.validation.diagnosis.nuisance import GEOMETRY, SPRINGS
+from forcefit.validation.diagnosis.unknowns import Acting, Small, Unknowns
 from tests.bar_for_tests import (
     BEAM,
     LENGTH,
@@ -21,11 +26,6 @@ from tests.bar_for_tests import (
     numbers,
 )
 from tests.planar_arm_for_tests import SIGMA
-from validation.diagnosis.claims import supported
-from validation.diagnosis.fit import MachineFit, fit_machine
-from validation.diagnosis.hypotheses import Hypothesis, Slot
-from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
-from validation.diagnosis.unknowns import Acting, Small, Unknowns
 
 SURE = norm.isf(0.5e-3)  # standard deviations that chance exceeds once in a thousand
 

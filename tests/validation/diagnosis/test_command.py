@@ -5,13 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from assembly.effects import apply_effects
-from assembly.files.robot_file import read_robot
-from assembly.kinematics.posture import place_robot
-from assembly.measurement.conditions import as_declared
-from assembly.measurement.predict import predict
+from forcefit.assembly.effects import apply_effects
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.measurement.predict import predict
+from forcefit.validation.campaign.campaign_file import read_campaign
 from tests.planar_arm_for_tests import measure
-from validation.campaign.campaign_file import read_campaign
 
 
 @pytest.fixture(scope="module")

@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.robots import three_rrr
+from forcefit.assembly.robots import three_rrr
+from forcefit.validation.campaign.campaign import number_rows
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.lack_of_fit import lack_of_fit
+from forcefit.validation.diagnosis.results import table
+from forcefit.validation.diagnosis.select import select
+from forcefit.validation.diagnosis.whitening import independent
+from forcefit.validation.multibody.simulation import without_clearance
+from forcefit.validation.synthetic.design import CampaignDesign
+from forcefit.validation.synthetic.machine import Hidden
 from tests.bar_for_tests import BEAM, LONGER, along, bar, columns_of, machine
 from tests.elastic_arm_for_tests import arm, with_errors
 from tests.points_for_tests import DEVICE, MACHINE, TARGETS, simulated, write_points
-from validation.campaign.campaign import number_rows
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.lack_of_fit import lack_of_fit
-from validation.diagnosis.results import table
-from validation.diagnosis.select import select
-from validation.diagnosis.whitening import independent
-from validation.multibody.simulation import without_clearance
-from validation.synthetic.design import CampaignDesign
-from validation.synthetic.machine import Hidden
 
 VISITS = 60
 DESIGN = CampaignDesign(

@@ -6,19 +6,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.effects import LIBRARY
-from assembly.files.robot_file import read_robot
+from forcefit.assembly.effects import LIBRARY
+from forcefit.assembly.files.robot_file import read_robot
 from forcefit.inputs.writing import plain
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.fit import fit_machine
+from forcefit.validation.diagnosis.hypotheses import hypotheses, with_declared
+from forcefit.validation.diagnosis.prediction import predicted
+from forcefit.validation.diagnosis.results import table
+from forcefit.validation.diagnosis.saving import save
+from forcefit.validation.diagnosis.signatures import conditions_of
+from forcefit.validation.diagnosis.unknowns import Acting, Unknowns
 from tests.elastic_arm_for_tests import arm, commanded
 from tests.planar_arm_for_tests import SIGMA, measured
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.fit import fit_machine
-from validation.diagnosis.hypotheses import hypotheses, with_declared
-from validation.diagnosis.prediction import predicted
-from validation.diagnosis.results import table
-from validation.diagnosis.saving import save
-from validation.diagnosis.signatures import conditions_of
-from validation.diagnosis.unknowns import Acting, Unknowns
 
 LOADS = ("mx", "my", "mz", "fx", "fy", "fz")
 ROWS = 12

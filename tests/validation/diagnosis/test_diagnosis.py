@@ -20,14 +20,14 @@ from scipy.stats import norm
 from examples.campaign_folder import data_folder
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import plain
+from forcefit.validation.campaign.campaign_file import read_campaign
+from forcefit.validation.diagnosis import trace
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.report import report_page
+from forcefit.validation.diagnosis.results import effects, table
+from forcefit.validation.diagnosis.sentence import sentence
+from forcefit.validation.diagnosis.text import text
 from tests.planar_arm_for_tests import SIGMA, measured
-from validation.campaign.campaign_file import read_campaign
-from validation.diagnosis import trace
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.report import report_page
-from validation.diagnosis.results import effects, table
-from validation.diagnosis.sentence import sentence
-from validation.diagnosis.text import text
 
 CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
 TRUTH = json.loads((CAMPAIGNS / "truth.json").read_text(encoding="utf-8"))

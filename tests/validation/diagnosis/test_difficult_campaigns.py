@@ -5,13 +5,13 @@ from functools import cache
 
 import pytest
 
-from assembly.files.robot_file import read_robot
 from examples.campaign_folder import DATA
-from validation.campaign.campaign_file import read_campaign, read_commands
-from validation.correction.prediction import predict
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.results import table
-from validation.diagnosis.saving import save
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.validation.campaign.campaign_file import read_campaign, read_commands
+from forcefit.validation.correction.prediction import predict
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.results import table
+from forcefit.validation.diagnosis.saving import save
 
 CASES = DATA.parent / "cases" / "campaigns"
 PRACTICE = DATA / "practice"

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.model.statuses import NOT_ENOUGH_ROWS
+from forcefit.assembly.model.statuses import NOT_ENOUGH_ROWS
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.prediction import predicted
+from forcefit.validation.diagnosis.results import table
+from forcefit.validation.diagnosis.text import text
 from tests.elastic_arm_for_tests import arm, commanded
 from tests.planar_arm_for_tests import SIGMA
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.prediction import predicted
-from validation.diagnosis.results import table
-from validation.diagnosis.text import text
 
 
 def seen(rows, seed, unlike=0.0):

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.figures import assembled, worst_robot, worst_row
 from tests.planar_arm_for_tests import SIGMA, measured
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.figures import assembled, worst_robot, worst_row
 
 
 @pytest.fixture(scope="module")

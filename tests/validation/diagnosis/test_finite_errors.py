@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from assembly.kinematics.posture import place_robot
-from assembly.model.robot import Frame, Robot
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.validation.campaign.campaign import Campaign
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.sequence import errors_of
 from tests.planar_arm_for_tests import SIGMA
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.sequence import errors_of
 
 TURNING = {"joint": "revolute", "actuated": True}
 ARM = Robot("arm", "tool", (

@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.stats import binom
 
+from forcefit.validation.diagnosis.diagnose import diagnose
 from tests.bar_for_tests import (
     BEAM,
     LENGTH,
@@ -19,7 +20,6 @@ from tests.bar_for_tests import (
     numbers,
 )
 from tests.planar_arm_for_tests import SIGMA
-from validation.diagnosis.diagnose import diagnose
 
 
 @pytest.mark.parametrize("start", [0.0, 1e-19, -1e-3])

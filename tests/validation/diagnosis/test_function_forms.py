@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from forcefit.validation.diagnosis import function_forms as forms
+from forcefit.validation.diagnosis.signatures import conditions_of
 from tests.bar_for_tests import bar
-from validation.diagnosis import function_forms as forms
-from validation.diagnosis.signatures import conditions_of
 
 CONDITIONS = conditions_of(
     bar(rows=30, time=np.arange(30.0), temperature=np.linspace(-1, 2, 30) ** 2)
@@ -20,7 +20,7 @@ def test_prior_probabilities_of_all_forms_sum_to_one(name):
 
 
 def test_products_have_a_form_that_a_robot_file_can_store():
-    from assembly.effects.forms import FORMS
+    from forcefit.assembly.effects.forms import FORMS
 
     pairs = [("q.drive", "time"), ("approach", "load.fz"), ("time", "position.x")]
     for first, second in pairs:

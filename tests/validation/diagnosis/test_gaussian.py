@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, multivariate_t
 
-from validation.diagnosis.gaussian import (
+from forcefit.validation.diagnosis.gaussian import (
     FREEDOM,
     SIZES,
     evidence_gains,

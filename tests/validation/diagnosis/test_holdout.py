@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from forcefit.validation.diagnosis.holdout import hidden, hold_out
 from tests.campaigns_for_tests import campaign_of
-from validation.diagnosis.holdout import hidden, hold_out
 
 
 def held_in(campaign):

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit.validation.diagnosis.hypotheses import hypotheses
+from forcefit.validation.diagnosis.signatures import conditions_of
 from tests.bar_for_tests import BEAM, bar
-from validation.diagnosis.hypotheses import hypotheses
-from validation.diagnosis.signatures import conditions_of
 
 TIME = 60.0 * np.arange(8)
 

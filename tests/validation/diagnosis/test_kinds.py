@@ -9,17 +9,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import read_robot
-from assembly.model.robot import Frame, Robot
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.validation.campaign.campaign_file import read_campaign
+from forcefit.validation.correction.prediction import predict
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.results import table
+from forcefit.validation.diagnosis.saving import save
+from forcefit.validation.synthetic.design import CampaignDesign, plan_campaign
+from forcefit.validation.synthetic.generator import generate_campaign, write_campaign
+from forcefit.validation.synthetic.machine import Hidden, simulate_readings
 from tests.elastic_arm_for_tests import SPRING, TUBE, arm, with_errors
-from validation.campaign.campaign_file import read_campaign
-from validation.correction.prediction import predict
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.results import table
-from validation.diagnosis.saving import save
-from validation.synthetic.design import CampaignDesign, plan_campaign
-from validation.synthetic.generator import generate_campaign, write_campaign
-from validation.synthetic.machine import Hidden, simulate_readings
 
 pytestmark = pytest.mark.slow
 

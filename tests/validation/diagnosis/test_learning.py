@@ -6,17 +6,17 @@ from functools import cache
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import read_robot
-from assembly.model.robot import Frame, Robot
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.validation.campaign.campaign_file import read_campaign
+from forcefit.validation.correction.prediction import predict
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.results import table
+from forcefit.validation.diagnosis.saving import save
+from forcefit.validation.diagnosis.sentence import sentence
+from forcefit.validation.synthetic.design import CampaignDesign
+from forcefit.validation.synthetic.generator import generate_campaign, write_campaign
 from tests.planar_arm_for_tests import SIGMA, measured
-from validation.campaign.campaign_file import read_campaign
-from validation.correction.prediction import predict
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.results import table
-from validation.diagnosis.saving import save
-from validation.diagnosis.sentence import sentence
-from validation.synthetic.design import CampaignDesign
-from validation.synthetic.generator import generate_campaign, write_campaign
 
 TURNING = {"joint": "revolute", "actuated": True}
 SPATIAL = Robot("arm", "tool", (

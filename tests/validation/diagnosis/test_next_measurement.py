@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from forcefit.validation.diagnosis.next_measurement import next_measurement
+from forcefit.validation.diagnosis.signatures import conditions_of
 from tests.bar_for_tests import (
     BEAM,
     ECCENTRIC,
@@ -20,8 +22,6 @@ from tests.bar_for_tests import (
     machine,
 )
 from tests.planar_arm_for_tests import SIGMA
-from validation.diagnosis.next_measurement import next_measurement
-from validation.diagnosis.signatures import conditions_of
 
 
 def test_another_temperature_separates_expansion_from_length():

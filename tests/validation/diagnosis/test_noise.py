@@ -3,8 +3,12 @@
 import numpy as np
 import pytest
 
-from validation.diagnosis.gaussian import scale
-from validation.diagnosis.noise import findings, probability_good, repeat_scatter
+from forcefit.validation.diagnosis.gaussian import scale
+from forcefit.validation.diagnosis.noise import (
+    findings,
+    probability_good,
+    repeat_scatter,
+)
 
 
 def test_outliers_are_distinguished_from_noise():

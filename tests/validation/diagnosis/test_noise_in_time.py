@@ -5,7 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from validation.diagnosis.noise_in_time import NoiseInTime, noise_in_time, widened
+from forcefit.validation.diagnosis.noise_in_time import (
+    NoiseInTime,
+    noise_in_time,
+    widened,
+)
 
 ROWS, STEP, SHARE, CONSTANT = 120, 20.0, 0.7, 300.0
 WITHIN_90 = 1.645

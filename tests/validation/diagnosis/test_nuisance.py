@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.measurement.predict import predict
-from assembly.model.robot import Frame, Robot
+from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.validation.diagnosis.nuisance import nuisance, with_compliance, with_error
+from forcefit.validation.diagnosis.responses import responses
+from forcefit.validation.diagnosis.signatures import conditions_of, whiten
 from tests.bar_for_tests import LENGTH, bar
-from validation.diagnosis.nuisance import nuisance, with_compliance, with_error
-from validation.diagnosis.responses import responses
-from validation.diagnosis.signatures import conditions_of, whiten
 
 LOAD = [0.0, 0, 4.0, 0, 0, 30.0]
 

@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from forcefit.validation.diagnosis.fit import MachineFit
+from forcefit.validation.diagnosis.plausible import implausible, impossible_rows
+from forcefit.validation.diagnosis.registration import device_frame
+from forcefit.validation.diagnosis.signatures import conditions_of
+from forcefit.validation.diagnosis.unknowns import Acting, Small, Unknowns
 from tests.planar_arm_for_tests import measured
-from validation.diagnosis.fit import MachineFit
-from validation.diagnosis.plausible import implausible, impossible_rows
-from validation.diagnosis.registration import device_frame
-from validation.diagnosis.signatures import conditions_of
-from validation.diagnosis.unknowns import Acting, Small, Unknowns
 
 
 def found(effects, small=()):

@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import minimize
 from scipy.stats import multivariate_t
 
-from validation.diagnosis.gaussian import size_penalty
-from validation.diagnosis.prior_sizes import Grouped, best_sizes
+from forcefit.validation.diagnosis.gaussian import size_penalty
+from forcefit.validation.diagnosis.prior_sizes import Grouped, best_sizes
 
 
 def _case(seed=1):

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from forcefit.validation.diagnosis.candidates import Candidate, CandidatePart
+from forcefit.validation.diagnosis.function_forms import CandidateShape
+from forcefit.validation.diagnosis.gaussian import marginalise
+from forcefit.validation.diagnosis.range_parts import PARTS, range_error
+from forcefit.validation.diagnosis.signatures import conditions_of
 from tests.campaigns_for_tests import campaign_of
-from validation.diagnosis.candidates import Candidate, CandidatePart
-from validation.diagnosis.function_forms import CandidateShape
-from validation.diagnosis.gaussian import marginalise
-from validation.diagnosis.range_parts import PARTS, range_error
-from validation.diagnosis.signatures import conditions_of
 
 ROWS = 60
 

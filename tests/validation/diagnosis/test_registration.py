@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assembly.effects.registration import BASE
-from assembly.kinematics.posture import place_robot
-from assembly.measurement.predict import predict
-from assembly.model.robot import Frame, Robot
+from forcefit.assembly.effects.registration import BASE
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.inputs.table import BadInput
+from forcefit.validation.diagnosis.registration import coarse_frame, register
+from forcefit.validation.diagnosis.signatures import conditions_of
 from tests.bar_for_tests import LENGTH, along, bar
-from validation.diagnosis.registration import coarse_frame, register
-from validation.diagnosis.signatures import conditions_of
 
 TURN, SHIFT = [0.3, -0.2, 0.5], [1.0, 0.5, -2.0]
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit.validation.diagnosis.relinearise import Relinearisation
+from forcefit.validation.diagnosis.states import Models
+from forcefit.validation.diagnosis.weighted_readings import WeightedReadings
 from tests.bar_for_tests import BEAM, LENGTH, bar, columns_of
-from validation.diagnosis.relinearise import Relinearisation
-from validation.diagnosis.states import Models
-from validation.diagnosis.weighted_readings import WeightedReadings
 
 TURN, LONGER = 6e-3, 5e-3
 CAMPAIGN = bar(link=BEAM, rows=20, spread=5.0)

@@ -4,11 +4,16 @@ import numpy as np
 import pytest
 from scipy.stats import binom, kstest
 
+from forcefit.validation.diagnosis import lack_of_fit as module
+from forcefit.validation.diagnosis.lack_of_fit import (
+    SIGNIFICANT,
+    lack_of_fit,
+    outlying,
+    trends,
+)
+from forcefit.validation.diagnosis.signatures import conditions_of, whiten
 from tests.campaigns_for_tests import campaign_of
 from tests.planar_arm_for_tests import SIGMA
-from validation.diagnosis import lack_of_fit as module
-from validation.diagnosis.lack_of_fit import SIGNIFICANT, lack_of_fit, outlying, trends
-from validation.diagnosis.signatures import conditions_of, whiten
 
 # is what is left noise?
 

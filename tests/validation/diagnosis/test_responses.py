@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.measurement.conditions import as_declared
-from assembly.model.robot import Clearance, Frame, Robot
-from stiffness.screws import rotation_matrix, skew
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.stiffness.screws import rotation_matrix, skew
+from forcefit.validation.diagnosis.responses import responses
+from forcefit.validation.diagnosis.signatures import conditions_of
 from tests.bar_for_tests import BEAM, LENGTH, along, bar
 from tests.linkages_for_tests import five_bar
-from validation.diagnosis.responses import responses
-from validation.diagnosis.signatures import conditions_of
 
 LOAD = np.array([0.3, -0.2, 3.0, 1.0, 5.0, -2.0])
 

@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from forcefit.validation.diagnosis import results as module
+from forcefit.validation.diagnosis.fit import MachineFit
+from forcefit.validation.diagnosis.nuisance import GEOMETRY, SPRINGS
+from forcefit.validation.diagnosis.sequence import Errors, Step
+from forcefit.validation.diagnosis.unknowns import Acting, Small, Unknowns
 from tests.bar_for_tests import LONGER, TURNED, bar
-from validation.diagnosis import results as module
-from validation.diagnosis.fit import MachineFit
-from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
-from validation.diagnosis.sequence import Errors, Step
-from validation.diagnosis.unknowns import Acting, Small, Unknowns
 
 
 def fitted(robot, parts, x, std):

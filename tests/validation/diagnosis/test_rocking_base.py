@@ -9,15 +9,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import write_robot
-from assembly.model.function import Function
-from assembly.model.robot import Frame, Robot
-from stiffness.screws import rotation_matrix
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.model.function import Function
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.stiffness.screws import rotation_matrix
+from forcefit.validation.campaign.campaign_file import read_campaign
+from forcefit.validation.correction.prediction import predict
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.results import learned
 from tests.campaigns_for_tests import write_campaign
-from validation.campaign.campaign_file import read_campaign
-from validation.correction.prediction import predict
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.results import learned
 
 SIGMA, ROWS, ROCKING = 2e-5, 80, 1e-3
 GAIN = 0.8  # of a sensor that is read in units of its own

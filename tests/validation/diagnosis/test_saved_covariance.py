@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.robots import load_robot
+from forcefit.assembly.robots import load_robot
 from forcefit.inputs.errors import BadInput
-from validation.diagnosis.saved_covariance import (
+from forcefit.validation.diagnosis.saved_covariance import (
     SavedCovariance,
     read_covariance,
     write_covariance,

@@ -6,19 +6,19 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import read_robot
+from forcefit.assembly.files.robot_file import read_robot
 from forcefit.inputs.writing import plain
+from forcefit.validation.correction.prediction import predict
+from forcefit.validation.diagnosis import diagnose as module
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.fit import fit_machine
+from forcefit.validation.diagnosis.prediction import predicted, residual_of
+from forcefit.validation.diagnosis.results import table
+from forcefit.validation.diagnosis.saved_covariance import read_covariance
+from forcefit.validation.diagnosis.saving import save
+from forcefit.validation.diagnosis.sequence import errors_of
 from tests.elastic_arm_for_tests import arm, commanded
 from tests.planar_arm_for_tests import SIGMA
-from validation.correction.prediction import predict
-from validation.diagnosis import diagnose as module
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.fit import fit_machine
-from validation.diagnosis.prediction import predicted, residual_of
-from validation.diagnosis.results import table
-from validation.diagnosis.saved_covariance import read_covariance
-from validation.diagnosis.saving import save
-from validation.diagnosis.sequence import errors_of
 
 ERRORS = np.random.default_rng(3).normal(size=(4, 6)) * np.repeat([4e-4, 2e-4], 3)
 ROWS = 72  # configurations, so that one split judges
@@ -227,7 +227,8 @@ def test_robot_that_predicts_worse_is_not_saved(found, tmp_path, run, monkeypatc
     folder.mkdir()
     worse = replace(found, after=found.before, before=found.after, verdict="learned")
     monkeypatch.setattr(
-        "validation.campaign.campaign_file.read_campaign", lambda path: found.campaign
+        "forcefit.validation.campaign.campaign_file.read_campaign",
+        lambda path: found.campaign,
     )
     for one, code, verdict in ((worse, 1, "learned"), (found, 0, "outside_library")):
         one = replace(one, verdict=verdict)

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit.validation.diagnosis.elements import Dense
+from forcefit.validation.diagnosis.search import Search
+from forcefit.validation.diagnosis.select import select
+from forcefit.validation.diagnosis.weighted_readings import WeightedReadings
 from tests.bar_for_tests import BEAM, LENGTH, along, bar, columns_of
-from validation.diagnosis.elements import Dense
-from validation.diagnosis.search import Search
-from validation.diagnosis.select import select
-from validation.diagnosis.weighted_readings import WeightedReadings
 
 ROWS = 40
 TIME = 60.0 * np.random.default_rng(0).permutation(ROWS)

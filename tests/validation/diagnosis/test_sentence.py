@@ -6,12 +6,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from assembly.model.function import Function
-from validation.diagnosis import sentence as module
-from validation.diagnosis.calibration import Calibration
-from validation.diagnosis.holdout import HeldOut
-from validation.diagnosis.lack_of_fit import Trend
-from validation.diagnosis.sentence import calibration_text, formula, open_text, sentence
+from forcefit.assembly.model.function import Function
+from forcefit.validation.diagnosis import sentence as module
+from forcefit.validation.diagnosis.calibration import Calibration
+from forcefit.validation.diagnosis.holdout import HeldOut
+from forcefit.validation.diagnosis.lack_of_fit import Trend
+from forcefit.validation.diagnosis.sentence import (
+    calibration_text,
+    formula,
+    open_text,
+    sentence,
+)
 
 
 def test_formula_of_a_product_names_both_variables():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from validation.diagnosis.separability import compare_signatures
+from forcefit.validation.diagnosis.separability import compare_signatures
 
 
 def columns(*vectors):

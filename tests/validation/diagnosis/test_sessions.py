@@ -5,18 +5,18 @@ import re
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.files.robot_file import read_robot, write_robot
 from forcefit.inputs.errors import BadInput
+from forcefit.validation.campaign.campaign_file import read_campaign, read_commands
+from forcefit.validation.correction.prediction import predict
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.results import table
+from forcefit.validation.diagnosis.saving import save
+from forcefit.validation.synthetic.design import CampaignDesign, plan_campaign
+from forcefit.validation.synthetic.effects import SCREW
+from forcefit.validation.synthetic.machine import Hidden, simulate_readings
 from tests.campaigns_for_tests import write_campaign
 from tests.elastic_arm_for_tests import arm, with_errors
-from validation.campaign.campaign_file import read_campaign, read_commands
-from validation.correction.prediction import predict
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.results import table
-from validation.diagnosis.saving import save
-from validation.synthetic.design import CampaignDesign, plan_campaign
-from validation.synthetic.effects import SCREW
-from validation.synthetic.machine import Hidden, simulate_readings
 
 SIGMA = np.repeat([1e-5, 5e-6], 3)
 DESIGN = CampaignDesign(configurations=32, rows=56, load=40.0, reach=0.8)

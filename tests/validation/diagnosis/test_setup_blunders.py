@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assembly.kinematics.posture import Posture, place_many, place_many_joints
-from assembly.measurement.conditions import as_declared
-from assembly.measurement.predict import predict
-from assembly.robots import load_robot
-from validation.campaign.campaign import Campaign, number_rows
-from validation.diagnosis.setup_blunders import setup_blunders
+from forcefit.assembly.kinematics.posture import Posture, place_many, place_many_joints
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.robots import load_robot
+from forcefit.validation.campaign.campaign import Campaign, number_rows
+from forcefit.validation.diagnosis.setup_blunders import setup_blunders
 
 ROWS = 25
 POINT = np.array([0.05, 0.02, 0.1])

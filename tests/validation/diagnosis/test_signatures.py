@@ -5,20 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.measurement.predict import predict
-from assembly.model.function import Function
+from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.model.function import Function
 from forcefit.inputs.table import BadInput
-from tests.bar_for_tests import BEAM, LONGER, bar, fit_of
-from tests.planar_arm_for_tests import SIGMA
-from validation.diagnosis.derivatives import Derivatives
-from validation.diagnosis.hypotheses import Hypothesis
-from validation.diagnosis.signatures import (
+from forcefit.validation.diagnosis.derivatives import Derivatives
+from forcefit.validation.diagnosis.hypotheses import Hypothesis
+from forcefit.validation.diagnosis.signatures import (
     Tangents,
     conditions_of,
     loaded_components,
     whiten,
 )
-from validation.diagnosis.trace import FINITE
+from forcefit.validation.diagnosis.trace import FINITE
+from tests.bar_for_tests import BEAM, LONGER, bar, fit_of
+from tests.planar_arm_for_tests import SIGMA
 
 
 def test_weight_has_the_direction_of_the_gravity_covariates():

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from forcefit.validation.campaign.campaign_file import read_campaign
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.results import table
+from forcefit.validation.synthetic.design import CampaignDesign, varied_for
+from forcefit.validation.synthetic.effects import LIBRARY
+from forcefit.validation.synthetic.equivalents import SAME, alternatives
+from forcefit.validation.synthetic.generator import generate_campaign, write_campaign
 from tests.elastic_arm_for_tests import arm, with_errors
-from validation.campaign.campaign_file import read_campaign
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.results import table
-from validation.synthetic.design import CampaignDesign, varied_for
-from validation.synthetic.effects import LIBRARY
-from validation.synthetic.equivalents import SAME, alternatives
-from validation.synthetic.generator import generate_campaign, write_campaign
 
 DESIGN = CampaignDesign(
     configurations=16, rows=80, load=40.0, reach=0.8,

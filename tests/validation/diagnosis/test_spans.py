@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import write_robot
-from assembly.model.robot import Frame, Robot
-from validation.campaign.campaign_file import read_campaign
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.prediction import predicted
-from validation.diagnosis.results import table
-from validation.diagnosis.saving import corrected
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.validation.campaign.campaign_file import read_campaign
+from forcefit.validation.diagnosis.diagnose import diagnose
+from forcefit.validation.diagnosis.prediction import predicted
+from forcefit.validation.diagnosis.results import table
+from forcefit.validation.diagnosis.saving import corrected
 
 ROWS, STEP, SIGMA = 240, 60.0, 2e-6
 BED, FRAME = 0.9e-6, -16e-6  # [m/K]

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from validation.diagnosis import text as module
-from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.next_measurement import load_text
+from forcefit.validation.diagnosis import text as module
+from forcefit.validation.diagnosis.diagnosis import Diagnosis
+from forcefit.validation.diagnosis.next_measurement import load_text
 
 NONE = float("nan")
 

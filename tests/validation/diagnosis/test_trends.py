@@ -7,12 +7,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import f
 
-from assembly.kinematics.posture import place_robot
-from assembly.model.robot import Frame, Robot
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.model.robot import Frame, Robot
+from forcefit.validation.diagnosis import lack_of_fit as module
+from forcefit.validation.diagnosis.lack_of_fit import trends
+from forcefit.validation.diagnosis.signatures import conditions_of
 from tests.bar_for_tests import bar
-from validation.diagnosis import lack_of_fit as module
-from validation.diagnosis.lack_of_fit import trends
-from validation.diagnosis.signatures import conditions_of
 
 ROWS = 30
 

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assembly.measurement.predict import read
-from tests.bar_for_tests import bar
-from validation.diagnosis.holdout import blocks_of
-from validation.diagnosis.signatures import conditions_of
-from validation.diagnosis.whitening import (
+from forcefit.assembly.measurement.predict import read
+from forcefit.validation.diagnosis.holdout import blocks_of
+from forcefit.validation.diagnosis.signatures import conditions_of
+from forcefit.validation.diagnosis.whitening import (
     independent,
     platform_motions,
     size_of_noise,
     whitening,
 )
+from tests.bar_for_tests import bar
 
 VISIT = np.array([3, 0, 3, 3, 7, 0, 9, 9, 9, 9, 3])
 

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.errors import BadInput
+from forcefit.validation.campaign.campaign_file import read_campaign
+from forcefit.validation.exchange.bag import is_bag, read_bag
 from tests.validation.exchange.test_tracker import (
     ANGLES,
     SHIFT,
@@ -14,8 +16,6 @@ from tests.validation.exchange.test_tracker import (
     Lab,
     seen,
 )
-from validation.campaign.campaign_file import read_campaign
-from validation.exchange.bag import is_bag, read_bag
 
 START = 1_700_000_000  # [s] of the first command
 

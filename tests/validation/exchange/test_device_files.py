@@ -11,6 +11,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from forcefit.inputs.errors import BadInput
+from forcefit.validation.campaign.campaign_file import read_campaign
+from forcefit.validation.exchange.cells import read_sheet
+from forcefit.validation.exchange.clock import parse_time
+from forcefit.validation.exchange.reading import Writing
 from tests.validation.exchange.test_tracker import (
     ANGLES,
     SHIFT,
@@ -21,10 +25,6 @@ from tests.validation.exchange.test_tracker import (
     points,
     seen,
 )
-from validation.campaign.campaign_file import read_campaign
-from validation.exchange.cells import read_sheet
-from validation.exchange.clock import parse_time
-from validation.exchange.reading import Writing
 
 
 @pytest.fixture

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from forcefit.validation.campaign.campaign_file import read_campaign
+from forcefit.validation.exchange.device_table import Writing, parse_time
 from tests.campaigns_for_tests import ARM
-from validation.campaign.campaign_file import read_campaign
-from validation.exchange.device_table import Writing, parse_time
 
 TARGETS = {"A": (0.0, 0.0, 0.1), "B": (0.1, 0.02, 0.0), "C": (0.0, 0.07, 0.03)}
 ANGLES = [(0.1 * k, 0.3 + 0.17 * k) for k in range(-6, 7)]

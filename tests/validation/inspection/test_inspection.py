@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from forcefit.validation.campaign.campaign_file import read_campaign
+from forcefit.validation.inspection.counts import correlation
+from forcefit.validation.inspection.design_remarks import remarks_on
+from forcefit.validation.inspection.design_signatures import design_signatures
+from forcefit.validation.inspection.inspection import inspect_campaign
+from forcefit.validation.inspection.measuring_order import revisits
+from forcefit.validation.inspection.repeats import repeat_noise
 from tests.campaigns_for_tests import ARM, campaign_of, write_campaign
-from validation.campaign.campaign_file import read_campaign
-from validation.inspection.counts import correlation
-from validation.inspection.design_remarks import remarks_on
-from validation.inspection.design_signatures import design_signatures
-from validation.inspection.inspection import inspect_campaign
-from validation.inspection.measuring_order import revisits
-from validation.inspection.repeats import repeat_noise
 
 BEAM = "link = { beam = { radius = 0.03 }, young = 7e10, poisson = 0.3 }\n"
 ELASTIC = ARM.replace(

@@ -6,10 +6,10 @@ import json
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import read_robot
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.validation.campaign.campaign_file import read_commands
+from forcefit.validation.inspection.planning import _Criterion
 from tests.campaigns_for_tests import ARM
-from validation.campaign.campaign_file import read_commands
-from validation.inspection.planning import _Criterion
 
 ROWS = 30
 

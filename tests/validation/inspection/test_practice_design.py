@@ -12,10 +12,10 @@ from scipy.stats import chi2
 
 from examples.campaign_folder import data_folder
 from forcefit.inputs.table import BadInput
-from validation.campaign.campaign_file import read_campaign
-from validation.diagnosis.derivatives import Derivatives
-from validation.diagnosis.signatures import Tangents, conditions_of
-from validation.inspection.inspection import inspect_campaign
+from forcefit.validation.campaign.campaign_file import read_campaign
+from forcefit.validation.diagnosis.derivatives import Derivatives
+from forcefit.validation.diagnosis.signatures import Tangents, conditions_of
+from forcefit.validation.inspection.inspection import inspect_campaign
 
 try:
     PRACTICE = data_folder("practice")

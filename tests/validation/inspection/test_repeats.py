@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from forcefit.validation.inspection.measuring_order import revisits
+from forcefit.validation.inspection.repeats import (
+    for_each_component,
+    repeat_noise,
+    slow_changes,
+)
 from tests.campaigns_for_tests import campaign_of
-from validation.inspection.measuring_order import revisits
-from validation.inspection.repeats import for_each_component, repeat_noise, slow_changes
 
 SIGMA = np.array([1e-5] * 3 + [5e-6] * 3)
 

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.exchange.robot_files import load_robot
-from assembly.kinematics.posture import home_posture
-from assembly.model.links import link_compliance
-from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
-from assembly.platform_stiffness.vibration import natural_modes
-from validation.multibody.simulation import simulated_frequencies
+from forcefit.assembly.exchange.robot_files import load_robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.links import link_compliance
+from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from forcefit.assembly.platform_stiffness.vibration import natural_modes
+from forcefit.validation.multibody.simulation import simulated_frequencies
 
 pytestmark = pytest.mark.exudyn
 ROOT = Path(__file__).parents[3]

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from assembly.kinematics.posture import home_posture
-from assembly.linear.energy import solve_assembly
-from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from forcefit.validation.multibody.motion import placement
+from forcefit.validation.multibody.simulation import SimulationModel, simulate_assembly
 from tests.multibody_for_tests import (
     FLAT,
     NU,
@@ -20,8 +22,6 @@ from tests.multibody_for_tests import (
     random_stiffness,
     tip_stiffness,
 )
-from validation.multibody.motion import placement
-from validation.multibody.simulation import SimulationModel, simulate_assembly
 
 pytestmark = pytest.mark.exudyn
 G = E / (2 * (1 + NU))

@@ -7,26 +7,31 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import validation.multibody.exudyn_solver
-from assembly.kinematics.posture import home_posture, place_robot
-from assembly.model.robot import Clearance, Frame, Robot
-from assembly.robots import load_robot
+import forcefit.validation.multibody.exudyn_solver
+from forcefit.assembly.kinematics.posture import home_posture, place_robot
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
+from forcefit.validation.multibody.exudyn_parts import OutOfTime
+from forcefit.validation.multibody.motion import (
+    exponential,
+    inverse,
+    logarithm,
+    placement,
+)
+from forcefit.validation.multibody.simulation import (
+    SimulationFailed,
+    SimulationModel,
+    closing_sequence,
+    simulate_assembly,
+    without_clearance,
+)
 from tests.multibody_for_tests import (
     FLAT,
     ROUND,
     coaxial,
     random_stiffness,
     tip_stiffness,
-)
-from validation.multibody.exudyn_parts import OutOfTime
-from validation.multibody.motion import exponential, inverse, logarithm, placement
-from validation.multibody.simulation import (
-    SimulationFailed,
-    SimulationModel,
-    closing_sequence,
-    simulate_assembly,
-    without_clearance,
 )
 
 pytestmark = pytest.mark.exudyn
@@ -277,7 +282,9 @@ def test_dynamic_relaxation_reaches_the_same_equilibrium(case, rng, monkeypatch)
     else:
         posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     static = simulate_assembly(posture)
-    monkeypatch.setattr(validation.multibody.exudyn_solver, "equilibrate", relax)
+    monkeypatch.setattr(
+        forcefit.validation.multibody.exudyn_solver, "equilibrate", relax
+    )
     relaxed = simulate_assembly(posture)
     assert relaxed.energy == pytest.approx(static.energy, rel=1e-8)
     np.testing.assert_allclose(

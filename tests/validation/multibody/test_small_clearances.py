@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import read_robot
-from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import solve_assembly
-from validation.crosscheck.pair import scaled
-from validation.multibody.simulation import SimulationModel, simulate_assembly
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.validation.crosscheck.pair import scaled
+from forcefit.validation.multibody.simulation import SimulationModel, simulate_assembly
 
 EXECHON = Path(__file__).with_name("exechon.toml")
 POSE = {"tz": 0.8, "rx": 0.32, "ry": 0.22}

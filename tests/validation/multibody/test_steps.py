@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.kinematics.se3 import logarithm
-from assembly.model.robot import BeamLink, Frame, Robot
-from assembly.steps.plan import Join, Plan, Preload, Release
-from assembly.steps.run import assemble_in_steps
-from stiffness.screws import SCREW
-from validation.multibody.simulation import simulate_assembly
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.kinematics.se3 import logarithm
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.steps.plan import Join, Plan, Preload, Release
+from forcefit.assembly.steps.run import assemble_in_steps
+from forcefit.stiffness.screws import SCREW
+from forcefit.validation.multibody.simulation import simulate_assembly
 
 pytestmark = pytest.mark.exudyn
 BEAM = BeamLink({"radius": 0.01}, 2.1e11, 0.3)

@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import Frame, MatrixLink, Robot
-from assembly.platform_stiffness.exact_tangent import exact_tangent
-from assembly.platform_stiffness.linear_tangent import without_clearance
-from assembly.robots import load_robot
-from validation.crosscheck.link_models import link_models
-from validation.multibody import tangent
-from validation.multibody.conservative_springs import far_couple, middle_wrench
-from validation.multibody.exudyn_model import Regularisation
-from validation.multibody.motion import exponential, logarithm, turn_of, turned
-from validation.multibody.simulation import SimulationModel
-from validation.multibody.simulation import without_clearance as without_play
-from validation.multibody.tangent import simulated_tangent
+from forcefit.assembly.exact.exact import solve_exact
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import Frame, MatrixLink, Robot
+from forcefit.assembly.platform_stiffness.exact_tangent import exact_tangent
+from forcefit.assembly.platform_stiffness.linear_tangent import without_clearance
+from forcefit.assembly.robots import load_robot
+from forcefit.validation.crosscheck.link_models import link_models
+from forcefit.validation.multibody import tangent
+from forcefit.validation.multibody.conservative_springs import far_couple, middle_wrench
+from forcefit.validation.multibody.exudyn_model import Regularisation
+from forcefit.validation.multibody.motion import exponential, logarithm, turn_of, turned
+from forcefit.validation.multibody.simulation import SimulationModel
+from forcefit.validation.multibody.simulation import without_clearance as without_play
+from forcefit.validation.multibody.tangent import simulated_tangent
 
 pytestmark = pytest.mark.exudyn
 

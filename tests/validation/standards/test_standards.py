@@ -5,11 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from tests.campaigns_for_tests import write_campaign
-from validation.campaign.campaign_file import read_campaign
-from validation.standards.figures import standard_figures
-from validation.standards.iso230 import axis_figures
-from validation.standards.iso9283 import (
+from forcefit.validation.campaign.campaign_file import read_campaign
+from forcefit.validation.standards.figures import standard_figures
+from forcefit.validation.standards.iso230 import axis_figures
+from forcefit.validation.standards.iso9283 import (
     accuracy_drift,
     distance_accuracy,
     orientation_accuracy,
@@ -17,6 +16,7 @@ from validation.standards.iso9283 import (
     position_accuracy,
     position_repeatability,
 )
+from tests.campaigns_for_tests import write_campaign
 
 
 def test_pose_accuracy_and_repeatability_equal_hand_calculation():

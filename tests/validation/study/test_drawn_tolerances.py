@@ -5,12 +5,12 @@ import json
 import pytest
 
 from forcefit.inputs.table import BadInput
+from forcefit.validation.study.headline import verdict
+from forcefit.validation.study.report import write_study
+from forcefit.validation.study.study import run_study
+from forcefit.validation.study.study_file import read_study
 from tests.drawn_four_bar_for_tests import COEFFICIENTS, LEVER, four_bar_file
 from tests.pages_for_tests import parse
-from validation.study.headline import verdict
-from validation.study.report import write_study
-from validation.study.study import run_study
-from validation.study.study_file import read_study
 
 QUIET = "[checks]\npicture = false\ncrosscheck = false\nreference = false\n"
 STATISTICS = "[statistics]\ndraws = {draws}\nimportance = {base}\n"

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import Clearance, Frame, Robot
-from validation.study.governing import CLEARANCE, ERROR, governing
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
+from forcefit.validation.study.governing import CLEARANCE, ERROR, governing
 
 
 def chain(*parts):

@@ -8,13 +8,13 @@ import pytest
 import xarray
 
 import forcefit as ff
-from assembly.files.robot_file import write_robot
-from assembly.report.platform_stiffness import largest_rows
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.report.platform_stiffness import largest_rows
+from forcefit.validation.study.report import report_page, results_table, write_study
+from forcefit.validation.study.study import run_study
+from forcefit.validation.study.study_file import read_study
 from tests.pages_for_tests import parse
 from tests.robots_for_tests import coaxial_beams
-from validation.study.report import report_page, results_table, write_study
-from validation.study.study import run_study
-from validation.study.study_file import read_study
 
 QUIET = "[checks]\npicture = false\ncrosscheck = false\nreference = false\n"
 LOAD = np.array([0.0, 0.0, 0.0, 40.0, -30.0, 0.0])

@@ -10,17 +10,22 @@ import numpy as np
 import pytest
 import xarray
 
-from assembly.files.robot_file import write_robot
-from assembly.kinematics.posture import place_robot
-from assembly.report.pose_errors import pose_error_of
-from assembly.robots import BUILT_IN
+from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.report.pose_errors import pose_error_of
+from forcefit.assembly.robots import BUILT_IN
 from forcefit.inputs.table import BadInput
+from forcefit.validation.study.headline import worst_clearance
+from forcefit.validation.study.report import (
+    report_page,
+    results_table,
+    verdict,
+    write_study,
+)
+from forcefit.validation.study.study import run_study
+from forcefit.validation.study.study_file import read_study
 from tests.pages_for_tests import parse
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
-from validation.study.headline import worst_clearance
-from validation.study.report import report_page, results_table, verdict, write_study
-from validation.study.study import run_study
-from validation.study.study_file import read_study
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "irsbot2.toml"
 SMALL = """
@@ -255,12 +260,14 @@ def test_study_whose_map_has_no_reachable_point_does_not_pass(tmp_path):
 
 
 def test_study_whose_reference_has_no_answer_does_not_pass(tmp_path, monkeypatch):
-    import assembly.linear.reference.as_printed
+    import forcefit.assembly.linear.reference.as_printed
 
     def lost(*_):
         raise RuntimeError("cvxpy: the problem is unbounded")
 
-    monkeypatch.setattr(assembly.linear.reference.as_printed, "energy_as_printed", lost)
+    monkeypatch.setattr(
+        forcefit.assembly.linear.reference.as_printed, "energy_as_printed", lost
+    )
     text = SMALL + QUIET + "crosscheck = false\nmaps = false\n"
     results = run_study(read_study(study_file(tmp_path, text), tmp_path / "out"))
     write_study(results)
@@ -298,7 +305,7 @@ def test_headline_is_the_worst_clearance_over_the_map(tmp_path):
 
 
 def test_study_reports_a_manipulator_that_cannot_be_assembled(tmp_path):
-    from assembly.model.robot import Frame, Robot
+    from forcefit.assembly.model.robot import Frame, Robot
 
     frames = (Frame("a"), Frame("b", geometric_error=[0, 0, 0, 1e-3, 0, 0]))
     write_robot(Robot("stuck", "a", frames, (("a", "b"),)), tmp_path / "stuck.toml")

@@ -9,15 +9,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.effects import LIBRARY, apply_effects
-from assembly.kinematics.posture import place_robot
-from assembly.measurement.conditions import as_declared
-from assembly.measurement.predict import predict
-from assembly.model.robot import BeamLink
-from assembly.robots import load_robot
-from validation.multibody.simulation import without_clearance
-from validation.synthetic.effects import Row
-from validation.synthetic.machine import Hidden, simulate_readings
+from forcefit.assembly.effects import LIBRARY, apply_effects
+from forcefit.assembly.kinematics.posture import place_robot
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.model.robot import BeamLink
+from forcefit.assembly.robots import load_robot
+from forcefit.validation.multibody.simulation import without_clearance
+from forcefit.validation.synthetic.effects import Row
+from forcefit.validation.synthetic.machine import Hidden, simulate_readings
 
 POINT = np.array([0.02, 0.0, 0.05])
 UNDER = {"temperature": 6.0, "time": 100.0, "approach": -1.0}

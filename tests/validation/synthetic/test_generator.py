@@ -11,12 +11,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
 from forcefit.inputs.errors import BadInput
-from validation.synthetic.design import CampaignDesign
-from validation.synthetic.effects import Row
-from validation.synthetic.generator import Noise, generate_campaign
-from validation.synthetic.machine import Hidden, simulate_readings
+from forcefit.validation.synthetic.design import CampaignDesign
+from forcefit.validation.synthetic.effects import Row
+from forcefit.validation.synthetic.generator import Noise, generate_campaign
+from forcefit.validation.synthetic.machine import Hidden, simulate_readings
 
 pytestmark = pytest.mark.exudyn
 

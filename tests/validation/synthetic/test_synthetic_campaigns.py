@@ -11,24 +11,37 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.files.robot_file import read_robot
-from assembly.kinematics.posture import Posture, place_many_joints
-from assembly.measurement.conditions import as_declared
-from assembly.measurement.predict import predict
-from assembly.model.robot import BeamLink, Frame, Robot
-from assembly.robots import load_robot
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.kinematics.posture import Posture, place_many_joints
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.measurement.predict import predict
+from forcefit.assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import plain
-from validation.campaign.campaign_file import read_campaign
-from validation.multibody.simulation import without_clearance
-from validation.synthetic.design import CampaignDesign, plan_campaign, varied_for
-from validation.synthetic.draws import SLIDING, NotApplicable, draw_effect, strengthened
-from validation.synthetic.effects import LIBRARY, Row
-from validation.synthetic.equivalents import alternatives
-from validation.synthetic.generator import Noise, generate_campaign, write_campaign
-from validation.synthetic.machine import Hidden, simulate_readings
-from validation.synthetic.outside import OUTSIDE
-from validation.synthetic.truth import truth_of
+from forcefit.validation.campaign.campaign_file import read_campaign
+from forcefit.validation.multibody.simulation import without_clearance
+from forcefit.validation.synthetic.design import (
+    CampaignDesign,
+    plan_campaign,
+    varied_for,
+)
+from forcefit.validation.synthetic.draws import (
+    SLIDING,
+    NotApplicable,
+    draw_effect,
+    strengthened,
+)
+from forcefit.validation.synthetic.effects import LIBRARY, Row
+from forcefit.validation.synthetic.equivalents import alternatives
+from forcefit.validation.synthetic.generator import (
+    Noise,
+    generate_campaign,
+    write_campaign,
+)
+from forcefit.validation.synthetic.machine import Hidden, simulate_readings
+from forcefit.validation.synthetic.outside import OUTSIDE
+from forcefit.validation.synthetic.truth import truth_of
 
 CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
 TRUTH = json.loads((CAMPAIGNS / "truth.json").read_text(encoding="utf-8"))

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.linear.closure import linearise, virtual_joints
-from assembly.linear.load import loads_on_frames
-from assembly.linear.reference.reduction import FreeMotion, reduce_problem
-from assembly.model.robot import Frame, Robot
+from forcefit.assembly.kinematics.posture import home_posture
+from forcefit.assembly.linear.closure import linearise, virtual_joints
+from forcefit.assembly.linear.load import loads_on_frames
+from forcefit.assembly.linear.reference.reduction import FreeMotion, reduce_problem
+from forcefit.assembly.model.robot import Frame, Robot
 from tests.robots_for_tests import coaxial_beams
 
 
