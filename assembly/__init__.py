@@ -3,5 +3,7 @@
 Begin with ``model/robot.py``, then ``kinematics/posture.py``, ``linear/energy.py``.
 """
 
-# ``import forcefit`` searches this text to recognise the package as its own
-DISTRIBUTION = "forcefit"
+if __name__ == "assembly":  # the name of the last release, in a checkout
+    from forcefit.old_packages import use_present_name
+
+    use_present_name(__name__)

@@ -7,10 +7,10 @@ grid of its workspace.  Printed, in this order:
 - microseconds of processor time a point for the energy (22), at the errors times 1 and
   times 0.2, by cvxpy rebuilt for every point (SI units), cvxpy with parameters (scaled,
   DPP; its matrices ready made), Clarabel on the full problem, Clarabel on the problem
-  reduced by ``forcefit.assembly.linear.reference.reduction`` (reduction counted), a batch of
-  moreau's on the full problem (to its 1e-8, without our certificate), our reference in
-  numpy, ``solve_assembly``, of one posture and of many (linearisation, reduction,
-  certificate counted), with the ratio of cvxpy's DPP to each;
+  reduced by ``forcefit.assembly.linear.reference.reduction`` (reduction counted), a
+  batch of moreau's on the full problem (to its 1e-8, without our certificate), our
+  reference in numpy, ``solve_assembly``, of one posture and of many (linearisation,
+  reduction, certificate counted), with the ratio of cvxpy's DPP to each;
 - the same for the energy under a force and a moment on the platform and weight, errors
   times 1, 0.2 and 0, and for draws of the errors at one posture under them;
 - the same for the margin (21), both readings;

@@ -19,7 +19,7 @@ from coverage import Coverage, CoverageData
 
 from benchmarks.faults import ROOT, Fault
 
-PACKAGES = ("stiffness", "assembly", "validation", "forcefit")
+FOLDERS = ("stiffness", "assembly", "validation", "forcefit")
 BESIDE = ("tests/test_answers.py",)
 MEMORY = 8 * 2**30  # [byte]
 PASSED, FAILED, INTERRUPTED, NONE_COLLECTED = 0, 1, 2, 5
@@ -89,7 +89,7 @@ class Tracer:
 
     def start(self) -> None:
         """Trace from here on."""
-        self.coverage = Coverage(str(self.data), source=list(PACKAGES))
+        self.coverage = Coverage(str(self.data), source=["forcefit"])
         self.coverage.start()
 
     def stop(self) -> None:
@@ -168,14 +168,16 @@ class Trace:
 
 def sources() -> Iterator[Path]:
     """Files of the packages."""
-    for package in PACKAGES:
-        for path in sorted((ROOT / package).rglob("*.py")):
+    for folder in FOLDERS:
+        for path in sorted((ROOT / folder).rglob("*.py")):
             yield path.relative_to(ROOT)
 
 
 def importers(path: Path) -> list[Path]:
     """Files of the packages that import a file's names."""
-    module = ".".join(path.with_suffix("").parts)
+    module = "forcefit." + ".".join(path.with_suffix("").parts).removeprefix(
+        "forcefit."
+    )
     text = re.compile(rf"^from {re.escape(module)} import", re.MULTILINE)
     return [p for p in sources() if text.search((ROOT / p).read_text("utf-8"))]
 

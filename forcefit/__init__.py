@@ -8,58 +8,17 @@ in :mod:`forcefit.commands`.
 import os.path
 import sys
 
+# In a checkout without symbolic links, as on Windows, the packages are one level up.
+if not os.path.isdir(os.path.join(__path__[0], "assembly")):
+    __path__.append(os.path.dirname(__path__[0]))
+from forcefit.old_packages import OldPackages
+
+if not any(isinstance(finder, OldPackages) for finder in sys.meta_path):
+    sys.meta_path.insert(0, OldPackages())
+
 TYPE_CHECKING = False  # importing typing takes longer than the rest of this module
 if TYPE_CHECKING:
     __version__: str
-
-_MARK = 'DISTRIBUTION = "forcefit"'  # text in each package's __init__.py
-_BESIDE = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
-
-
-def _refuse_namesakes() -> None:
-    """Raise an error if one of the packages belongs to another distribution.
-
-    Other distributions use the same package names.  Python imports the first package on
-    the path; in one folder the last installation overwrites earlier ones.
-
-    Raises:
-        ImportError: names the file of the other distribution.
-    """
-    for name in ("stiffness", "assembly", "validation"):
-        found = _place_of(name)
-        if found != os.path.join(_BESIDE, name, "__init__.py") or not _is_ours(found):
-            raise ImportError(
-                f"forcefit: found {found}, expected forcefit's own package {name!r} in "
-                f"{_BESIDE}; remove the package of this name, or install forcefit in "
-                "an environment of its own",
-                name=name, path=found,
-            )  # fmt: skip
-
-
-def _place_of(name: str) -> str:
-    """Return the first file of the package that Python would import, or ``"nothing"``.
-
-    Args:
-        name: name of the package.
-
-    Returns:
-        The path.  It is searched here because ``importlib.util``, which has such a
-        function, takes long to import.
-    """
-    for finder in sys.meta_path:
-        spec = finder.find_spec(name, None)
-        if spec is not None:
-            return os.path.realpath(spec.origin) if spec.origin else "nothing"
-    return "nothing"
-
-
-def _is_ours(file: str) -> bool:
-    """Return whether a package's first file belongs to forcefit."""
-    with open(file, encoding="utf-8", errors="replace") as text:
-        return _MARK in text.read()
-
-
-_refuse_namesakes()
 
 # modules and the public names that they define: the whole interface
 _OWNERS = {
@@ -112,10 +71,10 @@ _OWNERS = {
 _RENAMED = {
     "foretell": ("predict",), "load_deflection": ("deflection_curve",),
     "read_robot": ("load_robot",),
-    "home_posture": ("place_robot", "forcefit.assembly.kinematics.posture", "home_posture"),
-    "SweepOptions": ("sweep", "forcefit.assembly.sweeps.robot_sweep", "options_by_old_names"),
-    "ask_sweep": ("sweep", "forcefit.assembly.sweeps.request", "ask_sweep"),
-    "run_sweep": ("sweep", "forcefit.assembly.sweeps.sweep", "run_sweep"),
+    "home_posture": ("place_robot", "forcefit.assembly.kinematics.posture",
+    "home_posture"), "SweepOptions": ("sweep", "forcefit.assembly.sweeps.robot_sweep",
+    "options_by_old_names"), "ask_sweep": ("sweep", "forcefit.assembly.sweeps.request",
+    "ask_sweep"), "run_sweep": ("sweep", "forcefit.assembly.sweeps.sweep", "run_sweep"),
     "sweep_in_memory": ("sweep", "forcefit.assembly.sweeps.sweep", "sweep_in_memory"),
 }  # fmt: skip
 # public names of the last release that are now imported from their module

@@ -3,5 +3,7 @@
 Begin with ``crosscheck/crosscheck.py`` and ``diagnosis/diagnose.py``.
 """
 
-# ``import forcefit`` searches this text to recognise the package as its own
-DISTRIBUTION = "forcefit"
+if __name__ == "validation":  # the name of the last release, in a checkout
+    from forcefit.old_packages import use_present_name
+
+    use_present_name(__name__)

@@ -6,9 +6,9 @@ A step of the exact equilibrium needs the change v of the clearances u that mini
 
     where S has directions of negative curvature: normal to the active constraint
     boundaries, which is harmless, and sometimes elsewhere.  Far from the solution S is
-    made convex, and :mod:`forcefit.assembly.solvers.conic` solves the problem.  Near the
-    solution Newton's method on the active boundaries is exact to rounding, while the
-    conic solver stops at half of the digits.
+    made convex, and :mod:`forcefit.assembly.solvers.conic` solves the problem.  Near
+    the solution Newton's method on the active boundaries is exact to rounding, while
+    the conic solver stops at half of the digits.
 
 ======  ===========  =========  =====================================================
 symbol  code         shape      meaning

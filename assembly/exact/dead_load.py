@@ -12,7 +12,7 @@ symbol  code           shape       meaning
 ======  =============  ==========  ==================================================
 G       ``bodies`` ..  (n, 3, 4)   load on the body that reaches to each frame, before
         its joint, and on all that its joint carries
-w       ``load``       (6,)        on the platform, see :mod:`forcefit.assembly.exact.exact`
+w       ``load``       (6,)        on the platform, see :func:`.exact.solve_exact`
 M       --             (3, 3)      sum of the points times their forces
 ======  =============  ==========  ==================================================
 

@@ -7,11 +7,11 @@ Near a placement x the closures are linearised and the Lagrangian
 is expanded to second order, with its true Hessian.  The curvature of the closures times
 the wrenches that they carry exceeds compliant springs; without this term Gauss-Newton
 steps stall.  Springs and free motions are eliminated, and
-:mod:`forcefit.assembly.exact.contact_qp` solves the problem in the clearances.  A restoration
-(retraction) brings the step back onto the closures.  The step is accepted if it reduces
-the energy plus a penalty on the residual.  Otherwise a proximal term damps it, as in
-the method of Levenberg and Marquardt, measured in radians and reference lengths of
-every screw.
+:mod:`forcefit.assembly.exact.contact_qp` solves the problem in the clearances.  A
+restoration (retraction) brings the step back onto the closures.  The step is accepted
+if it reduces the energy plus a penalty on the residual.  Otherwise a proximal term
+damps it, as in the method of Levenberg and Marquardt, measured in radians and reference
+lengths of every screw.
 
 ======  =============  =============  ===============================================
 symbol  code           shape          meaning

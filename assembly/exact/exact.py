@@ -1,9 +1,9 @@
 r"""The forced assembly at least energy with finite motions: closures hold on SE(3).
 
 Springs, clearance cones and geometric errors are those of the linear virtual-joint
-model (:mod:`forcefit.assembly.linear.energy`).  Only the closures differ, because finite motions
-are composed as in :mod:`forcefit.assembly.exact.finite_robot`.  The springs' energy minus the
-work of the loads is minimised,
+model (:mod:`forcefit.assembly.linear.energy`).  Only the closures differ, because
+finite motions are composed as in :mod:`forcefit.assembly.exact.finite_robot`.  The
+springs' energy minus the work of the loads is minimised,
 
     minimise  |y|^2 / 2 - w . x_p(y, u, q) - W(y, u, q)
     subject to  r(y, u, q) = 0,   |u_k| <= 1 for each cone k,
@@ -147,7 +147,7 @@ class ExactAssembly:
         }
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return frames, closures and platform; see :mod:`forcefit.assembly.model.tables`."""
+        """Return frames, closures and platform, by ``assembly.model.tables``."""
         from forcefit.assembly.model.tables import assembly_dataset
 
         return assembly_dataset(self)
@@ -324,7 +324,8 @@ def solve_exact(
         start: the linear solution for this posture and these loads, if known.
         bodies: (n, 6) [N m, N] dead loads on the bodies of all frames, each at its
             frame's origin, base axes; moments are couples of dead forces.
-        gravity: (3,) [m/s^2] base axes; see :mod:`forcefit.assembly.exact.dead_load` for links.
+        gravity: (3,) [m/s^2] base axes; see :mod:`forcefit.assembly.exact.dead_load`
+            for links.
         point: (3,) [m] point of the platform, in its axes; the force moves with it.
         near: equilibrium of the same posture under another load, used as the start.
         progress: function called with the number of steps and the largest number.

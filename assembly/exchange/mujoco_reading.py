@@ -57,7 +57,7 @@ def compare_here(mechanism: Mechanism, path: Path) -> Comparison:
 
 
 def main() -> None:
-    """Compare files of :mod:`forcefit.assembly.exchange.comparison` in a separate process."""
+    """Compare files of :mod:`.comparison` in a separate process."""
     given, made = Path(sys.argv[1]), Path(sys.argv[2])
     with given.open("rb") as file:
         mechanism, path = pickle.load(file)

@@ -5,8 +5,8 @@ A distribution names a function for the ending of its files::
     [project.entry-points."forcefit.readers"]
     cad = "their_package.robots:read"   # of files that end in .cad
 
-``read(path)`` returns a :class:`forcefit.assembly.model.robot.Robot`; its ``BadInput`` is the
-message for the user.
+``read(path)`` returns a :class:`forcefit.assembly.model.robot.Robot`; its ``BadInput``
+is the message for the user.
 """
 
 from importlib.metadata import EntryPoint, entry_points

@@ -21,8 +21,8 @@ def lay_over(robot: Mapping[str, Any], overlay: Path | str) -> Table:
     """Return a robot's table with an overlay's keys added or replaced.
 
     Args:
-        robot: table of :func:`forcefit.assembly.files.robot_file.robot_table`; its paths start
-            in the overlay's folder.
+        robot: table of :func:`forcefit.assembly.files.robot_file.robot_table`; its
+            paths start in the overlay's folder.
         overlay: the file: ``[[frame]]`` with a ``name`` (``*`` matches any letters) and
             any keys of a frame except those of its placement; ``platform``,
             ``description``, ``[[effect]]`` of the whole robot.

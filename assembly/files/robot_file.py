@@ -70,7 +70,8 @@ def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
 
     Returns:
         The robot; its nominal closures hold in its home pose.  Meshes and libraries of
-        its links are not read: see :func:`forcefit.assembly.files.solved_links.solve_links`.
+        its links are not read: see
+        :func:`forcefit.assembly.files.solved_links.solve_links`.
 
     Raises:
         BadInput: the file breaks a rule of the format, or a closure does not hold.

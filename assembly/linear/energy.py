@@ -1,9 +1,9 @@
 """The least energy that closes a manipulator, problem (22), at one point or at many.
 
-The compiled method (:mod:`forcefit.assembly.linear.lanes`) computes all steps from the frames'
-poses to the certificate, with and without loads.  The reference
-(:mod:`forcefit.assembly.linear.reference`) solves points that it does not cover or certify; the
-answer's ``method`` says so.
+The compiled method (:mod:`forcefit.assembly.linear.lanes`) computes all steps from the
+frames' poses to the certificate, with and without loads.  The reference
+(:mod:`forcefit.assembly.linear.reference`) solves points that it does not cover or
+certify; the answer's ``method`` says so.
 """
 
 from collections.abc import Mapping, Sequence
@@ -116,10 +116,10 @@ def solve_assembly(
             all frames carry, each at its frame's origin, base axes.
 
     Returns:
-        The assembled manipulator; :func:`forcefit.assembly.linear.certificate.unproved` says
-        where the certificate falls short even so.  For many postures or sets of errors,
-        one object with all points; a point without a solution raises nothing and has
-        its reason in ``reason``.
+        The assembled manipulator; :func:`forcefit.assembly.linear.certificate.unproved`
+        says where the certificate falls short even so.  For many postures or sets of
+        errors, one object with all points; a point without a solution raises nothing
+        and has its reason in ``reason``.
 
     Raises:
         CannotAssemble: a closure is open that no clearance and no spring can close.

@@ -1,9 +1,9 @@
 """Of all assemblies of least energy, the one whose platform is nearest to nominal.
 
 Springs and loaded clearances are the same in all of them
-(:mod:`forcefit.assembly.linear.reference.pose_error`, ``frozen``).  Unloaded clearances may be
-anywhere in their cones as long as the closures hold.  The nearest pose is another
-second-order cone programme,
+(:mod:`forcefit.assembly.linear.reference.pose_error`, ``frozen``).  Unloaded clearances
+may be anywhere in their cones as long as the closures hold.  The nearest pose is
+another second-order cone programme,
 
     minimise  |x + X (v - u)|^2    subject to  H (v - u) = 0,  |v_k| <= 1,
 

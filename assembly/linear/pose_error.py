@@ -14,16 +14,16 @@ Passive joints keep within the bounds of their own motion.  Rotation and transla
 bounded separately: a tool on a bearing turns freely, and its point still has a largest
 error.
 
-The set of platform screws (:mod:`forcefit.assembly.linear.reference.pose_error`) is convex.
-With ``"compiled"``, :func:`forcefit.assembly.solvers.one_problem.farthest` brackets its farthest
-screw and calls Clarabel for single supports in doubt.  With ``"reference"``,
-:func:`forcefit.assembly.solvers.outer_cuts.farthest` does so in numpy, and Clarabel computes
-every support.
+The set of platform screws (:mod:`forcefit.assembly.linear.reference.pose_error`) is
+convex. With ``"compiled"``, :func:`forcefit.assembly.solvers.one_problem.farthest`
+brackets its farthest screw and calls Clarabel for single supports in doubt.  With
+``"reference"``, :func:`forcefit.assembly.solvers.outer_cuts.farthest` does so in numpy,
+and Clarabel computes every support.
 
 The first two assumptions are compiled from end to end
-(:mod:`forcefit.assembly.linear.moving_clearances`) and take some tenths of a millisecond a
-point.  For ``budget``, and for points that this does not cover, the set is set up in
-numpy, point by point.
+(:mod:`forcefit.assembly.linear.moving_clearances`) and take some tenths of a
+millisecond a point.  For ``budget``, and for points that this does not cover, the set
+is set up in numpy, point by point.
 """
 
 from collections.abc import Callable

@@ -1,6 +1,7 @@
 """The numbers of a least energy, of one point or of many, and their selection.
 
-:class:`forcefit.assembly.linear.assembled.Assembly` adds the quantities computed from them.
+:class:`forcefit.assembly.linear.assembled.Assembly` adds the quantities computed from
+them.
 """
 
 from collections.abc import Mapping

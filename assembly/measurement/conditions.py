@@ -1,9 +1,9 @@
 """Conditions of measurements of a robot, past or planned.
 
-An *effect* (:mod:`forcefit.assembly.effects`) is a property that the model of a robot lacks.  It
-changes one or more of the fields below and nothing else.  So any number of effects can
-be combined, and :func:`forcefit.assembly.measurement.predict.predict` does not depend on the
-effects.
+An *effect* (:mod:`forcefit.assembly.effects`) is a property that the model of a robot
+lacks.  It changes one or more of the fields below and nothing else.  So any number of
+effects can be combined, and :func:`forcefit.assembly.measurement.predict.predict` does
+not depend on the effects.
 
 ======  ====================  =========  =============================================
 symbol  code                  shape      meaning

@@ -1,11 +1,11 @@
 r"""The exact equilibrium of a robot without clearances, for many rows together.
 
-The equations are those of :mod:`forcefit.assembly.exact.exact`: closures hold on SE(3), every
-body and spring deforms by its compliance times its wrench, and free motions carry no
-load.  All rows are iterated together with the inverse of the linear model at the
-nominal posture (:mod:`forcefit.assembly.measurement.without_clearance`).  The first iterate is
-the linear solution.  Each further iteration reduces the error by a factor of the size
-of the motions (a chord method).  Rows that do not converge are solved by
+The equations are those of :mod:`forcefit.assembly.exact.exact`: closures hold on SE(3),
+every body and spring deforms by its compliance times its wrench, and free motions carry
+no load.  All rows are iterated together with the inverse of the linear model at the
+nominal posture (:mod:`forcefit.assembly.measurement.without_clearance`).  The first
+iterate is the linear solution.  Each further iteration reduces the error by a factor of
+the size of the motions (a chord method).  Rows that do not converge are solved by
 :func:`forcefit.assembly.exact.exact.solve_exact`.
 
 The rows and the iterate are defined in :mod:`forcefit.assembly.measurement.row_state`.

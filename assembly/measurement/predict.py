@@ -2,9 +2,9 @@
 
 Robots without clearances are solved together by
 :mod:`forcefit.assembly.measurement.without_clearance`, with finite motions by
-:mod:`forcefit.assembly.measurement.exact_rows`.  Rows with clearances, or with closures of
-ambiguous numerical rank, are solved one by one by :mod:`forcefit.assembly.linear.energy` and
-:mod:`forcefit.assembly.exact.exact`.
+:mod:`forcefit.assembly.measurement.exact_rows`.  Rows with clearances, or with closures
+of ambiguous numerical rank, are solved one by one by
+:mod:`forcefit.assembly.linear.energy` and :mod:`forcefit.assembly.exact.exact`.
 
 Sources:
     Public format, campaigns: rotation vector of R_actual R_nominal^T and difference of

@@ -1,7 +1,7 @@
 """A general effect: a small screw, or a compliance, as a function of variables.
 
-:mod:`forcefit.assembly.effects.forms` defines its numbers; :mod:`forcefit.assembly.effects.functions`
-applies it.
+:mod:`forcefit.assembly.effects.forms` defines its numbers;
+:mod:`forcefit.assembly.effects.functions` applies it.
 """
 
 from collections.abc import Mapping

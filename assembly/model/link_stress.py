@@ -2,10 +2,10 @@
 
 A link is held at its base and loaded by its frame's wrench at the tip; a beam with a
 density is also loaded by its own weight.  The formulas for beams are in
-:mod:`forcefit.stiffness.beam.beam_stress`.  Links given by a surface use the stress of unit
-wrenches by finite elements (:mod:`forcefit.stiffness.fem.stress`), without the points nearer
-than an interface's radius to a clamped, singular edge.  The stress of a link given by
-its stiffness alone is unknown.
+:mod:`forcefit.stiffness.beam.beam_stress`.  Links given by a surface use the stress of
+unit wrenches by finite elements (:mod:`forcefit.stiffness.fem.stress`), without the
+points nearer than an interface's radius to a clamped, singular edge.  The stress of a
+link given by its stiffness alone is unknown.
 """
 
 from collections.abc import Callable

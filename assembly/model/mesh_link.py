@@ -1,6 +1,7 @@
 """The stored finite-element solution of a mesh link, in its frame's axes.
 
-:func:`forcefit.assembly.files.solved_links.solve_links` solves them when a robot is loaded.
+:func:`forcefit.assembly.files.solved_links.solve_links` solves them when a robot is
+loaded.
 """
 
 from dataclasses import replace
@@ -75,7 +76,8 @@ def mesh_link_mass(frame: Frame) -> tuple[NDArray, NDArray]:
     """Return the consistent mass of a frame's mesh link, by finite elements.
 
     Args:
-        frame: one with a :class:`forcefit.assembly.model.robot.MeshLink` that has a density.
+        frame: one with a :class:`forcefit.assembly.model.robot.MeshLink` that has a
+            density.
 
     Returns:
         (12, 12) [kg m^2 .. kg] for screws of base and tip, each read at its end, in the

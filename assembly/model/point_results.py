@@ -60,7 +60,7 @@ class PointResults:
         return (self[i] for i in range(len(self)))
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set over ``point``; see :mod:`forcefit.assembly.model.tables`."""
+        """Return a data set over ``point``, by ``assembly.model.tables``."""
         from forcefit.assembly.model.tables import points_dataset
 
         arrays = {name: getattr(self, own) for name, own in self.VARIABLES.items()}

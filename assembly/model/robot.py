@@ -1,7 +1,7 @@
 """A manipulator as data: a tree of frames, and the closures that hold it together.
 
-:mod:`forcefit.assembly.model.frame` defines a frame, :mod:`forcefit.assembly.model.link_kinds` a link.
-Their names may be imported from here.
+:mod:`forcefit.assembly.model.frame` defines a frame,
+:mod:`forcefit.assembly.model.link_kinds` a link. Their names may be imported from here.
 """
 
 from collections.abc import Iterable, Mapping

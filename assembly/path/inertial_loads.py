@@ -6,9 +6,9 @@ A rigid body of mass m, centre c and moments of inertia I, at its frame's origin
 
 The inertia of a beam with a density acts along it, that of a link given by a mesh by
 its consistent mass matrix (:mod:`forcefit.assembly.path.beam_inertia`,
-:mod:`forcefit.assembly.path.mesh_inertia`): its part at the link's start acts on the part that
-carries the link.  A wrench at the tip instead would deflect a beam up to 1.5 times too
-much.
+:mod:`forcefit.assembly.path.mesh_inertia`): its part at the link's start acts on the
+part that carries the link.  A wrench at the tip instead would deflect a beam up to 1.5
+times too much.
 """
 
 from dataclasses import dataclass

@@ -29,8 +29,9 @@ class PathTimes:
     """How a path runs in time.
 
     Attributes:
-        profile: from rest to rest, a name of :data:`forcefit.assembly.path.profiles.PROFILES`;
-            None where times are given.
+        profile: from rest to rest, a name of
+            :data:`forcefit.assembly.path.profiles.PROFILES`; None where times are
+            given.
         duration: [s] of the profile.
         speed: [m/s, or rad/s or m/s of drives] its largest speed.
         acceleration: [m/s^2, or rad/s^2 or m/s^2 of drives] its largest acceleration.

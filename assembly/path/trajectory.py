@@ -4,8 +4,8 @@ Given times are interpolated by a quintic spline through the rows, continuous up
 fourth derivative.  With ends at rest, speed and acceleration are zero there; two rows
 are then the quintic profile.  A path without times is a natural cubic spline through
 its rows over the length of its chords, a straight line for two rows.  A profile of
-:mod:`forcefit.assembly.path.profiles` runs along it.  Both interpolate positions, rotation
-vectors or joint coordinates, component by component.
+:mod:`forcefit.assembly.path.profiles` runs along it.  Both interpolate positions,
+rotation vectors or joint coordinates, component by component.
 """
 
 from dataclasses import dataclass

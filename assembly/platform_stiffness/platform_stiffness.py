@@ -73,10 +73,10 @@ def platform_stiffness(
             force: ``"holding"`` or ``"letting go"``.
         method: ``"compiled"``, with the reference where that does not suffice; or
             ``"reference"``, numpy and Clarabel alone.  In the state ``"contact"`` it is
-            the method of :func:`forcefit.assembly.linear.energy.solve_assembly`, in ``"exact"``
-            that of :func:`forcefit.assembly.exact.exact.solve_exact`.  The classical model of
-            one posture always uses numpy, and its ``method`` says so; many postures are
-            compiled, in parallel.
+            the method of :func:`forcefit.assembly.linear.energy.solve_assembly`, in
+            ``"exact"`` that of :func:`forcefit.assembly.exact.exact.solve_exact`.  The
+            classical model of one posture always uses numpy, and its ``method`` says
+            so; many postures are compiled, in parallel.
 
     Returns:
         Stiffness, compliance, free motions and shares at that point, base axes; for

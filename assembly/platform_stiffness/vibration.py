@@ -1,7 +1,8 @@
 r"""Natural frequencies and modes at a posture, drives held.
 
 The stiffness is the tangent of the equilibrium, Z'HZ of
-:mod:`forcefit.assembly.platform_stiffness.exact_tangent`.  The mass is that of all moving
+:mod:`forcefit.assembly.platform_stiffness.exact_tangent`.  The mass is that of all
+moving
 bodies: masses and moments of inertia of frames as of rigid bodies, and beams with a
 density by their consistent mass, with a cubic motion between their clamped ends and the
 rotary inertia of their sections.

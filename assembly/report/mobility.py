@@ -65,9 +65,9 @@ def mobility_of(posture: Posture) -> dict[str, Any]:
         posture: of the robot.
 
     Returns:
-        The counts of :class:`forcefit.assembly.kinematics.mobility.Mobility`, the platform's
-        motions, and whether there are more freedoms than at postures nearby; then the
-        counts there, where motions lead away from the posture.
+        The counts of :class:`forcefit.assembly.kinematics.mobility.Mobility`, the
+        platform's motions, and whether there are more freedoms than at postures nearby;
+        then the counts there, where motions lead away from the posture.
     """
     here = mobility(posture)
     near = mobility_near(posture, here)

@@ -44,7 +44,8 @@ def pose_error_of(
         direction: (6,) direction along which the largest error is bounded too.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
-        options: options of :func:`forcefit.assembly.linear.pose_error.bound_pose_error`.
+        options: options of
+            :func:`forcefit.assembly.linear.pose_error.bound_pose_error`.
 
     Returns:
         The keys of the public format; ``status`` as in :func:`solution_of`.

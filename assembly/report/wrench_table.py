@@ -16,7 +16,8 @@ def wrench_lines(frames: Mapping[str, Any], closures: Sequence[Any]) -> list[str
     """Return the wrenches through all frames and closures as text.
 
     Args:
-        frames: wrenches by frame, from :func:`forcefit.assembly.report.results.solution_of`.
+        frames: wrenches by frame, from
+            :func:`forcefit.assembly.report.results.solution_of`.
         closures: wrenches of the closures from the same function.
 
     Returns:

@@ -37,7 +37,8 @@ def load_robot(name: str | Path, close: Closing | None = None) -> Robot:
     Args:
         name: name such as ``"irsbot2"``, or the path of a robot file.
         close: function that makes the closures of the declared robot hold, from
-            :mod:`forcefit.assembly.kinematics.closing`; by default they are not changed.
+            :mod:`forcefit.assembly.kinematics.closing`; by default they are not
+            changed.
 
     Returns:
         The robot.  Meshes and libraries of its links are read only by

@@ -3,10 +3,11 @@
 There are two problems: the least energy of a reduced problem (22), and the least factor
 on the clearances of problem (21).  Both are scaled here to size 1.  Clarabel solves the
 second problem.  With ``"reference"``, Clarabel also solves the first problem, and
-:mod:`forcefit.assembly.solvers.pressed_cones` refines each solution.  With ``"compiled"``, the
-compiled interior-point method solves it, or Clarabel if in doubt, and Newton's method
-on the dual (:mod:`forcefit.assembly.solvers.one_problem`) refines each solution.  The certified
-gap, which does not depend on the solvers, decides which solution is kept.
+:mod:`forcefit.assembly.solvers.pressed_cones` refines each solution.  With
+``"compiled"``, the compiled interior-point method solves it, or Clarabel if in doubt,
+and Newton's method on the dual (:mod:`forcefit.assembly.solvers.one_problem`) refines
+each solution.  The certified gap, which does not depend on the solvers, decides which
+solution is kept.
 
 Sources:
     Goulart, Chen (2024), Clarabel: an interior-point solver for conic programs with

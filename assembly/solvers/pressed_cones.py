@@ -1,4 +1,4 @@
-r"""Refinement of a minimum of :func:`forcefit.assembly.solvers.conic.minimise_energy` in numpy.
+r"""Refinement of a minimum of :func:`.conic.minimise_energy` in numpy.
 
 A cone solver ends at a gap.  When it is known which cones are in contact with their
 bounds, with forces f, the minimum satisfies equations that Newton's method solves to

@@ -2,11 +2,11 @@
 
 Tolerances t_g, one for each class of errors, have a cost ``c_g / t_g`` (or ``-c_g log
 t_g``).  Limits of margin and energy are convex:
-:mod:`forcefit.assembly.statistics.cutting_planes` finds the least cost and proves it for a yield
-of 1.  A yield below 1, and limits of wrenches, stress and pose errors, are not convex;
-:mod:`forcefit.assembly.statistics.least_cost` continues to a local minimum.  Finally, all
-tolerances are multiplied by one factor until independent draws, or the worst corners,
-just meet every limit, and new draws verify them.
+:mod:`forcefit.assembly.statistics.cutting_planes` finds the least cost and proves it
+for a yield of 1.  A yield below 1, and limits of wrenches, stress and pose errors, are
+not convex; :mod:`forcefit.assembly.statistics.least_cost` continues to a local minimum.
+Finally, all tolerances are multiplied by one factor until independent draws, or the
+worst corners, just meet every limit, and new draws verify them.
 """
 
 from collections.abc import Callable, Sequence

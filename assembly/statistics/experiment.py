@@ -52,8 +52,8 @@ class Experiment:
             ``{"fz": -50}``; none if absent.
         gravity: (3,) [m/s^2] base axes; none if absent.
         stiffness: state in which the platform's stiffness is computed, one of
-            :data:`forcefit.assembly.sweeps.point_stiffness.STATES` except the nominal one; empty
-            if it is not computed.
+            :data:`forcefit.assembly.sweeps.point_stiffness.STATES` except the nominal
+            one; empty if it is not computed.
         precision: [rad, m] required difference between upper and lower bound of the
             largest pose errors in the worst clearance model; inf if not needed.
         contact_length: [m] length of the contact model; random moments divided by it

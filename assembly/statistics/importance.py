@@ -24,10 +24,8 @@ from forcefit.assembly.model.error_distributions import ErrorSources
 from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
 from forcefit.assembly.statistics.ranking import group_of
 
-STREAMS = (
-    2,
-    3,
-)  # number of a stream of random numbers, see forcefit.assembly.model.error_distributions
+# numbers of streams of random numbers, see forcefit.assembly.model.error_distributions
+STREAMS = (2, 3)
 # largest share of discarded draws, because the errors of the others are dependent
 MOST_FAILED = 0.05
 _RESAMPLES = 200

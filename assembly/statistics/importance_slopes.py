@@ -2,9 +2,9 @@
 
 A quotient of sampled deviations is not a derivative, because it has the noise of the
 sample.  As long as the same clearances are active, the solution of (22) is linear in
-the errors, and its slopes are known exactly (:mod:`forcefit.assembly.statistics.sensitivity`).
-The gain of a group is the root mean square of the slopes, over the group's errors
-weighted by variance, and over some draws.
+the errors, and its slopes are known exactly
+(:mod:`forcefit.assembly.statistics.sensitivity`). The gain of a group is the root mean
+square of the slopes, over the group's errors weighted by variance, and over some draws.
 """
 
 import numpy as np

@@ -3,8 +3,8 @@
 Two values are given in addition to the shares of the variance.  The *part* of a group
 is the standard deviation of the platform's screw due to the group, from the same
 sample. The *gain* is an exact derivative, micrometres of the platform for each
-micrometre of error, see :mod:`forcefit.assembly.statistics.importance_slopes`.  Both are norms
-of the platform's vector, so a platform that follows an error has a gain of 1.
+micrometre of error, see :mod:`forcefit.assembly.statistics.importance_slopes`.  Both
+are norms of the platform's vector, so a platform that follows an error has a gain of 1.
 
 Shares are estimates.  Groups with overlapping intervals are not distinguished and share
 their possible ranks, see :mod:`forcefit.assembly.statistics.ranking`.

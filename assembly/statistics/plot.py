@@ -68,8 +68,8 @@ def histogram_figure(
 
     Args:
         data: result of :func:`forcefit.assembly.statistics.monte_carlo.run_draws`.
-        quantities: quantities to show, by the names in :mod:`forcefit.assembly.sweeps.panels`;
-            by default those with a limit.
+        quantities: quantities to show, by the names in
+            :mod:`forcefit.assembly.sweeps.panels`; by default those with a limit.
 
     Returns:
         A panel for each quantity that varies; bands are 95 % confidence intervals.

@@ -40,9 +40,10 @@ def respond(
         key: name of the quantity, for a posture prepared for energies: energy [J],
             force [N], moment [N m], stress [Pa], rotation [rad] or translation [m].
         clearance: for a pose error, one of
-            :data:`forcefit.assembly.statistics.clearance_positions.CLEARANCE_MODELS`.  In the
-            worst model, value and slopes are those of the largest error found.  For
-            uniform and contact positions the slopes are those of the solution of (22).
+            :data:`forcefit.assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
+            In the worst model, value and slopes are those of the largest error found.
+            For uniform and contact positions the slopes are those of the solution of
+            (22).
         contact_length: [m] length of the contact model, see
             :class:`forcefit.assembly.statistics.experiment.Experiment`.
 

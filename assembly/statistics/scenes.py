@@ -63,7 +63,8 @@ def tightest_robot(postures: Sequence[Posture], present: Mapping[str, Any]) -> s
 
     Args:
         postures: the assessed postures.
-        present: result of :func:`forcefit.assembly.statistics.tolerances.present_errors`.
+        present: result of
+            :func:`forcefit.assembly.statistics.tolerances.present_errors`.
 
     Returns:
         HTML of a scene with the assembled robot; empty if it cannot be assembled.
@@ -93,7 +94,8 @@ def margin_map(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
 
     Args:
         postures: the assessed postures.
-        present: result of :func:`forcefit.assembly.statistics.tolerances.present_errors`.
+        present: result of
+            :func:`forcefit.assembly.statistics.tolerances.present_errors`.
 
     Returns:
         HTML of a map; empty if the grid has no axis or more than two.

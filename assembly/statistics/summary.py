@@ -54,7 +54,7 @@ def summarise(
     level: float = 0.95,
     capable: bool = False,
 ) -> dict[str, Any]:
-    """Return a summary of draws from :func:`forcefit.assembly.statistics.monte_carlo.run_draws`.
+    """Return a summary of draws from :func:`.monte_carlo.run_draws`.
 
     Args:
         data: the draws.

@@ -39,7 +39,8 @@ def tolerances_page(
         results: results with ``present``, ``allocation`` or both, the number of
             ``postures`` and their ``grid``.
         provenance: the command and the files.
-        pictures: HTML from :mod:`forcefit.assembly.statistics.scenes`, with the present errors.
+        pictures: HTML from :mod:`forcefit.assembly.statistics.scenes`, with the present
+            errors.
 
     Returns:
         HTML, which needs no other file.

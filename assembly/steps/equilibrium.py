@@ -1,7 +1,8 @@
 """The least energy of a partly assembled robot, for many sets of errors at once.
 
 The small screws of all frames are s = e + E y + U u + F q: errors, springs, clearances
-and free motions (:mod:`forcefit.assembly.linear.closure`).  A step of assembly holds rows
+and free motions (:mod:`forcefit.assembly.linear.closure`).  A step of assembly holds
+rows
 
     R s + L y_f = b
 

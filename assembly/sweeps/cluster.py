@@ -48,7 +48,7 @@ def cluster_solver(
     scheduler: str | None = None,
     report: Callable[[str], None] = lambda text: None,
 ) -> Solver:
-    """Return a solver for :func:`forcefit.assembly.sweeps.sweep.run_sweep` on a cluster.
+    """Return a solver for :func:`.sweep.run_sweep` on a cluster.
 
     Args:
         workers: number of processes of a cluster that is started here, or

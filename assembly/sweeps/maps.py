@@ -31,8 +31,9 @@ def figure_of(
         data: data of a sweep, as saved.
         at: values on other axes by name; the nearest points are shown.  If no draw is
             selected, the median of the draws is shown.
-        quantities: quantities to show, by the names in :mod:`forcefit.assembly.sweeps.panels`;
-            by default those of the paper's figure 5.
+        quantities: quantities to show, by the names in
+            :mod:`forcefit.assembly.sweeps.panels`; by default those of the paper's
+            figure 5.
 
     Returns:
         A figure with a panel for each quantity, with six panels by default.

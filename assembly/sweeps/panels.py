@@ -2,8 +2,8 @@
 
 A quantity is a variable of the data set, with its component if it has several:
 ``energy``, ``stiffness.FX``, ``wrench.leg1.link_a.FZ``.  These are the column names of
-:func:`forcefit.assembly.sweeps.point_table.point_table`.  ``rotation`` and ``translation`` are
-the magnitudes of the platform's pose error.
+:func:`forcefit.assembly.sweeps.point_table.point_table`.  ``rotation`` and
+``translation`` are the magnitudes of the platform's pose error.
 """
 
 from collections.abc import Sequence

@@ -34,7 +34,8 @@ class Question:
     design: design parameters of the robot, if some vary.
         design: design parameters of the robot, if some vary; otherwise None.
         varied: paths of the varied parameters.
-        components: components of the postures, see :mod:`forcefit.assembly.sweeps.targets`.
+        components: components of the postures, see
+            :mod:`forcefit.assembly.sweeps.targets`.
         sources: sources of drawn errors; None if the robot's own errors are used.
         seed: seed of the draws.
         assumption: assumption of problem (27); None if its bounds are not computed.
@@ -46,8 +47,9 @@ class Question:
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         under: covariates on which the robot's effects depend.
-        stiffness: state of K_C, in :data:`forcefit.assembly.sweeps.point_stiffness.STATES`, if
-            K_C and the shares of its parts are computed; otherwise empty.
+        stiffness: state of K_C, in
+            :data:`forcefit.assembly.sweeps.point_stiffness.STATES`, if K_C and the
+            shares of its parts are computed; otherwise empty.
         frequencies: number of natural frequencies, from the same K_C and declared
             masses.
         kept: names of the variables that are stored; by default all computed ones.

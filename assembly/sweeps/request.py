@@ -46,7 +46,7 @@ _MODES = 100  # largest accepted number of natural frequencies
 
 @dataclass(frozen=True)
 class SweepOptions:
-    """The options of :func:`forcefit.assembly.sweeps.robot_sweep.sweep`, with the same names."""
+    """The options of :func:`.robot_sweep.sweep`, with the same names."""
 
     grid: str | None = None
     poses: Path | str | None = None

@@ -58,7 +58,7 @@ class Targets:
 
 
 def goals_of(names: Sequence[str], robot: Robot, rows: NDArray) -> NDArray:
-    """Return poses or coordinates in the form of :mod:`forcefit.assembly.kinematics.posture`.
+    """Return poses or coordinates in the form of ``assembly.kinematics.posture``.
 
     Args:
         names: names of the components, all of one kind.

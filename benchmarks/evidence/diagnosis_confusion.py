@@ -6,9 +6,9 @@
 Case k is drawn from seed k: a robot (``random_robots``), a design, and what is hidden:
 one public effect at 2, 5 or 9 times the noise, two, none, one that no library has, or
 one that the design cannot tell from another.  The data come from the simulation's side
-(``forcefit.validation.synthetic.generator``); what else would explain them as well is worked out
-there too (``forcefit.validation.synthetic.equivalents``).  FOLDER keeps campaigns, truths and
-answers, so that a run can be stopped and taken up again.
+(``forcefit.validation.synthetic.generator``); what else would explain them as well is
+worked out there too (``forcefit.validation.synthetic.equivalents``).  FOLDER keeps
+campaigns, truths and answers, so that a run can be stopped and taken up again.
 
 What counts as right is in ``diagnosis_score.py``.
 """

@@ -19,9 +19,10 @@ tangent has no part in the choice.
 
 Under load joints that are locked about some axes and elastic about others are elastic
 about all, 1e8 where they were locked: how such a joint turns far has no one law (see
-``forcefit.validation.crosscheck.stiffness_check``).  The load moves the platform by 0.03 rad or
-reference lengths, or a tenth, or a hundredth of it where that is too much.  Where the
-two platforms then stand in different equilibria that is said, and nothing is compared.
+``forcefit.validation.crosscheck.stiffness_check``).  The load moves the platform by
+0.03 rad or reference lengths, or a tenth, or a hundredth of it where that is too much.
+Where the two platforms then stand in different equilibria that is said, and nothing is
+compared.
 """
 
 import argparse

@@ -57,8 +57,8 @@ def peak_beam_stress(
     - hollow rectangle: 33 points along each outer side.
 
     Two local effects are left out: the stress where a joint holds the link's ends (a
-    held edge is singular, see :mod:`forcefit.stiffness.fem.stress`), and the stress in the inner
-    corners of a hollow rectangle, which depends on their fillets.
+    held edge is singular, see :mod:`forcefit.stiffness.fem.stress`), and the stress in
+    the inner corners of a hollow rectangle, which depends on their fillets.
 
     Args:
         section: ``radius`` and optionally ``inner_radius``, or ``width`` (along y) and

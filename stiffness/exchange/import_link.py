@@ -33,7 +33,8 @@ def import_link(
     """Return a link from a matrix of 6, 12 or more degrees of freedom.
 
     Args:
-        path: file of the stiffness matrix, see :mod:`forcefit.stiffness.exchange.matrix_file`.
+        path: file of the stiffness matrix, see
+            :mod:`forcefit.stiffness.exchange.matrix_file`.
         mass: file of the mass matrix for the same degrees of freedom; None without one.
         nodes: file with the positions of nodes, needed for interfaces of many nodes.
             Their order applies to rows that the matrix file does not name.

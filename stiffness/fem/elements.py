@@ -8,11 +8,12 @@ G      their gradients in space                                   (t, q, m, 3)
 w      quadrature weights times the Jacobian's determinant        (t, q)
 ====== ========================================================== ==========
 
-An element's m nodes are those of its lattice (:mod:`forcefit.stiffness.mesh.lagrange`): 20 in a
-cubic tetrahedron, 10 in a quadratic one.  The stiffness is assembled from the scalar
-gradients of all elements together, which is much faster than from a weak form: K[ai,
-bj] = sum_q w (lam G_ai G_bj + mu G_aj G_bi + mu d_ij G_a . G_b). Straight tetrahedra
-are integrated exactly; for curved ones the rule is exact to two more degrees.
+An element's m nodes are those of its lattice (:mod:`forcefit.stiffness.mesh.lagrange`):
+20 in a cubic tetrahedron, 10 in a quadratic one.  The stiffness is assembled from the
+scalar gradients of all elements together, which is much faster than from a weak form:
+K[ai, bj] = sum_q w (lam G_ai G_bj + mu G_aj G_bi + mu d_ij G_a . G_b). Straight
+tetrahedra are integrated exactly; for curved ones the rule is exact to two more
+degrees.
 """
 
 from collections.abc import Iterator

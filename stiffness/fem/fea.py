@@ -1,8 +1,9 @@
 """A link's stiffness from its surface by finite elements, with an error estimate.
 
 A surface is meshed into tetrahedra, from which a stiffness and an estimate of its error
-are computed (:mod:`forcefit.stiffness.fem.adaptive_step`).  The elements that contribute most to
-the error are refined until the required accuracy is reached or the budget is used.
+are computed (:mod:`forcefit.stiffness.fem.adaptive_step`).  The elements that
+contribute most to the error are refined until the required accuracy is reached or the
+budget is used.
 """
 
 import logging
@@ -143,8 +144,8 @@ def mesh_link(
         BadInput: the file or an interface is invalid.
 
     Sources:
-        Rivara (1984) for the bisection; :mod:`forcefit.stiffness.fem.error_indicator` for the
-        error.
+        Rivara (1984) for the bisection; :mod:`forcefit.stiffness.fem.error_indicator`
+        for the error.
     """
     shape = read_surface(Path(surface), unit)
     return solve_link(shape, base, tip, (material,), options=options).link

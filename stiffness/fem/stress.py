@@ -66,9 +66,9 @@ class StressInfluence:
         places: (p, 3) [m] positions of the nodes, in the link's axes.
         influence: (p, 6, 6) [Pa/(N m), Pa/N] stress xx yy zz yz xz xy for each
             component of the tip's wrench.  If the link was solved under its own weight
-            (:func:`forcefit.stiffness.fem.own_weight.with_own_weight`), it is (p, 9, 6) and the
-            last three rows [Pa per m/s^2] are for gravity; a wrench then has nine
-            components, gravity last.
+            (:func:`forcefit.stiffness.fem.own_weight.with_own_weight`), it is (p, 9, 6)
+            and the last three rows [Pa per m/s^2] are for gravity; a wrench then has
+            nine components, gravity last.
         away: [m] smallest distance of these nodes from an interface.
         reentrant_edges: whether some of the nodes are on re-entrant edges without a
             fillet, where the elastic stress is singular too.
@@ -258,8 +258,8 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     """Return the stresses of the six unit tip wrenches of a solved link.
 
     Args:
-        solved: result of :func:`forcefit.stiffness.fem.fea.solve_link`; a node between two
-            materials counts once for each material.
+        solved: result of :func:`forcefit.stiffness.fem.fea.solve_link`; a node between
+            two materials counts once for each material.
         away: [m] distance from the interfaces; one interface radius if absent.
 
     Returns:

@@ -1,11 +1,11 @@
 """Tetrahedra from surfaces, with exact interfaces and curved faces.
 
 Pytetwild makes the tetrahedra from a surface with fewer triangles
-(:mod:`forcefit.stiffness.surface.decimate`), in a separate process with a time limit.  The
-boundary of the mesh follows the surface only to within an envelope.  So every boundary
-triangle is assigned to a patch of the surface, and the nodes are projected onto the
-exact shapes of the patches. Meshes are cached by their input, because pytetwild is slow
-and never makes the same mesh twice.
+(:mod:`forcefit.stiffness.surface.decimate`), in a separate process with a time limit.
+The boundary of the mesh follows the surface only to within an envelope.  So every
+boundary triangle is assigned to a patch of the surface, and the nodes are projected
+onto the exact shapes of the patches. Meshes are cached by their input, because
+pytetwild is slow and never makes the same mesh twice.
 """
 
 import hashlib

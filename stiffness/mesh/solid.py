@@ -26,13 +26,14 @@ class Solid:
         patch: (f,) number of each face's patch; 0 is the base interface, 1 the tip.
         shapes: shape of each patch; None leaves the nodes of a patch unchanged.
         walls: for a pair of an interface and a patch that continues it smoothly, the
-            wall through their common line, see :mod:`forcefit.stiffness.surface.smooth_outline`.
+            wall through their common line, see
+            :mod:`forcefit.stiffness.surface.smooth_outline`.
         surface: surface to approximate; None if the shapes of the patches are
             sufficient.
         inner: (k, 3) corners of triangles inside the link, between regions.
         inner_patch: (k,) index of the shape of each inner triangle.
-        region: (t,) region of each tetrahedron, see :mod:`forcefit.stiffness.mesh.regions`; None
-            if the mesh was not cut.
+        region: (t,) region of each tetrahedron, see
+            :mod:`forcefit.stiffness.mesh.regions`; None if the mesh was not cut.
     """
 
     points: NDArray

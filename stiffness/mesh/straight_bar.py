@@ -34,8 +34,8 @@ def straight_bar(section: Mapping[str, float], longest: float = _LONGEST) -> Sol
 
     Args:
         section: lengths in the form of
-            :func:`forcefit.stiffness.beam.sections.declared_section`, relative to the length of
-            the bar.
+            :func:`forcefit.stiffness.beam.sections.declared_section`, relative to the
+            length of the bar.
         longest: thickness of the thickest layer, in widths of the section.
 
     Returns:

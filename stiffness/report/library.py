@@ -2,8 +2,8 @@
 
 A library is a folder with one JSON file for each entry.  An entry holds the stiffness
 and its error, the mesh, the parameters and the material, the digest of the geometry,
-the version of the program and the date.  :mod:`forcefit.stiffness.report.library_build` makes
-entries.
+the version of the program and the date.  :mod:`forcefit.stiffness.report.library_build`
+makes entries.
 """
 
 import itertools

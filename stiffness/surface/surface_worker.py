@@ -1,9 +1,10 @@
 """Process in which VTK, meshio and gmsh read a user's file, because they may crash.
 
-``python -m forcefit.stiffness.surface.surface_worker triangles|solids FILE READ.npz [SOLID]``
+``python -m forcefit.stiffness.surface.surface_worker triangles|solids FILE READ.npz
+[SOLID]``
 
-:mod:`forcefit.stiffness.surface.surface_files` runs this module in a separate process, so a
-damaged file ends only that process.
+:mod:`forcefit.stiffness.surface.surface_files` runs this module in a separate process,
+so a damaged file ends only that process.
 """
 
 import sys
@@ -27,9 +28,9 @@ def main(wanted: str, path: Path, made: Path, solid: str = "") -> None:
         path: path of an existing file.
         made: output file with ``points`` (n, 3) and ``faces`` (m, 3), for STEP also
             ``sides`` (m, 2), ``names`` and ``overlaps``, see
-            :class:`forcefit.stiffness.surface.step_file.StepTriangles`; or with ``names`` (n,),
-            ``volumes`` (n,) and ``boxes`` (n, 6); or with ``refused``, one line of
-            text.
+            :class:`forcefit.stiffness.surface.step_file.StepTriangles`; or with
+            ``names`` (n,), ``volumes`` (n,) and ``boxes`` (n, 6); or with ``refused``,
+            one line of text.
         solid: name of one of several solids of a STEP file.
     """
     _limit_memory()

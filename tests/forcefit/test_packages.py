@@ -17,7 +17,7 @@ from forcefit.inputs.packages import naming_packages
 from tests.packages_for_tests import ROOT, modules_of, run_without
 
 LEAST = ("numpy", "scipy", "clarabel", "typer", "rich")
-OURS = ("forcefit", "assembly", "stiffness", "validation")
+FOLDERS = ("assembly", "stiffness", "validation")
 POSE = ("--pose", "tx=0.1,tz=-0.5")
 GRID = ("--grid", "tx=-0.1:0.1:0.1,tz=-0.5")
 MSH = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
@@ -175,7 +175,7 @@ def test_solving_one_posture_requires_five_packages(tmp_path, words):
     """These are the packages of LEAST and their requirements;
     results are the same as with all packages."""
     ff.write_robot(ff.load_robot("irsbot2"), tmp_path / "robot.toml")
-    shown = modules_of(*LEAST) | {*OURS}
+    shown = modules_of(*LEAST) | {"forcefit"}
     assert not {"xarray", "cvxpy", "pyvista", "exudyn", "threadpoolctl"} & shown
     answers = [
         run_without(
@@ -187,46 +187,54 @@ def test_solving_one_posture_requires_five_packages(tmp_path, words):
     assert answers[0][0] == 0
 
 
-def imported(folders, code="import forcefit"):
-    """Exit status and last line on stderr of a fresh Python that runs some code."""
+def ran(folders, code):
+    """Exit status, standard output and warnings of a fresh Python."""
     path = os.pathsep.join(map(str, folders))
-    ran = subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-P", "-c", code], env=os.environ | {"PYTHONPATH": path},
         capture_output=True, text=True, check=False,
     )  # fmt: skip
-    return ran.returncode, (ran.stderr.strip().splitlines() or [""])[-1]
+    return done.returncode, done.stdout.strip(), done.stderr.strip()
 
 
-@pytest.mark.parametrize("name", OURS[1:])
+@pytest.mark.parametrize("name", FOLDERS)
 @pytest.mark.parametrize("file", ["{}.py", "{}/__init__.py"])
-def test_package_of_the_same_name_earlier_on_the_path_is_reported(tmp_path, name, file):
+@pytest.mark.parametrize("first", ["forcefit", "json"])
+def test_module_of_a_user_and_the_package_do_not_hide_each_other(
+    tmp_path, name, file, first
+):
     other = tmp_path / file.format(name)
     other.parent.mkdir(exist_ok=True)
-    other.write_text("raise SystemExit('another program was run')\n")
-    status, said = imported([tmp_path, ROOT])
-    assert status == 1
-    assert said.startswith(f"ImportError: forcefit: found {other}, expected forcefit's")
-    assert f"package '{name}' in {ROOT};" in said
+    other.write_text("owner = 'another program'\n")
+    code = f"import {first}, {name}, forcefit.{name} as ours; print({name}.owner, ours)"
+    status, out, err = ran([tmp_path, ROOT], code)
+    assert (status, err) == (0, "")
+    assert out.startswith(f"another program <module 'forcefit.{name}' from")
 
 
-@pytest.mark.parametrize("name", OURS[1:])
-def test_package_of_the_same_name_installed_over_forcefit_is_reported(tmp_path, name):
-    """Two wheels in one folder: it has the ``__init__.py`` of the last one."""
-    for one in OURS:
-        (tmp_path / one).mkdir()
-        shutil.copy(ROOT / one / "__init__.py", tmp_path / one)
-    assert imported([tmp_path]) == (0, "")
-    (tmp_path / name / "__init__.py").write_text("def validate(): ...\n")
-    status, said = imported([tmp_path])
-    assert status == 1
-    assert f"found {tmp_path / name / '__init__.py'}, expected forcefit's own" in said
+@pytest.mark.parametrize("name", FOLDERS)
+@pytest.mark.parametrize("first", ["forcefit", "json"])
+def test_old_name_of_a_package_leads_to_the_present_module(name, first):
+    """Also in a checkout, where the folder of this name is found first."""
+    module = {"stiffness": "link", "assembly": "model.robot", "validation": "study"}
+    old = f"{name}.{module[name]}"
+    code = f"import {first}, sys, {old}; print({old} is sys.modules['forcefit.{old}'])"
+    status, out, err = ran([ROOT], code)
+    assert (status, out) == (0, "True")
+    warning = f"FutureWarning: the package {name} is now forcefit.{name}"
+    assert err.splitlines()[0].endswith(warning)
 
 
-def test_folder_of_the_same_name_does_not_hide_the_package(tmp_path):
-    """Without ``__init__.py`` it is not a package while one exists further along the
-    path."""
-    (tmp_path / "assembly").mkdir()
-    assert imported([tmp_path, ROOT], "import forcefit, forcefit.assembly.model") == (
-        0,
-        "",
-    )
+def test_new_names_give_no_warning():
+    assert ran([ROOT], "import forcefit.validation.study.study") == (0, "", "")
+
+
+def test_checkout_without_symbolic_links_finds_the_packages(tmp_path):
+    """As on Windows, where git writes them as files of text."""
+    links = shutil.ignore_patterns("assembly", "stiffness", "validation")
+    shutil.copytree(ROOT / "forcefit", tmp_path / "forcefit", ignore=links)
+    (tmp_path / "forcefit" / "stiffness").write_text("../stiffness")
+    for name in FOLDERS:
+        (tmp_path / name).symlink_to(ROOT / name)
+    code = "import forcefit.stiffness.link as link; print(link.__name__)"
+    assert ran([tmp_path], code) == (0, "forcefit.stiffness.link", "")

@@ -5,7 +5,7 @@ Each of five assumptions is compared with a model that does not make it:
 ==================  ==================================================================
 assumption          compared with
 ==================  ==================================================================
-linear closures     closures that hold with finite motions, :mod:`forcefit.assembly.exact.exact`
+linear closures     closures that hold with finite motions, :func:`.solve_exact`
 beams               solids with held ends, by finite elements
 loads at the ends   a weight spread over its link
 disc and cone       a pin in two bushes, :mod:`forcefit.validation.assumptions.bushes`
@@ -149,8 +149,8 @@ def spread_cost(
 ) -> Cost:
     """Return the error of placing the weights of links at their ends.
 
-    The equivalent loads at the ends, :mod:`forcefit.assembly.linear.load`, cause the correct
-    pose; they lack the energy that beams store between their ends.
+    The equivalent loads at the ends, :mod:`forcefit.assembly.linear.load`, cause the
+    correct pose; they lack the energy that beams store between their ends.
 
     Args:
         posture: the robot's configuration.

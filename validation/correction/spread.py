@@ -1,7 +1,8 @@
 """Standard deviation of a robot's deviation due to the uncertainty in its file.
 
 The covariance of the readings is J C J', where C is the covariance of the parameters in
-the file (:mod:`forcefit.validation.diagnosis.saved_covariance`) and J their derivatives.
+the file (:mod:`forcefit.validation.diagnosis.saved_covariance`) and J their
+derivatives.
 """
 
 from collections.abc import Callable

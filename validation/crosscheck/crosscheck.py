@@ -2,8 +2,8 @@
 
 Both models are solved at several scales s of the load and all imperfections (geometric
 errors, clearances).  Without clearances, the platform's poses are compared
-(:mod:`forcefit.validation.crosscheck.pose_metric`).  With clearances, the pose of least energy
-is not unique, so energies and springs are compared
+(:mod:`forcefit.validation.crosscheck.pose_metric`).  With clearances, the pose of least
+energy is not unique, so energies and springs are compared
 (:mod:`forcefit.validation.crosscheck.clearance_metric`).
 """
 

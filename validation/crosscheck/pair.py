@@ -151,8 +151,8 @@ def hold_free_motions(posture: Posture) -> Posture:
 
     Returns:
         The posture of a robot whose passive joints have a spring of
-        :data:`~forcefit.validation.multibody.exudyn_model.HOLDING_STIFFNESS`, unless they have a
-        spring already.
+        :data:`~forcefit.validation.multibody.exudyn_model.HOLDING_STIFFNESS`, unless
+        they have a spring already.
     """
 
     def hold(frame: Frame) -> Frame:

@@ -16,8 +16,8 @@ def slope_figure(check: Crosscheck) -> "Figure":
     """Return a figure of the difference between both models over the scale.
 
     Args:
-        check: result of :func:`forcefit.validation.crosscheck.crosscheck.crosscheck`, without
-            clearances.
+        check: result of :func:`forcefit.validation.crosscheck.crosscheck.crosscheck`,
+            without clearances.
 
     Returns:
         A log-log figure with panels for rotation [mrad] and translation [mm], each with

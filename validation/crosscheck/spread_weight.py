@@ -2,9 +2,9 @@
 
 The virtual-joint model describes a link by its two ends.  If half of the weight acts at
 each end, with the moments of a beam clamped at both ends
-(:func:`forcefit.assembly.linear.load.weights`), the displacements of the ends are exact, but the
-energy between them is missing.  Without the moments, the displacements of the ends are
-wrong too: the tip of a cantilever moves by a third too far.
+(:func:`forcefit.assembly.linear.load.weights`), the displacements of the ends are
+exact, but the energy between them is missing.  Without the moments, the displacements
+of the ends are wrong too: the tip of a cantilever moves by a third too far.
 """
 
 from collections.abc import Iterator

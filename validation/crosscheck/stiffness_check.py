@@ -3,8 +3,8 @@
 At the equilibrium with the robot's errors, its load and its weight, the residual of the
 simulation is differentiated.  In addition, the platform is loaded slightly along each
 axis, in both directions.  Each method has an estimated uncertainty
-(:mod:`forcefit.validation.multibody.tangent`).  A method whose uncertainty exceeds the tolerance
-is not used for the verdict.
+(:mod:`forcefit.validation.multibody.tangent`).  A method whose uncertainty exceeds the
+tolerance is not used for the verdict.
 
 Clearances are zero in both models unless requested.  If clearances are in contact, only
 the linearised method is used, with smoothed contacts.  The force of a load is dead, and

@@ -5,9 +5,9 @@ The most probable x minimises
     F(x) = |W (y - f(x)) / sigma|^2 + |(x - m) / s|^2    within the bounds of x,
 
 Here f are the readings of the robot to be saved, computed by the function that predicts
-with the saved file (:mod:`forcefit.validation.diagnosis.prediction`).  Steps are Gauss-Newton
-steps, with the slopes of the linear model at the present robot; a step that increases F
-is halved.
+with the saved file (:mod:`forcefit.validation.diagnosis.prediction`).  Steps are
+Gauss-Newton steps, with the slopes of the linear model at the present robot; a step
+that increases F is halved.
 
 ======  ==============  =========  ===================================================
 symbol  code            shape      meaning

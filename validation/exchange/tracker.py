@@ -104,7 +104,8 @@ def import_readings(
     Args:
         files: exports of the device, or ROS bags.
         targets: the targets file (:mod:`forcefit.validation.exchange.targets_file`).
-        commands: the table of commands (:mod:`forcefit.validation.exchange.commands_table`).
+        commands: the table of commands
+            (:mod:`forcefit.validation.exchange.commands_table`).
         folder: folder to be written; it must be absent or empty.
 
     Returns:

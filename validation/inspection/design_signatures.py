@@ -100,15 +100,15 @@ def design_signatures(
 def changes_between_repeats(
     campaign: Campaign, signatures: DesignSignatures
 ) -> dict[str, NDArray]:
-    """Return the columns for :func:`forcefit.validation.inspection.repeats.repeat_noise`.
+    """Return the columns for :func:`.repeats.repeat_noise`.
 
     Args:
         campaign: campaign of N measured cells.
         signatures: signatures of the library's effects on the campaign.
 
     Returns:
-        The columns of :func:`forcefit.validation.inspection.repeats.slow_changes`, and the
-        columns of thermal expansion and friction in each configuration.
+        The columns of :func:`forcefit.validation.inspection.repeats.slow_changes`, and
+        the columns of thermal expansion and friction in each configuration.
     """
     slow = slow_changes(campaign)
     acts = {"temperature": "thermal_expansion", "approach": "friction_hysteresis"}

@@ -1,7 +1,7 @@
 """Beams of the simulation: their axes and the stiffness of their sections.
 
-This module is independent of :mod:`forcefit.assembly.model.links`, except for the constants of a
-section.
+This module is independent of :mod:`forcefit.assembly.model.links`, except for the
+constants of a section.
 """
 
 import math

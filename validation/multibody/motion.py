@@ -1,7 +1,7 @@
 """Finite rigid motions as 4 by 4 matrices, for the multibody simulation only.
 
-This module is independent of :mod:`forcefit.stiffness.screws` on purpose: a mistake in the
-placement of frames must not affect both sides.
+This module is independent of :mod:`forcefit.stiffness.screws` on purpose: a mistake in
+the placement of frames must not affect both sides.
 """
 
 import math

@@ -18,7 +18,8 @@ def platform_section(stiffness: dict[str, Any]) -> str:
     """Return K_C at the study's pose, and the most compliant parts, as HTML.
 
     Args:
-        stiffness: result of :func:`forcefit.assembly.report.platform_stiffness.stiffness_of`.
+        stiffness: result of
+            :func:`forcefit.assembly.report.platform_stiffness.stiffness_of`.
 
     Returns:
         Headings, tables and the chart of the parts' shares.

@@ -15,8 +15,8 @@ def service_section(service: dict[str, Any] | None) -> str:
     """Return loads, platform deflection and natural frequencies as HTML.
 
     Args:
-        service: result of :func:`forcefit.validation.study.service.at_pose`; None if not
-            requested.
+        service: result of :func:`forcefit.validation.study.service.at_pose`; None if
+            not requested.
 
     Returns:
         A table for the loads and a table for the frequencies.

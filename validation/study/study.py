@@ -1,7 +1,7 @@
 """A study: every check of a study file on one robot.
 
-:mod:`forcefit.validation.study.study_file` reads the file, :mod:`forcefit.validation.study.report` writes
-the results.
+:mod:`forcefit.validation.study.study_file` reads the file,
+:mod:`forcefit.validation.study.report` writes the results.
 """
 
 from collections.abc import Callable
@@ -67,7 +67,8 @@ class StudyResults:
         solution: solution at the study's pose, with the keys of ``assembly solve``.
         assembly: assembly of the solution; None if the robot cannot be assembled.
         error: bounds (27) by assumption, with the keys of ``assembly error``.
-        reference: result of :func:`forcefit.validation.study.printed_problems.compare_printed`.
+        reference: result of
+            :func:`forcefit.validation.study.printed_problems.compare_printed`.
         stiffness: K_E of the beam and of the finite elements, by frame.
         maps: data set over the grid.
         crosscheck: comparison with the multibody simulation.
@@ -75,7 +76,8 @@ class StudyResults:
         platform_stiffness: K_C at the pose, with the keys of ``assembly stiffness``.
         governing: bounds (27) with one part made perfect, from
             :func:`forcefit.validation.study.governing.governing`.
-        service: the robot under load, from :func:`forcefit.validation.study.service.at_pose`.
+        service: the robot under load, from
+            :func:`forcefit.validation.study.service.at_pose`.
         statistics: drawn parts at the pose, with the keys of ``assembly statistics``;
             None of a robot without tolerances of a drawing.
         draws: the data set of the draws, or None.

@@ -20,6 +20,7 @@ paper      quantity or problem                         function
 =========  ==========================================  ===============================
 
 ``closure.py`` and ``assembled.py`` are in the folder above, because the compiled
-methods use them too.  Cone programmes are solved by :mod:`forcefit.assembly.solvers.conic`.
-``as_printed.py`` solves (21) and (22) again, as the paper prints them, in cvxpy.
+methods use them too.  Cone programmes are solved by
+:mod:`forcefit.assembly.solvers.conic`. ``as_printed.py`` solves (21) and (22) again, as
+the paper prints them, in cvxpy.
 """

@@ -2,8 +2,8 @@
 
 Slow and simple on purpose: every screw of every frame is a variable, every constraint
 an equation of the paper.  Tests compare :mod:`forcefit.assembly.linear.energy` and
-:mod:`forcefit.assembly.linear.zone` with it.  Both use the same robot, bounds c-bar, compliances
-and eqs (13)-(15), but no common code solves the problems.
+:mod:`forcefit.assembly.linear.zone` with it.  Both use the same robot, bounds c-bar,
+compliances and eqs (13)-(15), but no common code solves the problems.
 
 Two departures from the printed problems: screws are in mrad and mm, to which the
 solver's absolute tolerances fit, and a rigid direction is a screw fixed at zero.

@@ -277,8 +277,8 @@ def within_bounds(
         assembly: the start.
         kept: frames whose bound of the joint's own motion counts from the first.
         moving: function of virtual joints that returns the cones that move.
-        own_axes_free: see :func:`forcefit.assembly.linear.closure.virtual_joints`; then no
-            spring acts.
+        own_axes_free: see :func:`forcefit.assembly.linear.closure.virtual_joints`; then
+            no spring acts.
 
     Returns:
         The set, within all bounds.

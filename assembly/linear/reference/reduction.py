@@ -1,6 +1,7 @@
 """Problem (22) reduced: free motions and springs eliminated exactly.
 
-With the columns of :mod:`forcefit.assembly.linear.closure` the assembly constraints read
+With the columns of :mod:`forcefit.assembly.linear.closure` the assembly constraints
+read
 
     A_q q + A_u u + A_y y = -misfit,      |u_k| <= 1 for each cone k.
 
