@@ -33,7 +33,9 @@ def test_readme_python_example_runs_within_20_lines():
 def test_every_module_of_the_equation_map_exists():
     rows = [line for line in README.splitlines() if line.startswith("| (")]
     names = {
-        n for row in rows for n in re.findall(r"`((?:stiffness|assembly)\.\S+)`", row)
+        n
+        for row in rows
+        for n in re.findall(r"`forcefit\.((?:stiffness|assembly)\.\S+)`", row)
     }
     assert len(names) >= 7
     for name in names:

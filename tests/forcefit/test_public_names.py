@@ -15,11 +15,17 @@ ROOT = Path(__file__).parents[2]
 STUB = ROOT / "forcefit/__init__.pyi"
 
 
+def import_of(owner, names):
+    """The import of names as ruff formats it."""
+    line = f"from {owner} import {', '.join(names)}\n"
+    if len(line) < 90:
+        return line
+    return f"from {owner} import (\n" + "".join(f"    {n},\n" for n in names) + ")\n"
+
+
 def stub_of(owners):
     """The stub that says what the table of public names says."""
-    imports = [
-        f"from {owner} import {', '.join(names)}\n" for owner, names in owners.items()
-    ]
+    imports = [import_of(owner, names) for owner, names in owners.items()]
     public = "".join(f'    "{name}",\n' for name in ff.__all__)
     return (
         '"""Public names for editors and type checkers, as in ``__init__.py``."""\n'

@@ -176,7 +176,9 @@ def test_journal_of_different_sources_is_refused(whole, tmp_path, monkeypatch):
     sweep, _, kept = whole
     copy = tmp_path / "sources" / "assembly"
     shutil.copytree(ROOT / "assembly", copy, ignore=shutil.ignore_patterns("__*__"))
-    monkeypatch.setattr(identity.assembly, "__file__", str(copy / "__init__.py"))
+    monkeypatch.setattr(
+        identity.forcefit.assembly, "__file__", str(copy / "__init__.py")
+    )
     identity.program_hash.cache_clear()
     assert small_sweep().identity == sweep.identity  # wherever the sources lie
     with (copy / "zone.py").open("a") as file:

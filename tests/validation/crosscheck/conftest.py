@@ -45,7 +45,7 @@ def broken(monkeypatch):
 def forget():
     """Clear the caches of all functions."""
     for name, module in list(sys.modules.items()):
-        if name.partition(".")[0] in {"stiffness", "assembly", "validation"}:
+        if name.startswith("forcefit."):
             for value in vars(module).values():
                 if isinstance(value, Cached):
                     value.cache_clear()
