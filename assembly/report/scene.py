@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.linear.energy import Assembly
+from forcefit.assembly.model.contact_closures import loops
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.report.error_body import ErrorBody
 from forcefit.assembly.report.plot import (
@@ -76,7 +77,7 @@ def _spec(
         "bodies": [_body(posture.robot, bodies, i) for i in range(len(ends))],
         "closures": [
             [posture.robot.index(name) for name in pair]
-            for pair in posture.robot.closures
+            for pair in loops(posture.robot)
         ],
         "closing": closing,
         "forces": forces,
