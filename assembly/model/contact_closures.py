@@ -4,7 +4,6 @@ A guide and a pad are two chains of fixed frames with clearances between the sam
 bodies (:mod:`forcefit.assembly.drawing.contacts`).  A closure joins the ends of the chains.
 """
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -30,10 +29,22 @@ def contact_closures(robot: Robot) -> NDArray:
     return marks
 
 
+def contact_frames(robot: Robot) -> frozenset[str]:
+    """Return the names of the frames in the two chains of every such closure."""
+    pairs = zip(robot.closures, contact_closures(robot), strict=True)
+    chains = [_apart(robot, *pair) for pair, of_contacts in pairs if of_contacts]
+    return frozenset(frame.name for chain in chains for frame in chain)
+
+
+def _apart(robot: Robot, first: str, second: str) -> list[Frame]:
+    """Frames on the path to one of two frames, but not on that to the other."""
+    paths = robot.on_path[[robot.index(first), robot.index(second)]]
+    return [robot.frames[i] for i in np.flatnonzero(paths[0] != paths[1])]
+
+
 def _joins_contacts(robot: Robot, first: str, second: str) -> bool:
     """Whether the chains to two frames consist of clearances, one without a bound."""
-    paths = robot.on_path[[robot.index(first), robot.index(second)]]
-    apart = [robot.frames[i] for i in np.flatnonzero(paths[0] != paths[1])]
+    apart = _apart(robot, first, second)
     unbounded = any(
         bound is not None and np.isinf(bound)
         for frame in apart if frame.clearance for bound in vars(frame.clearance).values()
@@ -51,10 +62,3 @@ def loops(robot: Robot) -> tuple[tuple[str, str], ...]:
     """Return the closures of the mechanism, without those of contacts."""
     pairs = zip(robot.closures, contact_closures(robot), strict=True)
     return tuple(closure for closure, of_contacts in pairs if not of_contacts)
-
-
-def without_contact_closures(robot: Robot) -> Robot:
-    """Return the robot without the closures of contacts; itself if it has none."""
-    if not contact_closures(robot).any():
-        return robot
-    return replace(robot, closures=loops(robot))
