@@ -119,9 +119,9 @@ def guide(
     most = 2 * min(2 * gaps[1] / width, 2 * gaps[0] / height)
     rolls = Clearance(spin=most), Clearance(spin=np.inf, axial=np.inf)
     contacts: list[Contact] = []
-    for chain, (name, roll) in enumerate(zip(("guide", "guide_far"), rolls)):
-        at = transform(edge if chain == 0 else -edge, np.eye(3))
-        contacts.append(Contact(f"{name}_roll", at, roll, chain=chain))
+    for chain, (name, side) in enumerate((("guide", 1.0), ("guide_far", -1.0))):
+        at = transform(side * edge, np.eye(3))
+        contacts.append(Contact(f"{name}_roll", at, rolls[chain], chain=chain))
         contacts += _tilts(name, gaps, length, chain)
     return tuple(contacts)
 

@@ -73,7 +73,7 @@ def robot_of_drawing(drawing: Drawing) -> Robot:
     for step in steps:
         placed += _frames_of(plan, step)
         if chain := _parallel(step):
-            placed += _second_chain(plan, step, chain)
+            placed += _second_chain(step, chain)
             closures.append((chain.meets, chain.parts[-1].name))
         if step.closes:
             placed += _ends(plan, step)
@@ -209,9 +209,9 @@ def _parallel(step: Step) -> Parallel | None:
     return parallel_parts(item, step.reverse) if isinstance(item, DrawnJoint) else None
 
 
-def _second_chain(plan: _Plan, step: Step, chain: Parallel) -> list[PlacedFrame]:
+def _second_chain(step: Step, chain: Parallel) -> list[PlacedFrame]:
     """Frames of the second chain of contacts of a joint."""
-    joint, carrier = step.edge.item, chain.start or plan.carriers[step.start]
+    joint, carrier = step.edge.item, chain.start
     assert isinstance(joint, DrawnJoint)
     placed = []
     for part in chain.parts:

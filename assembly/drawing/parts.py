@@ -39,12 +39,12 @@ class Parallel:
     """A second chain of frames between the same two bodies.
 
     Attributes:
-        start: frame of the joint after which it begins; None: before the joint.
+        start: name of the frame of the joint after which it begins.
         parts: its frames; the last one meets a frame of the first chain.
         meets: name of that frame.
     """
 
-    start: str | None
+    start: str
     parts: list[Part]
     meets: str
 
@@ -64,7 +64,9 @@ def parts_of(joint: DrawnJoint, reverse: bool = False) -> list[Part]:
     parts = _passed([part for part, chain in every if chain == 0], reverse)
     if any(chain == 1 for _, chain in every):
         at = 1 + max(i for i, part in enumerate(parts) if part.contact)
-        parts.insert(at, _end_of(parts[at - 1], f"{joint.name}.contacts_end"))
+        parts.insert(at, _bare(parts[at - 1], f"{joint.name}.contacts_end"))
+        if parts[0].contact:  # errors of the body before it move both chains
+            parts.insert(0, _bare(parts[0], f"{joint.name}.contacts_start"))
     return parts
 
 
@@ -84,12 +86,12 @@ def parallel_parts(joint: DrawnJoint, reverse: bool = False) -> Parallel | None:
     parts = parts_of(joint, reverse)
     contacts = [i for i, part in enumerate(parts) if part.contact]
     meets = parts[contacts[-1] + 1]
-    end = _end_of(meets, f"{joint.name}.contacts_far_end")
-    start = parts[contacts[0] - 1].name if contacts[0] else None
+    end = _bare(meets, f"{joint.name}.contacts_far_end")
+    start = parts[contacts[0] - 1].name
     return Parallel(start, [*_passed(chain, reverse), end], meets.name)
 
 
-def _end_of(part: Part, name: str) -> Part:
+def _bare(part: Part, name: str) -> Part:
     """A fixed frame at the pose of another, where two chains of contacts meet."""
     return Part(name, "fixed", part.pose, 0.0, JointNumbers())
 

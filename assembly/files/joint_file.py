@@ -85,8 +85,9 @@ def read_bounds(table: Table, joint: str) -> Clearance:
         The given bounds.
 
     Raises:
-        BadInput: a value is not a finite number >= 0, or inf of a fixed joint, or so
-            small that its square is 0; or ``ball`` is given with another bound of the same motion.
+        BadInput: a value is not a number >= 0, or ``inf`` of a joint that is not fixed,
+            or so small that its square is 0; or ``ball`` is given with another bound of
+            the same motion.
     """
     bounds = {
         key: _bound(table, key, unit, joint)

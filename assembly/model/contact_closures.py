@@ -45,11 +45,12 @@ def _apart(robot: Robot, first: str, second: str) -> list[Frame]:
 def _joins_contacts(robot: Robot, first: str, second: str) -> bool:
     """Whether the chains to two frames consist of clearances, one without a bound."""
     apart = _apart(robot, first, second)
-    unbounded = any(
-        bound is not None and np.isinf(bound)
-        for frame in apart if frame.clearance for bound in vars(frame.clearance).values()
-    )  # fmt: skip
-    return unbounded and all(map(_moves_by_clearance, apart))
+    return all(map(_moves_by_clearance, apart)) and any(map(_is_unbounded, apart))
+
+
+def _is_unbounded(frame: Frame) -> bool:
+    """Whether a clearance of a frame has no bound."""
+    return frame.clearance is not None and np.inf in vars(frame.clearance).values()
 
 
 def _moves_by_clearance(frame: Frame) -> bool:

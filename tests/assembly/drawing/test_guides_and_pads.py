@@ -4,8 +4,8 @@ A guide of length L, width w and height t leaves its block the small screws
 
     |TX + s1 L/2 RY + s2 t/2 RZ| <= c_x,  |TY + s1 L/2 RX + s2 w/2 RZ| <= c_y,
 
-s1, s2 = +-1, and a pad of 2A by 2B the octahedron |TZ| + B |RX| + A |RY| <= g.  Here they
-are rows of linear and convex programmes of other solvers.
+s1, s2 = +-1, and a pad of 2A by 2B the octahedron |TZ| + B |RX| + A |RY| <= g.  Here
+they are rows of linear and convex programmes of other solvers.
 """
 
 import itertools
@@ -51,7 +51,7 @@ def pad_slabs():
 
 
 def support(direction, slabs, equal=None):
-    """Most of direction @ screw where abs(slabs @ screw) <= 1, by linear programming."""
+    """Most of direction @ screw where abs(slabs @ screw) <= 1, a linear programme."""
     both = np.vstack([slabs, -slabs])
     zero = None if equal is None else np.zeros(len(equal))
     scale = np.array([1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5])
