@@ -8,7 +8,7 @@ s1, s2 = +-1, and a pad of 2A by 2B the octahedron |TZ| + B |RX| + A |RY| <= g. 
 they are rows of linear and convex programmes of other solvers.
 """
 
-import itertools
+from functools import partial
 
 import numpy as np
 import pytest
@@ -26,74 +26,34 @@ from forcefit.assembly.linear.reference.pose_error import reachable_screws
 from forcefit.assembly.linear.zone import zone_margin
 from forcefit.assembly.statistics.clearance_positions import position_clearances
 from forcefit.assembly.statistics.linear_response import linear_response
-from forcefit.stiffness.screws import skew
 from forcefit.validation.crosscheck.crosscheck import crosscheck
 from forcefit.validation.crosscheck.pair import scaled
+from tests.assembly.drawing.guides_for_tests import (
+    G_PAD,
+    GUIDE,
+    PAD,
+    A,
+    B,
+    C,
+    L,
+    W,
+    Z,
+    at,
+    body,
+    drawn_in,
+    guide_slabs,
+    joint,
+    pad_slabs,
+    support,
+)  # fmt: skip
 
-C, L, W, T = 1e-5, 0.08, 0.04, 0.03  # [m] gap, length, width, height
-GUIDE = "guide = { gap = 1e-5, length = 0.08, width = 0.04, height = 0.03 }"
-PAD = "pad = { gap = 1e-5, length = 0.06, width = 0.04 }"
-G_PAD, A, B = 1e-5, 0.03, 0.02  # [m] gap, half the length, half the width
 STIFFNESS = [2e4, 3e4, 1e4, 2e7, 1e7, 4e7]  # [N m/rad, N/m]
-SIGNS = list(itertools.product((1, -1), (1, -1)))
-
-
-def guide_slabs(gaps=(C, C)):
-    """(8, 6) rows, each of at most 1 on a screw in the guide's axes."""
-    rows = [np.array([0, s * L / 2, r * T / 2, 1, 0, 0]) / gaps[0] for s, r in SIGNS]
-    rows += [np.array([s * L / 2, 0, r * W / 2, 0, 1, 0]) / gaps[1] for s, r in SIGNS]
-    return np.array(rows)
-
-
-def pad_slabs():
-    """(4, 6) rows, likewise."""
-    return np.array([[s * B, r * A, 0, 0, 0, 1] for s, r in SIGNS]) / G_PAD
-
-
-def support(direction, slabs, equal=None):
-    """Most of direction @ screw where abs(slabs @ screw) <= 1, a linear programme."""
-    both = np.vstack([slabs, -slabs])
-    zero = None if equal is None else np.zeros(len(equal))
-    scale = np.array([1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5])
-    size = np.abs(direction * scale).max()
-    found = linprog(
-        -direction * scale / size, both * scale, np.ones(len(both)),
-        None if equal is None else equal * scale / 1e-5, zero, bounds=(None, None),
-    )  # fmt: skip
-    assert found.success, found.message
-    return -found.fun * size
 
 
 @pytest.fixture
 def drawn(tmp_path):
     """Return a function that reads bodies and joints, the platform being "table"."""
-
-    def read(*tables):
-        file = tmp_path / "drawn.toml"
-        head = 'format = 2\nplatform = "table"\nplatform_at = [0, 0, 0]\n'
-        file.write_text(head + "\n".join(tables))
-        return read_robot(file)
-
-    return read
-
-
-def body(name):
-    return f'[[body]]\nname = "{name}"\n'
-
-
-def joint(name, kind, first, second, *keys, at=(0, 0, 0)):
-    given = "\n".join(keys)
-    return f"""
-        [[joint]]
-        name = "{name}"
-        type = "{kind}"
-        between = ["{first}", "{second}"]
-        at = {[float(x) for x in at]}
-        {given}
-    """
-
-
-Z = "axis = [0, 0, 1]"
+    return partial(drawn_in, tmp_path)
 
 
 def one_joint(drawn, kind, clearance, reverse=False, keys=Z):
@@ -198,13 +158,6 @@ def test_the_energy_of_a_forced_guide_equals_that_of_its_slabs_in_cvxpy(
     assert solve_assembly(posture, method="reference").energy == pytest.approx(
         found.energy, rel=1e-8
     )
-
-
-def at(point):
-    """(6, 6) map of a screw at a point to the origin."""
-    shift = np.eye(6)
-    shift[3:, :3] = skew(np.array(point, dtype=float))
-    return shift
 
 
 FEET = ((-0.15, 0.0, 0.0), (0.15, 0.02, 0.0))
