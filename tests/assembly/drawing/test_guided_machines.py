@@ -41,6 +41,7 @@ from tests.assembly.drawing.guides_for_tests import (
 from tests.assembly.path.moving_robots_for_tests import instants
 
 K = np.array([2e4, 3e4, 1e4, 2e7, 1e7, 4e7])  # [N m/rad, N/m]
+DRIVEN = "actuated = true"
 SLIDE = f"clearance = {{ {GUIDE} }}"
 
 
@@ -56,7 +57,7 @@ def sprung_slide(drawn, clearance=SLIDE, mass=""):
     return drawn(
         body("carrier"), body("table") + mass,
         joint("spring", "fixed", "base", "carrier", spring),
-        joint("slide", "prismatic", "carrier", "table", Z, "actuated = true", clearance),
+        joint("slide", "prismatic", "carrier", "table", Z, DRIVEN, clearance),
     )  # fmt: skip
 
 
@@ -121,7 +122,8 @@ def mounted(drawn, error):
     off = f"geometric_error = {[float(x) for x in error]}"
     spring = f"joint_stiffness = {K.tolist()}"
     return home_posture(drawn(
-        body("carrier"), body("table"), joint("spring", "fixed", "base", "carrier", spring),
+        body("carrier"), body("table"),
+        joint("spring", "fixed", "base", "carrier", spring),
         joint("slide", "prismatic", "carrier", "table", Z, SLIDE),
         joint("mount", "fixed", "table", "base", off),
     ))  # fmt: skip
@@ -151,8 +153,7 @@ def test_the_paper_s_problem_as_printed_has_the_energy_of_a_guide(drawn):
 def test_worst_case_of_a_guided_arm_is_the_farthest_corner(drawn):
     """Corners of the errors and of the slabs; the shares of both add up to it."""
     robot = drawn(
-        body("table"), joint("slide", "prismatic", "base", "table", Z, SLIDE,
-                             "actuated = true")
+        body("table"), joint("slide", "prismatic", "base", "table", Z, SLIDE, DRIVEN)
     )  # fmt: skip
     width = np.array([1e-4, 0, 2e-4, 2e-5, 0, 0])
     sources = tolerance_sources(robot, width, ("table",))
@@ -174,8 +175,7 @@ def test_worst_case_of_a_guided_arm_is_the_farthest_corner(drawn):
 def test_positions_in_contact_are_corners_of_the_slabs(drawn):
     """Pressed by any wrench the block rests at a corner: at five of the eight slabs."""
     posture = home_posture(drawn(
-        body("table"), joint("slide", "prismatic", "base", "table", Z, SLIDE,
-                             "actuated = true")
+        body("table"), joint("slide", "prismatic", "base", "table", Z, SLIDE, DRIVEN)
     ))  # fmt: skip
     prepared = linear_response(posture)
     draws = prepared.solve(np.zeros((40, len(posture.robot.frames), 6)))
