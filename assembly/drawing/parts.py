@@ -64,9 +64,9 @@ def parts_of(joint: DrawnJoint, reverse: bool = False) -> list[Part]:
     parts = _passed([part for part, chain in every if chain == 0], reverse)
     if any(chain == 1 for _, chain in every):
         at = 1 + max(i for i, part in enumerate(parts) if part.contact)
-        parts.insert(at, _bare(parts[at - 1], f"{joint.name}.contacts_end"))
+        parts.insert(at, _bare(joint, "contacts_end"))
         if parts[0].contact:  # errors of the body before it move both chains
-            parts.insert(0, _bare(parts[0], f"{joint.name}.contacts_start"))
+            parts.insert(0, _bare(joint, "contacts_start"))
     return parts
 
 
@@ -85,15 +85,15 @@ def parallel_parts(joint: DrawnJoint, reverse: bool = False) -> Parallel | None:
         return None
     parts = parts_of(joint, reverse)
     contacts = [i for i, part in enumerate(parts) if part.contact]
-    meets = parts[contacts[-1] + 1]
-    end = _bare(meets, f"{joint.name}.contacts_far_end")
-    start = parts[contacts[0] - 1].name
-    return Parallel(start, [*_passed(chain, reverse), end], meets.name)
+    start, meets = parts[contacts[0] - 1].name, parts[contacts[-1] + 1].name
+    end = _bare(joint, "contacts_far_end")
+    return Parallel(start, [*_passed(chain, reverse), end], meets)
 
 
-def _bare(part: Part, name: str) -> Part:
-    """A fixed frame at the pose of another, where two chains of contacts meet."""
-    return Part(name, "fixed", part.pose, 0.0, JointNumbers())
+def _bare(joint: DrawnJoint, suffix: str) -> Part:
+    """A fixed frame at a joint's point, where two chains of contacts meet."""
+    name = f"{joint.name}.{suffix}"
+    return Part(name, "fixed", joint_axes(joint), 0.0, JointNumbers())
 
 
 def _all_parts(joint: DrawnJoint) -> list[tuple[Part, int]]:

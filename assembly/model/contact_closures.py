@@ -29,6 +29,7 @@ def contact_closures(robot: Robot) -> NDArray:
     return marks
 
 
+@lru_cache(maxsize=64)
 def contact_frames(robot: Robot) -> frozenset[str]:
     """Return the names of the frames in the two chains of every such closure."""
     pairs = zip(robot.closures, contact_closures(robot), strict=True)
