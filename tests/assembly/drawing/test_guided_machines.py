@@ -8,7 +8,8 @@ import pytest
 from scipy.spatial import HalfspaceIntersection
 
 from forcefit.assembly.exchange.convert import convert
-from forcefit.assembly.files.robot_file import write_robot
+from forcefit.assembly.files.robot_file import read_robot, write_robot
+from forcefit.assembly.kinematics.mobility import mobility
 from forcefit.assembly.kinematics.posture import home_posture, together
 from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.linear.reference.as_printed import energy_as_printed
@@ -17,6 +18,7 @@ from forcefit.assembly.measurement.conditions import as_declared
 from forcefit.assembly.measurement.predict import predict, with_rest_positions
 from forcefit.assembly.model.contact_closures import contact_closures, loops
 from forcefit.assembly.model.error_distributions import tolerance_sources
+from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.assembly.path.path_errors import path_errors
 from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from forcefit.assembly.report.results import solution_of
@@ -26,6 +28,7 @@ from forcefit.assembly.statistics.worst_pose import worst_pose
 from forcefit.assembly.steps.plan import Join, Plan
 from forcefit.assembly.steps.run import assemble_in_steps
 from forcefit.assembly.sweeps.robot_sweep import sweep
+from forcefit.inputs.table import BadInput
 from tests.assembly.drawing.guides_for_tests import (
     GUIDE,
     PAD,
@@ -223,3 +226,35 @@ def test_closures_between_contacts_are_no_loops_of_other_programs(drawn, tmp_pat
     assert (tmp_path / "robot.xml").read_text().count("<weld") == 1
     closures = solution_of(posture)["closures"]
     assert [tuple(one["frames"]) for one in closures] == list(loops(posture.robot))
+
+
+def test_chains_of_bounded_clearances_are_a_loop_of_the_mechanism():
+    """Two shafts in bores between the same bodies: six over-constraints, counted."""
+    bore = Clearance(radial=1e-5, tilt=1e-4)
+    frames = (
+        Frame("first", clearance=bore), Frame("table", "first"),
+        Frame("second", clearance=bore), Frame("end", "second"),
+    )  # fmt: skip
+    robot = Robot("two bores", "table", frames, (("table", "end"),))
+    assert not contact_closures(robot).any()
+    assert mobility(home_posture(robot)).overconstraint == 6
+
+
+def test_only_a_fixed_joint_may_have_an_unbounded_clearance(tmp_path):
+    """The range of a joint that moves is unbounded where the key is left out."""
+    file = tmp_path / "robot.toml"
+    frame = """
+        platform = "end"
+        [[frame]]
+        name = "end"
+        parent = "a"
+        [[frame]]
+        name = "a"
+        parent = "base"
+        clearance = { spin = inf }
+    """
+    file.write_text(frame)
+    assert read_robot(file).frame("a").clearance == Clearance(spin=np.inf)
+    file.write_text(frame + 'joint = "revolute"\n')
+    with pytest.raises(BadInput, match=r"clearance.spin: found inf, expected a finite"):
+        read_robot(file)
