@@ -29,6 +29,10 @@ from forcefit.assembly.steps.plan import Join, Plan
 from forcefit.assembly.steps.run import assemble_in_steps
 from forcefit.assembly.sweeps.robot_sweep import sweep
 from forcefit.inputs.table import BadInput
+from forcefit.validation.multibody.simulation import (
+    simulate_assembly,
+    without_clearance,
+)
 from tests.assembly.drawing.guides_for_tests import (
     GUIDE,
     PAD,
@@ -258,3 +262,12 @@ def test_only_a_fixed_joint_may_have_an_unbounded_clearance(tmp_path):
     file.write_text(frame + 'joint = "revolute"\n')
     with pytest.raises(BadInput, match=r"clearance.spin: found inf, expected a finite"):
         read_robot(file)
+
+
+@pytest.mark.exudyn
+def test_a_simulated_arm_without_clearance_takes_errors_of_every_frame(drawn, rng):
+    """Tight contacts are one rigid guide: only the load bends the spring, F^2 / 2 K."""
+    robot = without_clearance(sprung_slide(drawn))
+    robot = robot.with_errors(1e-4 * rng.uniform(-1, 1, size=(len(robot.frames), 6)))
+    found = simulate_assembly(home_posture(robot), load=[0, 0, 0, 100.0, 0, 0])
+    assert found.energy == pytest.approx(100.0**2 / K[3] / 2, rel=1e-2)
