@@ -1,8 +1,9 @@
 """Clearances of joints by the sizes of their contacts, as frames with bounds.
 
-Each frame turns a little about its own axes.  Frames in series allow the sums of their
-turns.  Two chains of such frames between the same two bodies, joined by a closure,
-allow the small screws that both chains allow.  All sets of this table are exact.
+Each frame makes small turns about its own axes, or small shifts along them.  Frames in
+series allow the sums of their motions.  Two chains of such frames between the same two
+bodies, joined by a closure, allow the small screws that both chains allow.  All sets of
+this table are exact.
 
 ======  ==================  ============================================================
 chains  contacts            small screws that the contacts allow, in the joint's axes
@@ -17,8 +18,9 @@ chains  contacts            small screws that the contacts allow, in the joint's
   two rotations of at most c / L, about one end each, move the two ends independently
   in discs of radius c.  Likewise in two bearings, of any heights and gaps.
 - Guide: the four edges of the block stay within the gaps at both ends.  Each chain
-  rolls freely about one edge, (w/2, t/2) or (-w/2, -t/2).  Its turns about y and x at
-  both ends then move the faces that meet at this edge, by at most c_x and c_y:
+  rolls about one edge, (w/2, t/2) or (-w/2, -t/2), without reaching a bound of the
+  roll.  Its turns about y and x at both ends then move the faces that meet at this
+  edge, by at most c_x and c_y:
   ``|TX - y RZ +- L/2 RY| <= c_x`` and ``|TY + x RZ -+ L/2 RX| <= c_y`` there.  Both
   edges together are the inequalities of the table.
 - Pad: the four corners stay within the gap.  The first chain turns about the lines

@@ -56,8 +56,8 @@ def _is_unbounded(frame: Frame) -> bool:
 
 def _moves_by_clearance(frame: Frame) -> bool:
     """Whether nothing moves a frame against its parent but its clearance."""
-    moved = frame.joint != "fixed", frame.locked_at, frame.link, frame.joint_stiffness
-    return not any(one is not None and one is not False for one in moved)
+    others = frame.locked_at, frame.link, frame.joint_stiffness
+    return frame.joint == "fixed" and all(other is None for other in others)
 
 
 def loops(robot: Robot) -> tuple[tuple[str, str], ...]:
