@@ -1,27 +1,34 @@
-"""Clearances of joints by the sizes of their contacts, as frames in series.
+"""Clearances of joints by the sizes of their contacts, as frames with bounds.
 
-Each frame turns a little about its own axes, and the small screws that the contacts
-allow are the sums of these turns: exactly for a bore.  The sets of a guide and of a pad
-are no such sums; these sums contain them, so that largest errors are on the safe side.
+Each frame makes small turns about its own axes, or small shifts along them.  Frames in
+series allow the sums of their motions.  Two chains of such frames between the same two
+bodies, joined by a closure, allow the small screws that both chains allow.  All sets of
+this table are exact.
 
-========  ==================  ==========================================================
-frames    contacts            small screws that the contacts allow, in the joint's axes
-========  ==================  ==========================================================
-2         bore of length L    ``|(TX, TY) + z (RY, -RX)| <= c`` at ``z = -L/2, L/2``
-4, joint  guide of length L,  ``|TX| + L/2 |RY| + t/2 |RZ| <= c_x`` and
-          w by t              ``|TY| + L/2 |RX| + w/2 |RZ| <= c_y``
-4         pad, 2A by 2B       ``|TZ| + B |RX| + A |RY| <= g``
-========  ==================  ==========================================================
+======  ==================  ============================================================
+chains  contacts            small screws that the contacts allow, in the joint's axes
+======  ==================  ============================================================
+1       bore of length L    ``|(TX, TY) + z (RY, -RX)| <= c`` at ``z = -L/2, L/2``
+2       guide of length L,  ``|TX| + L/2 |RY| + t/2 |RZ| <= c_x`` and
+        w by t              ``|TY| + L/2 |RX| + w/2 |RZ| <= c_y``
+2       pad, 2A by 2B       ``|TZ| + B |RX| + A |RY| <= g``
+======  ==================  ============================================================
 
 - Bore: a small rotation about one end moves the shaft at the other end only.  So the
   two rotations of at most c / L, about one end each, move the two ends independently
   in discs of radius c.  Likewise in two bearings, of any heights and gaps.
-- Guide: likewise about x and y alone, and RZ between its largest values independently
-  of the others.  Exact without RZ; the volume is 3 to 5 times that of the guide.
-- Pad: turns about the four lines that join the middles of neighbouring sides.  Exact
-  along TZ, RX and RY alone; the volume is 1.5 times that of the pad.
+- Guide: the four edges of the block stay within the gaps at both ends.  Each chain
+  rolls about one edge, (w/2, t/2) or (-w/2, -t/2), without reaching a bound of the
+  roll.  Its turns about y and x at both ends then move the faces that meet at this
+  edge, by at most c_x and c_y:
+  ``|TX - y RZ +- L/2 RY| <= c_x`` and ``|TY + x RZ -+ L/2 RX| <= c_y`` there.  Both
+  edges together are the inequalities of the table.
+- Pad: the four corners stay within the gap.  The first chain turns about the lines
+  through two of three corners, and so moves each of the three by at most g.  In the
+  second chain everything is free but the height of the fourth corner.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,6 +50,7 @@ class Contact:
         fit: ISO 286 fit from whose mean the bounds follow, or empty.
         end: how they follow from it; its parts are those of a bearing, empty where
             the joint has one hole and one shaft.
+        chain: 0 of the frames in series with the joint's own, 1 of those in parallel.
     """
 
     suffix: str
@@ -50,6 +58,7 @@ class Contact:
     clearance: Clearance
     fit: str = ""
     end: FittedEnd | None = None
+    chain: int = 0
 
 
 def bearings(
@@ -93,39 +102,43 @@ def fitted(
     )
 
 
-def guide(gaps: tuple[float, float], length: float) -> tuple[Contact, ...]:
+def guide(
+    gaps: tuple[float, float], length: float, width: float, height: float
+) -> tuple[Contact, ...]:
     """Return the contacts of a block in a guide along z, its middle at the origin.
 
     Args:
         gaps: [m] c_x and c_y, along x and y from the middle to one side.
         length: [m] L of the guide, > 0.
-
-    Returns:
-        Four: turns about y and x at both ends.  The roll is not among them.
-    """
-    contacts = []
-    # columns: axes of a frame whose z is the joint's y, then x
-    axes = np.eye(3)[:, [2, 0, 1]], np.eye(3)[:, [1, 2, 0]]
-    for name, gap, R in zip(("yaw", "pitch"), gaps, axes, strict=True):
-        for end, z in (("start", -length / 2), ("end", length / 2)):
-            turn = Clearance(spin=gap / length)
-            pose = transform([0.0, 0.0, z], R)
-            contacts.append(Contact(f"guide_{name}_{end}", pose, turn))
-    return tuple(contacts)
-
-
-def largest_roll(gaps: tuple[float, float], width: float, height: float) -> float:
-    """Return the largest roll of a block in its guide.
-
-    Args:
-        gaps: [m] c_x and c_y.
         width: [m] w along x, > 0.
         height: [m] t along y, > 0.
 
     Returns:
-        [rad] the lesser of 2 c_y / w and 2 c_x / t.
+        Two chains, which roll about two opposite edges of the block.
     """
-    return min(2 * gaps[1] / width, 2 * gaps[0] / height)
+    edge = np.array([width / 2, height / 2, 0.0])
+    # the slabs hold the roll within half of the bound of the first chain
+    most = 2 * min(2 * gaps[1] / width, 2 * gaps[0] / height)
+    rolls = Clearance(spin=most), Clearance(spin=np.inf, axial=np.inf)
+    contacts: list[Contact] = []
+    for chain, (name, side) in enumerate((("guide", 1.0), ("guide_far", -1.0))):
+        at = transform(side * edge, np.eye(3))
+        contacts.append(Contact(f"{name}_roll", at, rolls[chain], chain=chain))
+        contacts += _tilts(name, gaps, length, chain)
+    return tuple(contacts)
+
+
+def _tilts(
+    name: str, gaps: tuple[float, float], length: float, chain: int
+) -> Iterator[Contact]:
+    """Turns about y and x at both ends of a guide; each moves the other end only."""
+    # columns: axes of a frame whose z is the joint's y, then x
+    axes = np.eye(3)[:, [2, 0, 1]], np.eye(3)[:, [1, 2, 0]]
+    for turn, gap, R in zip(("yaw", "pitch"), gaps, axes, strict=True):
+        for end, z in (("start", -length / 2), ("end", length / 2)):
+            pose = transform([0.0, 0.0, z], R)
+            bound = Clearance(spin=gap / length)
+            yield Contact(f"{name}_{turn}_{end}", pose, bound, chain=chain)
 
 
 def pad(gap: float, length: float, width: float) -> tuple[Contact, ...]:
@@ -137,19 +150,23 @@ def pad(gap: float, length: float, width: float) -> tuple[Contact, ...]:
         width: [m] 2B along y, > 0.
 
     Returns:
-        Four turns about lines in the plane of the pad.
+        Two chains: the turns by which three corners move, and the fourth corner.
     """
+    A, B = length / 2, width / 2
+    corners = np.array([[A, B, 0.0], [-A, B, 0.0], [-A, -B, 0.0], [A, -B, 0.0]])
     contacts = []
-    for k, (s, t) in enumerate(((1, 1), (1, -1), (-1, 1), (-1, -1)), 1):
-        # TZ = g / 4 at the middle, with g / 4 more or less at the middles of the sides
-        rotation = np.array([s * gap / (2 * width), t * gap / (2 * length), 0.0])
-        turn = Clearance(spin=float(np.linalg.norm(rotation)))
-        along = np.array([s * length, t * width, 0.0]) / np.hypot(length, width)
+    for k, (here, one, other) in enumerate(((0, 1, 2), (1, 2, 0), (2, 0, 1)), 1):
+        # a turn about the line through two corners moves the third alone
+        line = corners[other] - corners[one]
+        along = line / np.linalg.norm(line)
         across = np.cross([0.0, 0.0, 1.0], along)
+        arm = abs(across @ (corners[here] - corners[one]))
         R = np.column_stack([across, [0.0, 0.0, 1.0], along])
-        middle = -length * width / (2 * np.hypot(length, width)) * across
-        contacts.append(Contact(f"pad_{k}", transform(middle, R), turn))
-    return tuple(contacts)
+        turn = Clearance(spin=float(gap / arm))
+        contacts.append(Contact(f"pad_{k}", transform(corners[one], R), turn))
+    free = Clearance(tilt=np.inf, spin=np.inf, radial=np.inf, axial=gap)
+    last = transform(corners[3], np.eye(3))
+    return (*contacts, Contact("pad_4", last, free, chain=1))
 
 
 def _along_z(z: float) -> NDArray:

@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 from forcefit.assembly.drawing.callouts import frame_callouts, frame_fits
 from forcefit.assembly.drawing.drawing import Drawing, DrawnBody, DrawnJoint
 from forcefit.assembly.drawing.links import link_at_tip
-from forcefit.assembly.drawing.parts import joint_axes, parts_of
+from forcefit.assembly.drawing.parts import (
+    Parallel,
+    Part,
+    joint_axes,
+    parallel_parts,
+    parts_of,
+)
 from forcefit.assembly.drawing.tree import ROOT, Edge, Node, Step, steps_of
 from forcefit.assembly.model.placed_frames import PlacedFrame, place_frames
 from forcefit.assembly.model.robot import BASE, Frame, Robot
@@ -66,6 +72,9 @@ def robot_of_drawing(drawing: Drawing) -> Robot:
     closures = []
     for step in steps:
         placed += _frames_of(plan, step)
+        if chain := _parallel(step):
+            placed += _second_chain(step, chain)
+            closures.append((chain.meets, chain.parts[-1].name))
         if step.closes:
             placed += _ends(plan, step)
             closures.append((plan.ends[step.edge], plan.seats[step.edge]))
@@ -120,7 +129,8 @@ def _part_names(drawing: Drawing) -> set[str]:
     """Names of the frames of all joints, which must be different."""
     owners: dict[str, str] = {}
     for joint in drawing.joints:
-        for part in parts_of(joint):
+        chain = parallel_parts(joint)
+        for part in [*parts_of(joint), *(chain.parts if chain else ())]:
             if part.name in owners:
                 raise BadInput(
                     f"joint {quoted(joint.name)}: found {quoted(part.name)} as the "
@@ -166,15 +176,7 @@ def _frames_of(plan: _Plan, step: Step) -> list[PlacedFrame]:
     placed: list[PlacedFrame] = []
     if isinstance(item, DrawnJoint):
         for part in parts_of(item, step.reverse):
-            numbers = part.numbers
-            motion = _motion(item, part.position) if part.kind != "fixed" else {}
-            frame = Frame(
-                part.name, carrier, joint=part.kind, **motion,
-                clearance=numbers.clearance, joint_stiffness=numbers.stiffness,
-                geometric_error=numbers.error, tolerance=numbers.tolerance,
-                locked_at=numbers.locked_at,
-            )  # fmt: skip
-            placed.append((frame, part.pose))
+            placed.append((_frame(item, part, carrier), part.pose))
             carrier = part.name
     else:
         is_body = _is_body(plan.drawing, step)
@@ -186,6 +188,35 @@ def _frames_of(plan: _Plan, step: Step) -> list[PlacedFrame]:
         carrier = name
     if not step.closes and step.end in plan.own and plan.own[step.end] != carrier:
         placed.append(_body_frame(plan, step.end, carrier))
+    return placed
+
+
+def _frame(joint: DrawnJoint, part: Part, carrier: str) -> Frame:
+    """One frame of a joint."""
+    numbers = part.numbers
+    motion = _motion(joint, part.position) if part.kind != "fixed" else {}
+    return Frame(
+        part.name, carrier, joint=part.kind, **motion,
+        clearance=numbers.clearance, joint_stiffness=numbers.stiffness,
+        geometric_error=numbers.error, tolerance=numbers.tolerance,
+        locked_at=numbers.locked_at,
+    )  # fmt: skip
+
+
+def _parallel(step: Step) -> Parallel | None:
+    """The second chain of contacts of an edge, None where it has none."""
+    item = step.edge.item
+    return parallel_parts(item, step.reverse) if isinstance(item, DrawnJoint) else None
+
+
+def _second_chain(step: Step, chain: Parallel) -> list[PlacedFrame]:
+    """Frames of the second chain of contacts of a joint."""
+    joint, carrier = step.edge.item, chain.start
+    assert isinstance(joint, DrawnJoint)
+    placed = []
+    for part in chain.parts:
+        placed.append((_frame(joint, part, carrier), part.pose))
+        carrier = part.name
     return placed
 
 

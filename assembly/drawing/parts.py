@@ -23,6 +23,7 @@ class Part:
         pose: (4, 4) at home before its motion, seen from the base.
         position: [rad or m] coordinate at home.
         numbers: error, clearance and stiffness of this frame.
+        contact: whether it is a contact, not the joint's own frame.
     """
 
     name: str
@@ -30,6 +31,22 @@ class Part:
     pose: NDArray
     position: float
     numbers: JointNumbers
+    contact: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Parallel:
+    """A second chain of frames between the same two bodies.
+
+    Attributes:
+        start: name of the frame of the joint after which it begins.
+        parts: its frames; the last one meets a frame of the first chain.
+        meets: name of that frame.
+    """
+
+    start: str
+    parts: list[Part]
+    meets: str
 
 
 def parts_of(joint: DrawnJoint, reverse: bool = False) -> list[Part]:
@@ -43,14 +60,59 @@ def parts_of(joint: DrawnJoint, reverse: bool = False) -> list[Part]:
     Returns:
         At least one; each error, bound and spring is on one of them.
     """
-    parts: list[Part] = []
+    every = _all_parts(joint)
+    parts = _passed([part for part, chain in every if chain == 0], reverse)
+    if any(chain == 1 for _, chain in every):
+        at = 1 + max(i for i, part in enumerate(parts) if part.contact)
+        parts.insert(at, _bare(joint, "contacts_end"))
+        if parts[0].contact:  # errors of the body before it move both chains
+            parts.insert(0, _bare(joint, "contacts_start"))
+    return parts
+
+
+def parallel_parts(joint: DrawnJoint, reverse: bool = False) -> Parallel | None:
+    """The frames of the second chain of a joint's contacts.
+
+    Args:
+        joint: of any type.
+        reverse: as for :func:`parts_of`.
+
+    Returns:
+        The chain, None where the contacts are in one chain.
+    """
+    chain = [part for part, k in _all_parts(joint) if k == 1]
+    if not chain:
+        return None
+    parts = parts_of(joint, reverse)
+    contacts = [i for i, part in enumerate(parts) if part.contact]
+    start, meets = parts[contacts[0] - 1].name, parts[contacts[-1] + 1].name
+    end = _bare(joint, "contacts_far_end")
+    return Parallel(start, [*_passed(chain, reverse), end], meets)
+
+
+def _bare(joint: DrawnJoint, suffix: str) -> Part:
+    """A fixed frame at a joint's point, where two chains of contacts meet."""
+    name = f"{joint.name}.{suffix}"
+    return Part(name, "fixed", joint_axes(joint), 0.0, JointNumbers())
+
+
+def _all_parts(joint: DrawnJoint) -> list[tuple[Part, int]]:
+    """The frames of a joint from its first body to its second, and their chains."""
+    parts: list[tuple[Part, int]] = []
     for row, numbers in zip(_motions(joint), _shares(joint), strict=True):
         part = _part(joint, *row, numbers)
         contacts = [
-            _contact_part(joint, row[0], part.pose, c) for c in numbers.contacts
+            (_contact_part(joint, row[0], part.pose, c), c.chain)
+            for c in numbers.contacts
         ]
+        own = [(part, 0)]
         # a pad belongs to the second body, a bore and a guide to the first
-        parts += [part, *contacts] if joint.kind == "planar" else [*contacts, part]
+        parts += [*own, *contacts] if joint.kind == "planar" else [*contacts, *own]
+    return parts
+
+
+def _passed(parts: list[Part], reverse: bool) -> list[Part]:
+    """The frames in the order in which the tree passes them."""
     return [_reversed(part) for part in reversed(parts)] if reverse else parts
 
 
@@ -64,7 +126,7 @@ def _contact_part(
         parts = ".".join(filter(None, (joint.name, suffix, end.parts)))
         end = replace(end, parts=parts)
     numbers = JointNumbers(clearance=contact.clearance, fit=contact.fit, fitted_end=end)
-    return Part(name, "fixed", pose @ contact.pose, 0.0, numbers)
+    return Part(name, "fixed", pose @ contact.pose, 0.0, numbers, contact=True)
 
 
 def joint_axes(joint: DrawnJoint) -> NDArray:

@@ -30,6 +30,7 @@ from forcefit.assembly.exchange.rigid_bodies import (
     with_possible_moments,
 )
 from forcefit.assembly.exchange.springs import other_springs, springs_at_rest
+from forcefit.assembly.model.contact_closures import loops
 from forcefit.assembly.model.robot import BASE, Frame, Robot
 from forcefit.inputs.errors import BadInput
 from forcefit.stiffness.screws import rotation_vector, transform
@@ -264,7 +265,7 @@ def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
         bodies=bodies,
         joints=tuple(joints),
         loops=tuple(
-            Loop(f"loop{i}", on[a], on[b]) for i, (a, b) in enumerate(robot.closures, 1)
+            Loop(f"loop{i}", on[a], on[b]) for i, (a, b) in enumerate(loops(robot), 1)
         ),
         platform=on[robot.platform],
     )

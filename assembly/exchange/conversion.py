@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from forcefit.assembly.exchange.comparison import Comparison
+from forcefit.assembly.model.contact_closures import loops
 from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.errors import quoted
 
@@ -47,7 +48,7 @@ class Conversion:
             "robot": self.robot.name,
             "platform": self.robot.platform,
             "frames": len(self.robot.frames),
-            "closures": len(self.robot.closures),
+            "closures": len(loops(self.robot)),
             "files": [str(path) for path in self.files],
             "home": {
                 "open_before": self.open_before,
@@ -63,7 +64,7 @@ class Conversion:
     def text(self) -> str:
         """Return a few lines for people."""
         robot = self.robot
-        count = len(robot.closures)
+        count = len(loops(robot))
         lines = [
             f"{robot.name}: {len(robot.frames)} frames, "
             f"{count} loop{'s' * (count != 1)}, platform {quoted(robot.platform)}",

@@ -5,7 +5,6 @@ from forcefit.assembly.drawing.contacts import (
     bearings,
     fitted,
     guide,
-    largest_roll,
     pad,
 )
 from forcefit.assembly.drawing.drawing import FREE_ROWS
@@ -119,7 +118,7 @@ def _refuse_without_shaft(table: Table, key: str, kind: str) -> None:
 
 
 def _in_guide(table: Table, kind: str, bounds: Clearance) -> _Clearance:
-    """The largest roll as a bound, and the contacts of a guide with it."""
+    """The bound along the axis, and the contacts of a guide."""
     _refuse_type(table, "guide", kind, "prismatic")
     _refuse_with(table, "guide", ("radial", "tilt", "spin", "ball"))
     inner = _sizes(table, "guide", ("gap", "length", "width", "height"))
@@ -132,8 +131,7 @@ def _in_guide(table: Table, kind: str, bounds: Clearance) -> _Clearance:
         x = y = inner.number("gap", "m", least=0.0, largest=LARGEST_LENGTH)
     length, width, height = (_length(inner, k) for k in ("length", "width", "height"))
     inner.finish()
-    roll = largest_roll((x, y), width, height)
-    return Clearance(axial=bounds.axial, spin=roll), guide((x, y), length)
+    return _of_shaft(bounds), guide((x, y), length, width, height)
 
 
 def _on_pad(table: Table, kind: str, bounds: Clearance) -> _Clearance:

@@ -1,5 +1,6 @@
 """Clearance and stiffness of a joint, read from a robot file."""
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -84,11 +85,12 @@ def read_bounds(table: Table, joint: str) -> Clearance:
         The given bounds.
 
     Raises:
-        BadInput: a value is not a finite number >= 0, or so small that its square is 0;
-            or ``ball`` is given with another bound of the same motion.
+        BadInput: a value is not a number >= 0, or ``inf`` of a joint that is not fixed,
+            or so small that its square is 0; or ``ball`` is given with another bound of
+            the same motion.
     """
     bounds = {
-        key: table.number(key, unit, least=0.0, largest=LARGEST_LENGTH)
+        key: _bound(table, key, unit, joint)
         for key, unit in _CLEARANCE.items()
         if table.has(key)
     }
@@ -108,6 +110,13 @@ def read_bounds(table: Table, joint: str) -> Clearance:
                 given = "fit" if fit and key == "radial" else key
                 raise table.bad(given, ONE_OF_BALL)
     return Clearance(**bounds)
+
+
+def _bound(table: Table, key: str, unit: str, joint: str) -> float:
+    """A bound; ``inf`` leaves a motion of a fixed joint free, as contacts do."""
+    if joint == "fixed" and table.content[key] == math.inf:
+        return float(table.get(key))
+    return table.number(key, unit, least=0.0, largest=LARGEST_LENGTH)
 
 
 def read_fit(table: Table) -> str:

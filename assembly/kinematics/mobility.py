@@ -16,6 +16,7 @@ from forcefit.assembly.kinematics.near_postures import near_postures
 from forcefit.assembly.kinematics.nominal import mobile, motion_screws, size_of
 from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.kinematics.ranks import MISMATCH_FACTOR, rank_of
+from forcefit.assembly.model.contact_closures import contact_closures
 
 # relative size of singular values that count as zero: those of files rounded at 6
 # digits, and of singular postures, which closures to 1e-10 determine to its root
@@ -202,7 +203,8 @@ def _rates(posture: Posture) -> tuple[NDArray, NDArray]:
     The unit rate of a prismatic joint is one size: counts do not depend on the size.
 
     Returns:
-        (6 closures, n) at the base's origin, (6, n) at the platform's.
+        (6 closures, n) at the base's origin, without those of contacts; (6, n) at the
+        platform's.
     """
     robot = posture.robot
     size, i = size_of(robot), robot.index(robot.platform)
@@ -210,8 +212,9 @@ def _rates(posture: Posture) -> tuple[NDArray, NDArray]:
     screws = with_balls(robot, T, motion_screws(robot, T))
     screws[[frame.joint == "prismatic" for frame in robot.frames]] *= size
     scale = np.array([1.0] * 3 + [size] * 3)
-    blocks = closure_signs(robot)[:, :, None] * (screws / scale)
-    A = np.swapaxes(blocks, 1, 2).reshape(6 * len(robot.closures), len(robot.frames))
+    signs = closure_signs(robot)[~contact_closures(robot)]
+    blocks = signs[:, :, None] * (screws / scale)
+    A = np.swapaxes(blocks, 1, 2).reshape(6 * len(signs), len(robot.frames))
     screws[:, 3:] += np.cross(screws[:, :3], T[i, :3, 3])
     return A, (screws / scale * robot.on_path[i][:, None]).T
 

@@ -21,6 +21,7 @@ from forcefit.assembly.model.clearance import (
     component_bounds,
     scales_with_margin,
 )
+from forcefit.assembly.model.contact_closures import loops
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
 
 # relative to the largest wrench of the same kind; smaller wrenches count as zero
@@ -89,6 +90,7 @@ def with_clearances_at_rest(conditions: Conditions) -> Conditions:
 def _component_bounds(robot: Robot) -> NDArray:
     """Return the (n, 6) bound of each component of a clearance screw; 0 without one."""
     bounds = np.where(scales_with_margin(robot), clearance_bounds(robot), 0.0)
+    bounds[np.isinf(bounds)] = 0.0
     return component_bounds(bounds)
 
 
@@ -115,9 +117,10 @@ def without_joint_clearances(robot: Robot) -> Robot:
         robot: robot with or without clearances.
 
     Returns:
-        The robot without clearance cones.
+        The robot without clearance cones, and without closures between contacts.
     """
-    return replace(robot, frames=tuple(_tight(f) for f in robot.frames))
+    tight = tuple(_tight(frame) for frame in robot.frames)
+    return replace(robot, frames=tight, closures=loops(robot))
 
 
 def _tight(frame: Frame) -> Frame:

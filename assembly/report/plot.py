@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.linear.energy import Assembly
+from forcefit.assembly.model.contact_closures import contact_frames
+from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.report.error_body import ErrorBody, possible_errors
 from forcefit.stiffness.screws import rotation_matrix, screw_map
 
@@ -94,10 +96,9 @@ def robot_plotter(
     size = float(np.ptp(bodies.ends, axis=0).max()) or 1.0
     exaggeration_factor = exaggeration or readable_factor(bodies, size)
     plotter = pyvista.Plotter(off_screen=off_screen, window_size=(1100, 800))
-    for start, end in zip(bodies.starts, bodies.ends, strict=True):
-        if np.linalg.norm(end - start) >= _SHORT:
-            grey = pyvista.Line(start, end).tube(radius=0.005 * size)
-            plotter.add_mesh(grey, color="lightgrey")
+    for i in _drawn_rows(assembly.posture.robot, bodies):
+        grey = pyvista.Line(bodies.starts[i], bodies.ends[i]).tube(radius=0.005 * size)
+        plotter.add_mesh(grey, color="lightgrey")
     add_bodies(plotter, assembly, bodies, exaggeration_factor, size)
     _add_joint_axes(plotter, assembly.posture, size)
     caption = (
@@ -126,14 +127,24 @@ def add_bodies(
     """
     import pyvista
 
-    for i, frame in enumerate(assembly.posture.robot.frames):
-        if np.linalg.norm(bodies.ends[i] - bodies.starts[i]) >= _SHORT:
-            line = pyvista.Spline(_shape(bodies, i, factor), 40)
-            plotter.add_mesh(
-                line.tube(radius=0.008 * size), name=f"body {frame.name}",
-                color="crimson" if frame.link else "steelblue", reset_camera=False,
-                render=False,
-            )  # fmt: skip
+    robot = assembly.posture.robot
+    for i in _drawn_rows(robot, bodies):
+        frame, line = robot.frames[i], pyvista.Spline(_shape(bodies, i, factor), 40)
+        plotter.add_mesh(
+            line.tube(radius=0.008 * size), name=f"body {frame.name}",
+            color="crimson" if frame.link else "steelblue", reset_camera=False,
+            render=False,
+        )  # fmt: skip
+
+
+def _drawn_rows(robot: Robot, bodies: DisplacedBodies) -> list[int]:
+    """Return the rows of bodies that are not short, without contacts of joints."""
+    lengths = np.linalg.norm(bodies.ends - bodies.starts, axis=1)
+    contacts = contact_frames(robot)
+    return [
+        i for i, frame in enumerate(robot.frames)
+        if lengths[i] >= _SHORT and frame.name not in contacts
+    ]  # fmt: skip
 
 
 def _add_joint_axes(plotter: Any, posture: Posture, size: float) -> None:

@@ -25,6 +25,7 @@ from forcefit.assembly.linear.load import massless
 from forcefit.assembly.linear.pose_error import bound_pose_error
 from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.linear.zone import zone_margin
+from forcefit.assembly.model.contact_closures import contact_closures
 from forcefit.assembly.model.statuses import NOT_PROVED, UNSTABLE
 from forcefit.assembly.platform_stiffness.exact_tangent import exact_tangent
 from forcefit.assembly.report.beyond_linear import far_from_linear
@@ -177,10 +178,11 @@ def _screws_and_wrenches(assembly: Assembly | ExactAssembly) -> dict[str, Any]:
         for f, start in zip(robot.frames, assembly.start_wrenches, strict=True):
             if np.isfinite(start).all():
                 frames[f.name]["start_wrench"] = start
+    of_contacts = contact_closures(robot)
     closures = [
         {"frames": list(pair), "wrench": assembly.closure_wrenches[k]}
-        for k, pair in enumerate(robot.closures)
-    ]
+        for k, pair in enumerate(robot.closures) if not of_contacts[k]
+    ]  # fmt: skip
     return {
         "energy": assembly.energy,
         "potential": assembly.potential,

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.linear.energy import Assembly
+from forcefit.assembly.model.contact_closures import contact_frames, loops
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.report.error_body import ErrorBody
 from forcefit.assembly.report.plot import (
@@ -76,7 +77,7 @@ def _spec(
         "bodies": [_body(posture.robot, bodies, i) for i in range(len(ends))],
         "closures": [
             [posture.robot.index(name) for name in pair]
-            for pair in posture.robot.closures
+            for pair in loops(posture.robot)
         ],
         "closing": closing,
         "forces": forces,
@@ -93,11 +94,12 @@ def _body(robot: Robot, bodies: DisplacedBodies, i: int) -> dict[str, Any]:
     frame, parent = robot.frames[i], int(robot.parents[i])
     start, end = bodies.starts[i], bodies.ends[i]
     s = np.linspace(0.0, 1.0, _SAMPLES)[:, None]
+    of_contact = frame.name in contact_frames(robot)
     return {
         "name": frame.name, "parent": parent, "joint": frame.joint,
         "actuated": frame.actuated, "elastic": frame.link is not None,
         "kind": "elastic" if frame.link is not None else "rigid",
-        "long": bool(np.linalg.norm(end - start) > 1e-9),
+        "long": bool(np.linalg.norm(end - start) > 1e-9) and not of_contact,
         "nominal": start + s * (end - start), "moved": _moved(bodies, i, s),
     }  # fmt: skip
 

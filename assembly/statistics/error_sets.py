@@ -4,9 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linprog
 
 from forcefit.assembly.callouts.zone import Zone
 from forcefit.assembly.kinematics.callout_maps import PlacedCallout
+from forcefit.assembly.kinematics.ranks import RANK
+from forcefit.assembly.linear.reference.reduction import complement
+from forcefit.assembly.model.contact_closures import contact_closures
 from forcefit.assembly.model.error_distributions import KINDS, ErrorSources
 from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
 from forcefit.assembly.statistics.linear_response import LinearResponse
@@ -27,6 +31,7 @@ class ErrorSets:
         rigid_rows: (p, total) rows that must be zero: of rigid parts.
         spring_rows: (r, total) rows that load springs.
         clearances: number of coordinates of clearances.
+        contact_rows: (q, total) rows that must be zero: of parallel contacts.
     """
 
     names: tuple[str, ...]
@@ -36,6 +41,33 @@ class ErrorSets:
     rigid_rows: NDArray
     spring_rows: NDArray
     clearances: int
+    contact_rows: NDArray
+
+    def weights_on_zones(self, along: NDArray) -> NDArray:
+        """Return the weights of the coordinates less those that contacts balance.
+
+        Args:
+            along: (total,) weights of the coordinates.
+
+        Returns:
+            (total,) of the least sum of supports; the largest product with ``along``
+            over all positions of the contacts is that sum.
+        """
+        rows = self.contact_rows
+        own = rows.any(axis=0)
+        size = np.abs(along[own]).max(initial=0.0)
+        if size == 0.0:
+            return along
+        D, w, count = rows[:, own].T, along[own] / size, int(own.sum())
+        slack = -np.eye(count)
+        least = linprog(
+            np.concatenate([np.zeros(len(rows)), np.ones(count)]),
+            np.block([[-D, slack], [D, slack]]), np.concatenate([-w, w]),
+            bounds=[(None, None)] * len(rows) + [(0.0, None)] * count,
+        )  # fmt: skip
+        balanced = along.copy()
+        balanced[own] -= size * D @ least.x[: len(rows)]
+        return balanced
 
 
 def error_sets(prepared: LinearResponse, sources: Sources) -> ErrorSets:
@@ -70,8 +102,18 @@ def error_sets(prepared: LinearResponse, sources: Sources) -> ErrorSets:
         tuple(names), tuple(zones),
         tuple(np.split(np.arange(sum(sizes)), np.cumsum(sizes)[:-1])),
         to_platform, _real_rows(prepared.infeasible, both),
-        _real_rows(prepared.misfit, both), nu,
+        _real_rows(prepared.misfit, both), nu, _contact_rows(prepared, both),
     )  # fmt: skip
+
+
+def _contact_rows(prepared: LinearResponse, columns: NDArray) -> NDArray:
+    """Rows of the closures between parallel contacts, without free motions."""
+    found = [np.zeros((0, columns.shape[1]))]
+    for k in np.flatnonzero(contact_closures(prepared.posture.robot)).tolist():
+        closure = prepared.closures[6 * k : 6 * k + 6]
+        held = complement(closure @ prepared.joints.free, RANK)
+        found.append(_real_rows(held.T @ closure, columns))
+    return np.vstack(found)
 
 
 def _real_rows(rows: NDArray, columns: NDArray) -> NDArray:

@@ -103,7 +103,9 @@ def worst_pose(
         prepared = linear_response(replace(prepared.posture, robot=robot))
         sources = replace(sources, fits=())
     sets, half = error_sets(prepared, sources), 3 * POSE_ERRORS.index(quantity)
-    held, sprung = len(sets.rigid_rows) > 0, len(sets.spring_rows) > 0
+    # contacts of a joint hold each other, but no part
+    held = len(sets.rigid_rows) > len(sets.contact_rows)
+    sprung = len(sets.spring_rows) > 0
     if sprung and sets.clearances:
         reading = "equilibrium"
     else:
@@ -122,7 +124,7 @@ def worst_pose(
         direction = screw[half : half + 3]
     size = float(np.linalg.norm(direction))
     direction = direction / size if size else np.eye(3)[0]
-    weights = direction @ sets.screws[half : half + 3]
+    weights = sets.weights_on_zones(direction @ sets.screws[half : half + 3])
     shares = [
         (name, zone.farthest_u(weights[columns])[1])
         for name, zone, columns in zip(

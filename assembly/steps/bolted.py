@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from forcefit.assembly.kinematics.posture import Posture, place_robot
 from forcefit.assembly.linear.reference.energy import CannotAssemble
+from forcefit.assembly.model.contact_closures import contact_frames
 from forcefit.assembly.model.error_distributions import draw_generator
 from forcefit.assembly.model.robot import Frame, LockedAt, Robot
 from forcefit.assembly.solvers.conic import SolverFailed
@@ -200,7 +201,9 @@ def loose_over_poses(robot: Robot) -> list[str]:
     Returns:
         A list of one sentence, or empty.
     """
-    loose = [f.name for f in robot.frames if f.joint == "fixed" and f.clearance]
+    contacts = contact_frames(robot)
+    fixed = [f for f in robot.frames if f.joint == "fixed" and f.clearance]
+    loose = [frame.name for frame in fixed if frame.name not in contacts]
     if not loose:
         return []
     return [

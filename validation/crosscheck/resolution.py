@@ -116,7 +116,7 @@ def _changes(posture: Posture, weight: bool) -> Iterator[tuple[str, str, float, 
         yield from _joint_changes(frame, more)
         clearance = frame.clearance or Clearance()
         for key, bound in vars(clearance).items():
-            if bound:
+            if bound and np.isfinite(bound):
                 larger = replace(clearance, **{key: more * bound})
                 name = f"{frame.name}.{key}"
                 yield name, "clearance", bound, replace(frame, clearance=larger)

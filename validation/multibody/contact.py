@@ -103,7 +103,8 @@ def joint_clearance(
     free: list[int] = []
     for name, rows in _CONES:
         bound = getattr(given, name)
-        if moves and frame.own_axis in rows and (bound is None or bound >= _UNBOUNDED):
+        own = moves and frame.own_axis in rows
+        if bound == math.inf or (own and (bound is None or bound >= _UNBOUNDED)):
             free += rows
         elif bound:
             stiffness = TURN_STIFFNESS if rows[0] < 3 else SHIFT_STIFFNESS

@@ -198,7 +198,7 @@ def _add_frame(
         place = tree.links[frame.name].far
     tree.bodies[frame.name] = place
     clearance = joint_clearance(frame, case.scale, case.bushes)
-    if case.clearances and clearance.cones:
+    if case.clearances and (clearance.cones or (clearance.free and not frame.passive)):
         tree.contacts[frame.name] = model.add_contact(place, clearance)
         place = tree.contacts[frame.name].far
     K = frame.springs

@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from forcefit.assembly.model.contact_closures import loops
 from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
@@ -371,9 +372,10 @@ def without_clearance(robot: Robot) -> Robot:
 
     Returns:
         The robot; its passive joints move about or along their z axis without bounds.
+        Closures between parallel contacts, which are rigid then, are left out.
     """
     frames = tuple(replace(frame, clearance=None) for frame in robot.frames)
-    return replace(robot, frames=frames)
+    return replace(robot, frames=frames, closures=loops(robot))
 
 
 def _read(

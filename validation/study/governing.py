@@ -77,7 +77,8 @@ def _tight(frame: Frame) -> Frame | None:
     """Return the joint without its clearances; None if it has none."""
     own = own_cone(frame)
     clearances = [key for k, key in enumerate(BOUNDS) if k != own]
-    if not any(getattr(frame.clearance, key, None) for key in clearances):
+    bounds = [getattr(frame.clearance, key, None) or 0.0 for key in clearances]
+    if not any(bounds) or np.isinf(bounds).any():  # inf is free, not a clearance
         return None
     assert frame.clearance is not None
     tight = replace(frame.clearance, **dict.fromkeys(clearances))

@@ -8,6 +8,7 @@ import numpy as np
 
 from forcefit.assembly.linear.assembled import Assembly, without_rounding
 from forcefit.assembly.linear.zone import ASSEMBLABLE
+from forcefit.assembly.model.contact_closures import loops
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import write_json, write_text
 from forcefit.page.page import Page, Provenance, Tile, command_line, page
@@ -133,7 +134,7 @@ def report_page(results: StudyResults) -> str:
     ]
     about = (
         f"{robot.name}: {robot.description}. {len(robot.frames)} frames, "
-        f"{len(robot.closures)} closures; {study.errors}; link stiffness: "
+        f"{len(loops(robot))} closures; {study.errors}; link stiffness: "
         f"{study.source}."
     )
     command = command_line()

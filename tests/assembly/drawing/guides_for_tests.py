@@ -1,0 +1,75 @@
+"""Robots with guides and pads, and the slabs of their clearances."""
+
+import itertools
+
+import numpy as np
+from scipy.optimize import linprog
+
+from forcefit.assembly.files.robot_file import read_robot
+from forcefit.stiffness.screws import skew
+
+C, L, W, T = 1e-5, 0.08, 0.04, 0.03  # [m] gap, length, width, height
+GUIDE = "guide = { gap = 1e-5, length = 0.08, width = 0.04, height = 0.03 }"
+PAD = "pad = { gap = 1e-5, length = 0.06, width = 0.04 }"
+G_PAD, A, B = 1e-5, 0.03, 0.02  # [m] gap, half the length, half the width
+SIGNS = list(itertools.product((1, -1), (1, -1)))
+
+
+def guide_slabs(gaps=(C, C)):
+    """(8, 6) rows, each of at most 1 on a screw in the guide's axes."""
+    rows = [np.array([0, s * L / 2, r * T / 2, 1, 0, 0]) / gaps[0] for s, r in SIGNS]
+    rows += [np.array([s * L / 2, 0, r * W / 2, 0, 1, 0]) / gaps[1] for s, r in SIGNS]
+    return np.array(rows)
+
+
+def pad_slabs():
+    """(4, 6) rows, likewise."""
+    return np.array([[s * B, r * A, 0, 0, 0, 1] for s, r in SIGNS]) / G_PAD
+
+
+def support(direction, slabs, equal=None):
+    """Most of direction @ screw where abs(slabs @ screw) <= 1, a linear programme."""
+    both = np.vstack([slabs, -slabs])
+    zero = None if equal is None else np.zeros(len(equal))
+    scale = np.array([1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5])
+    size = np.abs(direction * scale).max()
+    found = linprog(
+        -direction * scale / size, both * scale, np.ones(len(both)),
+        None if equal is None else equal * scale / 1e-5, zero, bounds=(None, None),
+    )  # fmt: skip
+    assert found.success, found.message
+    return -found.fun * size
+
+
+def at(point):
+    """(6, 6) map of a screw at a point to the origin."""
+    shift = np.eye(6)
+    shift[3:, :3] = skew(np.array(point, dtype=float))
+    return shift
+
+
+def drawn_in(folder, *tables):
+    """A robot of bodies and joints whose platform is the body "table"."""
+    file = folder / "drawn.toml"
+    head = 'format = 2\nplatform = "table"\nplatform_at = [0, 0, 0]\n'
+    file.write_text(head + "\n".join(tables))
+    return read_robot(file)
+
+
+def body(name):
+    return f'[[body]]\nname = "{name}"\n'
+
+
+def joint(name, kind, first, second, *keys, at=(0, 0, 0)):
+    given = "\n".join(keys)
+    return f"""
+        [[joint]]
+        name = "{name}"
+        type = "{kind}"
+        between = ["{first}", "{second}"]
+        at = {[float(x) for x in at]}
+        {given}
+    """
+
+
+Z = "axis = [0, 0, 1]"
