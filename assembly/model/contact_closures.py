@@ -1,7 +1,8 @@
 """Closures between parallel contacts of one joint, which are no loops of a mechanism.
 
 A guide and a pad are two chains of fixed frames with clearances between the same two
-bodies (:mod:`forcefit.assembly.drawing.contacts`).  A closure joins the ends of the chains.
+bodies (:mod:`forcefit.assembly.drawing.contacts`).  A closure joins the ends of the
+chains.
 """
 
 from functools import lru_cache
