@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from forcefit.assembly.files.written_units import without_units
+from forcefit.assembly.model.joint_names import names_of, row_of
 from forcefit.assembly.model.largest import LARGEST, LARGEST_LENGTH
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.steps.plan import (
@@ -218,13 +219,17 @@ _READERS: dict[str, Callable[[Table, str, Robot], Step]] = {
 
 
 def _frame(table: Table, key: str, robot: Robot) -> str:
-    """Return the name of a frame."""
+    """Return the name of a frame; of a joint of several, of that in its axes."""
     name = table.text(key, expected="the name of a frame")
-    names = [frame.name for frame in robot.frames]
+    names = names_of(robot)
     if name not in names:
         fault = f"found {quoted(name)}, expected the name of a frame"
         raise table.bad(key, f"{fault}{nearest(name, names)}")
-    return name
+    if key == "join" and name in robot.joints:
+        frames = ", ".join(robot.joints[name].frames)
+        fault = f"found {quoted(name)}, a joint of several motions"
+        raise table.bad(key, f"{fault}; expected one of its frames {frames}")
+    return robot.frames[row_of(robot, name)].name
 
 
 def _part(table: Table, key: str, robot: Robot) -> tuple[str, str] | str:

@@ -7,7 +7,7 @@ Their names may be imported from here.
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,6 +37,9 @@ from forcefit.assembly.model.link_kinds import (
 from forcefit.inputs.table import BadInput, nearest, quoted
 from forcefit.results.display import Figures, html_table, largest, short_repr, show
 from forcefit.stiffness.screws import rotation_matrix, transform
+
+if TYPE_CHECKING:
+    from forcefit.assembly.model.joint_names import NamedJoint
 
 __all__ = [
     "BASE", "JOINTS", "LOCKED", "NO_SPIN", "BeamLink", "Clearance", "Frame",
@@ -133,6 +136,8 @@ class Robot(EqualData):
             return self._rows[name]
         except KeyError:
             hint = nearest(name, self._rows)
+            if name in self.joints:
+                hint = f", but a joint of {', '.join(self.joints[name].frames)}"
             raise BadInput(f"{self.name}: no frame {quoted(name)}{hint}") from None
 
     def frame(self, name: str) -> Frame:
@@ -146,6 +151,13 @@ class Robot(EqualData):
     @cached_property
     def _rows(self) -> dict[str, int]:
         return {frame.name: i for i, frame in enumerate(self.frames)}
+
+    @cached_property
+    def joints(self) -> "Mapping[str, NamedJoint]":
+        """Joints of several frames by name, such as ``ball`` of ``ball.first``."""
+        from forcefit.assembly.model.joint_names import joints_of
+
+        return joints_of(self)
 
     @cached_property
     def parents(self) -> NDArray:

@@ -45,7 +45,11 @@ _UNTOUCHED = 1e-9  # component of a unit screw below which it counts as zero
 
 
 class Part(NamedTuple):
-    """Owner of a deformation: a frame's ``link``, ``joint`` or ``clearance``."""
+    """Owner of a deformation: ``link``, ``joint`` or ``clearance`` of a frame.
+
+    ``frame`` may be the name of a joint of several frames
+    (:func:`forcefit.assembly.model.joint_names.shown_name`).
+    """
 
     frame: str
     kind: str
