@@ -3,95 +3,15 @@
 A joint of several freedoms is a series of passive frames at one point, each with one
 freedom (:mod:`forcefit.assembly.drawing.parts`).  Its errors, clearance and springs are on one
 of them, those of a universal joint on both.  A user names the joint; these functions
-return the frames that are meant.
+return the frames that are meant.  :mod:`forcefit.assembly.model.frame_series` finds the joints.
 """
 
-from dataclasses import dataclass
-
-import numpy as np
-
+from forcefit.assembly.model.frame_series import NamedJoint
 from forcefit.assembly.model.robot import Robot
 from forcefit.stiffness.screws import SCREW
 
-_SAME = 1e-9  # [m] distance below which the frames of one joint are at one point
-# ends of the frames' names with their joints, from the first body to the second
-_SERIES: dict[tuple[tuple[str, str], ...], str] = {
-    (("first", "revolute"), ("second", "revolute")): "universal",
-    (
-        ("first", "revolute"),
-        ("second", "revolute"),
-        ("third", "revolute"),
-    ): "spherical",
-    (("turn", "revolute"), ("slide", "prismatic")): "cylindrical",
-    (
-        ("slide_x", "prismatic"),
-        ("slide_y", "prismatic"),
-        ("turn", "revolute"),
-    ): "planar",
-}
 # component of the frame slide_x, whose z is the joint's x, for each of a planar joint
 _OF_PLANE = (2, 0, 1, 5, 3, 4)
-
-
-@dataclass(frozen=True)
-class NamedJoint:
-    """A joint of several frames.
-
-    Attributes:
-        name: of the joint.
-        kind: ``"universal"``, ``"spherical"``, ``"cylindrical"`` or ``"planar"``.
-        frames: names of its frames with a freedom, parents first.
-        main: name of the frame at the joint's point and in its axes.
-        carriers: names of the frames with its geometric errors: two of a universal
-            joint, one of others.
-    """
-
-    name: str
-    kind: str
-    frames: tuple[str, ...]
-    main: str
-    carriers: tuple[str, ...]
-
-
-def joints_of(robot: Robot) -> dict[str, NamedJoint]:
-    """Return the joints of several frames by name, in the order of the frames.
-
-    Args:
-        robot: any robot; joints are recognised by the names, the kinds and the common
-            point of their frames, so that a converted file has them too.
-    """
-    stems: dict[str, list[str]] = {}
-    known = {frame.name for frame in robot.frames}
-    for frame in robot.frames:
-        stem, dot, _ = frame.name.rpartition(".")
-        if dot and frame.passive and stem not in known:
-            stems.setdefault(stem, []).append(frame.name)
-    found = (_joint(robot, stem, names) for stem, names in stems.items())
-    return {joint.name: joint for joint in found if joint is not None}
-
-
-def _joint(robot: Robot, stem: str, names: list[str]) -> NamedJoint | None:
-    """The joint of the frames whose names begin alike, None if they are not one."""
-    ends = tuple((name[len(stem) + 1 :], robot.frame(name).joint) for name in names)
-    kind = _SERIES.get(ends) or _SERIES.get(ends[::-1])
-    if kind is None or not _at_one_point(robot, stem, names):
-        return None
-    ordered = names if ends in _SERIES else names[::-1]
-    main = ordered[2] if kind == "planar" else ordered[0]
-    carriers = ordered if kind == "universal" else ordered[:1]
-    return NamedJoint(stem, kind, tuple(names), main, tuple(carriers))
-
-
-def _at_one_point(robot: Robot, stem: str, names: list[str]) -> bool:
-    """Whether frames follow each other at one point, only contacts between them."""
-    first, row = robot.index(names[0]), robot.index(names[-1])
-    T = np.eye(4)
-    while row != first:
-        T = robot.fixed_transforms[row] @ T
-        row = int(robot.parents[row])
-        if row < 0 or not robot.frames[row].name.startswith(f"{stem}."):
-            return False
-    return float(np.abs(T[:3, 3]).max()) <= _SAME
 
 
 def row_of(robot: Robot, name: str) -> int:

@@ -7,7 +7,7 @@ Their names may be imported from here.
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,6 +26,7 @@ from forcefit.assembly.model.frame import (
     beam_axis,
     locked,
 )
+from forcefit.assembly.model.frame_series import NamedJoint, joints_of
 from forcefit.assembly.model.function import Function
 from forcefit.assembly.model.link_kinds import (
     BeamLink,
@@ -37,9 +38,6 @@ from forcefit.assembly.model.link_kinds import (
 from forcefit.inputs.table import BadInput, nearest, quoted
 from forcefit.results.display import Figures, html_table, largest, short_repr, show
 from forcefit.stiffness.screws import rotation_matrix, transform
-
-if TYPE_CHECKING:
-    from forcefit.assembly.model.joint_names import NamedJoint
 
 __all__ = [
     "BASE", "JOINTS", "LOCKED", "NO_SPIN", "BeamLink", "Clearance", "Frame",
@@ -153,11 +151,9 @@ class Robot(EqualData):
         return {frame.name: i for i, frame in enumerate(self.frames)}
 
     @cached_property
-    def joints(self) -> "Mapping[str, NamedJoint]":
+    def joints(self) -> Mapping[str, NamedJoint]:
         """Joints of several frames by name, such as ``ball`` of ``ball.first``."""
-        from forcefit.assembly.model.joint_names import joints_of
-
-        return joints_of(self)
+        return joints_of(self.frames)
 
     @cached_property
     def parents(self) -> NDArray:

@@ -196,3 +196,13 @@ def test_path_through_a_point_out_of_reach_between_rows_is_refused(run, tmp_path
     status, out, err = run("assembly", "path", "five_bar", "--path", file, *words)
     assert (status, out) == (2, "")
     assert err.count("\n") == 1
+
+
+def test_path_refuses_a_drive_force_and_a_state_that_do_not_exist(run, slide):
+    asked = ["assembly", "path", slide / "slide.toml", "--path", slide / "way.csv",
+             "--profile", "quintic", "--duration", 0.05]  # fmt: skip
+    status, _, message = run(*asked, "--drive-force", "rial=3")
+    assert status == 2 and 'no drive "rial"; did you mean "rail"' in message
+    status, _, message = run(*asked, "--state", "contcat", "-o", slide / "way.nc")
+    assert status == 2 and "--state: found 'contcat'; did you mean" in message
+    assert not list(slide.glob("way.nc*"))
