@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from forcefit.assembly.kinematics.nominal import Target
-from forcefit.assembly.kinematics.posture import together
+from forcefit.assembly.kinematics.posture import Posture, together
 from forcefit.assembly.kinematics.verdict import verdicts
 from forcefit.assembly.linear.energy import Assembly, solve_assembly
 from forcefit.assembly.linear.pose_error import bound_pose_error
@@ -22,7 +22,11 @@ from forcefit.assembly.model.links import own_screw
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.model.statuses import OK, SINGULAR
 from forcefit.assembly.path.beam_inertia import beam_stress
-from forcefit.assembly.path.idle_motions import with_idle_accelerations
+from forcefit.assembly.path.idle_motions import (
+    idle_motions,
+    momentum_free_rates,
+    with_idle_accelerations,
+)
 from forcefit.assembly.path.inertial_loads import InertialLoads, inertial_loads
 from forcefit.assembly.path.motion import Motion, NotFollowed, follow_path
 from forcefit.assembly.path.placing import check_path_robot, first_frequency, placed
@@ -204,7 +208,12 @@ def _solve(asked: _Asked, rows: slice) -> dict[str, NDArray]:
     """Return the results of a block of points."""
     motion, verdict = _moved(asked, rows)
     gravity = np.zeros(3) if asked.gravity is None else np.asarray(asked.gravity, float)
-    motion = with_idle_accelerations(motion, gravity)
+    idle = idle_motions(motion)
+    if idle is not None:
+        motion = _followed(
+            asked, rows, motion.postures, momentum_free_rates(motion, idle)
+        )
+        motion = with_idle_accelerations(motion, idle, gravity)
     loads = inertial_loads(motion, gravity)
     still = np.zeros_like(motion.twists)
     at_rest = replace(motion, twists=still, accelerations=still)
@@ -255,17 +264,23 @@ def _moved(asked: _Asked, rows: slice) -> tuple[Motion, list[tuple[str, str]]]:
     goals = goals_of(path.names, robot, values)
     target = Target(coordinates=goals) if of_joints(path.names) else Target(goals)
     verdict = verdicts(robot, target, there.coordinates, there.transforms)
+    return _followed(asked, rows, there), verdict
+
+
+def _followed(
+    asked: _Asked, rows: slice, postures: Posture, idle: NDArray | float = 0.0
+) -> Motion:
+    """Return the motion of a block of points, with added rates of idle motions."""
+    path = asked.trajectory
+    at = path.values[rows], path.first[rows], path.second[rows]
     try:
-        motion = follow_path(
-            there, path.names, (values, path.first[rows], path.second[rows])
-        )
+        return follow_path(postures, path.names, at, idle)
     except NotFollowed as error:
         raise BadInput(
             f"path at {path.times[rows][error.row]:.6g} s: the platform cannot have "
             "the velocity and acceleration of the path here; expected a path without "
             "singular postures"
         ) from None
-    return motion, verdict
 
 
 def _assembled(asked: _Asked, motion: Motion, loads: InertialLoads) -> Assembly:
