@@ -64,7 +64,7 @@ def read_function(table: Table, robot: Robot) -> Function:
         raise table.bad("kind", f'found "compliance" in the {where}, expected "screw"')
     components = _words(table, "components", 6)
     for name in components:
-        valid = components_of(where)
+        valid = components_of(where, robot)
         if name not in valid:
             hint = nearest(name, valid)
             raise table.bad("components", f"found {quoted(name)} there{hint}")
