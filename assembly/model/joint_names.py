@@ -6,10 +6,16 @@ of them, those of a universal joint on both.  A user names the joint; these func
 return the frames that are meant.  :mod:`forcefit.assembly.model.frame_series` finds the joints.
 """
 
+import re
+
 from forcefit.assembly.model.frame_series import NamedJoint
 from forcefit.assembly.model.robot import Robot
 from forcefit.stiffness.screws import SCREW
 
+# ends of the names of a joint's contacts (assembly/drawing/contacts.py)
+_CONTACT = re.compile(
+    r"(bore|bearing)_(start|end)|guide_(yaw|pitch)_(start|end)|pad_[1-4]"
+)
 # component of the frame slide_x, whose z is the joint's x, for each of a planar joint
 _OF_PLANE = (2, 0, 1, 5, 3, 4)
 
@@ -91,6 +97,32 @@ def shown_name(robot: Robot, row: int) -> str:
         if name == joint.main and joint.kind != "universal":
             return joint.name
     return name
+
+
+def joint_of(robot: Robot, row: int) -> str:
+    """Return the name of the drawn joint to which a frame belongs.
+
+    Args:
+        robot: any robot.
+        row: of a frame.
+
+    Returns:
+        The name of the joint of several frames, or of the joint whose contact the frame
+        is (``"foot"`` of ``foot.bore_start``); otherwise the name of the frame.
+    """
+    frame = robot.frames[row]
+    stem, _, end = frame.name.rpartition(".")
+    of_contact = frame.joint == "fixed" and _CONTACT.fullmatch(end) is not None
+    name = stem if of_contact and stem in names_of(robot) else frame.name
+    for joint in robot.joints.values():
+        if name in joint.frames:
+            return joint.name
+    return name
+
+
+def moves(robot: Robot, name: str) -> bool:
+    """Return whether a frame, or a joint of several frames, has a motion."""
+    return name in robot.joints or robot.frame(name).joint != "fixed"
 
 
 def names_of(robot: Robot) -> list[str]:

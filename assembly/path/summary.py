@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.linear.closure import virtual_joints
+from forcefit.assembly.model.joint_names import joint_of
 from forcefit.assembly.model.link_stress import stressed_links
 from forcefit.assembly.model.statuses import OK
 from forcefit.assembly.path.path_errors import PathErrors
@@ -84,7 +85,7 @@ def path_summary(errors: PathErrors) -> dict[str, Any]:
     if not solved.any():
         return summary
     owners = {
-        "force": [frame.name for frame in errors.robot.frames],
+        "force": [joint_of(errors.robot, i) for i in range(len(errors.robot.frames))],
         "stress": [link.frame for link in stressed_links(errors.robot)],
     }
     summary["largest"] = {

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from forcefit.assembly.callouts.zone import Zone
 from forcefit.assembly.kinematics.callout_maps import PlacedCallout
 from forcefit.assembly.model.error_distributions import KINDS, ErrorSources
+from forcefit.assembly.model.joint_names import shown_name
 from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
 from forcefit.assembly.statistics.linear_response import LinearResponse
 from forcefit.inputs.table import BadInput
@@ -127,4 +128,4 @@ def _cone_name(prepared: LinearResponse, column: NDArray) -> str:
     """Name of a clearance: the frame's, and its components."""
     row = int(np.flatnonzero(column)[0])
     kind = ("tilt", "tilt", "spin", "radial", "radial", "axial")[row % 6]
-    return f"{kind} clearance of {prepared.posture.robot.frames[row // 6].name}"
+    return f"{kind} clearance of {shown_name(prepared.posture.robot, row // 6)}"

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from forcefit.assembly.kinematics.posture import Posture, place_robot
 from forcefit.assembly.linear.reference.energy import CannotAssemble
 from forcefit.assembly.model.error_distributions import draw_generator
+from forcefit.assembly.model.joint_names import joint_of, moves
 from forcefit.assembly.model.robot import Frame, LockedAt, Robot
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.steps.left_anywhere import positions_left_anywhere
@@ -200,7 +201,11 @@ def loose_over_poses(robot: Robot) -> list[str]:
     Returns:
         A list of one sentence, or empty.
     """
-    loose = [f.name for f in robot.frames if f.joint == "fixed" and f.clearance]
+    owners = dict.fromkeys(
+        joint_of(robot, row) for row, f in enumerate(robot.frames)
+        if f.joint == "fixed" and f.clearance
+    )  # fmt: skip
+    loose = [name for name in owners if not moves(robot, name)]
     if not loose:
         return []
     return [

@@ -8,7 +8,9 @@ from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.error_distributions import read_sources, tolerance_sources
 from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from forcefit.assembly.report.platform_stiffness import stiffness_values
+from forcefit.assembly.report.results import solution_of, solution_text
 from forcefit.assembly.statistics.linear_response import linear_response
+from forcefit.assembly.steps.bolted import loose_over_poses
 from forcefit.assembly.sweeps.parameters import load_design
 from forcefit.assembly.sweeps.robot_sweep import sweep
 from forcefit.inputs.table import BadInput
@@ -219,3 +221,36 @@ def test_frames_of_different_points_are_no_joint(tmp_path):
         '[[frame]]\nname = "tip"\nparent = "leg.second"\n'
     )
     assert read_robot(file).joints == {}
+
+
+def test_table_of_wrenches_has_one_row_for_a_joint(tmp_path):
+    """The force along the leg, in the axes of its ball and of its cross."""
+    load = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -600.0])
+    posture = home_posture(read_robot(hexapod(tmp_path)))
+    results = solution_of(posture, load)
+    assert results["joint_frames"]["leg1.ball"] == "leg1.ball.first"
+    rows = {
+        line.split()[0]: [float(x) for x in line.split()[1:]]
+        for line in solution_text(results).splitlines() if line.startswith("leg1.")
+    }  # fmt: skip
+    assert [name for name in rows if "ball" in name] == ["leg1.ball"]
+    assert {"leg1.cross", "leg1.drive"} <= rows.keys()
+    force = np.linalg.solve(legs(), load)[0]
+    for name in ("leg1.ball", "leg1.cross"):
+        moment, through = np.split(np.array(rows[name]), 2)
+        assert np.linalg.norm(through) == pytest.approx(abs(force), rel=1e-4)
+        assert moment == pytest.approx(0, abs=1e-6)
+
+
+BORE = "clearance = { radial = 1e-5, length = 0.04, axial = 1e-5 }"
+
+
+@pytest.mark.parametrize(("kind", "loose"), [
+    ("universal", []), ("revolute", []), ("cylindrical", []), ("fixed", ['"j"']),
+])  # fmt: skip
+def test_only_a_fixed_joint_is_reported_as_loose(tmp_path, kind, loose):
+    """The frames of a bore are no joints of their own."""
+    key = BORE if kind != "cylindrical" else BORE.replace(", axial = 1e-5", "")
+    robot = read_robot(one_joint(tmp_path, kind, key))
+    (text,) = loose_over_poses(robot) or [""]
+    assert [name for name in ('"j"', "bore") if name in text] == loose
