@@ -233,14 +233,18 @@ def _frame(table: Table, key: str, robot: Robot) -> str:
 
 
 def _part(table: Table, key: str, robot: Robot) -> tuple[str, str] | str:
-    """Return a frame, or the closure of two frames in either order."""
+    """Return a frame, or the closure of two frames in either order.
+
+    A closure after a drawn joint may be named by the joint: its frame is ``ball.end``.
+    """
     value = table.require(key, "a frame, or the two frames of a closure")
     if isinstance(value, str):
         return _frame(table, key, robot)
     proper = isinstance(value, list) and all(isinstance(v, str) for v in value)
-    for pair in (value, value[::-1]) if proper and len(value) == 2 else ():
-        if tuple(pair) in robot.closures:
-            return pair[0], pair[1]
+    for first, second in (value, value[::-1]) if proper and len(value) == 2 else ():
+        for pair in ((first, second), (f"{first}.end", second)):
+            if pair in robot.closures:
+                return pair
     known = ", ".join(f'["{a}", "{b}"]' for a, b in robot.closures) or "no closure"
     fault = f"found {describe(value)}, expected a frame or one of the closures {known}"
     raise table.bad(key, fault)

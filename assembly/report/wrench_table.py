@@ -38,8 +38,8 @@ def wrench_lines(
     tables = {
         "wrenches through the bodies, at each frame's origin in its axes":
             ("frame", {
-                shown: frame["wrench"] for name, frame in frames.items()
-                if (shown := _shown(name, joints))
+                row: frame["wrench"] for name, frame in frames.items()
+                if (row := _shown(name, joints))
             }),
         "wrenches at the start of links under their own weight": ("frame", starts),
         "wrenches of the closures, at the platform's origin, base axes":

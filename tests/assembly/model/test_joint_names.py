@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.files.step_file import read_steps
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.error_distributions import read_sources, tolerance_sources
 from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
@@ -254,3 +255,23 @@ def test_only_a_fixed_joint_is_reported_as_loose(tmp_path, kind, loose):
     robot = read_robot(one_joint(tmp_path, kind, key))
     (text,) = loose_over_poses(robot) or [""]
     assert [name for name in ('"j"', "bore") if name in text] == loose
+
+
+def plan_of(tmp_path, text):
+    file = tmp_path / "plan.toml"
+    file.write_text(text)
+    return read_steps(file, read_robot(hexapod(tmp_path)))
+
+
+def test_plan_of_steps_names_joints_of_several_frames(tmp_path):
+    """A closure by its joint, in either order, and a frame at the joint's point."""
+    plan = plan_of(
+        tmp_path,
+        '[[step]]\njoin = ["plate", "leg2.ball"]\n'
+        '[[step]]\nmeasure = "leg1.ball"\ncomponents = ["tz"]\n',
+    )
+    assert [step.part for step in plan.steps] == [
+        ("leg2.ball.end", "plate"), "leg1.ball.first",
+    ]  # fmt: skip
+    with pytest.raises(BadInput, match="expected one of its frames leg1.ball.first, "):
+        plan_of(tmp_path, '[[step]]\njoin = "leg1.ball"\n')

@@ -202,7 +202,9 @@ def test_path_refuses_a_drive_force_and_a_state_that_do_not_exist(run, slide):
     asked = ["assembly", "path", slide / "slide.toml", "--path", slide / "way.csv",
              "--profile", "quintic", "--duration", 0.05]  # fmt: skip
     status, _, message = run(*asked, "--drive-force", "rial=3")
-    assert status == 2 and 'no drive "rial"; did you mean "rail"' in message
+    assert status == 2
+    assert 'no drive "rial"; did you mean "rail"' in message
     status, _, message = run(*asked, "--state", "contcat", "-o", slide / "way.nc")
-    assert status == 2 and "--state: found 'contcat'; did you mean" in message
+    assert status == 2
+    assert "--state: found 'contcat'; did you mean" in message
     assert not list(slide.glob("way.nc*"))
