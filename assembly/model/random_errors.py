@@ -79,9 +79,11 @@ def frames_named(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
         BadInput: a name matches neither a frame nor a joint.
     """
     known = names_of(robot)
+    frames = known[: len(robot.frames)]
     chosen = set()
     for name in names:
-        fits = {k for k in known if k == name or k.split(".", 1)[-1] == name}
+        among = frames if name in frames else known  # a frame's name means no joint
+        fits = {k for k in among if k == name or k.split(".", 1)[-1] == name}
         if not fits:
             hint = nearest(name, known)
             raise BadInput(f"{robot.name}: no frame {quoted(name)}{hint}")
