@@ -298,3 +298,23 @@ def test_round_legs_between_balls_keep_no_spin(tmp_path):
         errors = path_errors(robot, path, gravity=[0.0, 0.0, -9.81])
         forces.append(errors.arrays["drive_force"][0])
     np.testing.assert_allclose(forces[1], forces[0], rtol=1e-9)
+
+
+def test_thread_turns_the_force_of_a_slide_into_a_torque(tmp_path):
+    """A leg with its masses on its axis: the torque of its screw is h times the force.
+
+    The spindle turns many times, but has no inertia about its axis.
+    """
+    names = ["tx", "ty", "tz", "rx", "ry", "rz"]
+    pose, rate, second = [0.05, -0.02, 0.55, 0.1, -0.1, 0.2], [0.5] * 6, [-3.0] * 6
+    path, file = instants(names, [pose], [rate], [second]), tmp_path / "six.toml"
+    slides, _ = six_legs(file, "universal", mass=0.8)
+    threads = file.read_text().replace(
+        'type = "prismatic"', 'type = "helical", pitch = 0.01'
+    )
+    file.write_text(threads)
+    force, torque = (
+        path_errors(robot, path, gravity=[0.0, 0.0, -9.81]).arrays["drive_force"]
+        for robot in (slides, read_robot(file))
+    )
+    np.testing.assert_allclose(torque, 0.01 / (2 * np.pi) * force, rtol=1e-9)
